@@ -1,0 +1,75 @@
+# One line per library, test, benchmark and fuzz target; each folder's CMakeLists.txt lists its sources.
+
+# gimnet_library(NAME SOURCES a.cpp ... [DEPENDS lib ...]): a static library with the shared options.
+function(gimnet_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC gimnet_options ${ARG_DEPENDS})
+endfunction()
+
+# gimnet_test(FILE_test.cpp DEPENDS lib ...): a GoogleTest binary named after its path; every TEST is one ctest entry.
+function(gimnet_test source)
+  cmake_parse_arguments(ARG "" "" "DEPENDS" ${ARGN})
+  file(RELATIVE_PATH _path ${CMAKE_SOURCE_DIR}/tests ${CMAKE_CURRENT_SOURCE_DIR}/${source})
+  string(REGEX REPLACE "\\.(cpp|c)$" "" _name "${_path}")
+  string(REPLACE "/" "." _name "${_name}")
+  # TEST() registers by a global object; a source's options come after those that forbid these.
+  set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS -Wno-global-constructors)
+  add_executable(${_name} ${source})
+  target_link_libraries(${_name} PRIVATE ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
+  target_include_directories(${_name} PRIVATE ${CMAKE_SOURCE_DIR})
+  gtest_discover_tests(${_name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 120)
+endfunction()
+
+# gimnet_bench(FILE_bench.cpp DEPENDS lib ...): a Google Benchmark binary; ctest runs it once, briefly, so that it cannot rot.
+function(gimnet_bench source)
+  cmake_parse_arguments(ARG "" "" "DEPENDS" ${ARGN})
+  file(RELATIVE_PATH _path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${source})
+  string(REGEX REPLACE "\\.cpp$" "" _name "${_path}")
+  string(REPLACE "/" "." _name "${_name}")
+  add_executable(${_name} ${source})
+  target_link_libraries(${_name} PRIVATE ${ARG_DEPENDS} benchmark::benchmark benchmark::benchmark_main)
+  if(GIMNET_TESTS)
+    add_test(NAME ${_name}.smoke COMMAND ${_name} --benchmark_min_time=0.001)
+  endif()
+endfunction()
+
+# gimnet_fuzz(FILE_fuzz.cpp DEPENDS lib ...): a libFuzzer target FILE_fuzz; seeds, if it has any, in
+# fuzz/seeds/FILE_fuzz; ctest runs it for a second. See fuzz/README.md.
+function(gimnet_fuzz source)
+  cmake_parse_arguments(ARG "" "" "DEPENDS" ${ARGN})
+  get_filename_component(_name ${source} NAME_WE)
+  add_executable(${_name} ${source})
+  target_link_libraries(${_name} PRIVATE ${ARG_DEPENDS})
+  target_include_directories(${_name} PRIVATE ${CMAKE_SOURCE_DIR})
+  target_compile_options(${_name} PRIVATE -fsanitize=fuzzer)
+  target_link_options(${_name} PRIVATE -fsanitize=fuzzer)
+  add_dependencies(all_fuzz ${_name})
+  set(_inputs ${CMAKE_BINARY_DIR}/corpus/${_name})
+  file(MAKE_DIRECTORY ${_inputs} ${CMAKE_BINARY_DIR}/crashes)
+  if(IS_DIRECTORY ${CMAKE_SOURCE_DIR}/fuzz/seeds/${_name})
+    list(APPEND _inputs ${CMAKE_SOURCE_DIR}/fuzz/seeds/${_name})
+  endif()
+  set(_options -max_total_time=1 -timeout=10 -rss_limit_mb=1024
+    -artifact_prefix=${CMAKE_BINARY_DIR}/crashes/${_name}-)
+  if(EXISTS ${CMAKE_SOURCE_DIR}/fuzz/gimnet.dict)
+    list(APPEND _options -dict=${CMAKE_SOURCE_DIR}/fuzz/gimnet.dict)
+  endif()
+  add_test(NAME fuzz.${_name} COMMAND ${_name} ${_options} ${_inputs})
+  set_tests_properties(fuzz.${_name} PROPERTIES LABELS fuzz TIMEOUT 120)
+endfunction()
+
+# gimnet_group(NAME FOLDER): a target NAME that builds the programs of a folder and nothing else.
+function(gimnet_group name folder)
+  get_property(_targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  get_property(_below DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(_subfolder ${_below})
+    get_property(_more DIRECTORY ${_subfolder} PROPERTY BUILDSYSTEM_TARGETS)
+    list(APPEND _targets ${_more})
+  endforeach()
+  add_custom_target(${name} DEPENDS ${_targets})
+endfunction()
+
+if(GIMNET_TESTS)
+  include(GoogleTest)
+endif()

@@ -1,0 +1,43 @@
+# Warnings, sanitizers and build accelerators that every target shares.
+
+add_library(gimnet_options INTERFACE)
+target_compile_options(gimnet_options INTERFACE
+  -Wall -Wextra -Wshadow -Wconversion -Werror
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>
+  $<$<AND:$<CXX_COMPILER_ID:Clang>,$<COMPILE_LANGUAGE:CXX>>:-Wthread-safety -Wglobal-constructors
+    -Wno-unused-command-line-argument>)
+target_include_directories(gimnet_options INTERFACE ${CMAKE_SOURCE_DIR}/src ${CMAKE_SOURCE_DIR}/include)
+
+if(GIMNET_SANITIZE STREQUAL "address")
+  target_compile_options(gimnet_options INTERFACE
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(gimnet_options INTERFACE -fsanitize=address,undefined)
+elseif(GIMNET_SANITIZE STREQUAL "thread")
+  # ThreadSanitizer does not model the fences inside concurrentqueue; the alias in
+  # hub/concurrent puts a mutex queue in its place.
+  target_compile_options(gimnet_options INTERFACE -fsanitize=thread -fno-omit-frame-pointer)
+  target_compile_definitions(gimnet_options INTERFACE GIMNET_TSAN_QUEUE=1)
+  target_link_options(gimnet_options INTERFACE -fsanitize=thread)
+elseif(GIMNET_SANITIZE)
+  message(FATAL_ERROR "GIMNET_SANITIZE is '${GIMNET_SANITIZE}': use address, thread, or leave it empty")
+endif()
+
+if(GIMNET_FUZZ)
+  # The fuzzer steers by the branches that an input takes in the libraries, not only in its target.
+  target_compile_options(gimnet_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
+if(GIMNET_PLANTED_BUG)
+  string(TOUPPER "${GIMNET_PLANTED_BUG}" _bug)
+  target_compile_definitions(gimnet_options INTERFACE GIMNET_BUG_${_bug}=1)
+endif()
+
+find_program(GIMNET_CCACHE ccache)
+if(GIMNET_CCACHE)
+  set(CMAKE_C_COMPILER_LAUNCHER ${GIMNET_CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${GIMNET_CCACHE})
+endif()
+find_program(GIMNET_MOLD mold)
+if(GIMNET_MOLD)
+  add_link_options(-fuse-ld=mold)
+endif()

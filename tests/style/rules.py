@@ -1,0 +1,308 @@
+"""The house rules that a machine can check. Each rule is a function from a Tree to sentences, one per violation."""
+
+import re
+
+from tree import CODE_FOLDERS, CPP_SUFFIXES, HEADER_SUFFIXES, TEXT_FOLDERS
+
+FILE_LINES_MAX = 399
+FUNCTION_LINES_MAX = 59
+UNTESTED_LIST = "tests/style/untested_sources.txt"
+UNTESTED_MAX = 12
+PLANTED_LIST = "fuzz/planted_bugs.txt"
+REQUIREMENTS = "docs/requirements.md"
+
+# Who may include whom: the table of docs/architecture.md, "May include". Longest prefix wins.
+_BASE = ("base",)
+_PROTO = _BASE + ("proto",)
+_HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/queue_gauges.hpp")
+_CONCURRENT = _PROTO + _HUB_PARTS + ("hub/concurrent",)
+_DATA = _CONCURRENT + ("hub/transport/transport.hpp", "hub/data")
+_SHARD = _DATA + ("hub/transport", "hub/shard")
+_CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/control")
+_NIF = _PROTO + ("client/nif",)
+_GIMI = _NIF + ("client/gimi",)
+MAY_INCLUDE = {
+    "base": _BASE,
+    "proto": _PROTO,
+    "hub/limits.hpp": _BASE,
+    "hub/limits.cpp": _BASE + ("hub/limits.hpp",),
+    "hub/observe/counters.hpp": _PROTO,
+    "hub/observe/queue_gauges.hpp": _PROTO + ("hub/observe/counters.hpp",),
+    "hub/observe/counters.cpp": _PROTO + ("hub/observe/counters.hpp",),
+    "hub/concurrent": _CONCURRENT,
+    "hub/data": _DATA,
+    "hub/transport": _CONCURRENT + ("hub/transport",),
+    "hub/shard": _SHARD,
+    "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/control/state"),
+    "hub/control": _CONTROL,
+    "hub/config": _CONTROL + ("hub/config",),
+    "hub/observe": _CONCURRENT + ("hub/observe",),
+    "hub": _PROTO + ("hub",),
+    "client/nif": _NIF,
+    "client/gimi": _GIMI,
+    "tools": _GIMI + ("tools",),
+    "examples": _GIMI + ("examples",),
+}
+# Public headers belong to the part that implements them.
+PUBLIC_HEADERS = (("gimnet/bitestream", "proto"), ("gimnet/nif", "client/nif"), ("gimnet/gimi", "client/gimi"))
+
+_SOCKETS = ("sys/socket.h", "sys/un.h", "sys/epoll.h", "netinet/", "arpa/", "netdb.h", "poll.h", "boost/asio")
+_THREADS = ("thread", "mutex", "shared_mutex", "atomic", "condition_variable", "future", "semaphore", "latch",
+            "barrier", "stop_token", "pthread.h", "stdatomic.h", "threads.h")
+_LIBRARIES = ("boost/", "concurrentqueue/", "readerwriterqueue/", "fmt/", "spdlog/", "CLI/", "toml++/", "jemalloc/")
+FORBIDDEN_INCLUDES = {
+    "base": _LIBRARIES,
+    "proto": _LIBRARIES + _SOCKETS + _THREADS,
+    "client": _LIBRARIES,
+    "hub/data": ("mutex", "shared_mutex", "condition_variable", "functional", "boost/asio"),
+    "hub/control/state": _SOCKETS + _THREADS,
+}
+
+_SHARED_POINTER = re.compile(r"\b(shared_ptr|make_shared|weak_ptr|enable_shared_from_this|std::function)\b")
+_MEMORY_ORDER = re.compile(r"\bmemory_order(_|::)(relaxed|consume|acquire|release|acq_rel|seq_cst)\b")
+_SLEEP = re.compile(r"\b(sleep_for|sleep_until|usleep|nanosleep)\b|\b(time|asyncio)\.sleep\b|(?<![\w.])sleep\(")
+_UNFINISHED = re.compile(r"\b(TODO|FIXME|HACK|XXX)\b|\bfor now\b", re.IGNORECASE)
+_MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home)/|/tmp/wt\b|\bshared/design\b")
+_PLANTED = re.compile(r"\bGIMNET_BUG_([A-Z0-9_]+)\b")
+_REQUIREMENT = re.compile(r"^\| ([A-Z]-\d+[a-z]?) \|.*\|([^|]*)\|$")
+_TEST_PATH = re.compile(r"\b(?:tests|perf|fuzz|bench)/[\w./-]+")
+_LINK = re.compile(r"\]\(([^)\s]+)\)")
+# A public C header may guard itself in the way that every C compiler knows.
+_INCLUDE_GUARD = re.compile(r"\A#ifndef (GIMNET_\w+_H)\n#define \1\n")
+_FUZZ_TARGET = re.compile(r"^\s*gimnet_fuzz\(\s*(?:\S*/)?([A-Za-z0-9_]+)\.cpp", re.MULTILINE)
+
+
+def _longest_prefix(name, prefixes):
+    fitting = [p for p in prefixes if name == p or name.startswith(p.rstrip("/") + "/")]
+    return max(fitting, key=len, default=None)
+
+
+def part_of(name):
+    """The part of the house that a file belongs to, `name` as in an #include; None for what is not placed."""
+    for prefix, part in PUBLIC_HEADERS:
+        if name.startswith(prefix):
+            return part
+    return _longest_prefix(name, MAY_INCLUDE)
+
+
+def _part_files(tree):
+    """(file, its name as in an #include) for everything that the arrows bind."""
+    for file in tree.files(("src", "include"), CPP_SUFFIXES):
+        yield file, file.path.split("/", 1)[1]
+    for file in tree.files(("examples",), CPP_SUFFIXES):
+        yield file, file.path
+
+
+def include_arrows(tree):
+    for file, name in _part_files(tree):
+        part = part_of(name)
+        if part is None:
+            yield f"{file.path}: no rule says what this folder may include; place it in tests/style/rules.py"
+            continue
+        for include in file.includes():
+            target = include.name
+            ours = include.quoted or target.startswith("gimnet/")
+            if not ours or (part == "examples" and "/" not in target):
+                continue
+            target = part_of(target) if target.startswith("gimnet/") else target
+            if target is None or _longest_prefix(target, MAY_INCLUDE[part]) is None:
+                yield f"{file.path}:{include.line}: {part} may not include \"{include.name}\""
+
+
+def forbidden_includes(tree):
+    for file, name in _part_files(tree):
+        folder = _longest_prefix(name, FORBIDDEN_INCLUDES)
+        if folder is None and part_of(name) == "proto":
+            folder = "proto"
+        for include in file.includes() if folder else ():
+            if any(include.name == bad or (bad.endswith(("/", "asio")) and include.name.startswith(bad))
+                   for bad in FORBIDDEN_INCLUDES[folder]):
+                yield f"{file.path}:{include.line}: {folder} may not include <{include.name}>"
+
+
+def no_shared_pointers_in_the_data_plane(tree):
+    for file in tree.files(("src/hub/data",), CPP_SUFFIXES):
+        for number, line in enumerate(file.code_lines(), 1):
+            match = _SHARED_POINTER.search(line)
+            if match:
+                yield f"{file.path}:{number}: the data plane does not use {match[1]}"
+
+
+def includes_from_src(tree):
+    for file in tree.files(CODE_FOLDERS, CPP_SUFFIXES):
+        for include in file.includes():
+            if "../" in include.name:
+                yield f"{file.path}:{include.line}: includes start at src/, not with ../"
+
+
+def own_header_first(tree):
+    for file in tree.files(("src",), (".cpp", ".c")):
+        stem = file.path.rsplit(".", 1)[0]
+        own = next((stem + suffix for suffix in HEADER_SUFFIXES if tree.exists(stem + suffix)), None)
+        includes = file.includes()
+        if own and (not includes or includes[0].name != own.removeprefix("src/")):
+            yield f"{file.path}:1: includes its own header {own} first"
+
+
+def pragma_once(tree):
+    for file in tree.files(CODE_FOLDERS, HEADER_SUFFIXES):
+        guarded = file.path.startswith("include/") and file.suffix == ".h" and _INCLUDE_GUARD.search(file.text)
+        if "#pragma once" not in file.lines and not guarded:
+            yield f"{file.path}:1: no #pragma once"
+
+
+def file_length(tree):
+    for file in tree.files(CODE_FOLDERS, CPP_SUFFIXES + (".py", ".sh")):
+        if len(file.lines) > FILE_LINES_MAX:
+            yield f"{file.path}: {len(file.lines)} lines, at most {FILE_LINES_MAX}: split it along a noun of the docs"
+
+
+def function_length(tree):
+    for file in tree.files(CODE_FOLDERS, CPP_SUFFIXES + (".py",)):
+        for function in file.functions():
+            if function.length > FUNCTION_LINES_MAX:
+                yield (f"{file.path}:{function.line}: {function.length} lines, at most {FUNCTION_LINES_MAX}: "
+                       f"{function.name[:60]}")
+
+
+def memory_orders_name_their_partner(tree):
+    for file in tree.files(("src", "include"), CPP_SUFFIXES):
+        code = file.code_lines()
+        for number, line in enumerate(code):
+            near = file.lines[max(0, number - 3) : number + 1]
+            if _MEMORY_ORDER.search(line) and not any("//" in text for text in near):
+                yield f"{file.path}:{number + 1}: a memory order without a comment on its partner operation"
+
+
+def no_sleeps_in_tests(tree):
+    for file in tree.files(("tests",), CPP_SUFFIXES + (".py",)):
+        if "support" in file.path.split("/") or file.path.startswith("tests/style/"):
+            continue
+        for number, line in enumerate(file.lines, 1):
+            if _SLEEP.search(line):
+                yield f"{file.path}:{number}: a test waits for a condition with a deadline, it does not sleep"
+
+
+def _all_text(tree):
+    yield from tree.top_level_files()
+    for file in tree.files(TEXT_FOLDERS):
+        if not file.path.startswith(("tests/style/", "fuzz/seeds/")):
+            yield file
+
+
+def no_machine_paths(tree):
+    for file in _all_text(tree):
+        for number, line in enumerate(file.lines, 1):
+            if _MACHINE_PATH.search(line):
+                yield f"{file.path}:{number}: names a place on somebody's machine"
+
+
+def nothing_left_for_later(tree):
+    for file in tree.files(CODE_FOLDERS, CPP_SUFFIXES + (".py", ".sh", ".txt")):
+        if file.path.startswith(("tests/style/", "fuzz/seeds/")):
+            continue
+        for number, line in enumerate(file.lines, 1):
+            match = _UNFINISHED.search(line)
+            if match:
+                yield f"{file.path}:{number}: '{match[0]}': finish it or leave it out"
+
+
+def _list_entries(tree, path):
+    file = tree.file(path)
+    for number, line in enumerate(file.lines if file else (), 1):
+        if line.strip() and not line.startswith("#"):
+            yield number, line.strip()
+
+
+def _has_mirrored_test(tree, source):
+    stem = source.removeprefix("src/").rsplit(".", 1)[0]
+    return any(tree.exists(f"tests/{stem}_test{suffix}") for suffix in (".cpp", ".c", ".py"))
+
+
+def tests_mirror_sources(tree):
+    excused, without_test = {}, 0
+    for number, line in _list_entries(tree, UNTESTED_LIST):
+        source, _, reason = (part.strip() for part in line.partition(":"))
+        excused[source] = reason
+        where = f"{UNTESTED_LIST}:{number}:"
+        if not reason:
+            yield f"{where} {source} has no reason"
+        elif reason.startswith("tests/"):
+            if not tree.exists(reason.split()[0]):
+                yield f"{where} {reason.split()[0]} does not exist"
+        else:
+            without_test += 1
+        if not tree.exists(source) or _has_mirrored_test(tree, source):
+            yield f"{where} {source} does not exist or has its own test: take it off the list"
+    if without_test > UNTESTED_MAX:
+        yield f"{UNTESTED_LIST}: {without_test} sources without a test, at most {UNTESTED_MAX}"
+    for file in tree.files(("src",), (".cpp", ".c")):
+        if file.path not in excused and not _has_mirrored_test(tree, file.path):
+            yield f"{file.path}: no {file.path.replace('src', 'tests', 1).rsplit('.', 1)[0]}_test.cpp"
+
+
+def planted_bugs_are_listed(tree):
+    listed, targets_with_bug = set(), set()
+    for number, line in _list_entries(tree, PLANTED_LIST):
+        words = line.split()
+        if len(words) < 2:
+            yield f"{PLANTED_LIST}:{number}: a line is BUG TARGET"
+            continue
+        listed.add(words[0])
+        targets_with_bug.add(words[1])
+    planted = {bug for file in tree.files(("src", "include"), CPP_SUFFIXES) for bug in _PLANTED.findall(file.text)}
+    targets = {name for file in tree.files(("fuzz",), (".txt",)) if file.path.endswith("CMakeLists.txt")
+               for name in _FUZZ_TARGET.findall(file.text)}
+    for bug in sorted(planted - listed):
+        yield f"{PLANTED_LIST}: GIMNET_BUG_{bug} is in the sources, but no target is said to find it"
+    for bug in sorted(listed - planted):
+        yield f"{PLANTED_LIST}: no source mentions GIMNET_BUG_{bug}"
+    for target in sorted(targets_with_bug - targets):
+        yield f"{PLANTED_LIST}: there is no fuzz target {target}"
+    for target in sorted(targets - targets_with_bug):
+        yield f"{PLANTED_LIST}: the fuzz target {target} has no bug that it must find"
+
+
+def requirements_name_tests_that_exist(tree):
+    file = tree.file(REQUIREMENTS)
+    for number, line in enumerate(file.lines if file else (), 1):
+        row = _REQUIREMENT.match(line)
+        if not row:
+            continue
+        tests = [path.rstrip(".") for path in _TEST_PATH.findall(row[2])]
+        if not tests and row[2].strip() != "open":
+            yield f"{REQUIREMENTS}:{number}: {row[1]} names neither a test nor 'open'"
+        for path in tests:
+            if not (tree.root / path).exists():
+                yield f"{REQUIREMENTS}:{number}: {path} does not exist"
+
+
+def links_resolve(tree):
+    documents = [file for file in tree.top_level_files() if file.suffix == ".md"]
+    documents += list(tree.files(TEXT_FOLDERS, (".md",)))
+    for file in documents:
+        for number, line in enumerate(file.lines, 1):
+            for link in _LINK.findall(line):
+                target = link.split("#")[0]
+                if target and ":" not in target and not ((tree.root / file.path).parent / target).exists():
+                    yield f"{file.path}:{number}: the link to {target} leads nowhere"
+
+
+RULES = (
+    include_arrows,
+    forbidden_includes,
+    no_shared_pointers_in_the_data_plane,
+    includes_from_src,
+    own_header_first,
+    pragma_once,
+    file_length,
+    function_length,
+    memory_orders_name_their_partner,
+    no_sleeps_in_tests,
+    no_machine_paths,
+    nothing_left_for_later,
+    tests_mirror_sources,
+    planted_bugs_are_listed,
+    requirements_name_tests_that_exist,
+    links_resolve,
+)

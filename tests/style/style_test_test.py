@@ -1,0 +1,234 @@
+#!/usr/bin/env python3
+"""Each rule finds a violation planted for it and lets the nearest innocent code pass: a rule that cannot fail is none."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import rules
+from tree import Tree
+
+GUARDED = "#pragma once\n"
+
+
+def long_function(lines, head="int f(int a) {"):
+    return head + "\n" + "  a();\n" * (lines - 2) + "}\n"
+
+
+# rule: (innocent trees, trees with exactly one violation); a tree is {path: text}.
+CASES = {
+    rules.include_arrows: (
+        [
+            {"src/proto/frame/a.cpp": '#include "base/ids.hpp"\n#include <vector>\n'},
+            {"src/hub/data/a.cpp": '#include "hub/limits.hpp"\n#include "hub/concurrent/waker.hpp"\n'},
+            {"src/hub/control/conductor.cpp": '#include "hub/control/state/names.hpp"\n#include "hub/shard/a.hpp"\n'},
+            {"src/hub/control/state/names.cpp": '#include "proto/control/ns.hpp"\n#include "hub/limits.hpp"\n'},
+            {"src/hub/control/listener.hpp": '#include "hub/version.hpp"\n#include "hub/observe/names.hpp"\n'},
+            {"src/hub/config/options.hpp": '#include "hub/control/listen_url.hpp"\n'},
+            {"src/hub/data/egress/a.hpp": '#include "hub/transport/transport.hpp"\n'},
+            {"src/hub/main.cpp": '#include "hub/control/conductor.hpp"\n'},
+            {"src/client/gimi/a.cpp": '#include "client/nif/a.hpp"\n#include "gimnet/nif.h"\n'},
+            {"src/tools/a.cpp": '#include "client/gimi/node.hpp"\n#include <CLI/CLI.hpp>\n'},
+            {"examples/a.cpp": '#include <gimnet/gimi.hpp>\n#include "local.hpp"\n'},
+            {"include/gimnet/gimi.hpp": '#include "gimnet/nif.h"\n'},
+        ],
+        [
+            {"src/base/a.cpp": '#include "proto/frame/a.hpp"\n'},
+            {"src/proto/a.cpp": '#include "hub/limits.hpp"\n'},
+            {"src/proto/a.cpp": '#include "gimnet/nif.h"\n'},
+            {"src/hub/concurrent/a.hpp": '#include "hub/data/a.hpp"\n'},
+            {"src/hub/data/a.cpp": '#include "hub/shard/commands.hpp"\n'},
+            {"src/hub/data/a.cpp": '#include "hub/observe/web.hpp"\n'},
+            {"src/hub/data/a.cpp": '#include "hub/transport/socket_transport.hpp"\n'},
+            {"src/hub/control/a.cpp": '#include "hub/config/options.hpp"\n'},
+            {"src/hub/config/a.cpp": '#include "hub/hub.hpp"\n'},
+            {"src/hub/shard/a.cpp": '#include "hub/control/conductor.hpp"\n'},
+            {"src/hub/control/state/a.cpp": '#include "hub/control/conductor.hpp"\n'},
+            {"src/hub/control/state/a.cpp": '#include "hub/concurrent/waker.hpp"\n'},
+            {"src/hub/main.cpp": '#include "client/nif/a.hpp"\n'},
+            {"src/hub/main.cpp": "#include <gimnet/nif.h>\n"},
+            {"src/client/nif/a.cpp": '#include "hub/limits.hpp"\n'},
+            {"src/client/nif/a.cpp": '#include "client/gimi/node.hpp"\n'},
+            {"src/tools/a.cpp": '#include "hub/limits.hpp"\n'},
+            {"src/newpart/a.cpp": "int a;\n"},
+            {"include/gimnet/unplaced.h": "int a;\n"},
+        ],
+    ),
+    rules.forbidden_includes: (
+        [
+            {"src/proto/a.cpp": "#include <vector>\n#include <functional>\n"},
+            {"src/client/nif/a.cpp": "#include <mutex>\n#include <sys/socket.h>\n"},
+            {"src/hub/data/a.cpp": "#include <atomic>\n#include <memory>\n"},
+            {"src/hub/control/a.cpp": "#include <boost/asio.hpp>\n"},
+        ],
+        [
+            {"src/proto/a.cpp": "#include <sys/socket.h>\n"},
+            {"src/proto/a.cpp": "#include <netinet/in.h>\n"},
+            {"src/proto/a.cpp": "#include <thread>\n"},
+            {"src/proto/a.cpp": "#  include <mutex>\n"},
+            {"src/proto/a.cpp": "#include <atomic>\n"},
+            {"src/proto/a.cpp": "#include <boost/endian.hpp>\n"},
+            {"include/gimnet/bitestream.h": "#include <pthread.h>\n"},
+            {"src/base/a.hpp": "#include <boost/assert.hpp>\n"},
+            {"src/client/gimi/a.cpp": "#include <boost/asio.hpp>\n"},
+            {"src/client/gimi/a.cpp": "#include <fmt/format.h>\n"},
+            {"src/hub/data/a.cpp": "#include <mutex>\n"},
+            {"src/hub/data/a.cpp": "#include <shared_mutex>\n"},
+            {"src/hub/data/a.cpp": "#include <functional>\n"},
+            {"src/hub/control/state/a.cpp": "#include <thread>\n"},
+            {"src/hub/control/state/a.cpp": "#include <boost/asio/post.hpp>\n"},
+        ],
+    ),
+    rules.no_shared_pointers_in_the_data_plane: (
+        [{"src/hub/data/a.hpp": "std::unique_ptr<int> a;  // no shared_ptr\n"}, {"src/hub/a.hpp": "std::shared_ptr<int> a;\n"}],
+        [{"src/hub/data/a.hpp": "std::shared_ptr<int> a;\n"}, {"src/hub/data/a.cpp": "auto a = std::make_shared<int>();\n"}],
+    ),
+    rules.includes_from_src: (
+        [{"src/base/a.cpp": '#include "base/a.hpp"\n'}],
+        [{"src/base/a.cpp": '#include "../base/a.hpp"\n'}, {"tests/base/a_test.cpp": '#include "base/../a.hpp"\n'}],
+    ),
+    rules.own_header_first: (
+        [
+            {"src/base/a.cpp": '// About.\n#include "base/a.hpp"\n\n#include <vector>\n', "src/base/a.hpp": GUARDED},
+            {"src/base/main.cpp": "#include <vector>\n"},
+        ],
+        [
+            {"src/base/a.cpp": '#include <vector>\n#include "base/a.hpp"\n', "src/base/a.hpp": GUARDED},
+            {"src/base/a.cpp": "int a;\n", "src/base/a.hpp": GUARDED},
+        ],
+    ),
+    rules.pragma_once: (
+        [
+            {"src/a.hpp": GUARDED, "src/a.cpp": "int a;\n"},
+            {"include/gimnet/a.h": "#ifndef GIMNET_A_H\n#define GIMNET_A_H\n#endif\n"},
+        ],
+        [
+            {"src/a.hpp": "int a;\n"},
+            {"src/a.h": "#ifndef GIMNET_A_H\n#define GIMNET_A_H\n#endif\n"},
+            {"include/gimnet/a.h": "int a;\n"},
+        ],
+    ),
+    rules.file_length: (
+        [{"src/a.cpp": "int a;\n" * rules.FILE_LINES_MAX}, {"docs/a.md": "a\n" * 1000}],
+        [{"src/a.cpp": "int a;\n" * (rules.FILE_LINES_MAX + 1)}, {"perf/a.py": "a = 1\n" * (rules.FILE_LINES_MAX + 1)}],
+    ),
+    rules.function_length: (
+        [
+            {"src/a.cpp": long_function(rules.FUNCTION_LINES_MAX) * 2},
+            {"src/a.cpp": "namespace a {\n" + "int b;\n" * 80 + "}  // namespace a\n"},
+            {"src/a.hpp": "class A : public B(C) {\n public:\n" + "  int a();\n" * 80 + "};\n"},
+            {"src/a.cpp": "constexpr int kTable[f(2)] = {\n" + "    1,\n" * 80 + "};\n"},
+            {"tests/a.cpp": "int f() {\n  return a;\n}\n" + 'const char* a = R"(\n' + "{\n" * 80 + '}\n)";\n'},
+            {"tests/a.py": "def f():\n" + "    a = 1\n" * (rules.FUNCTION_LINES_MAX - 1)},
+        ],
+        [
+            {"src/a.cpp": long_function(rules.FUNCTION_LINES_MAX + 1)},
+            {"src/a.cpp": long_function(70, "double g(int a,\n         int b) {")},
+            {"src/a.cpp": long_function(70, "A::A(int a)\n    : a_(a) {")},
+            {"src/a.cpp": long_function(70, 'extern "C" int f(int a) {')},
+            {"src/a.hpp": "class A {\n  template <class T>\n  void f(T a) {\n" + "    a();\n" * 70 + "  }\n};\n"},
+            {"src/a.cpp": "int f() {\n#if A\n" + "  if (a) {\n    b();\n  } else {\n    c();\n  }\n" * 15 + "#endif\n}\n"},
+            {"src/a.cpp": 'int f() {\n  a(R"(\n}\n)");\n' + "  a();\n" * 70 + "}\n"},
+            {"src/a.c": "int f(void) {\n  /* a\n}\n*/\n" + "  a();\n" * 70 + "}\n"},
+            {"tests/a_test.cpp": long_function(70, "TEST(A, B) {")},
+            {"tests/a.py": "def f():\n" + "    a = 1\n" * rules.FUNCTION_LINES_MAX},
+        ],
+    ),
+    rules.memory_orders_name_their_partner: (
+        [
+            {"src/a.cpp": "// Pairs with the load in b().\na.store(1, std::memory_order_release);\n"},
+            {"src/a.cpp": "// Pairs with b().\nint x;\nint y;\na.load(std::memory_order_acquire);\n"},
+            {"src/a.cpp": "a.load(std::memory_order_relaxed);  // a counter: no partner\n"},
+        ],
+        [
+            {"src/a.cpp": "a.store(1, std::memory_order_release);\n"},
+            {"src/a.cpp": "// Too far.\nint x;\nint y;\nint z;\na.load(std::memory_order::acquire);\n"},
+        ],
+    ),
+    rules.no_sleeps_in_tests: (
+        [{"tests/support/wait.cpp": "std::this_thread::sleep_for(a);\n"}, {"src/a.cpp": "usleep(1);\n"}],
+        [
+            {"tests/a_test.cpp": "std::this_thread::sleep_for(a);\n"},
+            {"tests/a_test.c": "usleep(1);\n"},
+            {"tests/system/a_test.py": "time.sleep(1)\n"},
+        ],
+    ),
+    rules.no_machine_paths: (
+        [{"docs/a.md": "perf/work/a and the network/root/a\n"}],
+        [{"docs/a.md": "see /work/a\n"}, {"src/a.cpp": '"/root/a"\n'}, {"README.md": "cd /tmp/wt\n"}, {"dev": "cd /home/me/\n"}],
+    ),
+    rules.nothing_left_for_later: (
+        [{"src/a.cpp": "int todos;\n"}],
+        [{"src/a.cpp": "// TODO: more\n"}, {"perf/a.py": "# good enough for now\n"}],
+    ),
+    rules.tests_mirror_sources: (
+        [
+            {"src/base/a.cpp": "", "tests/base/a_test.cpp": ""},
+            {"src/hub/a.cpp": "", rules.UNTESTED_LIST: "# list\nsrc/hub/a.cpp: a main()\n"},
+            {"src/a.cpp": "", "tests/b_test.cpp": "", rules.UNTESTED_LIST: "src/a.cpp: tests/b_test.cpp\n"},
+        ],
+        [
+            {"src/base/a.cpp": "", "tests/a_test.cpp": ""},
+            {"src/base/a.c": ""},
+            {rules.UNTESTED_LIST: "src/gone.cpp: a reason\n"},
+            {"src/a.cpp": "", rules.UNTESTED_LIST: "src/a.cpp:\n"},
+            {"src/a.cpp": "", rules.UNTESTED_LIST: "src/a.cpp: tests/gone_test.cpp\n"},
+            {"src/a.cpp": "", "tests/a_test.cpp": "", rules.UNTESTED_LIST: "src/a.cpp: main\n"},
+            {rules.UNTESTED_LIST: "".join(f"src/a{n}.cpp: main\n" for n in range(rules.UNTESTED_MAX + 1))}
+            | {f"src/a{n}.cpp": "" for n in range(rules.UNTESTED_MAX + 1)},
+        ],
+    ),
+    rules.planted_bugs_are_listed: (
+        [{"src/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.PLANTED_LIST: "# list\nA a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(b/a_fuzz.cpp DEPENDS c)\n"}],
+        [
+            {"src/a.cpp": "#ifdef GIMNET_BUG_A\n"},
+            {rules.PLANTED_LIST: "A a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},
+            {"src/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.PLANTED_LIST: "A a_fuzz\n"},
+            {"fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},
+            {rules.PLANTED_LIST: "A\n"},
+        ],
+    ),
+    rules.links_resolve: (
+        [{"README.md": "[a](docs/a.md#b), [b](https://example.org), [c](docs)\n", "docs/a.md": "[r](../README.md)\n"}],
+        [{"README.md": "[a](docs/gone.md)\n"}, {"docs/a.md": "[r](README.md)\n"}],
+    ),
+    rules.requirements_name_tests_that_exist: (
+        [
+            {rules.REQUIREMENTS: "| id | what | proof |\n| R-01 | joins | open |\n"},
+            {rules.REQUIREMENTS: "| I-02a | joins | `tests/a_test.cpp` (A.B) |\n", "tests/a_test.cpp": ""},
+        ],
+        [
+            {rules.REQUIREMENTS: "| R-01 | joins | `tests/a_test.cpp` |\n"},
+            {rules.REQUIREMENTS: "| R-01 | joins | |\n"},
+            {rules.REQUIREMENTS: "| R-01 | joins | soon |\n"},
+        ],
+    ),
+}
+
+
+class StyleRules(unittest.TestCase):
+    def violations(self, rule, files):
+        with tempfile.TemporaryDirectory() as folder:
+            for path, text in files.items():
+                (Path(folder) / path).parent.mkdir(parents=True, exist_ok=True)
+                (Path(folder) / path).write_text(text)
+            return list(rule(Tree(folder)))
+
+    def test_every_rule_has_cases(self):
+        self.assertEqual(set(rules.RULES), set(CASES))
+
+    def test_innocent_code_passes(self):
+        for rule, (innocent, _) in CASES.items():
+            for files in innocent:
+                with self.subTest(rule=rule.__name__, files=list(files)):
+                    self.assertEqual(self.violations(rule, files), [])
+
+    def test_planted_violations_are_found_once(self):
+        for rule, (_, planted) in CASES.items():
+            for files in planted:
+                with self.subTest(rule=rule.__name__, files=list(files)):
+                    self.assertEqual(len(self.violations(rule, files)), 1, files)
+
+
+if __name__ == "__main__":
+    unittest.main()
