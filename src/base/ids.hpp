@@ -1,0 +1,62 @@
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+namespace gimnet {
+
+/// A number that names one kind of thing only: two ids with different tags neither compare nor convert.
+/// Thread safety: a value type.
+template <class Tag, class Value>
+class StrongId {
+ public:
+  constexpr StrongId() = default;
+  constexpr explicit StrongId(Value value) : value_(value) {}
+  [[nodiscard]] constexpr Value value() const { return value_; }
+  friend constexpr auto operator<=>(StrongId, StrongId) = default;
+
+ private:
+  Value value_{};
+};
+
+/// A hub: 12 bits, 1..4094; 0 is "the hub I am connected to", 4095 "every hub" (docs/protocol.md, section 1).
+using HubId = StrongId<struct HubIdTag, std::uint16_t>;
+/// A node: hub << 20 | index.
+using NodeId = StrongId<struct NodeIdTag, std::uint32_t>;
+/// A group (one per service): owner hub << 20 | index, in a number space of its own.
+using GroupId = StrongId<struct GroupIdTag, std::uint32_t>;
+/// One of the hub's io threads, 0..shards-1.
+using ShardIndex = StrongId<struct ShardIndexTag, std::uint8_t>;
+/// The place of a session in its shard's table.
+using ConnectionSlot = StrongId<struct ConnectionSlotTag, std::uint32_t>;
+
+inline constexpr std::uint32_t kIndexBits = 20;
+inline constexpr std::uint32_t kIndexMask = (1u << kIndexBits) - 1;
+inline constexpr std::uint32_t kHubIndex = 0;             ///< the hub itself
+inline constexpr std::uint32_t kEveryIndex = kIndexMask;  ///< every node of a hub
+inline constexpr HubId kOwnHub{0};
+inline constexpr HubId kEveryHub{4095};
+inline constexpr std::uint16_t kHubIdMax = 4094;
+
+/// REQUIRES: hub <= 4095, index < 2^20.
+template <class Id>
+[[nodiscard]] constexpr Id make_id(HubId hub, std::uint32_t index) {
+  return Id{(static_cast<std::uint32_t>(hub.value()) << kIndexBits) | (index & kIndexMask)};
+}
+template <class Id>
+[[nodiscard]] constexpr HubId hub_of(Id id) {
+  return HubId{static_cast<std::uint16_t>(id.value() >> kIndexBits)};
+}
+template <class Id>
+[[nodiscard]] constexpr std::uint32_t index_of(Id id) {
+  return id.value() & kIndexMask;
+}
+
+}  // namespace gimnet
+
+template <class Tag, class Value>
+struct std::hash<gimnet::StrongId<Tag, Value>> {
+  std::size_t operator()(gimnet::StrongId<Tag, Value> id) const noexcept { return std::hash<Value>{}(id.value()); }
+};

@@ -1,0 +1,74 @@
+#include "base/byte_buffer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <utility>
+
+namespace gimnet {
+namespace {
+
+std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+std::string_view text(const ByteBuffer& buffer) {
+  return {reinterpret_cast<const char*>(buffer.data()), buffer.size()};
+}
+
+TEST(ByteBuffer, AppendsInOrder) {
+  ByteBuffer buffer;
+  ASSERT_TRUE(buffer.append(bytes("GIM")));
+  ASSERT_TRUE(buffer.append(bytes("")));
+  ASSERT_TRUE(buffer.append(bytes("net")));
+  EXPECT_EQ(text(buffer), "GIMnet");
+}
+
+TEST(ByteBuffer, GrowsByDoublingUpToTheMaximum) {
+  ByteBuffer buffer;
+  const std::array<std::byte, 200> some{};
+  ASSERT_TRUE(buffer.append(some, 500));
+  EXPECT_EQ(buffer.capacity(), 256u);
+  ASSERT_TRUE(buffer.append(some, 500));
+  EXPECT_EQ(buffer.capacity(), 500u);
+  ASSERT_TRUE(buffer.append(some, 500));
+  EXPECT_EQ(buffer.size(), 600u) << "the maximum bounds what is reserved ahead, not what is asked for";
+}
+
+TEST(ByteBuffer, MovesItsMemory) {
+  ByteBuffer from;
+  ASSERT_TRUE(from.append(bytes("GIMnet")));
+  const std::byte* memory = from.data();
+  ByteBuffer to(std::move(from));
+  EXPECT_EQ(to.data(), memory);
+  ByteBuffer assigned;
+  assigned = std::move(to);
+  EXPECT_EQ(text(assigned), "GIMnet");
+}
+
+TEST(ByteBuffer, KeepsItsMemoryWhenCleared) {
+  ByteBuffer buffer;
+  ASSERT_TRUE(buffer.append(bytes("GIMnet")));
+  const std::size_t capacity = buffer.capacity();
+  buffer.clear();
+  EXPECT_TRUE(buffer.empty());
+  EXPECT_EQ(buffer.capacity(), capacity);
+}
+
+TEST(ByteBuffer, SaysWhenThereIsNoMemory) {
+  ByteBuffer buffer;
+  ASSERT_TRUE(buffer.append(bytes("GIMnet")));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
+  EXPECT_FALSE(buffer.reserve(SIZE_MAX / 4));
+#endif
+  EXPECT_EQ(text(buffer), "GIMnet");
+}
+
+TEST(ByteBufferDeathTest, RefusesASizeOverItsCapacity) {
+  ByteBuffer buffer;
+  EXPECT_DEATH(buffer.set_size(1), "broken invariant");
+}
+
+}  // namespace
+}  // namespace gimnet

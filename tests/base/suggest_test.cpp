@@ -1,0 +1,34 @@
+#include "base/suggest.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace gimnet {
+namespace {
+
+TEST(EditDistance, CountsLetters) {
+  EXPECT_EQ(edit_distance("", ""), 0u);
+  EXPECT_EQ(edit_distance("", "abc"), 3u);
+  EXPECT_EQ(edit_distance("abc", ""), 3u);
+  EXPECT_EQ(edit_distance("shards", "shards"), 0u);
+  EXPECT_EQ(edit_distance("shard", "shards"), 1u);
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
+}
+
+TEST(EditDistance, CountsASwapOfNeighboursOnce) { EXPECT_EQ(edit_distance("lsiten", "listen"), 1u); }
+
+TEST(DidYouMean, NamesTheNearest) {
+  constexpr std::array<std::string_view, 3> kWords{"--listen", "--limit", "--shards"};
+  EXPECT_EQ(did_you_mean("--lisen", kWords), "; did you mean --listen?");
+  EXPECT_EQ(did_you_mean("--shrads", kWords), "; did you mean --shards?");
+}
+
+TEST(DidYouMean, IsSilentWhenNothingIsNear) {
+  constexpr std::array<std::string_view, 2> kWords{"--listen", "--limit"};
+  EXPECT_EQ(did_you_mean("--colour-scheme", kWords), "");
+  EXPECT_EQ(did_you_mean("x", {}), "");
+}
+
+}  // namespace
+}  // namespace gimnet
