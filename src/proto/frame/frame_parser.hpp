@@ -1,0 +1,138 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "base/endian.hpp"
+#include "base/ids.hpp"
+#include "base/result.hpp"
+#include "proto/frame/fragment_header.hpp"
+#include "proto/frame/frame_error.hpp"
+#include "proto/frame/frame_header.hpp"
+
+// Finds frames in a read buffer, in place: no copy, no allocation, and nothing read beyond the bytes that are there.
+// Thread safety: pure functions; views refer to the caller's bytes.
+
+namespace gimnet::proto {
+
+/// Neighbouring whole frames. Valid until: the buffer changes.
+struct RunView {
+  const std::byte* bytes = nullptr;
+  std::uint32_t size = 0;
+  std::uint32_t frames = 0;
+};
+
+enum class Found : std::uint8_t {
+  run,        ///< `run` has at least one frame
+  need_more,  ///< the first frame is not whole yet: `needed` says how many bytes that takes, counted from `begin`
+  too_long,   ///< the first frame is longer than allowed: the stream cannot be read on
+};
+
+struct NextRun {
+  Found found = Found::need_more;
+  RunView run;
+  std::uint32_t needed = 0;
+};
+
+/// Bytes of a read buffer that one call looks at.
+inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
+
+/// True where neighbouring frames with equal headers mean the same to a router, so that they may travel as one run:
+/// not for LIST (its ids differ), FLOW and control kinds, fragments, extensions and LATEST, which are looked at singly.
+[[nodiscard]] constexpr bool may_form_run(const FrameHeader& header) {
+  constexpr std::uint32_t kRunKinds =
+      0xFFFFu & ~(1u << static_cast<unsigned>(Kind::list)) & ~(1u << static_cast<unsigned>(Kind::flow));
+  const auto kind = static_cast<unsigned>(header.kind);
+  return kind < kFirstControlKind && ((kRunKinds >> kind) & 1u) != 0 && !header.has(kFlagFragment | kFlagExt) &&
+         header.policy() != Policy::latest;
+}
+
+/// The longest run of whole frames at `begin` whose bytes 4..15 (dst, src, kind, flags, hops, lane) are all equal; a
+/// frame that may_form_run() excludes is a run of its own. Of the rules of section 2 only the length is checked: the
+/// caller checks one header per run. REQUIRES: begin <= end.
+[[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end, std::uint32_t max_length) {
+  const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
+  if (available < kHeaderSize) return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize)};
+  const FrameHeader header = load_header(begin);
+  if (header.length > max_length) return {Found::too_long, {}, 0};
+  if (header.frame_size() > available) {
+    return {Found::need_more, {}, static_cast<std::uint32_t>(header.frame_size())};
+  }
+  std::size_t size = header.frame_size();
+  std::uint32_t frames = 1;
+  if (may_form_run(header)) {
+    const auto addresses = load_le<std::uint64_t>(begin + 4);
+    const auto attributes = load_le<std::uint32_t>(begin + 12);
+#if defined(GIMNET_BUG_PARSER_RUN_PAST_END)
+    while (available - size >= kHeaderSize - 1) {
+#else
+    while (available - size >= kHeaderSize) {
+#endif
+      const std::byte* next = begin + size;
+      const auto length = load_le<std::uint32_t>(next);
+      if (load_le<std::uint64_t>(next + 4) != addresses || load_le<std::uint32_t>(next + 12) != attributes) break;
+      if (length > max_length || kHeaderSize + length > available - size) break;
+      size += kHeaderSize + length;
+      ++frames;
+    }
+  }
+  return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0};
+}
+
+/// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0 and without ids.
+enum class Origin : std::uint8_t { node, hub };
+
+/// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind, policy, n of LIST.
+[[nodiscard]] constexpr FrameError check_header_from_node(const FrameHeader& header) {
+  const auto kind = static_cast<std::uint8_t>(header.kind);
+  if ((header.lane & ~kLaneMask) != 0) return FrameError::reserved_lane_bits;
+  if (header.has(kFlagReservedMask)) return FrameError::reserved_flag_bits;
+  if (header.hops != 0) return FrameError::hops_not_zero;
+  if (kind > static_cast<std::uint8_t>(Kind::route)) return FrameError::unknown_kind;
+  if (header.kind == Kind::report || header.kind == Kind::route) return FrameError::kind_not_allowed;
+  const bool to_many = header.kind == Kind::group || header.kind == Kind::list || header.kind == Kind::broadcast;
+  if (header.policy() == Policy::block && to_many) return FrameError::block_not_allowed;
+  const bool to_one = header.kind == Kind::unicast || header.kind == Kind::service;
+  if (header.policy() == Policy::latest && to_one && !header.has(kFlagKeyed)) return FrameError::latest_without_key;
+  if (header.kind == Kind::list && (header.dst == 0 || header.dst > kListRecipientsMax)) return FrameError::list_count;
+  return FrameError::none;
+}
+
+/// The node ids of a LIST frame, at any alignment. Valid until: the frame's bytes change.
+class ListIds {
+ public:
+  constexpr ListIds() = default;
+  /// REQUIRES: 4 * count readable bytes.
+  ListIds(const std::byte* bytes, std::uint32_t count) : bytes_(bytes), count_(count) {}
+  [[nodiscard]] std::uint32_t size() const { return count_; }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  /// REQUIRES: index < size().
+  [[nodiscard]] NodeId operator[](std::uint32_t index) const {
+    GIMNET_ASSERT(index < count_);
+    return NodeId{load_le<std::uint32_t>(bytes_ + std::size_t{4} * index)};
+  }
+
+ private:
+  const std::byte* bytes_ = nullptr;
+  std::uint32_t count_ = 0;
+};
+
+/// One legal frame, taken apart. Valid until: its bytes change.
+struct FrameView {
+  FrameHeader header;
+  ListIds recipients;                       ///< LIST only
+  std::span<const std::byte> extensions;    ///< without the u16 before them; see extensions.hpp
+  std::optional<FragmentHeader> fragment;   ///< where FRAGMENT is set
+  std::optional<std::uint64_t> key;         ///< where KEYED is set: its 8 bytes as a little-endian number
+  std::span<const std::byte> payload;       ///< what is left
+  std::span<const std::byte> after_header;  ///< everything after the 16 bytes
+};
+
+/// Takes one frame apart and checks all of section 2 that a frame shows by itself. `frame` may be longer than the
+/// frame; shorter is FrameError::incomplete. The largest length and the source are the caller's to check.
+[[nodiscard]] Result<FrameView, FrameError> parse_frame(std::span<const std::byte> frame, Origin origin);
+
+}  // namespace gimnet::proto

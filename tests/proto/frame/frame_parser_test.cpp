@@ -1,0 +1,345 @@
+#include "proto/frame/frame_parser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "proto/frame/frame_builder.hpp"
+#include "tests/vectors/vector_file.hpp"
+
+namespace gimnet::proto {
+namespace {
+
+using test::Bytes;
+using test::load_vector;
+
+constexpr std::uint32_t kMax = kFrameLengthDefault;
+
+FrameHeader header_to(std::uint32_t dst, Kind kind = Kind::unicast, std::uint8_t flags = 0) {
+  FrameHeader header;
+  header.dst = dst;
+  header.src = 0x00700011;
+  header.kind = kind;
+  header.flags = flags;
+  return header;
+}
+
+void append_frame(Bytes& bytes, FrameHeader header, std::size_t payload) {
+  header.length = static_cast<std::uint32_t>(payload);
+  const std::size_t at = bytes.size();
+  bytes.resize(at + kHeaderSize + payload, std::byte{0x5A});
+  store_header(bytes.data() + at, header);
+}
+
+NextRun run_of(const Bytes& bytes, std::uint32_t max = kMax) {
+  return next_run(bytes.data(), bytes.data() + bytes.size(), max);
+}
+
+FrameError error_of(const Bytes& frame, Origin origin = Origin::node) {
+  const auto parsed = parse_frame(frame, origin);
+  return parsed ? FrameError::none : parsed.error();
+}
+
+// next_run()
+
+TEST(NextRun, AsksForAHeader) {
+  const Bytes bytes(kHeaderSize - 1);
+  for (std::size_t size = 0; size < kHeaderSize; ++size) {
+    const auto next = next_run(bytes.data(), bytes.data() + size, kMax);
+    EXPECT_EQ(next.found, Found::need_more);
+    EXPECT_EQ(next.needed, kHeaderSize);
+  }
+}
+
+TEST(NextRun, AsksForTheWholeFrame) {
+  Bytes bytes;
+  append_frame(bytes, header_to(1), 100);
+  bytes.pop_back();
+  const auto next = run_of(bytes);
+  EXPECT_EQ(next.found, Found::need_more);
+  EXPECT_EQ(next.needed, kHeaderSize + 100);
+}
+
+TEST(NextRun, JoinsFramesWithEqualHeadersAndAnyLength) {
+  Bytes bytes;
+  for (const std::size_t payload : {16u, 0u, 1u, 4096u}) append_frame(bytes, header_to(1), payload);
+  const std::size_t whole = bytes.size();
+  append_frame(bytes, header_to(2), 16);
+  const auto next = run_of(bytes);
+  ASSERT_EQ(next.found, Found::run);
+  EXPECT_EQ(next.run.bytes, bytes.data());
+  EXPECT_EQ(next.run.frames, 4u);
+  EXPECT_EQ(next.run.size, whole);
+}
+
+TEST(NextRun, EndsBeforeAFrameThatIsNotWhole) {
+  for (std::size_t missing = 1; missing <= kHeaderSize + 8; ++missing) {
+    Bytes bytes;
+    for (int i = 0; i < 3; ++i) append_frame(bytes, header_to(1), 8);
+    bytes.resize(bytes.size() - missing);
+    const auto next = run_of(bytes);
+    ASSERT_EQ(next.found, Found::run);
+    EXPECT_EQ(next.run.frames, 2u);
+    EXPECT_EQ(next.run.size, 2 * (kHeaderSize + 8));
+  }
+}
+
+TEST(NextRun, EndsWhereAnyOtherByteOfTheHeaderDiffers) {
+  for (std::size_t byte = 4; byte < kHeaderSize; ++byte) {
+    Bytes bytes;
+    append_frame(bytes, header_to(1), 8);
+    append_frame(bytes, header_to(1), 8);
+    bytes[kHeaderSize + 8 + byte] ^= std::byte{0x40};
+    const auto next = run_of(bytes);
+    ASSERT_EQ(next.found, Found::run);
+    EXPECT_EQ(next.run.frames, 1u) << "byte " << byte;
+  }
+}
+
+TEST(NextRun, GivesSomeFramesSingly) {
+  const std::vector<FrameHeader> single = {header_to(2, Kind::list),          header_to(0, Kind::flow),
+                                           header_to(0, Kind::link),          header_to(0, Kind::ns),
+                                           header_to(0, Kind::ctrl),          header_to(0, static_cast<Kind>(200)),
+                                           header_to(1, Kind::unicast, 0x08), header_to(1, Kind::unicast, 0x10),
+                                           header_to(1, Kind::unicast, 0x23), header_to(1, Kind::group, 3)};
+  for (const FrameHeader& header : single) {
+    Bytes bytes;
+    append_frame(bytes, header, 32);
+    append_frame(bytes, header, 32);
+    EXPECT_EQ(run_of(bytes).run.frames, 1u) << int{static_cast<std::uint8_t>(header.kind)} << " " << int{header.flags};
+  }
+}
+
+TEST(NextRun, JoinsEveryOtherDataKind) {
+  for (const int kind : {0, 1, 3, 4, 5, 7, 8, 15}) {
+    Bytes bytes;
+    append_frame(bytes, header_to(1, static_cast<Kind>(kind), kFlagKeyed | kFlagReport), 32);
+    append_frame(bytes, header_to(1, static_cast<Kind>(kind), kFlagKeyed | kFlagReport), 32);
+    EXPECT_EQ(run_of(bytes).run.frames, 2u) << kind;
+  }
+}
+
+TEST(NextRun, RefusesALengthOverTheLimit) {
+  Bytes bytes;
+  append_frame(bytes, header_to(1), 65);
+  EXPECT_EQ(run_of(bytes, 65).found, Found::run);
+  EXPECT_EQ(run_of(bytes, 64).found, Found::too_long);
+  store_le(bytes.data(), UINT32_MAX);
+  EXPECT_EQ(run_of(bytes, kFrameLengthMax).found, Found::too_long);
+}
+
+TEST(NextRun, EndsBeforeALengthOverTheLimit) {
+  Bytes bytes;
+  append_frame(bytes, header_to(1), 8);
+  append_frame(bytes, header_to(1), 65);
+  EXPECT_EQ(run_of(bytes, 64).run.frames, 1u);
+}
+
+/// Frames of a stream, each with its bytes, as a reader finds them that gets the stream in the given pieces.
+std::vector<Bytes> frames_of(const Bytes& stream, const std::vector<std::size_t>& cuts) {
+  std::vector<Bytes> frames;
+  Bytes buffer;
+  std::size_t from = 0;
+  for (const std::size_t cut : cuts) {
+    buffer.insert(buffer.end(), stream.begin() + static_cast<std::ptrdiff_t>(from),
+                  stream.begin() + static_cast<std::ptrdiff_t>(cut));
+    from = cut;
+    std::size_t at = 0;
+    for (;;) {
+      const auto next = next_run(buffer.data() + at, buffer.data() + buffer.size(), kMax);
+      if (next.found != Found::run) break;
+      for (std::size_t end = at + next.run.size; at < end;) {
+        const std::size_t size = load_header(buffer.data() + at).frame_size();
+        frames.push_back(test::to_bytes(std::span<const std::byte>(buffer).subspan(at, size)));
+        at += size;
+      }
+    }
+    buffer.erase(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(at));
+  }
+  return frames;
+}
+
+TEST(NextRun, FindsTheSameFramesHoweverTheBytesAreSplit) {
+  std::mt19937 random(7);  // NOLINT: the same every time
+  Bytes stream;
+  for (int i = 0; i < 40; ++i) append_frame(stream, header_to(1 + random() % 2), random() % 40);
+  const auto whole = frames_of(stream, {stream.size()});
+  ASSERT_EQ(whole.size(), 40u);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::size_t> cuts;
+    for (std::size_t at = random() % 30; at < stream.size(); at += 1 + random() % 60) cuts.push_back(at);
+    cuts.push_back(stream.size());
+    EXPECT_EQ(frames_of(stream, cuts), whole);
+  }
+}
+
+// check_header_from_node()
+
+TEST(CheckHeader, AcceptsEveryLegalHeader) {
+  EXPECT_EQ(check_header_from_node(header_to(1)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 1)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 3 | kFlagKeyed)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::group, 3)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1, static_cast<Kind>(15))), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(0, Kind::ctrl)), FrameError::none);
+}
+
+TEST(CheckHeader, NamesEachCause) {
+  auto lane = header_to(1);
+  lane.lane = 4;
+  EXPECT_EQ(check_header_from_node(lane), FrameError::reserved_lane_bits);
+  auto hops = header_to(1);
+  hops.hops = 1;
+  EXPECT_EQ(check_header_from_node(hops), FrameError::hops_not_zero);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x40)), FrameError::reserved_flag_bits);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x80)), FrameError::reserved_flag_bits);
+  EXPECT_EQ(check_header_from_node(header_to(1, static_cast<Kind>(20))), FrameError::unknown_kind);
+  EXPECT_EQ(check_header_from_node(header_to(1, static_cast<Kind>(255))), FrameError::unknown_kind);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::report)), FrameError::kind_not_allowed);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::route)), FrameError::kind_not_allowed);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 3)), FrameError::latest_without_key);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::service, 3)), FrameError::latest_without_key);
+  for (const Kind kind : {Kind::group, Kind::list, Kind::broadcast}) {
+    EXPECT_EQ(check_header_from_node(header_to(1, kind, 1)), FrameError::block_not_allowed);
+  }
+}
+
+TEST(CheckHeader, BoundsTheRecipientsOfAList) {
+  EXPECT_EQ(check_header_from_node(header_to(0, Kind::list)), FrameError::list_count);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::list)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1024, Kind::list)), FrameError::none);
+  EXPECT_EQ(check_header_from_node(header_to(1025, Kind::list)), FrameError::list_count);
+}
+
+// parse_frame()
+
+TEST(ParseFrame, TakesTheExampleApart) {
+  const auto bytes = load_vector("frame/unicast");
+  const auto frame = parse_frame(bytes, Origin::node);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->header.length, 2u);
+  EXPECT_EQ(frame->header.dst, 0x00700012u);
+  EXPECT_EQ(frame->header.src, 0x00700011u);
+  EXPECT_EQ(frame->header.kind, Kind::unicast);
+  EXPECT_EQ(frame->header.lane, 1);
+  EXPECT_EQ(test::to_bytes(frame->payload), test::to_bytes("hi"));
+  EXPECT_FALSE(frame->fragment || frame->key);
+}
+
+TEST(ParseFrame, TakesEveryPartInItsOrder) {
+  const auto bytes = load_vector("frame/list_everything");
+  const auto frame = parse_frame(bytes, Origin::node);
+  ASSERT_TRUE(frame);
+  ASSERT_EQ(frame->recipients.size(), 1u);
+  EXPECT_EQ(frame->recipients[0], NodeId{0x00700012});
+  EXPECT_EQ(frame->extensions.size(), 3u);
+  EXPECT_EQ(frame->fragment, (FragmentHeader{9, 0, 2}));
+  EXPECT_EQ(frame->key, 0x0000000100000003u);
+  EXPECT_EQ(test::to_bytes(frame->payload), test::to_bytes("hi"));
+  EXPECT_EQ(frame->after_header.size(), frame->header.length);
+}
+
+TEST(ParseFrame, TakesTheRecipientsFrameOfAListFromAHub) {
+  const auto bytes = load_vector("frame/list_to_recipient");
+  const auto frame = parse_frame(bytes, Origin::hub);
+  ASSERT_TRUE(frame);
+  EXPECT_TRUE(frame->recipients.empty());
+  EXPECT_EQ(test::to_bytes(frame->payload), test::to_bytes("hi"));
+  EXPECT_EQ(error_of(bytes, Origin::node), FrameError::list_count);
+}
+
+TEST(ParseFrame, LetsAHubSendWhatANodeMayNot) {
+  const auto report = load_vector("frame/report");
+  EXPECT_EQ(error_of(report, Origin::hub), FrameError::none);
+  EXPECT_EQ(error_of(report, Origin::node), FrameError::kind_not_allowed);
+  auto hops = load_vector("frame/unicast");
+  hops[14] = std::byte{63};
+  hops[13] = std::byte{0xC0};
+  EXPECT_EQ(error_of(hops, Origin::hub), FrameError::none);
+}
+
+TEST(ParseFrame, TakesEveryVectorAndRefusesEachThatIsCut) {
+  for (const std::string folder : {"frame", "flow", "gimi", "ns", "ctrl"}) {
+    for (const auto& name : test::vectors_in(folder)) {
+      const auto bytes = load_vector(name);
+      EXPECT_EQ(error_of(bytes, Origin::hub), FrameError::none) << name;
+      for (std::size_t size = 0; size < bytes.size(); ++size) {
+        const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+        EXPECT_EQ(error_of(cut, Origin::hub), FrameError::incomplete) << name << " at " << size;
+      }
+    }
+  }
+}
+
+/// The frame with its length, and so its payload, cut to `length`.
+Bytes shortened(Bytes frame, std::uint32_t length) {
+  store_le(frame.data(), length);
+  frame.resize(kHeaderSize + length);
+  return frame;
+}
+
+TEST(ParseFrame, NamesWhatDoesNotFit) {
+  // ids 4, EXT 2 + 3, fragment header 12, key 8, payload 2
+  const auto frame = load_vector("frame/list_everything");
+  EXPECT_EQ(error_of(shortened(frame, 3)), FrameError::list_too_short);
+  EXPECT_EQ(error_of(shortened(frame, 5)), FrameError::ext_too_short);
+  EXPECT_EQ(error_of(shortened(frame, 8)), FrameError::ext_too_short);
+  EXPECT_EQ(error_of(shortened(frame, 20)), FrameError::fragment_too_short);
+  EXPECT_EQ(error_of(shortened(frame, 28)), FrameError::key_too_short);
+  EXPECT_EQ(error_of(shortened(frame, 29)), FrameError::fragment_empty);
+  EXPECT_EQ(error_of(shortened(frame, 31)), FrameError::none);
+}
+
+TEST(ParseFrame, RefusesAnExtensionThatDoesNotFit) {
+  auto frame = load_vector("frame/list_everything");
+  frame[kHeaderSize + 4 + 2 + 1] = std::byte{2};  // the PAD's length: one more than EXT has
+  EXPECT_EQ(error_of(frame), FrameError::ext_too_short);
+}
+
+TEST(ParseFrame, ChecksFragmentsAgainstTheirTotal) {
+  auto frame = load_vector("frame/fragment_last");  // message 9, offset 3, total 6, payload 3
+  EXPECT_EQ(error_of(frame), FrameError::none);
+  store_fragment_header(frame.data() + kHeaderSize, {9, 4, 6});
+  EXPECT_EQ(error_of(frame), FrameError::fragment_over_total);
+  store_fragment_header(frame.data() + kHeaderSize, {9, UINT32_MAX - 2, UINT32_MAX});
+  EXPECT_EQ(error_of(frame), FrameError::fragment_over_total) << "offset + payload does not wrap";
+  store_fragment_header(frame.data() + kHeaderSize, {9, UINT32_MAX - 3, UINT32_MAX});
+  EXPECT_EQ(error_of(frame), FrameError::none);
+}
+
+TEST(ParseFrame, RefusesAListThatIsNotStrictlyAscending) {
+  auto frame = load_vector("frame/list_from_node");
+  EXPECT_EQ(error_of(frame), FrameError::none);
+  store_le(frame.data() + kHeaderSize + 4, std::uint32_t{0x00700012});
+  EXPECT_EQ(error_of(frame), FrameError::list_not_ascending) << "repeated";
+  store_le(frame.data() + kHeaderSize + 4, std::uint32_t{0x00700011});
+  EXPECT_EQ(error_of(frame), FrameError::list_not_ascending) << "descending";
+}
+
+TEST(ParseFrame, TakesAListOf1024) {
+  std::vector<NodeId> ids;
+  for (std::uint32_t i = 1; i <= kListRecipientsMax; ++i) ids.push_back(NodeId{i});
+  FrameParts parts;
+  parts.header = header_to(0, Kind::list);
+  parts.recipients = ids;
+  Bytes frame(prefix_size(parts));
+  ASSERT_EQ(write_frame(parts, {}, frame), frame.size());
+  const auto parsed = parse_frame(frame, Origin::node);
+  ASSERT_TRUE(parsed);
+  EXPECT_EQ(parsed->recipients.size(), kListRecipientsMax);
+  EXPECT_EQ(parsed->recipients[1023], NodeId{1024});
+}
+
+TEST(FrameErrorText, SaysEachCause) {
+  for (std::size_t i = 0; i < kFrameErrorCount; ++i) {
+    EXPECT_STRNE(frame_error_text(static_cast<FrameError>(i)), "unknown error");
+  }
+  EXPECT_STREQ(frame_error_text(FrameError::fragment_over_total), "a fragment ends after the message's total");
+  EXPECT_STREQ(frame_error_text(static_cast<FrameError>(kFrameErrorCount)), "unknown error");
+}
+
+}  // namespace
+}  // namespace gimnet::proto
