@@ -1,0 +1,50 @@
+#include "proto/control/control_message.hpp"
+
+#include <cstring>
+
+namespace gimnet::proto {
+namespace {
+
+constexpr std::size_t kStatusCount = 7;
+
+}  // namespace
+
+const char* status_name(Status status) {
+  constexpr const char* kNames[kStatusCount] = {"done",  "not_supported", "bad_request", "not_found",
+                                                "taken", "denied",        "limit"};
+  const auto index = static_cast<std::size_t>(status);
+  return index < kStatusCount ? kNames[index] : "unknown";
+}
+
+std::optional<ControlView> split_control(std::span<const std::byte> payload) {
+  if (payload.size() < kControlHeaderSize) return std::nullopt;
+  const ControlHeader header{load_le<std::uint16_t>(payload.data()), load_le<std::uint16_t>(payload.data() + 2)};
+  return ControlView{header, payload.subspan(kControlHeaderSize)};
+}
+
+Payload assemble_control(ControlHeader header, const bitestream::Writer& body) {
+  // What the structs write is within the limits of Bitestream; anything else is a mistake in this program.
+  GIMNET_CHECK(body.finish() == BITESTREAM_OK);
+  Payload payload(kControlHeaderSize + body.size());
+  store_le(payload.data(), header.operation);
+  store_le(payload.data() + 2, header.request);
+  if (body.size() != 0) std::memcpy(payload.data() + kControlHeaderSize, body.bytes().data(), body.size());
+  return payload;
+}
+
+Payload encode_refusal(ControlHeader request, const Refusal& refusal) {
+  bitestream::Writer body;
+  body.put_u16(kStatusKey, static_cast<std::uint16_t>(refusal.status));
+  put_clean_text(body, kSentenceKey, refusal.sentence, kSentenceBytesMax);
+  return assemble_control({static_cast<std::uint16_t>(request.operation | kAnswerBit), request.request}, body);
+}
+
+Refusal read_status(std::span<const std::byte> body) {
+  Fields fields(body, "answer");
+  const auto status = fields.required_number<std::uint16_t>(kStatusKey, "status");
+  std::string sentence = fields.text(kSentenceKey, "sentence", kSentenceBytesMax);
+  if (fields.failed()) return {Status::bad_request, fields.error().sentence};
+  return {static_cast<Status>(status), std::move(sentence)};
+}
+
+}  // namespace gimnet::proto

@@ -1,0 +1,115 @@
+#include "proto/control/ctrl.hpp"
+
+#include "proto/control/names.hpp"
+
+// The numbers are the keys in the table of docs/protocol.md, section 9; what a message writes and what it reads stand
+// side by side.
+
+namespace gimnet::proto::ctrl {
+namespace {
+
+/// Heads, keys, lengths and numbers of any record.
+constexpr std::size_t kRecordOverhead = 128;
+
+std::vector<Counter> read_counters(Fields& counters) {
+  std::vector<Counter> found;
+  bitestream::Reader reader = counters.reader();
+  while (const auto value = reader.next()) {
+    const auto count = value->as<std::uint64_t>();
+    if (value->key().is_text() && count) found.push_back({std::string(value->key().text()), *count});
+  }
+  return found;
+}
+
+}  // namespace
+
+void HubInfoAnswer::write(bitestream::Writer& writer) const {
+  writer.put_u16(3, hub.value());
+  put_clean_text(writer, 4, hub_name, kNameBytesMax);
+  put_clean_text(writer, 5, version, kRemarkBytesMax);
+  writer.put_u32(6, shards);
+  writer.put_u64(7, uptime_ms);
+  writer.put_u32(8, nodes);
+  writer.put_u32(9, services);
+}
+HubInfoAnswer HubInfoAnswer::read(Fields& fields) {
+  HubInfoAnswer answer;
+  answer.hub = HubId{fields.required_number<std::uint16_t>(3, "hub id")};
+  answer.hub_name = fields.text(4, "hub name", kNameBytesMax);
+  answer.version = fields.text(5, "version", kRemarkBytesMax);
+  answer.shards = fields.number<std::uint32_t>(6, "number of shards", 0);
+  answer.uptime_ms = fields.number<std::uint64_t>(7, "uptime", 0);
+  answer.nodes = fields.number<std::uint32_t>(8, "number of nodes", 0);
+  answer.services = fields.number<std::uint32_t>(9, "number of services", 0);
+  return answer;
+}
+
+void StatisticsAnswer::write(bitestream::Writer& writer) const {
+  for (const ShardRecord& record : shards) {
+    writer.begin_nested(3);
+    writer.put_u16(1, record.shard);
+    writer.begin_nested(2);
+    for (const Counter& counter : record.counters) writer.put_u64(std::string_view(counter.name), counter.value);
+    writer.end_nested();
+    writer.end_nested();
+  }
+}
+StatisticsAnswer StatisticsAnswer::read(Fields& fields) {
+  StatisticsAnswer answer;
+  answer.shards = fields.records<ShardRecord>(3, "shard record", [](Fields& record) {
+    ShardRecord shard;
+    shard.shard = record.required_number<std::uint16_t>(1, "shard");
+    const auto counters = record.records<std::vector<Counter>>(2, "counters", read_counters);
+    for (const auto& some : counters) shard.counters.insert(shard.counters.end(), some.begin(), some.end());
+    return shard;
+  });
+  return answer;
+}
+
+void Connections::write(bitestream::Writer& writer) const {
+  if (after.value() != 0) writer.put_u32(4, after.value());
+  if (records_max != kPageRecordsDefault) writer.put_u32(5, records_max);
+}
+Connections Connections::read(Fields& fields) {
+  Connections connections;
+  connections.after = NodeId{fields.number<std::uint32_t>(4, "node id to continue after", 0)};
+  connections.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  return connections;
+}
+
+std::size_t page_bytes_max(const ConnectionRecord& record) {
+  return kRecordOverhead + record.name.size() + record.transport.size() + record.peer.size();
+}
+
+void ConnectionsAnswer::write(bitestream::Writer& writer) const {
+  for (const ConnectionRecord& record : connections) {
+    writer.begin_nested(3);
+    writer.put_u32(1, record.node.value());
+    put_clean_text(writer, 2, record.name, kNameBytesMax);
+    writer.put_u16(3, record.shard);
+    put_clean_text(writer, 4, record.transport, kRemarkBytesMax);
+    put_clean_text(writer, 5, record.peer, kRemarkBytesMax);
+    writer.put_bool(6, record.connected);
+    writer.put_u64(7, record.queued_bytes);
+    writer.end_nested();
+  }
+  writer.put_bool(4, more);
+}
+ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
+  ConnectionsAnswer answer;
+  answer.connections = fields.records<ConnectionRecord>(3, "record", [](Fields& record) {
+    ConnectionRecord connection;
+    connection.node = NodeId{record.required_number<std::uint32_t>(1, "node id")};
+    connection.name = record.text(2, "name", kNameBytesMax);
+    connection.shard = record.number<std::uint16_t>(3, "shard", 0);
+    connection.transport = record.text(4, "transport", kRemarkBytesMax);
+    connection.peer = record.text(5, "peer", kRemarkBytesMax);
+    connection.connected = record.flag(6, "connected", false);
+    connection.queued_bytes = record.number<std::uint64_t>(7, "number of queued bytes", 0);
+    return connection;
+  });
+  answer.more = fields.flag(4, "more", false);
+  return answer;
+}
+
+}  // namespace gimnet::proto::ctrl

@@ -1,0 +1,171 @@
+#include "proto/control/link.hpp"
+
+#include <algorithm>
+
+#include "proto/control/names.hpp"
+
+namespace gimnet::proto {
+namespace {
+
+constexpr std::size_t kVersionOffset = 6;
+
+// Keys of HELLO and of WELCOME.
+namespace hello_key {
+enum : std::uint32_t {
+  role = 1,
+  name,
+  token,
+  epoch,
+  resume,
+  frame_length_max,
+  features,
+  description,
+  resume_epoch,
+  resume_taken,
+  shard,
+  resume_buffer_bytes,
+};
+}  // namespace hello_key
+
+namespace welcome_key {
+enum : std::uint32_t {
+  node = 1,
+  token,
+  hub,
+  hub_name,
+  epoch,
+  frame_length_max,
+  features,
+  keep_alive_ms,
+  silent_ms,
+  hub_time,
+  resumed,
+  taken,
+  resume_buffer_bytes,
+  grace_ms,
+  name_provisional,
+  last_goodbye_code,
+  last_goodbye_sentence,
+  name,
+};
+}  // namespace welcome_key
+
+namespace goodbye_key {
+enum : std::uint32_t { code = 1, sentence };
+}  // namespace goodbye_key
+
+}  // namespace
+
+Opening check_opening(std::span<const std::byte> bytes) {
+  const std::size_t mark = std::min(bytes.size(), kVersionOffset);
+  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(mark), kOpening.begin())) {
+    return Opening::other_protocol;
+  }
+  if (bytes.size() > kVersionOffset && bytes[kVersionOffset] != std::byte{kVersionMajor}) return Opening::bad_version;
+  return bytes.size() < kOpeningSize ? Opening::need_more : Opening::accepted;
+}
+
+void Hello::write(bitestream::Writer& writer) const {
+  namespace key = hello_key;
+  writer.put_u8(key::role, static_cast<std::uint8_t>(role));
+  put_clean_text(writer, key::name, name, kAdmissionBytesMax);
+  writer.put_opaque(key::token, token);
+  writer.put_u64(key::epoch, epoch);
+  writer.put_bool(key::resume, resume);
+  writer.put_u32(key::frame_length_max, frame_length_max);
+  writer.put_u64(key::features, features);
+  put_clean_text(writer, key::description, description, kDescriptionBytesMax);
+  if (resume_epoch != 0) writer.put_u64(key::resume_epoch, resume_epoch);
+  if (resume_taken != 0) writer.put_u64(key::resume_taken, resume_taken);
+  if (shard) writer.put_u16(key::shard, *shard);
+  writer.put_u32(key::resume_buffer_bytes, resume_buffer_bytes);
+}
+
+Hello Hello::read(Fields& fields) {
+  namespace key = hello_key;
+  Hello hello;
+  hello.role = static_cast<Role>(fields.number<std::uint8_t>(key::role, "role", 0));
+  // Longer names than are allowed pass, so that they are answered with bad_name.
+  hello.name = fields.text(key::name, "name", kAdmissionBytesMax);
+  hello.token = fields.opaque(key::token, "session token", kTokenBytesMax);
+  hello.epoch = fields.number<std::uint64_t>(key::epoch, "epoch", 0);
+  hello.resume = fields.flag(key::resume, "resume wish", false);
+  hello.frame_length_max = fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
+  hello.features = fields.number<std::uint64_t>(key::features, "feature set", 0);
+  hello.description = fields.text(key::description, "description", kDescriptionBytesMax);
+  hello.resume_epoch = fields.number<std::uint64_t>(key::resume_epoch, "hub epoch", 0);
+  hello.resume_taken = fields.number<std::uint64_t>(key::resume_taken, "count of frames taken", 0);
+  if (fields.has(key::shard)) hello.shard = fields.number<std::uint16_t>(key::shard, "shard", 0);
+  hello.resume_buffer_bytes =
+      fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", kResumeBufferDefault);
+  return hello;
+}
+
+void Welcome::write(bitestream::Writer& writer) const {
+  namespace key = welcome_key;
+  writer.put_u32(key::node, node.value());
+  writer.put_opaque(key::token, token);
+  writer.put_u16(key::hub, hub.value());
+  put_clean_text(writer, key::hub_name, hub_name, kNameBytesMax);
+  writer.put_u64(key::epoch, epoch);
+  writer.put_u32(key::frame_length_max, frame_length_max);
+  writer.put_u64(key::features, features);
+  writer.put_u32(key::keep_alive_ms, keep_alive_ms);
+  writer.put_u32(key::silent_ms, silent_ms);
+  writer.put_time(key::hub_time, hub_time_ns);
+  writer.put_bool(key::resumed, resumed);
+  writer.put_u64(key::taken, taken);
+  writer.put_u32(key::resume_buffer_bytes, resume_buffer_bytes);
+  writer.put_u32(key::grace_ms, grace_ms);
+  writer.put_bool(key::name_provisional, name_provisional);
+  if (last_goodbye_code != 0) writer.put_u16(key::last_goodbye_code, last_goodbye_code);
+  put_clean_text(writer, key::last_goodbye_sentence, last_goodbye_sentence, kSentenceBytesMax);
+  put_clean_text(writer, key::name, name, kNameBytesMax);
+}
+
+Welcome Welcome::read(Fields& fields) {
+  namespace key = welcome_key;
+  Welcome welcome;
+  welcome.node = NodeId{fields.required_number<std::uint32_t>(key::node, "node id")};
+  welcome.token = fields.opaque(key::token, "session token", kTokenBytesMax);
+  welcome.hub = HubId{fields.required_number<std::uint16_t>(key::hub, "hub id")};
+  welcome.hub_name = fields.text(key::hub_name, "hub name", kNameBytesMax);
+  welcome.epoch = fields.number<std::uint64_t>(key::epoch, "epoch", 0);
+  welcome.frame_length_max = fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
+  welcome.features = fields.number<std::uint64_t>(key::features, "feature set", 0);
+  welcome.keep_alive_ms = fields.number<std::uint32_t>(key::keep_alive_ms, "keep-alive interval", 0);
+  welcome.silent_ms = fields.number<std::uint32_t>(key::silent_ms, "silent time", 0);
+  welcome.hub_time_ns = fields.time(key::hub_time, "hub time");
+  welcome.resumed = fields.flag(key::resumed, "resumed", false);
+  welcome.taken = fields.number<std::uint64_t>(key::taken, "count of frames taken", 0);
+  welcome.resume_buffer_bytes = fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", 0);
+  welcome.grace_ms = fields.number<std::uint32_t>(key::grace_ms, "grace time", 0);
+  welcome.name_provisional = fields.flag(key::name_provisional, "provisional name", false);
+  welcome.last_goodbye_code = fields.number<std::uint16_t>(key::last_goodbye_code, "last GOODBYE", 0);
+  welcome.last_goodbye_sentence = fields.text(key::last_goodbye_sentence, "last sentence", kSentenceBytesMax);
+  welcome.name = fields.text(key::name, "name", kNameBytesMax);
+  return welcome;
+}
+
+const char* goodbye_name(GoodbyeCode code) {
+  constexpr const char* kNames[kGoodbyeCount] = {
+      "done",        "bad_version",       "malformed",     "hello_timeout", "name_taken",    "bad_name",
+      "hub_full",    "draining",          "replaced",      "silent",        "slow_consumer", "wrong_source",
+      "not_allowed", "too_many_requests", "stalled_frame", "kicked",        "no_memory"};
+  const auto index = static_cast<std::size_t>(code);
+  return index < kGoodbyeCount ? kNames[index] : "unknown";
+}
+
+void Goodbye::write(bitestream::Writer& writer) const {
+  writer.put_u16(goodbye_key::code, static_cast<std::uint16_t>(code));
+  put_clean_text(writer, goodbye_key::sentence, sentence, kSentenceBytesMax);
+}
+
+Goodbye Goodbye::read(Fields& fields) {
+  Goodbye goodbye;
+  goodbye.code = static_cast<GoodbyeCode>(fields.required_number<std::uint16_t>(goodbye_key::code, "code"));
+  goodbye.sentence = fields.text(goodbye_key::sentence, "sentence", kSentenceBytesMax);
+  return goodbye;
+}
+
+}  // namespace gimnet::proto

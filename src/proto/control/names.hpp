@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+// Names of nodes and services, and patterns over them (docs/protocol.md, section 8).
+// Thread safety: pure functions. Cost: linear in the name, at most 16 x 16 comparisons of parts for a pattern.
+
+namespace gimnet::proto {
+
+inline constexpr std::size_t kNameBytesMax = 255;
+inline constexpr std::size_t kNamePartsMax = 16;
+
+/// What is wrong with a name, as a clause for a sentence ("it has an empty part"); nullptr: nothing is.
+[[nodiscard]] const char* name_fault(std::string_view name);
+[[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
+
+/// A name, of which parts may be `*` (one part) or `**` (any number, none included).
+[[nodiscard]] bool valid_pattern(std::string_view pattern);
+
+/// Does the whole name fit the pattern? False where one of them is not valid.
+[[nodiscard]] bool matches(std::string_view pattern, std::string_view name);
+
+/// `node` is all before the last '/', `service` the part after it; without '/', both are empty.
+struct ServiceName {
+  std::string_view node;
+  std::string_view service;
+};
+[[nodiscard]] ServiceName split_service_name(std::string_view full_name);
+[[nodiscard]] std::string join_service_name(std::string_view node, std::string_view service);
+
+/// The name of a service within its node: a valid name of one part.
+[[nodiscard]] bool valid_service_name(std::string_view service);
+
+}  // namespace gimnet::proto

@@ -1,0 +1,275 @@
+#include "proto/control/ns.hpp"
+
+#include "proto/control/names.hpp"
+
+// The numbers are the keys in the tables of docs/protocol.md, section 8; what a message writes and what it reads stand
+// side by side.
+
+namespace gimnet::proto::ns {
+namespace {
+
+/// Heads, keys, lengths and numbers of any record.
+constexpr std::size_t kRecordOverhead = 160;
+
+std::string read_name(Fields& fields, std::uint32_t key, const char* name) {
+  return fields.required_text(key, name, kNameBytesMax);
+}
+
+template <class Id>
+Id read_id(Fields& fields, std::uint32_t key, const char* name) {
+  return Id{fields.number<std::uint32_t>(key, name, 0)};
+}
+
+template <class Id>
+Id read_required_id(Fields& fields, std::uint32_t key, const char* name) {
+  return Id{fields.required_number<std::uint32_t>(key, name)};
+}
+
+template <class Choice>
+Choice read_choice(Fields& fields, std::uint32_t key, const char* name) {
+  return static_cast<Choice>(fields.number<std::uint8_t>(key, name, 0));
+}
+
+/// For requests, where a hub has to understand the choice.
+template <class Choice>
+Choice read_known_choice(Fields& fields, std::uint32_t key, const char* name, Choice last) {
+  const auto choice = read_choice<Choice>(fields, key, name);
+  if (choice <= last) return choice;
+  fields.fail(std::string("has an unknown ") + name);
+  return Choice{};
+}
+
+template <class Choice>
+void put_choice(bitestream::Writer& writer, std::uint32_t key, Choice choice) {
+  writer.put_u8(key, static_cast<std::uint8_t>(choice));
+}
+
+void write_page_request(bitestream::Writer& writer, const std::string& pattern, std::uint32_t after,
+                        std::uint32_t records_max) {
+  put_clean_text(writer, 3, pattern, kSentenceBytesMax);
+  if (after != 0) writer.put_u32(4, after);
+  if (records_max != kPageRecordsDefault) writer.put_u32(5, records_max);
+}
+
+}  // namespace
+
+void Resolve::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+Resolve Resolve::read(Fields& fields) { return {read_name(fields, 3, "name")}; }
+
+void ResolveAnswer::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
+ResolveAnswer ResolveAnswer::read(Fields& fields) { return {read_required_id<NodeId>(fields, 3, "node id")}; }
+
+void Reverse::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
+Reverse Reverse::read(Fields& fields) { return {read_required_id<NodeId>(fields, 3, "node id")}; }
+
+void ReverseAnswer::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kNameBytesMax);
+  writer.put_u32(4, node.value());
+}
+ReverseAnswer ReverseAnswer::read(Fields& fields) {
+  ReverseAnswer answer;
+  answer.name = fields.text(3, "name", kNameBytesMax);
+  answer.node = read_required_id<NodeId>(fields, 4, "node id");
+  return answer;
+}
+
+void List::write(bitestream::Writer& writer) const { write_page_request(writer, pattern, after.value(), records_max); }
+List List::read(Fields& fields) {
+  List list;
+  list.pattern = fields.text(3, "pattern", kNameBytesMax);
+  list.after = read_id<NodeId>(fields, 4, "node id to continue after");
+  list.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  return list;
+}
+
+std::size_t page_bytes_max(const NodeRecord& record) {
+  return kRecordOverhead + record.name.size() + record.hub_name.size() + record.description.size() +
+         record.place.size();
+}
+
+void ListAnswer::write(bitestream::Writer& writer) const {
+  for (const NodeRecord& record : nodes) {
+    writer.begin_nested(3);
+    writer.put_u32(1, record.node.value());
+    put_clean_text(writer, 2, record.name, kNameBytesMax);
+    writer.put_u16(3, record.hub.value());
+    put_clean_text(writer, 4, record.hub_name, kNameBytesMax);
+    writer.put_bool(5, record.connected);
+    put_clean_text(writer, 6, record.description, kDescriptionBytesMax);
+    put_clean_text(writer, 7, record.place, kRemarkBytesMax);
+    writer.put_u64(8, record.joined_ms);
+    writer.put_u32(9, record.services);
+    writer.end_nested();
+  }
+  writer.put_bool(4, more);
+}
+ListAnswer ListAnswer::read(Fields& fields) {
+  ListAnswer answer;
+  answer.nodes = fields.records<NodeRecord>(3, "record", [](Fields& record) {
+    NodeRecord node;
+    node.node = read_required_id<NodeId>(record, 1, "node id");
+    node.name = record.text(2, "name", kNameBytesMax);
+    node.hub = HubId{record.number<std::uint16_t>(3, "hub id", 0)};
+    node.hub_name = record.text(4, "hub name", kNameBytesMax);
+    node.connected = record.flag(5, "connected", false);
+    node.description = record.text(6, "description", kDescriptionBytesMax);
+    node.place = record.text(7, "place", kRemarkBytesMax);
+    node.joined_ms = record.number<std::uint64_t>(8, "time since it joined", 0);
+    node.services = record.number<std::uint32_t>(9, "number of services", 0);
+    return node;
+  });
+  answer.more = fields.flag(4, "more", false);
+  return answer;
+}
+
+void Advertise::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, service, kSentenceBytesMax);
+  writer.put_u32(4, message_type);
+  writer.put_u32(5, instance);
+  put_choice(writer, 6, direction);
+  put_choice(writer, 7, delivery);
+  put_clean_text(writer, 8, metadata, kMetadataBytesMax);
+  if (former_group.value() != 0) writer.put_u32(9, former_group.value());
+}
+Advertise Advertise::read(Fields& fields) {
+  Advertise advertise;
+  advertise.service = read_name(fields, 3, "service name");
+  advertise.message_type = fields.number<std::uint32_t>(4, "message type", 0);
+  advertise.instance = fields.number<std::uint32_t>(5, "instance", 0);
+  advertise.direction = read_known_choice(fields, 6, "direction", Direction::accepts);
+  advertise.delivery = read_known_choice(fields, 7, "delivery", Delivery::latest);
+  advertise.metadata = fields.text(8, "metadata", kMetadataBytesMax);
+  advertise.former_group = read_id<GroupId>(fields, 9, "former group id");
+  return advertise;
+}
+
+void AdvertiseAnswer::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, group.value());
+  writer.put_u32(4, subscribers);
+}
+AdvertiseAnswer AdvertiseAnswer::read(Fields& fields) {
+  AdvertiseAnswer answer;
+  answer.group = read_required_id<GroupId>(fields, 3, "group id");
+  answer.subscribers = fields.number<std::uint32_t>(4, "number of subscribers", 0);
+  return answer;
+}
+
+void Withdraw::write(bitestream::Writer& writer) const { writer.put_u32(3, group.value()); }
+Withdraw Withdraw::read(Fields& fields) { return {read_required_id<GroupId>(fields, 3, "group id")}; }
+
+void Services::write(bitestream::Writer& writer) const {
+  write_page_request(writer, pattern, after.value(), records_max);
+}
+Services Services::read(Fields& fields) {
+  Services services;
+  services.pattern = fields.text(3, "pattern", kNameBytesMax);
+  services.after = read_id<GroupId>(fields, 4, "group id to continue after");
+  services.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  return services;
+}
+
+std::size_t page_bytes_max(const ServiceRecord& record) {
+  return kRecordOverhead + record.name.size() + record.metadata.size() + record.hub_name.size();
+}
+
+void ServicesAnswer::write(bitestream::Writer& writer) const {
+  for (const ServiceRecord& record : services) {
+    writer.begin_nested(3);
+    writer.put_u32(1, record.group.value());
+    put_clean_text(writer, 2, record.name, kNameBytesMax);
+    writer.put_u32(3, record.node.value());
+    writer.put_u32(4, record.message_type);
+    writer.put_u32(5, record.instance);
+    put_choice(writer, 6, record.direction);
+    put_choice(writer, 7, record.delivery);
+    put_clean_text(writer, 8, record.metadata, kMetadataBytesMax);
+    writer.put_u32(9, record.subscribers);
+    put_clean_text(writer, 10, record.hub_name, kNameBytesMax);
+    writer.end_nested();
+  }
+  writer.put_bool(4, more);
+}
+ServicesAnswer ServicesAnswer::read(Fields& fields) {
+  ServicesAnswer answer;
+  answer.services = fields.records<ServiceRecord>(3, "record", [](Fields& record) {
+    ServiceRecord service;
+    service.group = read_required_id<GroupId>(record, 1, "group id");
+    service.name = record.text(2, "name", kNameBytesMax);
+    service.node = read_id<NodeId>(record, 3, "node id");
+    service.message_type = record.number<std::uint32_t>(4, "message type", 0);
+    service.instance = record.number<std::uint32_t>(5, "instance", 0);
+    service.direction = read_choice<Direction>(record, 6, "direction");
+    service.delivery = read_choice<Delivery>(record, 7, "delivery");
+    service.metadata = record.text(8, "metadata", kMetadataBytesMax);
+    service.subscribers = record.number<std::uint32_t>(9, "number of subscribers", 0);
+    service.hub_name = record.text(10, "hub name", kNameBytesMax);
+    return service;
+  });
+  answer.more = fields.flag(4, "more", false);
+  return answer;
+}
+
+void Subscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+Subscribe Subscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
+
+void SubscribeAnswer::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, group.value());
+  writer.put_u32(4, message_type);
+  writer.put_u32(5, instance);
+  put_choice(writer, 7, delivery);
+}
+SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
+  SubscribeAnswer answer;
+  answer.group = read_id<GroupId>(fields, 3, "group id");
+  answer.message_type = fields.number<std::uint32_t>(4, "message type", 0);
+  answer.instance = fields.number<std::uint32_t>(5, "instance", 0);
+  answer.delivery = read_choice<Delivery>(fields, 7, "delivery");
+  return answer;
+}
+
+void Unsubscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+Unsubscribe Unsubscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
+
+void ServiceMoved::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kSentenceBytesMax);
+  writer.put_u32(4, old_group.value());
+  writer.put_u32(5, new_group.value());
+  writer.put_u32(6, message_type);
+  writer.put_u32(7, instance);
+  put_choice(writer, 8, delivery);
+}
+ServiceMoved ServiceMoved::read(Fields& fields) {
+  ServiceMoved moved;
+  moved.name = read_name(fields, 3, "full service name");
+  moved.old_group = read_id<GroupId>(fields, 4, "old group id");
+  moved.new_group = read_id<GroupId>(fields, 5, "new group id");
+  moved.message_type = fields.number<std::uint32_t>(6, "message type", 0);
+  moved.instance = fields.number<std::uint32_t>(7, "instance", 0);
+  moved.delivery = read_choice<Delivery>(fields, 8, "delivery");
+  return moved;
+}
+
+void SubscriberChange::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, group.value());
+  writer.put_u32(4, node.value());
+  writer.put_u32(5, subscribers);
+}
+void SubscriberChange::read_into(Fields& fields) {
+  group = read_required_id<GroupId>(fields, 3, "group id");
+  node = read_required_id<NodeId>(fields, 4, "node id");
+  subscribers = fields.number<std::uint32_t>(5, "number of subscribers", 0);
+}
+
+SubscriberJoined SubscriberJoined::read(Fields& fields) {
+  SubscriberJoined joined;
+  joined.read_into(fields);
+  return joined;
+}
+
+SubscriberLeft SubscriberLeft::read(Fields& fields) {
+  SubscriberLeft left;
+  left.read_into(fields);
+  return left;
+}
+
+}  // namespace gimnet::proto::ns

@@ -1,0 +1,285 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "proto/control/control_message.hpp"
+
+// HubNS, names and services: the payloads of NS frames (docs/protocol.md, section 8), one struct for each request,
+// answer and event. Encode and decode with the templates of control_message.hpp.
+// Thread safety: value types. Limits: names 255 bytes, metadata 4,096, descriptions and places 256.
+
+namespace gimnet::proto::ns {
+
+enum class Operation : std::uint16_t {
+  resolve = 3,
+  reverse = 4,
+  list = 5,
+  advertise = 7,
+  withdraw = 8,
+  services = 9,
+  subscribe = 10,
+  unsubscribe = 11,
+  service_moved = 32,
+  subscriber_joined = 33,
+  subscriber_left = 34,
+};
+
+[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) { return static_cast<std::uint16_t>(operation); }
+[[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
+  return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
+}
+
+enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
+enum class Delivery : std::uint8_t { stream = 0, latest = 1 };
+
+/// Records of one page, if the request does not say.
+inline constexpr std::uint32_t kPageRecordsDefault = 256;
+
+// RESOLVE: which node has that name?
+
+struct Resolve {
+  static constexpr std::uint16_t kOperation = request_of(Operation::resolve);
+  static constexpr const char* kName = "RESOLVE";
+  std::string name;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Resolve read(Fields& fields);
+  friend bool operator==(const Resolve&, const Resolve&) = default;
+};
+
+struct ResolveAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::resolve);
+  static constexpr const char* kName = "answer to RESOLVE";
+  NodeId node;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ResolveAnswer read(Fields& fields);
+  friend bool operator==(const ResolveAnswer&, const ResolveAnswer&) = default;
+};
+
+// REVERSE: which name has that node?
+
+struct Reverse {
+  static constexpr std::uint16_t kOperation = request_of(Operation::reverse);
+  static constexpr const char* kName = "REVERSE";
+  NodeId node;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Reverse read(Fields& fields);
+  friend bool operator==(const Reverse&, const Reverse&) = default;
+};
+
+struct ReverseAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::reverse);
+  static constexpr const char* kName = "answer to REVERSE";
+  std::string name;  ///< empty: the node has none
+  NodeId node;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ReverseAnswer read(Fields& fields);
+  friend bool operator==(const ReverseAnswer&, const ReverseAnswer&) = default;
+};
+
+// LIST: nodes by pattern, in pages of ascending ids
+
+struct List {
+  static constexpr std::uint16_t kOperation = request_of(Operation::list);
+  static constexpr const char* kName = "LIST";
+  std::string pattern;  ///< empty: all
+  NodeId after;         ///< continue after this one; 0: from the start
+  std::uint32_t records_max = kPageRecordsDefault;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static List read(Fields& fields);
+  friend bool operator==(const List&, const List&) = default;
+};
+
+struct NodeRecord {
+  NodeId node;
+  std::string name;
+  HubId hub;
+  std::string hub_name;
+  bool connected = false;
+  std::string description;
+  std::string place;            ///< address of the peer
+  std::uint64_t joined_ms = 0;  ///< ms since it joined
+  std::uint32_t services = 0;   ///< provided
+  friend bool operator==(const NodeRecord&, const NodeRecord&) = default;
+};
+/// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.
+[[nodiscard]] std::size_t page_bytes_max(const NodeRecord& record);
+
+struct ListAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::list);
+  static constexpr const char* kName = "answer to LIST";
+  std::vector<NodeRecord> nodes;
+  bool more = false;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ListAnswer read(Fields& fields);
+  friend bool operator==(const ListAnswer&, const ListAnswer&) = default;
+};
+
+// ADVERTISE and WITHDRAW: a service of mine
+
+struct Advertise {
+  static constexpr std::uint16_t kOperation = request_of(Operation::advertise);
+  static constexpr const char* kName = "ADVERTISE";
+  std::string service;  ///< within the node, without '/'
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  Direction direction = Direction::provides;
+  Delivery delivery = Delivery::stream;
+  std::string metadata;
+  GroupId former_group;  ///< from before a reconnect; 0: none
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Advertise read(Fields& fields);
+  friend bool operator==(const Advertise&, const Advertise&) = default;
+};
+
+struct AdvertiseAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::advertise);
+  static constexpr const char* kName = "answer to ADVERTISE";
+  GroupId group;
+  std::uint32_t subscribers = 0;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static AdvertiseAnswer read(Fields& fields);
+  friend bool operator==(const AdvertiseAnswer&, const AdvertiseAnswer&) = default;
+};
+
+struct Withdraw {
+  static constexpr std::uint16_t kOperation = request_of(Operation::withdraw);
+  static constexpr const char* kName = "WITHDRAW";
+  GroupId group;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Withdraw read(Fields& fields);
+  friend bool operator==(const Withdraw&, const Withdraw&) = default;
+};
+
+struct WithdrawAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::withdraw);
+  static constexpr const char* kName = "answer to WITHDRAW";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static WithdrawAnswer read(Fields&) { return {}; }
+  friend bool operator==(const WithdrawAnswer&, const WithdrawAnswer&) = default;
+};
+
+// SERVICES: services by pattern over their full names, in pages of ascending group ids
+
+struct Services {
+  static constexpr std::uint16_t kOperation = request_of(Operation::services);
+  static constexpr const char* kName = "SERVICES";
+  std::string pattern;  ///< empty: all
+  GroupId after;        ///< continue after this one; 0: from the start
+  std::uint32_t records_max = kPageRecordsDefault;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Services read(Fields& fields);
+  friend bool operator==(const Services&, const Services&) = default;
+};
+
+struct ServiceRecord {
+  GroupId group;
+  std::string name;  ///< full
+  NodeId node;
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  Direction direction = Direction::provides;  ///< as sent: may be a value that is not listed
+  Delivery delivery = Delivery::stream;       ///< as sent: may be a value that is not listed
+  std::string metadata;
+  std::uint32_t subscribers = 0;
+  std::string hub_name;
+  friend bool operator==(const ServiceRecord&, const ServiceRecord&) = default;
+};
+/// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.
+[[nodiscard]] std::size_t page_bytes_max(const ServiceRecord& record);
+
+struct ServicesAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::services);
+  static constexpr const char* kName = "answer to SERVICES";
+  std::vector<ServiceRecord> services;
+  bool more = false;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ServicesAnswer read(Fields& fields);
+  friend bool operator==(const ServicesAnswer&, const ServicesAnswer&) = default;
+};
+
+// SUBSCRIBE and UNSUBSCRIBE: a service by its full name, which need not exist yet
+
+struct Subscribe {
+  static constexpr std::uint16_t kOperation = request_of(Operation::subscribe);
+  static constexpr const char* kName = "SUBSCRIBE";
+  std::string name;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Subscribe read(Fields& fields);
+  friend bool operator==(const Subscribe&, const Subscribe&) = default;
+};
+
+struct SubscribeAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::subscribe);
+  static constexpr const char* kName = "answer to SUBSCRIBE";
+  GroupId group;  ///< 0: no such service yet
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static SubscribeAnswer read(Fields& fields);
+  friend bool operator==(const SubscribeAnswer&, const SubscribeAnswer&) = default;
+};
+
+struct Unsubscribe {
+  static constexpr std::uint16_t kOperation = request_of(Operation::unsubscribe);
+  static constexpr const char* kName = "UNSUBSCRIBE";
+  std::string name;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Unsubscribe read(Fields& fields);
+  friend bool operator==(const Unsubscribe&, const Unsubscribe&) = default;
+};
+
+struct UnsubscribeAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::unsubscribe);
+  static constexpr const char* kName = "answer to UNSUBSCRIBE";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static UnsubscribeAnswer read(Fields&) { return {}; }
+  friend bool operator==(const UnsubscribeAnswer&, const UnsubscribeAnswer&) = default;
+};
+
+// Events
+
+/// To subscribers, before the first frame under a new group id.
+struct ServiceMoved {
+  static constexpr std::uint16_t kOperation = request_of(Operation::service_moved);
+  static constexpr const char* kName = "SERVICE_MOVED";
+  std::string name;   ///< full
+  GroupId old_group;  ///< 0: none
+  GroupId new_group;  ///< 0: withdrawn
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ServiceMoved read(Fields& fields);
+  friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;
+};
+
+/// What happened to the subscribers of a service, told to its provider.
+struct SubscriberChange {
+  GroupId group;
+  NodeId node;
+  std::uint32_t subscribers = 0;  ///< now
+  void write(bitestream::Writer& writer) const;
+  void read_into(Fields& fields);
+  friend bool operator==(const SubscriberChange&, const SubscriberChange&) = default;
+};
+
+struct SubscriberJoined : SubscriberChange {
+  static constexpr std::uint16_t kOperation = request_of(Operation::subscriber_joined);
+  static constexpr const char* kName = "SUBSCRIBER_JOINED";
+  [[nodiscard]] static SubscriberJoined read(Fields& fields);
+  friend bool operator==(const SubscriberJoined&, const SubscriberJoined&) = default;
+};
+
+struct SubscriberLeft : SubscriberChange {
+  static constexpr std::uint16_t kOperation = request_of(Operation::subscriber_left);
+  static constexpr const char* kName = "SUBSCRIBER_LEFT";
+  [[nodiscard]] static SubscriberLeft read(Fields& fields);
+  friend bool operator==(const SubscriberLeft&, const SubscriberLeft&) = default;
+};
+
+}  // namespace gimnet::proto::ns

@@ -1,0 +1,68 @@
+#include "proto/gimi/message_header.hpp"
+
+#include "base/endian.hpp"
+
+namespace gimnet::proto::gimi {
+
+MessageHeader load_message_header(const std::byte* bytes) {
+  return {load_le<std::uint32_t>(bytes), static_cast<Operation>(bytes[4]), static_cast<std::uint8_t>(bytes[5]),
+          load_le<std::uint16_t>(bytes + 6)};
+}
+
+void store_message_header(std::byte* bytes, const MessageHeader& header) {
+  store_le(bytes, header.sequence);
+  bytes[4] = static_cast<std::byte>(header.operation);
+  bytes[5] = static_cast<std::byte>(header.flags);
+  store_le(bytes + 6, header.extension_bytes);
+}
+
+std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
+  if (payload.size() < kMessageHeaderSize) return std::nullopt;
+  MessageView view;
+  view.header = load_message_header(payload.data());
+  if (view.header.operation > Operation::pong) return std::nullopt;
+  const auto rest = payload.subspan(kMessageHeaderSize);
+  if (view.header.extension_bytes > rest.size()) return std::nullopt;
+  view.extension = rest.first(view.header.extension_bytes);
+  view.data = rest.subspan(view.header.extension_bytes);
+  if (view.header.has(kFlagTimestamp)) {
+#if !defined(GIMNET_BUG_TIMESTAMP_UNCHECKED)
+    if (view.extension.size() < kTimestampSize) return std::nullopt;
+#endif
+    view.timestamp_ns = load_le<std::int64_t>(view.extension.data());
+  }
+  return view;
+}
+
+std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
+                                 std::span<std::byte, kMessagePrefixMax> bytes) {
+  header.extension_bytes = timestamp_ns ? kTimestampSize : 0;
+  header.flags =
+      static_cast<std::uint8_t>(timestamp_ns ? header.flags | kFlagTimestamp : header.flags & ~kFlagTimestamp);
+  store_message_header(bytes.data(), header);
+  if (timestamp_ns) store_le(bytes.data() + kMessageHeaderSize, *timestamp_ns);
+  return kMessageHeaderSize + header.extension_bytes;
+}
+
+std::optional<Ack> decode_ack(std::span<const std::byte> data) {
+  if (data.size() < kAckSize) return std::nullopt;
+  return Ack{load_le<std::uint64_t>(data.data()), load_le<std::uint32_t>(data.data() + 8)};
+}
+
+void encode_ack(const Ack& ack, std::span<std::byte, kAckSize> data) {
+  store_le(data.data(), ack.bitmap);
+  store_le(data.data() + 8, ack.pong_sequence);
+}
+
+std::optional<Ping> decode_ping(std::span<const std::byte> data) {
+  if (data.size() < kPingTimeSize) return std::nullopt;
+  return Ping{load_le<std::int64_t>(data.data()), data.subspan(kPingTimeSize)};
+}
+
+std::optional<Failure> decode_failure(std::span<const std::byte> data) {
+  if (data.size() < kErrorStatusSize) return std::nullopt;
+  const auto text = data.subspan(kErrorStatusSize);
+  return Failure{load_le<std::uint16_t>(data.data()), {reinterpret_cast<const char*>(text.data()), text.size()}};
+}
+
+}  // namespace gimnet::proto::gimi

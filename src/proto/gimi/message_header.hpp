@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+// The header of GIMI messages: the first bytes of the payload of a KEYED frame (docs/protocol.md, section 7).
+// Thread safety: value types and pure functions.
+
+namespace gimnet::proto::gimi {
+
+inline constexpr std::size_t kMessageHeaderSize = 8;
+inline constexpr std::size_t kTimestampSize = 8;
+inline constexpr std::size_t kAckSize = 12;
+inline constexpr std::size_t kPingTimeSize = 8;
+inline constexpr std::size_t kErrorStatusSize = 2;
+
+/// The frame's key: which queue of the receiver a message belongs to.
+struct StreamKey {
+  std::uint32_t type = 0;
+  std::uint32_t instance = 0;
+
+  [[nodiscard]] constexpr std::uint64_t value() const { return type | (static_cast<std::uint64_t>(instance) << 32); }
+  [[nodiscard]] static constexpr StreamKey of(std::uint64_t key) {
+    return {static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32)};
+  }
+  friend constexpr bool operator==(const StreamKey&, const StreamKey&) = default;
+};
+
+enum class Operation : std::uint8_t { data = 0, ack = 1, request = 2, reply = 3, error = 4, ping = 5, pong = 6 };
+
+inline constexpr std::uint8_t kFlagAckWanted = 0x01;
+inline constexpr std::uint8_t kFlagTimestamp = 0x02;
+
+struct MessageHeader {
+  std::uint32_t sequence = 0;
+  Operation operation = Operation::data;
+  std::uint8_t flags = 0;
+  std::uint16_t extension_bytes = 0;
+  [[nodiscard]] constexpr bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
+  friend constexpr bool operator==(const MessageHeader&, const MessageHeader&) = default;
+};
+
+/// REQUIRES: 8 readable bytes.
+[[nodiscard]] MessageHeader load_message_header(const std::byte* bytes);
+/// REQUIRES: 8 writable bytes.
+void store_message_header(std::byte* bytes, const MessageHeader& header);
+
+/// A message taken apart. Valid until: its bytes change.
+struct MessageView {
+  MessageHeader header;
+  std::optional<std::int64_t> timestamp_ns;  ///< since 1970, where the flag is set
+  std::span<const std::byte> extension;      ///< all of it, the time stamp included
+  std::span<const std::byte> data;
+};
+
+/// Nothing: shorter than its header or extension, an unknown operation, or a time stamp flag without 8 bytes.
+[[nodiscard]] std::optional<MessageView> parse_message(std::span<const std::byte> payload);
+
+/// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it. Sets the flag and
+/// `extension_bytes` of the header. Returns the size, 8 or 16.
+inline constexpr std::size_t kMessagePrefixMax = kMessageHeaderSize + kTimestampSize;
+std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
+                                 std::span<std::byte, kMessagePrefixMax> bytes);
+
+/// Data of ACK. The header's sequence is the highest DATA sequence taken.
+struct Ack {
+  std::uint64_t bitmap = 0;         ///< bit i: sequence - 1 - i was taken too
+  std::uint32_t pong_sequence = 0;  ///< of the PONG that this repeats an ACK for, or 0
+  friend constexpr bool operator==(const Ack&, const Ack&) = default;
+};
+/// Nothing: too short. Bytes after the layout are skipped.
+[[nodiscard]] std::optional<Ack> decode_ack(std::span<const std::byte> data);
+void encode_ack(const Ack& ack, std::span<std::byte, kAckSize> data);
+
+/// Data of PING and, unchanged, of PONG. Valid until: its bytes change.
+struct Ping {
+  std::int64_t sent_ns = 0;  ///< the pinger's clock
+  std::span<const std::byte> echo;
+};
+/// Nothing: too short.
+[[nodiscard]] std::optional<Ping> decode_ping(std::span<const std::byte> data);
+
+/// Data of ERROR. Valid until: its bytes change.
+struct Failure {
+  std::uint16_t status = 0;
+  std::string_view sentence;
+};
+/// Nothing: too short.
+[[nodiscard]] std::optional<Failure> decode_failure(std::span<const std::byte> data);
+
+}  // namespace gimnet::proto::gimi

@@ -1,0 +1,77 @@
+#include "proto/control/ctrl.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "proto/control/names.hpp"
+#include "proto/frame/frame_parser.hpp"
+#include "tests/vectors/vector_file.hpp"
+
+namespace gimnet::proto::ctrl {
+namespace {
+
+using test::Bytes;
+using test::load_vector;
+
+Bytes payload_of(const std::string& vector) {
+  const auto bytes = load_vector(vector);
+  return test::to_bytes(parse_frame(bytes, Origin::hub)->payload);
+}
+
+template <class Message>
+void expect_request(const std::string& vector, std::uint16_t request, const Message& message) {
+  const auto payload = payload_of(vector);
+  const auto decoded = decode<Message>(payload);
+  ASSERT_TRUE(decoded) << decoded.error().sentence;
+  EXPECT_EQ(*decoded, message) << vector;
+  EXPECT_EQ(encode(message, request), payload) << vector;
+}
+
+template <class Answer>
+void expect_answer(const std::string& vector, std::uint16_t request, const Answer& answer) {
+  const auto payload = payload_of(vector);
+  const auto decoded = decode_answer<Answer>(payload);
+  ASSERT_TRUE(decoded) << decoded.error().sentence;
+  EXPECT_EQ(*decoded, answer) << vector;
+  EXPECT_EQ(encode_answer(answer, request), payload) << vector;
+}
+
+TEST(CtrlMessages, AreDecodedAndWrittenAsTheVectorsSay) {
+  expect_request("ctrl/hub_info", 1, HubInfo{});
+  expect_answer("ctrl/hub_info_answer", 1, HubInfoAnswer{HubId{7}, "lab", "0.1.0", 2, 60000, 3, 1});
+  expect_request("ctrl/statistics", 2, Statistics{});
+  expect_answer("ctrl/statistics_answer", 2,
+                StatisticsAnswer{{{0, {{"accepted", 10}, {"delivered", 9}}}, {1, {{"accepted", 0}}}}});
+  expect_request("ctrl/connections", 3, Connections{NodeId{0x00700010}, 2});
+  expect_answer("ctrl/connections_answer", 3,
+                ConnectionsAnswer{{{NodeId{0x00700011}, "robot", 1, "tcp", "127.0.0.1:40000", true, 4096}}, false});
+}
+
+TEST(CtrlMessages, SkipCountersThatAreNotNumbers) {
+  bitestream::Writer body;
+  body.put_u16(1, 0);
+  body.begin_nested(3);
+  body.put_u16(1, 0);
+  body.begin_nested(2);
+  body.put_text("version", "9");
+  body.put_u8("accepted", 1);
+  body.put_u8(7, 1);
+  body.end_nested();
+  body.end_nested();
+  const auto answer = decode_answer<StatisticsAnswer>(assemble_control({StatisticsAnswer::kOperation, 1}, body));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(*answer, (StatisticsAnswer{{{0, {{"accepted", 1}}}}}));
+}
+
+TEST(CtrlMessages, RecordsFitInTheBytesThatArePlannedForThem) {
+  ConnectionRecord record;
+  record.name.assign(kNameBytesMax, 'n');
+  record.transport.assign(kRemarkBytesMax, 't');
+  record.peer.assign(kRemarkBytesMax, 'p');
+  const ConnectionsAnswer one{{record}, false};
+  EXPECT_LE(encode_answer(one, 1).size() - encode_answer(ConnectionsAnswer{}, 1).size(), page_bytes_max(record));
+}
+
+}  // namespace
+}  // namespace gimnet::proto::ctrl

@@ -1,0 +1,95 @@
+#include "proto/control/names.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace gimnet::proto {
+namespace {
+
+std::string repeated(const std::string& part, std::size_t times) {
+  std::string name = part;
+  for (std::size_t i = 1; i < times; ++i) name += "/" + part;
+  return name;
+}
+
+TEST(Names, AcceptPartsOfTheAllowedCharacters) {
+  for (const char* name : {"a", "robot1/base", "A-Z_a-z.0-9", "...", "a/b/c"}) EXPECT_TRUE(valid_name(name)) << name;
+}
+
+TEST(Names, RefuseEverythingElse) {
+  for (const char* name : {"", "/", "a/", "/a", "a//b", "a b", "a*", "*", "**", "a\n", "\xC3\xA4", "a\\b", "a:b"}) {
+    EXPECT_FALSE(valid_name(name)) << name;
+  }
+  EXPECT_FALSE(valid_name(std::string("a\0b", 3)));
+}
+
+TEST(Names, HaveAtMost255Bytes) {
+  EXPECT_TRUE(valid_name(std::string(255, 'a')));
+  EXPECT_FALSE(valid_name(std::string(256, 'a')));
+  EXPECT_STREQ(name_fault(std::string(256, 'a')), "it has more than 255 bytes");
+}
+
+TEST(Names, HaveAtMost16Parts) {
+  EXPECT_TRUE(valid_name(repeated("a", 16)));
+  EXPECT_FALSE(valid_name(repeated("a", 17)));
+  EXPECT_STREQ(name_fault(repeated("a", 17)), "it has more than 16 parts");
+}
+
+TEST(Patterns, AreNamesWithWildcardParts) {
+  for (const char* pattern : {"a", "*", "**", "a/*", "*/a/**", "**/**"}) EXPECT_TRUE(valid_pattern(pattern)) << pattern;
+  for (const char* pattern : {"", "a*", "***", "*/", "**a", "a//*"}) EXPECT_FALSE(valid_pattern(pattern)) << pattern;
+}
+
+TEST(Patterns, MatchTheWholeName) {
+  EXPECT_TRUE(matches("robot/base", "robot/base"));
+  EXPECT_FALSE(matches("robot/base", "robot"));
+  EXPECT_FALSE(matches("robot", "robot/base"));
+  EXPECT_FALSE(matches("robot", "robot2"));
+}
+
+TEST(Patterns, StarIsOnePart) {
+  EXPECT_TRUE(matches("*", "robot"));
+  EXPECT_FALSE(matches("*", "robot/base"));
+  EXPECT_TRUE(matches("robot/*/scan", "robot/laser/scan"));
+  EXPECT_FALSE(matches("robot/*/scan", "robot/scan"));
+}
+
+TEST(Patterns, TwoStarsAreAnyNumberOfParts) {
+  for (const char* name : {"a", "a/b", "a/b/c"}) EXPECT_TRUE(matches("**", name)) << name;
+  EXPECT_TRUE(matches("a/**", "a"));
+  EXPECT_TRUE(matches("a/**/z", "a/z"));
+  EXPECT_TRUE(matches("a/**/z", "a/b/z/z"));
+  EXPECT_FALSE(matches("a/**/z", "a/b/z/c"));
+  EXPECT_TRUE(matches("**/b/**", "a/b"));
+  EXPECT_FALSE(matches("**/b/**", "a/c"));
+}
+
+TEST(Patterns, DoNotMatchWhatIsNotValid) {
+  EXPECT_FALSE(matches("**", ""));
+  EXPECT_FALSE(matches("**", "a//b"));
+  EXPECT_FALSE(matches("a*", "a*"));
+}
+
+TEST(Patterns, MatchTheLongestOfBoth) {
+  EXPECT_TRUE(matches(repeated("**", 16), repeated("a", 16)));
+  EXPECT_TRUE(matches(repeated("*", 16), repeated("a", 16)));
+  EXPECT_FALSE(matches(repeated("**", 15) + "/b", repeated("a", 16)));
+}
+
+TEST(ServiceNames, SplitAtTheLastSlash) {
+  const auto name = split_service_name("robot/base/odom");
+  EXPECT_EQ(name.node, "robot/base");
+  EXPECT_EQ(name.service, "odom");
+  EXPECT_EQ(join_service_name(name.node, name.service), "robot/base/odom");
+  EXPECT_TRUE(split_service_name("odom").service.empty());
+}
+
+TEST(ServiceNames, HaveOnePart) {
+  EXPECT_TRUE(valid_service_name("odom"));
+  EXPECT_FALSE(valid_service_name("laser/scan"));
+  EXPECT_FALSE(valid_service_name(""));
+}
+
+}  // namespace
+}  // namespace gimnet::proto

@@ -1,0 +1,133 @@
+#include "proto/control/ns.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "proto/control/names.hpp"
+#include "proto/frame/frame_parser.hpp"
+#include "tests/vectors/vector_file.hpp"
+
+namespace gimnet::proto::ns {
+namespace {
+
+using test::Bytes;
+using test::load_vector;
+
+constexpr NodeId kNode{0x00700012};
+constexpr GroupId kGroup{0x00700005};
+
+Bytes payload_of(const std::string& vector) {
+  const auto bytes = load_vector(vector);
+  return test::to_bytes(parse_frame(bytes, Origin::hub)->payload);
+}
+
+template <class Message>
+void expect_request(const std::string& vector, std::uint16_t request, const Message& message) {
+  const auto payload = payload_of(vector);
+  const auto decoded = decode<Message>(payload);
+  ASSERT_TRUE(decoded) << decoded.error().sentence;
+  EXPECT_EQ(*decoded, message) << vector;
+  EXPECT_EQ(encode(message, request), payload) << vector;
+}
+
+template <class Answer>
+void expect_answer(const std::string& vector, std::uint16_t request, const Answer& answer) {
+  const auto payload = payload_of(vector);
+  const auto decoded = decode_answer<Answer>(payload);
+  ASSERT_TRUE(decoded) << decoded.error().sentence;
+  EXPECT_EQ(*decoded, answer) << vector;
+  EXPECT_EQ(encode_answer(answer, request), payload) << vector;
+}
+
+TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
+  expect_request("ns/resolve", 1, Resolve{"robot/base"});
+  expect_answer("ns/resolve_answer", 1, ResolveAnswer{kNode});
+  expect_request("ns/reverse", 2, Reverse{kNode});
+  expect_answer("ns/reverse_answer", 2, ReverseAnswer{"robot/base", kNode});
+  expect_request("ns/list", 3, List{"robot/**", NodeId{0x00700011}, 2});
+  expect_request("ns/advertise", 4,
+                 Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta", kGroup});
+  expect_answer("ns/advertise_answer", 4, AdvertiseAnswer{kGroup, 2});
+  expect_request("ns/withdraw", 5, Withdraw{kGroup});
+  expect_answer("ns/withdraw_answer", 5, WithdrawAnswer{});
+  expect_request("ns/services", 6, Services{});
+  expect_request("ns/subscribe", 7, Subscribe{"robot/odom"});
+  expect_answer("ns/subscribe_answer", 7, SubscribeAnswer{kGroup, 3, 1, Delivery::latest});
+  expect_request("ns/unsubscribe", 8, Unsubscribe{"robot/odom"});
+  expect_answer("ns/unsubscribe_answer", 8, UnsubscribeAnswer{});
+}
+
+TEST(NsMessages, ListRecordsAsTheVectorsSay) {
+  ListAnswer list;
+  list.nodes = {{kNode, "robot/base", HubId{7}, "lab", true, "a robot", "127.0.0.1:40000", 1500, 2},
+                {NodeId{0x00700013}, "robot/laser", HubId{7}, "lab", false, "a robot", "127.0.0.1:40000", 1500, 2}};
+  list.more = true;
+  expect_answer("ns/list_answer", 3, list);
+
+  ServicesAnswer services;
+  services.services = {
+      {kGroup, "robot/odom", NodeId{0x00700011}, 3, 1, Direction::provides, Delivery::latest, "x y theta", 2, "lab"}};
+  expect_answer("ns/services_answer", 6, services);
+}
+
+TEST(NsMessages, EventsAreAsTheVectorsSay) {
+  expect_request("ns/service_moved", 0,
+                 ServiceMoved{"robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest});
+  SubscriberJoined joined;
+  joined.group = kGroup;
+  joined.node = kNode;
+  joined.subscribers = 2;
+  expect_request("ns/subscriber_joined", 0, joined);
+  SubscriberLeft left;
+  left.group = kGroup;
+  left.node = kNode;
+  left.subscribers = 1;
+  expect_request("ns/subscriber_left", 0, left);
+}
+
+TEST(NsMessages, BoundNames) {
+  bitestream::Writer longest;
+  longest.put_text(3, std::string(kNameBytesMax, 'a'));
+  EXPECT_TRUE(decode<Resolve>(assemble_control({Resolve::kOperation, 1}, longest)));
+  bitestream::Writer longer;
+  longer.put_text(3, std::string(kNameBytesMax + 1, 'a'));
+  EXPECT_FALSE(decode<Resolve>(assemble_control({Resolve::kOperation, 1}, longer)));
+}
+
+TEST(NsMessages, RefuseAChoiceThatAHubDoesNotKnow) {
+  bitestream::Writer body;
+  body.put_text(3, "odom");
+  body.put_u8(7, 2);
+  const auto advertise = decode<Advertise>(assemble_control({Advertise::kOperation, 1}, body));
+  ASSERT_FALSE(advertise);
+  EXPECT_EQ(advertise.error().sentence, "ADVERTISE has an unknown delivery");
+}
+
+TEST(NsMessages, NeedWhatTheyAreAbout) {
+  EXPECT_FALSE(decode<Resolve>(test::from_hex("03 00 01 00")));
+  EXPECT_FALSE(decode<Reverse>(test::from_hex("04 00 01 00")));
+  EXPECT_FALSE(decode<Advertise>(test::from_hex("07 00 01 00")));
+  EXPECT_FALSE(decode<Withdraw>(test::from_hex("08 00 01 00")));
+  EXPECT_FALSE(decode<Subscribe>(test::from_hex("0a 00 01 00")));
+  EXPECT_TRUE(decode<List>(test::from_hex("05 00 01 00"))) << "LIST has a default for everything";
+}
+
+TEST(NsMessages, RecordsFitInTheBytesThatArePlannedForThem) {
+  const auto size_of = [](const auto& answer) { return encode_answer(answer, 1).size(); };
+  NodeRecord node;
+  node.node = NodeId{UINT32_MAX};
+  node.name.assign(kNameBytesMax, 'n');
+  node.hub_name.assign(kNameBytesMax, 'h');
+  node.description.assign(kDescriptionBytesMax, 'd');
+  node.place.assign(kRemarkBytesMax, 'p');
+  EXPECT_LE(size_of(ListAnswer{{node}, false}) - size_of(ListAnswer{}), page_bytes_max(node));
+  ServiceRecord service;
+  service.name.assign(kNameBytesMax, 'n');
+  service.metadata.assign(kMetadataBytesMax, 'm');
+  service.hub_name.assign(kNameBytesMax, 'h');
+  EXPECT_LE(size_of(ServicesAnswer{{service}, false}) - size_of(ServicesAnswer{}), page_bytes_max(service));
+}
+
+}  // namespace
+}  // namespace gimnet::proto::ns

@@ -1,0 +1,104 @@
+#include "proto/gimi/message_header.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+
+#include "proto/frame/frame_parser.hpp"
+#include "tests/vectors/vector_file.hpp"
+
+namespace gimnet::proto::gimi {
+namespace {
+
+using test::Bytes;
+using test::load_vector;
+using test::to_bytes;
+
+constexpr std::int64_t kNewYear = 1767225600000000000;
+
+Bytes payload_of(const std::string& vector) {
+  const auto bytes = load_vector(vector);
+  const auto frame = parse_frame(bytes, Origin::node);
+  EXPECT_EQ(StreamKey::of(*frame->key), (StreamKey{3, 1})) << vector;
+  return to_bytes(frame->payload);
+}
+
+TEST(GimiMessage, HasATimeStamp) {
+  const auto payload = payload_of("gimi/data");
+  const auto message = parse_message(payload);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->header, (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8}));
+  EXPECT_EQ(message->timestamp_ns, kNewYear);
+  EXPECT_EQ(to_bytes(message->data), to_bytes("hi"));
+}
+
+TEST(GimiMessage, HasAnExtensionToSkip) {
+  const auto payload = payload_of("gimi/data_extension");
+  const auto message = parse_message(payload);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->timestamp_ns, std::nullopt);
+  EXPECT_EQ(message->extension.size(), 3u);
+  EXPECT_EQ(to_bytes(message->data), to_bytes("hi"));
+}
+
+TEST(GimiMessage, PrefixIsWrittenAsTheVectorsSay) {
+  for (const auto& name : test::vectors_in("gimi")) {
+    if (name == "gimi/data_extension") continue;
+    const auto payload = payload_of(name);
+    const auto message = parse_message(payload);
+    ASSERT_TRUE(message) << name;
+    std::array<std::byte, kMessagePrefixMax> prefix{};
+    const std::size_t size = write_message_prefix(message->header, message->timestamp_ns, prefix);
+    Bytes written(prefix.begin(), prefix.begin() + static_cast<std::ptrdiff_t>(size));
+    written.insert(written.end(), message->data.begin(), message->data.end());
+    EXPECT_EQ(written, payload) << name;
+  }
+}
+
+TEST(GimiMessage, RefusesWhatDoesNotFit) {
+  auto payload = payload_of("gimi/data");
+  EXPECT_FALSE(parse_message(std::span(payload).first(kMessageHeaderSize - 1)));
+  EXPECT_FALSE(parse_message(std::span(payload).first(kMessagePrefixMax - 1)));
+  EXPECT_TRUE(parse_message(std::span(payload).first(kMessagePrefixMax)));
+  payload[6] = std::byte{7};
+  EXPECT_FALSE(parse_message(payload)) << "a time stamp has 8 bytes";
+  payload[5] = std::byte{0};
+  EXPECT_TRUE(parse_message(payload));
+  payload[4] = std::byte{7};
+  EXPECT_FALSE(parse_message(payload)) << "operation 7";
+}
+
+TEST(GimiAck, IsDecodedAndWrittenAsTheVectorSays) {
+  const auto payload = payload_of("gimi/ack");
+  const auto message = parse_message(payload);
+  EXPECT_EQ(message->header.sequence, 40u);
+  EXPECT_EQ(decode_ack(message->data), (Ack{0b101, 0}));
+  std::array<std::byte, kAckSize> memory{};
+  encode_ack({0b101, 0}, memory);
+  EXPECT_EQ(Bytes(memory.begin(), memory.end()), to_bytes(message->data));
+  EXPECT_FALSE(decode_ack(message->data.first(kAckSize - 1)));
+}
+
+TEST(GimiPing, CarriesWhatIsToComeBack) {
+  const auto ping = payload_of("gimi/ping");
+  const auto pong = payload_of("gimi/pong");
+  const auto decoded = decode_ping(parse_message(ping)->data);
+  ASSERT_TRUE(decoded);
+  EXPECT_EQ(decoded->sent_ns, kNewYear);
+  EXPECT_EQ(to_bytes(decoded->echo), to_bytes("echo"));
+  EXPECT_EQ(to_bytes(parse_message(pong)->data), to_bytes(parse_message(ping)->data));
+  EXPECT_FALSE(decode_ping(parse_message(ping)->data.first(7)));
+}
+
+TEST(GimiError, HasAStatusAndASentence) {
+  const auto payload = payload_of("gimi/error");
+  const auto failure = decode_failure(parse_message(payload)->data);
+  ASSERT_TRUE(failure);
+  EXPECT_EQ(failure->status, 3);
+  EXPECT_EQ(failure->sentence, "lost");
+  EXPECT_FALSE(decode_failure(parse_message(payload)->data.first(1)));
+}
+
+}  // namespace
+}  // namespace gimnet::proto::gimi
