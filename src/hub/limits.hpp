@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+// Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp, shown by
+// `tcphub --help-limits` and set by `tcphub --limit NAME=VALUE`.
+
+namespace gimnet::hub {
+
+/// The limits in force. Thread safety: immutable after start-up.
+struct Limits {
+  // Frames and turns
+  std::uint64_t frame_bytes = 65'536;
+  std::uint64_t turn_bytes = 256 * 1024;
+  std::uint64_t stalled_frame_ms = 30'000;
+  std::uint64_t partial_bytes = 64ull << 20;
+  // Joining
+  std::uint64_t handshake_bytes = 1'024;
+  std::uint64_t handshake_ms = 5'000;
+  std::uint64_t handshakes = 4'096;
+  std::uint64_t nodes = 100'000;
+  std::uint64_t grace_ms = 30'000;
+  // Keep-alive
+  std::uint64_t keep_alive_ms = 1'000;
+  std::uint64_t silent_ms = 3'000;
+  // Outboxes
+  std::uint64_t lane0_bytes = 512 * 1024;
+  std::uint64_t lane1_bytes = 1536 * 1024;
+  std::uint64_t lane2_bytes = 1536 * 1024;
+  std::uint64_t lane3_bytes = 512 * 1024;
+  std::uint64_t control_bytes = 256 * 1024;
+  std::uint64_t reserve_bytes = 1ull << 20;
+  std::uint64_t budget_bytes = 256ull << 20;
+  std::uint64_t lane0_bytes_per_s = 64ull << 20;
+  std::uint64_t block_ms = 5'000;
+  std::uint64_t slow_consumer_ms = 10'000;
+  std::uint64_t slow_consumer_bytes = 4'096;
+  std::uint64_t resume_bytes = 1ull << 20;
+  std::uint64_t report_interval_ms = 10;
+  std::uint64_t socket_send_bytes = 256 * 1024;
+  // Between shards
+  std::uint64_t mailbox_entries = 8'192;
+  std::uint64_t mailbox_bytes = 16ull << 20;
+  // Control
+  std::uint64_t requests = 64;
+  std::uint64_t services_per_node = 1'024;
+  std::uint64_t subscriptions_per_node = 1'024;
+  std::uint64_t page_records = 256;
+  std::uint64_t drain_ms = 10'000;
+};
+
+/// One row of the table of limits.
+struct LimitInfo {
+  std::string_view name;
+  std::string_view unit;
+  std::uint64_t Limits::* field;
+  std::uint64_t least;
+  std::uint64_t most;
+  std::string_view reason;
+};
+
+/// All limits, in the order in which documents list them.
+[[nodiscard]] std::span<const LimitInfo> limit_table();
+
+/// Sets one limit from "NAME=VALUE" (VALUE a whole number, with an optional suffix k, M or G for powers of 1,024).
+/// Returns an empty string, or what is wrong and what to do, naming the nearest limit for an unknown name.
+[[nodiscard]] std::string set_limit(Limits& limits, std::string_view assignment);
+
+}  // namespace gimnet::hub

@@ -1,0 +1,151 @@
+#include "hub/transport/memory_transport.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+/// A FIFO of bytes whose memory is kept, so that a warmed-up pipe does not allocate.
+class ByteQueue {
+ public:
+  void append(const std::byte* bytes, std::size_t size) {
+    if (begin_ == bytes_.size()) clear();
+    bytes_.insert(bytes_.end(), bytes, bytes + size);
+  }
+  [[nodiscard]] std::size_t size() const { return bytes_.size() - begin_; }
+  /// REQUIRES: size <= size().
+  const std::byte* take(std::size_t size) {
+    const std::byte* taken = bytes_.data() + begin_;
+    begin_ += size;
+    return taken;
+  }
+  void clear() {
+    bytes_.clear();
+    begin_ = 0;
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::size_t begin_ = 0;
+};
+
+/// What each of the next calls may move.
+class Plan {
+ public:
+  void set(std::vector<std::size_t> sizes) {
+    sizes_ = std::move(sizes);
+    next_ = 0;
+  }
+  [[nodiscard]] std::size_t next() { return next_ < sizes_.size() ? sizes_[next_++] : ~std::size_t{0}; }
+
+ private:
+  std::vector<std::size_t> sizes_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+struct MemoryPipe {
+  ByteQueue to_hub;
+  ByteQueue to_peer;
+  Plan sends;
+  Plan receives;
+  std::size_t room = ~std::size_t{0};
+  std::size_t reset_after = ~std::size_t{0};
+  std::uint32_t unsent_limit = 0;
+  std::uint64_t send_calls = 0;
+  bool closed = false;
+  bool failed = false;
+  bool gone = false;
+
+  [[nodiscard]] std::size_t free_room() const { return room - std::min(room, to_peer.size()); }
+};
+
+MemoryTransport::MemoryTransport(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
+
+MemoryTransport::~MemoryTransport() { pipe_->gone = true; }
+
+IoResult MemoryTransport::receive(std::span<std::byte> into) {
+  GIMNET_CHECK(!into.empty());
+  MemoryPipe& pipe = *pipe_;
+  if (pipe.failed) return {IoStatus::failed, 0};
+  if (pipe.to_hub.size() == 0) return {pipe.closed ? IoStatus::closed : IoStatus::would_block, 0};
+  const std::size_t size = std::min({into.size(), pipe.to_hub.size(), pipe.receives.next()});
+  if (size == 0) return {IoStatus::would_block, 0};
+  std::memcpy(into.data(), pipe.to_hub.take(size), size);
+  return {IoStatus::ok, size};
+}
+
+IoResult MemoryTransport::send(std::span<const iovec> pieces) {
+  GIMNET_CHECK(!pieces.empty() && pieces.size() <= 64);
+  MemoryPipe& pipe = *pipe_;
+  ++pipe.send_calls;
+  if (pipe.failed) return {IoStatus::failed, 0};
+  std::size_t allowed = std::min({pipe.free_room(), pipe.sends.next(), pipe.reset_after});
+  std::size_t sent = 0;
+  for (const iovec& piece : pieces) {
+    GIMNET_CHECK(piece.iov_len != 0);
+    const std::size_t size = std::min(allowed - sent, piece.iov_len);
+    pipe.to_peer.append(static_cast<const std::byte*>(piece.iov_base), size);
+    sent += size;
+    if (size < piece.iov_len) break;
+  }
+  if (pipe.reset_after != ~std::size_t{0}) {
+    pipe.reset_after -= sent;
+    pipe.failed = pipe.reset_after == 0;
+    if (sent == 0 && pipe.failed) return {IoStatus::failed, 0};
+  }
+  return sent == 0 ? IoResult{IoStatus::would_block, 0} : IoResult{IoStatus::ok, sent};
+}
+
+std::uint64_t MemoryTransport::unsent_bytes() const { return pipe_->to_peer.size(); }
+
+void MemoryTransport::limit_unsent(std::uint32_t bytes) { pipe_->unsent_limit = bytes; }
+
+MemoryPeer::MemoryPeer(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
+
+void MemoryPeer::write(std::span<const std::byte> bytes) { pipe_->to_hub.append(bytes.data(), bytes.size()); }
+
+std::size_t MemoryPeer::read(std::vector<std::byte>& into, std::size_t most) {
+  const std::size_t size = std::min(most, pipe_->to_peer.size());
+  const std::byte* bytes = pipe_->to_peer.take(size);
+  into.insert(into.end(), bytes, bytes + size);
+  return size;
+}
+
+std::size_t MemoryPeer::readable() const { return pipe_->to_peer.size(); }
+
+void MemoryPeer::close() { pipe_->closed = true; }
+
+void MemoryPeer::reset() { pipe_->failed = true; }
+
+void MemoryPeer::reset_after(std::size_t bytes) {
+  pipe_->reset_after = bytes;
+  pipe_->failed = bytes == 0;
+}
+
+void MemoryPeer::set_room(std::size_t bytes) { pipe_->room = bytes; }
+
+void MemoryPeer::plan_sends(std::vector<std::size_t> bytes) { pipe_->sends.set(std::move(bytes)); }
+
+void MemoryPeer::plan_receives(std::vector<std::size_t> bytes) { pipe_->receives.set(std::move(bytes)); }
+
+bool MemoryPeer::transport_readable() const { return pipe_->failed || pipe_->closed || pipe_->to_hub.size() != 0; }
+
+bool MemoryPeer::transport_writable() const { return pipe_->failed || pipe_->free_room() != 0; }
+
+bool MemoryPeer::transport_gone() const { return pipe_->gone; }
+
+std::uint32_t MemoryPeer::unsent_limit() const { return pipe_->unsent_limit; }
+
+std::uint64_t MemoryPeer::send_calls() const { return pipe_->send_calls; }
+
+std::pair<std::unique_ptr<MemoryTransport>, MemoryPeer> make_memory_pipe() {
+  auto pipe = std::make_shared<MemoryPipe>();
+  return {std::make_unique<MemoryTransport>(pipe), MemoryPeer(pipe)};
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,72 @@
+#include "hub/limits.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Limits, EveryFieldIsInTheTableOnce) {
+  std::set<std::string_view> names;
+  for (const LimitInfo& limit : limit_table()) EXPECT_TRUE(names.insert(limit.name).second) << limit.name;
+  EXPECT_EQ(names.size() * sizeof(std::uint64_t), sizeof(Limits));
+}
+
+TEST(Limits, DefaultsAreWithinTheirRanges) {
+  const Limits defaults;
+  for (const LimitInfo& limit : limit_table()) {
+    EXPECT_GE(defaults.*limit.field, limit.least) << limit.name;
+    EXPECT_LE(defaults.*limit.field, limit.most) << limit.name;
+    EXPECT_FALSE(limit.reason.empty()) << limit.name;
+    EXPECT_FALSE(limit.unit.empty()) << limit.name;
+  }
+}
+
+TEST(Limits, EachTakesItsLeastAndMostAndNothingBeyond) {
+  for (const LimitInfo& limit : limit_table()) {
+    Limits limits;
+    const std::string name{limit.name};
+    EXPECT_EQ(set_limit(limits, name + "=" + std::to_string(limit.most)), "");
+    EXPECT_EQ(limits.*limit.field, limit.most);
+    EXPECT_EQ(set_limit(limits, name + "=" + std::to_string(limit.least)), "");
+    EXPECT_EQ(limits.*limit.field, limit.least);
+    EXPECT_THAT(set_limit(limits, name + "=" + std::to_string(limit.most + 1)), HasSubstr("must be"));
+    if (limit.least > 0) {
+      EXPECT_THAT(set_limit(limits, name + "=" + std::to_string(limit.least - 1)), HasSubstr("must be"));
+    }
+    EXPECT_EQ(limits.*limit.field, limit.least);
+  }
+}
+
+TEST(Limits, SuffixesArePowersOf1024) {
+  Limits limits;
+  EXPECT_EQ(set_limit(limits, "resume_bytes=64k"), "");
+  EXPECT_EQ(limits.resume_bytes, 65'536u);
+  EXPECT_EQ(set_limit(limits, "budget_bytes=1G"), "");
+  EXPECT_EQ(limits.budget_bytes, 1ull << 30);
+  EXPECT_EQ(set_limit(limits, "lane2_bytes=8M"), "");
+  EXPECT_EQ(limits.lane2_bytes, 8ull << 20);
+}
+
+TEST(Limits, WhatIsNoNumberIsRefused) {
+  Limits limits;
+  for (const char* bad : {"nodes=", "nodes=abc", "nodes=-1", "nodes=1.5", "nodes=10T", "nodes=10kk", "nodes= 10",
+                          "nodes=99999999999999999999", "nodes=18446744073709551615G"}) {
+    EXPECT_NE(set_limit(limits, bad), "") << bad;
+  }
+  EXPECT_EQ(limits.nodes, Limits{}.nodes);
+}
+
+TEST(Limits, ErrorsSayWhatToDo) {
+  Limits limits;
+  EXPECT_THAT(set_limit(limits, "nods=10"), HasSubstr("did you mean nodes?"));
+  EXPECT_THAT(set_limit(limits, "nodes"), HasSubstr("NAME=VALUE"));
+  EXPECT_THAT(set_limit(limits, "qqqqqqqq=1"), HasSubstr("--help-limits"));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,154 @@
+#include "hub/transport/socket_transport.hpp"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace gimnet::hub {
+namespace {
+
+using Family = SocketTransport::Family;
+
+/// The hub's end as a transport, and the far end's descriptor.
+struct Ends {
+  std::unique_ptr<SocketTransport> near;
+  int far = -1;
+  ~Ends() {
+    if (far >= 0) ::close(far);
+  }
+};
+
+std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) {
+  int pair[2] = {-1, -1};
+  EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+  auto ends = std::make_unique<Ends>();
+  ends->near = std::make_unique<SocketTransport>(pair[0], Family::unix_socket, limits);
+  ends->far = pair[1];
+  return ends;
+}
+
+std::unique_ptr<Ends> tcp_ends(const Limits& limits = {}) {
+  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  EXPECT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
+  EXPECT_EQ(::listen(listener, 1), 0);
+  EXPECT_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  auto ends = std::make_unique<Ends>();
+  ends->far = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  EXPECT_EQ(::connect(ends->far, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  ends->near =
+      std::make_unique<SocketTransport>(::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC), Family::tcp, limits);
+  ::close(listener);
+  return ends;
+}
+
+iovec piece(std::string_view text) { return {const_cast<char*>(text.data()), text.size()}; }
+
+int option(int descriptor, int level, int name) {
+  int value = -1;
+  socklen_t size = sizeof value;
+  EXPECT_EQ(::getsockopt(descriptor, level, name, &value, &size), 0);
+  return value;
+}
+
+/// Sends until nothing is taken any more; returns how many bytes were.
+std::size_t fill(SocketTransport& transport) {
+  const std::vector<std::byte> block(64 * 1'024);
+  std::size_t total = 0;
+  for (;;) {
+    const iovec one{const_cast<std::byte*>(block.data()), block.size()};
+    const IoResult result = transport.send({&one, 1});
+    if (result.status != IoStatus::ok) return total;
+    total += result.bytes;
+  }
+}
+
+TEST(SocketTransport, SendsGatheredPiecesInOrder) {
+  for (const auto& ends : {unix_ends(), tcp_ends()}) {
+    const std::array<iovec, 3> pieces{piece("one "), piece("two "), piece("three")};
+    const IoResult sent = ends->near->send(pieces);
+    EXPECT_EQ(sent.status, IoStatus::ok);
+    EXPECT_EQ(sent.bytes, 13u);
+    std::array<char, 32> text{};
+    EXPECT_EQ(::recv(ends->far, text.data(), text.size(), 0), 13);
+    EXPECT_STREQ(text.data(), "one two three");
+  }
+}
+
+TEST(SocketTransport, ReceivesWithoutWaiting) {
+  const auto ends = unix_ends();
+  std::array<std::byte, 4> room{};
+  EXPECT_EQ(ends->near->receive(room).status, IoStatus::would_block);
+  ASSERT_EQ(::send(ends->far, "abcdef", 6, 0), 6);
+  const IoResult first = ends->near->receive(room);
+  EXPECT_EQ(first.status, IoStatus::ok);
+  EXPECT_EQ(first.bytes, 4u);
+  EXPECT_EQ(ends->near->receive(room).bytes, 2u);
+  EXPECT_EQ(ends->near->receive(room).status, IoStatus::would_block);
+}
+
+TEST(SocketTransport, TellsAnOrderlyEndFromABrokenOne) {
+  const auto orderly = tcp_ends();
+  ::close(std::exchange(orderly->far, -1));
+  std::array<std::byte, 4> room{};
+  EXPECT_EQ(orderly->near->receive(room).status, IoStatus::closed);
+
+  const auto broken = tcp_ends();
+  const linger at_once{1, 0};
+  ASSERT_EQ(::setsockopt(broken->far, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once), 0);
+  ::close(std::exchange(broken->far, -1));
+  EXPECT_EQ(broken->near->receive(room).status, IoStatus::failed);
+}
+
+TEST(SocketTransport, SendingToNobodyFailsWithoutASignal) {
+  const auto ends = unix_ends();
+  ::close(std::exchange(ends->far, -1));
+  const iovec one = piece("x");
+  EXPECT_EQ(ends->near->send({&one, 1}).status, IoStatus::failed);
+}
+
+TEST(SocketTransport, AFullSocketTakesNoMoreAndSaysHowMuchWaits) {
+  for (const auto& ends : {unix_ends(), tcp_ends()}) {
+    EXPECT_EQ(ends->near->unsent_bytes(), 0u);
+    EXPECT_GT(fill(*ends->near), 0u);
+    EXPECT_GT(ends->near->unsent_bytes(), 0u);
+  }
+}
+
+TEST(SocketTransport, SetsItsOptions) {
+  Limits limits;
+  limits.socket_send_bytes = 128 * 1'024;
+  const auto ends = tcp_ends(limits);
+  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF), 2 * 128 * 1'024);  // as kernels report it
+  EXPECT_NE(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NODELAY), 0);
+}
+
+TEST(SocketTransport, LimitsWhatWaitsUnsentOnTcp) {
+  const auto ends = tcp_ends();
+  ends->near->limit_unsent(16'384);
+  EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NOTSENT_LOWAT), 16'384);
+  ends->near->limit_unsent(1);
+  EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NOTSENT_LOWAT), 4'096);
+}
+
+TEST(SocketTransport, LimitsWhatWaitsUnsentOnUnixSockets) {
+  const auto limited = unix_ends();
+  limited->near->limit_unsent(16'384);
+  const auto free = unix_ends();
+  EXPECT_LT(fill(*limited->near), fill(*free->near));
+}
+
+}  // namespace
+}  // namespace gimnet::hub
