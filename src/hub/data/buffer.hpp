@@ -1,0 +1,67 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+namespace gimnet::hub {
+
+class BufferPool;
+
+enum class BufferKind : std::uint8_t {
+  slab,     ///< what connections read into; frames are routed where they lie
+  chunk,    ///< small memory that waiting frames are copied into
+  foreign,  ///< stands on this shard for a slab of another one
+};
+
+/// Bytes with a reference count. The count is a plain integer: a buffer belongs to one shard, and another shard holds
+/// it through a `foreign` buffer of its own, so that only handing over between shards costs an atomic operation. Bytes
+/// that were handed on are immutable.
+struct Buffer {
+  std::byte* data = nullptr;
+  std::uint32_t capacity = 0;
+  std::uint32_t references = 0;
+  BufferKind kind = BufferKind::chunk;
+  std::uint8_t size_class = 0;
+  bool pinned = false;  ///< counted against the budget, because a waiting frame keeps it
+  BufferPool* pool = nullptr;
+  Buffer* next_free = nullptr;
+  Buffer* lender = nullptr;            ///< of a foreign buffer: the slab that it stands for
+  std::atomic<std::uint32_t> lent{0};  ///< of a slab: foreign buffers and mailbox entries that stand for it
+};
+
+/// One reference to a Buffer. Copying is spelled share(). Thread safety: none; one shard.
+class BufferRef {
+ public:
+  BufferRef() = default;
+  /// Takes a reference of its own.
+  explicit BufferRef(Buffer* buffer) : buffer_(buffer) {
+    if (buffer_ != nullptr) ++buffer_->references;
+  }
+  BufferRef(BufferRef&& other) noexcept : buffer_(std::exchange(other.buffer_, nullptr)) {}
+  BufferRef& operator=(BufferRef&& other) noexcept {
+    std::swap(buffer_, other.buffer_);
+    return *this;
+  }
+  BufferRef(const BufferRef&) = delete;
+  BufferRef& operator=(const BufferRef&) = delete;
+  ~BufferRef() { reset(); }
+
+  [[nodiscard]] BufferRef share() const { return BufferRef(buffer_); }
+  [[nodiscard]] Buffer* get() const { return buffer_; }
+  [[nodiscard]] explicit operator bool() const { return buffer_ != nullptr; }
+  Buffer* operator->() const { return buffer_; }
+
+  void reset() {
+    if (buffer_ != nullptr && --buffer_->references == 0) recycle(*buffer_);
+    buffer_ = nullptr;
+  }
+
+ private:
+  static void recycle(Buffer& buffer);
+
+  Buffer* buffer_ = nullptr;
+};
+
+}  // namespace gimnet::hub

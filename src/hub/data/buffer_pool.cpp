@@ -1,0 +1,168 @@
+#include "hub/data/buffer_pool.hpp"
+
+#include <algorithm>
+#include <new>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kHeaderRoom = 16;  // a frame's header, which its length does not count
+constexpr std::size_t kFreeForeignMax = 4096;
+}  // namespace
+
+void BufferRef::recycle(Buffer& buffer) { buffer.pool->recycle(buffer); }
+
+void BufferPool::FreeList::push(Buffer& buffer) {
+  buffer.next_free = head;
+  head = &buffer;
+  ++count;
+}
+
+Buffer* BufferPool::FreeList::pop() {
+  Buffer* buffer = head;
+  if (buffer != nullptr) {
+    head = buffer->next_free;
+    --count;
+  }
+  return buffer;
+}
+
+BufferPool::BufferPool(std::uint32_t frame_bytes, BudgetLease& budget)
+    : slab_bytes_(static_cast<std::uint32_t>(kSlabReadBytes + kHeaderRoom + frame_bytes)), budget_(budget) {}
+
+BufferPool::~BufferPool() {
+  while (Buffer* slab = free_slabs_.pop()) free_buffer(slab);
+  while (Buffer* foreign = free_foreign_.pop()) free_buffer(foreign);
+  for (FreeList& list : free_chunks_) {
+    while (Buffer* chunk = list.pop()) free_buffer(chunk);
+  }
+  // acquire pairs with the release in end_loan(); shards are joined before their pools go, so no loan is open.
+  for (Buffer* slab : lent_slabs_) {
+    GIMNET_CHECK(slab->lent.load(std::memory_order_acquire) == 0);
+    free_buffer(slab);
+  }
+}
+
+BufferRef BufferPool::take_slab() {
+  Buffer* slab = free_slabs_.pop();
+  if (slab == nullptr) slab = reclaim_lent_slab();
+  if (slab == nullptr) slab = allocate(slab_bytes_, BufferKind::slab);
+  return BufferRef(slab);
+}
+
+BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
+  for (std::uint8_t size_class = 0; size_class < kChunkSizes.size(); ++size_class) {
+    if (bytes > kChunkSizes[size_class]) continue;
+    Buffer* chunk = free_chunks_[size_class].pop();
+    if (chunk == nullptr) {
+      chunk = allocate(kChunkSizes[size_class], BufferKind::chunk);
+      chunk->size_class = size_class;
+    }
+    return BufferRef(chunk);
+  }
+  Buffer* chunk = allocate(bytes, BufferKind::chunk);
+  chunk->size_class = kUnpooled;
+  return BufferRef(chunk);
+}
+
+Buffer* BufferPool::lend(Buffer& buffer) {
+  Buffer* slab = buffer.kind == BufferKind::foreign ? buffer.lender : &buffer;
+  // relaxed: the entry itself is published by the mailbox; the count only has to be there before the lender lets go,
+  // and the lender is this thread or holds a loan that this thread keeps open.
+  slab->lent.fetch_add(1, std::memory_order_relaxed);
+  return slab;
+}
+
+BufferRef BufferPool::adopt(Buffer* lent) {
+  const auto known = std::find_if(adopted_.begin(), adopted_.end(),
+                                  [&](const Buffer* each) { return each->lender->pool == lent->pool; });
+  if (known != adopted_.end() && (*known)->lender == lent) {
+    end_loan(lent);  // one loan is enough
+    return BufferRef(*known);
+  }
+  Buffer* foreign = free_foreign_.pop();
+  if (foreign == nullptr) {
+    foreign = new Buffer;
+    foreign->kind = BufferKind::foreign;
+    foreign->pool = this;
+  }
+  foreign->lender = lent;
+  foreign->data = lent->data;
+  foreign->capacity = lent->capacity;
+  if (known != adopted_.end()) {
+    *known = foreign;
+  } else {
+    adopted_.push_back(foreign);
+  }
+  return BufferRef(foreign);
+}
+
+void BufferPool::end_loan(Buffer* lent) {
+  lent->lent.fetch_sub(1, std::memory_order_release);  // pairs with the acquire load in recycle(), reclaim_lent_slab()
+}
+
+void BufferPool::pin(Buffer& buffer) {
+  if (buffer.pinned) return;
+  buffer.pinned = true;
+  pinned_bytes_ += buffer.capacity;
+  budget_.take(buffer.capacity);
+}
+
+void BufferPool::unpin(Buffer& buffer) {
+  if (!buffer.pinned) return;
+  buffer.pinned = false;
+  pinned_bytes_ -= buffer.capacity;
+  budget_.give_back(buffer.capacity);
+}
+
+void BufferPool::recycle(Buffer& buffer) {
+  unpin(buffer);
+  switch (buffer.kind) {
+    case BufferKind::foreign:
+      std::erase(adopted_, &buffer);
+      end_loan(std::exchange(buffer.lender, nullptr));
+      if (free_foreign_.count < kFreeForeignMax) return free_foreign_.push(buffer);
+      break;
+    case BufferKind::slab:
+      // acquire pairs with the release in end_loan(): the other shard has read its last byte.
+      if (buffer.lent.load(std::memory_order_acquire) != 0) return lent_slabs_.push_back(&buffer);
+      if (free_slabs_.count < kFreeSlabsMax) return free_slabs_.push(buffer);
+      break;
+    case BufferKind::chunk:
+      if (buffer.size_class == kUnpooled) break;
+      if (FreeList& list = free_chunks_[buffer.size_class]; list.count * buffer.capacity < kFreeChunkBytesMax) {
+        return list.push(buffer);
+      }
+      break;
+  }
+  free_buffer(&buffer);
+}
+
+Buffer* BufferPool::reclaim_lent_slab() {
+  for (std::size_t i = 0; i < lent_slabs_.size(); ++i) {
+    Buffer* slab = lent_slabs_[i];
+    if (slab->lent.load(std::memory_order_acquire) != 0) continue;  // pairs with the release in end_loan()
+    lent_slabs_[i] = lent_slabs_.back();
+    lent_slabs_.pop_back();
+    return slab;
+  }
+  return nullptr;
+}
+
+Buffer* BufferPool::allocate(std::uint32_t capacity, BufferKind kind) {
+  auto* buffer = new Buffer;
+  buffer->data = static_cast<std::byte*>(::operator new(capacity, std::align_val_t{kAlignment}));
+  buffer->capacity = capacity;
+  buffer->kind = kind;
+  buffer->pool = this;
+  return buffer;
+}
+
+void BufferPool::free_buffer(Buffer* buffer) {
+  if (buffer->kind != BufferKind::foreign) ::operator delete(buffer->data, std::align_val_t{kAlignment});
+  delete buffer;
+}
+
+}  // namespace gimnet::hub

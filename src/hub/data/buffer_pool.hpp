@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/budget.hpp"
+#include "hub/data/buffer.hpp"
+
+namespace gimnet::hub {
+
+/// Slab bytes in which a read may begin; the frame that is begun there ends in the room behind it.
+inline constexpr std::uint32_t kSlabReadBytes = 256 * 1024;
+
+/// The buffers of one shard. Memory that was used once is kept for the next time, within limits, so that after a
+/// warm-up no turn allocates. Thread safety: none; one shard (lend() and the end of a loan cross shards by an atomic).
+/// Ownership: owns every buffer; must outlive all references.
+class BufferPool {
+ public:
+  /// frame_bytes: the largest `length` of a frame.
+  BufferPool(std::uint32_t frame_bytes, BudgetLease& budget);
+  ~BufferPool();
+  BufferPool(const BufferPool&) = delete;
+  BufferPool& operator=(const BufferPool&) = delete;
+
+  [[nodiscard]] BufferRef take_slab();
+  /// A chunk of at least `bytes`.
+  [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
+
+  /// Counts a loan of the slab behind `buffer`, for one mailbox entry, and returns that slab. Its bytes stay until the
+  /// borrowing shard has called adopt() and let its reference go, or end_loan().
+  [[nodiscard]] static Buffer* lend(Buffer& buffer);
+  /// On the borrowing shard: a reference that ends the loan when it is let go. Loans of one slab that follow each other
+  /// become one buffer, so that it is counted once and neighbouring frames in it are seen to be neighbours.
+  [[nodiscard]] BufferRef adopt(Buffer* lent);
+  static void end_loan(Buffer* lent);
+
+  /// Counts the buffer against the budget until it is free again; once, however many frames keep it.
+  void pin(Buffer& buffer);
+  /// No waiting frame keeps it any more, though somebody else does.
+  void unpin(Buffer& buffer);
+  [[nodiscard]] std::uint64_t pinned_bytes() const { return pinned_bytes_; }
+
+  void recycle(Buffer& buffer);
+
+ private:
+  static constexpr std::array<std::uint32_t, 3> kChunkSizes{1024, 4 * 1024, 16 * 1024};
+  static constexpr std::uint8_t kUnpooled = 0xFF;
+  static constexpr std::size_t kFreeSlabsMax = 16;
+  static constexpr std::size_t kFreeChunkBytesMax = std::size_t{4} << 20;
+
+  struct FreeList {
+    Buffer* head = nullptr;
+    std::size_t count = 0;
+    void push(Buffer& buffer);
+    [[nodiscard]] Buffer* pop();
+  };
+
+  [[nodiscard]] Buffer* allocate(std::uint32_t capacity, BufferKind kind);
+  static void free_buffer(Buffer* buffer);
+  [[nodiscard]] Buffer* reclaim_lent_slab();
+
+  const std::uint32_t slab_bytes_;
+  BudgetLease& budget_;
+  FreeList free_slabs_;
+  FreeList free_foreign_;
+  std::vector<Buffer*> adopted_;  ///< foreign buffers in use, the last one of each lending pool
+  std::array<FreeList, kChunkSizes.size()> free_chunks_;
+  std::vector<Buffer*> lent_slabs_;  ///< free here, still read by another shard
+  std::uint64_t pinned_bytes_ = 0;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::hub {
+
+/// A number that one thread changes and any thread reads. Adding costs a plain load and store, no locked instruction.
+class Counter {
+ public:
+  void add(std::uint64_t n) {
+    // relaxed: only the owner writes, and readers want a recent number, not an order.
+    value_.store(value_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
+  }
+  void subtract(std::uint64_t n) {
+    // relaxed: as in add().
+    value_.store(value_.load(std::memory_order_relaxed) - n, std::memory_order_relaxed);
+  }
+  void store(std::uint64_t n) { value_.store(n, std::memory_order_relaxed); }  // relaxed: as in add()
+  void raise_to(std::uint64_t n) {
+    // relaxed: as in add().
+    if (n > value_.load(std::memory_order_relaxed)) value_.store(n, std::memory_order_relaxed);
+  }
+  // relaxed: as in add().
+  [[nodiscard]] std::uint64_t value() const { return value_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::uint64_t> value_{0};
+};
+
+/// What one shard did. The ledger: accepted + copies = delivered + dropped + queued, per frame and recipient.
+/// Thread safety: written by its shard only, read by anybody.
+struct alignas(64) ShardCounters {
+  // The ledger, in frames
+  Counter accepted;   ///< taken from the connections of this shard
+  Counter copies;     ///< recipients beyond the first
+  Counter delivered;  ///< handed to the kernel, or confirmed where resume is on
+  Counter queued;     ///< waiting in an outbox, a resume buffer or (counted at the sending shard) a mailbox
+  std::array<Counter, proto::kDropReasonCount> dropped;
+
+  // Traffic
+  Counter received_bytes;
+  Counter sent_bytes;
+  Counter receive_calls;
+  Counter send_calls;
+  Counter turns;
+  // Copying: what was copied on the way through, in payload-carrying bytes
+  Counter copied_bytes;      ///< into outboxes: small runs, and small frames that have to wait
+  Counter moved_tail_bytes;  ///< the begun frame at the end of a read
+  // Between shards
+  Counter mailbox_entries;
+  Counter mailbox_frames;
+  Counter mailbox_wakeups;
+  // Events
+  Counter connections;  ///< attached now
+  Counter sessions;     ///< connections and sessions within their grace time
+  Counter malformed;    ///< connections closed for it
+  Counter wrong_source;
+  Counter silent;
+  Counter slow_consumers;
+  Counter stalled_frames;
+  Counter too_many_requests;
+  Counter no_memory;
+  Counter pauses;
+  Counter resumes;
+  Counter reports;
+  Counter held_reads;  ///< times a sender that ignored PAUSE was not read
+  Counter gap_frames;  ///< let go at a resume and announced with SKIP
+  Counter resumed;
+  Counter lane0_demoted;  ///< frames
+  Counter pinned_bytes;   ///< kept from being freed by waiting frames, now
+  Counter pinned_bytes_max;
+};
+
+}  // namespace gimnet::hub

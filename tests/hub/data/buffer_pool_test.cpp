@@ -1,0 +1,138 @@
+#include "hub/data/buffer_pool.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace gimnet::hub {
+namespace {
+
+class Pools : public ::testing::Test {
+ protected:
+  Budget budget{64ull << 20};
+  BudgetLease lease{budget};
+  BufferPool pool{65'536, lease};
+  BudgetLease other_lease{budget};
+  BufferPool other{65'536, other_lease};
+};
+
+using BufferPoolTest = Pools;
+
+TEST_F(BufferPoolTest, GivesTheSameMemoryAgain) {
+  BufferRef first = pool.take_slab();
+  const std::byte* data = first->data;
+  EXPECT_GE(first->capacity, kSlabReadBytes + 16 + 65'536);
+  first.reset();
+  EXPECT_EQ(pool.take_slab()->data, data);
+}
+
+TEST_F(BufferPoolTest, AReferenceKeepsTheBuffer) {
+  BufferRef first = pool.take_slab();
+  BufferRef second = first.share();
+  EXPECT_EQ(first->references, 2u);
+  first.reset();
+  EXPECT_NE(pool.take_slab().get(), second.get());
+  BufferRef moved = std::move(second);
+  EXPECT_EQ(moved->references, 1u);
+}
+
+TEST_F(BufferPoolTest, ChunksAreAtLeastAsLargeAsAskedFor) {
+  for (const std::uint32_t bytes : {1u, 1'024u, 1'025u, 4'096u, 4'097u, 16'384u, 16'385u, 100'000u}) {
+    const BufferRef chunk = pool.take_chunk(bytes);
+    EXPECT_GE(chunk->capacity, bytes);
+    EXPECT_EQ(chunk->kind, BufferKind::chunk);
+  }
+}
+
+TEST_F(BufferPoolTest, PinsABufferOnceUntilItIsFree) {
+  BufferRef slab = pool.take_slab();
+  const std::uint64_t capacity = slab->capacity;
+  pool.pin(*slab.get());
+  pool.pin(*slab.get());
+  EXPECT_EQ(pool.pinned_bytes(), capacity);
+  const BufferRef second = slab.share();
+  slab.reset();
+  EXPECT_EQ(pool.pinned_bytes(), capacity);
+  BufferRef moved = second.share();
+  moved.reset();
+  EXPECT_EQ(pool.pinned_bytes(), capacity);
+}
+
+TEST_F(BufferPoolTest, AFreedPinIsGivenBack) {
+  {
+    const BufferRef slab = pool.take_slab();
+    pool.pin(*slab.get());
+  }
+  EXPECT_EQ(pool.pinned_bytes(), 0u);
+  EXPECT_FALSE(pool.take_slab()->pinned);
+}
+
+TEST_F(BufferPoolTest, ALentSlabIsNotReusedBeforeItsLoanEnds) {
+  BufferRef slab = pool.take_slab();
+  Buffer* const memory = slab.get();
+  Buffer* const lent = BufferPool::lend(*slab.get());
+  slab.reset();
+  EXPECT_NE(pool.take_slab().get(), memory);
+  BufferPool::end_loan(lent);
+  const BufferRef held = pool.take_slab();  // the free one
+  EXPECT_EQ(pool.take_slab().get(), memory) << "reclaimed";
+}
+
+TEST_F(BufferPoolTest, ABorrowedSlabIsGivenBackWithTheLastReference) {
+  BufferRef slab = pool.take_slab();
+  {
+    const BufferRef foreign = other.adopt(BufferPool::lend(*slab.get()));
+    EXPECT_EQ(foreign->kind, BufferKind::foreign);
+    EXPECT_EQ(foreign->data, slab->data);
+    const BufferRef again = foreign.share();
+    EXPECT_EQ(slab->lent.load(), 1u);
+  }
+  EXPECT_EQ(slab->lent.load(), 0u);
+}
+
+// However many mailbox entries lie in one slab, it is one piece of memory, and counts once.
+TEST_F(BufferPoolTest, ASlabThatIsBorrowedOftenIsPinnedOnce) {
+  BufferRef slab = pool.take_slab();
+  std::vector<BufferRef> borrowed;
+  for (int i = 0; i < 100; ++i) {
+    borrowed.push_back(other.adopt(BufferPool::lend(*slab.get())));
+    other.pin(*borrowed.back().get());
+  }
+  EXPECT_EQ(other.pinned_bytes(), slab->capacity);
+  borrowed.clear();
+  EXPECT_EQ(other.pinned_bytes(), 0u);
+  EXPECT_EQ(slab->lent.load(), 0u);
+  const BufferRef later = other.adopt(BufferPool::lend(*slab.get()));
+  EXPECT_EQ(later->data, slab->data);
+}
+
+TEST_F(BufferPoolTest, LendingABorrowedSlabLendsTheSlabBehindIt) {
+  BufferRef slab = pool.take_slab();
+  const BufferRef foreign = other.adopt(BufferPool::lend(*slab.get()));
+  EXPECT_EQ(BufferPool::lend(*foreign.get()), slab.get());
+  BufferPool::end_loan(slab.get());
+}
+
+TEST(BudgetLease, LeasesInPiecesAndGivesBack) {
+  Budget budget(4 << 20);
+  {
+    BudgetLease lease(budget);
+    lease.take(100);
+    EXPECT_EQ(budget.left(), 3 << 20);
+    lease.take(4 << 20);
+    EXPECT_EQ(budget.left(), 0);
+    EXPECT_TRUE(lease.exhausted());
+    lease.give_back(100);
+    EXPECT_FALSE(lease.exhausted()) << "exactly the budget";
+    BudgetLease other(budget);
+    other.take(1);
+    EXPECT_TRUE(other.exhausted());
+    lease.give_back(4 << 20);
+    EXPECT_FALSE(other.exhausted()) << "what the other shard gave back";
+    other.give_back(1);
+  }
+  EXPECT_EQ(budget.left(), 4 << 20);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
