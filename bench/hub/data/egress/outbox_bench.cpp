@@ -1,0 +1,77 @@
+// One connection's queue: in and out at once, with a backlog under each policy, and as fragments of large messages.
+
+#include <benchmark/benchmark.h>
+
+#include "bench/hub/data/support/null_transport.hpp"
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using testing::EgressRig;
+using testing::TestFrame;
+
+void in_and_out(benchmark::State& state) {
+  EgressRig rig;
+  Outbox outbox;
+  GatherWriter writer;
+  benchmarks::NullTransport transport;
+  const hub::Run run = rig.run({std::string(static_cast<std::size_t>(state.range(0)), 'x')});
+  const proto::FrameHeader header = run.header();
+  for (auto _ : state) {
+    outbox.push(run, header, {}, rig.context);
+    benchmark::DoNotOptimize(writer.flush(outbox, nullptr, transport, rig.context));
+    outbox.on_emptied(rig.context);
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(in_and_out)->Arg(0)->Arg(16)->Arg(256)->Arg(1'000)->Arg(1'010)->Arg(65'536);
+
+/// A full lane that takes no more: what each message costs then.
+void into_a_full_lane(benchmark::State& state, const TestFrame& frame) {
+  EgressRig rig;
+  Outbox outbox;
+  const hub::Run run = rig.run({std::string(200, 'k')}, frame);
+  const proto::FrameHeader header = run.header();
+  for (std::uint64_t bytes = 0; bytes < rig.limits.lane1_bytes; bytes += run.size) {
+    outbox.push(run, header, {}, rig.context);
+  }
+  outbox.settle(rig.context);
+  for (auto _ : state) outbox.push(run, header, {}, rig.context);
+  state.SetItemsProcessed(state.iterations());
+  outbox.drop_all(proto::DropReason::link_lost, rig.context);
+}
+BENCHMARK_CAPTURE(into_a_full_lane, drop, TestFrame{.flags = 2});
+BENCHMARK_CAPTURE(into_a_full_lane, oldest, TestFrame{.kind = proto::Kind::group});
+BENCHMARK_CAPTURE(into_a_full_lane, latest, TestFrame{.flags = 3 | proto::kFlagKeyed});
+
+/// A message of 1 MiB in fragments of 8 KiB, as it comes in a few turns.
+void fragments(benchmark::State& state) {
+  EgressRig rig;
+  Outbox outbox;
+  GatherWriter writer;
+  benchmarks::NullTransport transport;
+  constexpr std::uint32_t kPiece = 8 * 1024;
+  constexpr std::uint32_t kTotal = 1 << 20;
+  constexpr std::uint32_t kPerTurn = 16;
+  std::uint32_t number = 0;
+  std::uint32_t offset = 0;
+  for (auto _ : state) {
+    for (std::uint32_t i = 0; i < kPerTurn; ++i) {
+      rig.push_fragment(outbox, number, offset, kTotal, std::string(kPiece, 'f'));
+      offset += kPiece;
+      if (offset == kTotal) {
+        offset = 0;
+        ++number;
+      }
+    }
+    benchmark::DoNotOptimize(writer.flush(outbox, nullptr, transport, rig.context));
+    outbox.on_emptied(rig.context);
+  }
+  state.SetItemsProcessed(state.iterations() * kPerTurn);
+  state.SetBytesProcessed(state.iterations() * kPerTurn * kPiece);
+}
+BENCHMARK(fragments);
+
+}  // namespace
+}  // namespace gimnet::hub

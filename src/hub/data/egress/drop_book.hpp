@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/data/tally.hpp"
+#include "proto/frame/frame_header.hpp"
+#include "proto/frame/report.hpp"
+
+namespace gimnet::hub {
+
+/// Where every frame that is not delivered ends: counted by reason, and, where its sender asked for it, remembered for
+/// a REPORT. Reports for one sender and reason are merged until they are due. Thread safety: one shard.
+class DropBook {
+ public:
+  /// interval_ms: the shortest time between two reports to one sender for one reason.
+  DropBook(Tally& tally, std::uint64_t interval_ms) : tally_(tally), interval_ms_(interval_ms) {}
+
+  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes.
+  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
+
+  /// True while reports wait for their time, or senders are to be forgotten: flush() has something to do.
+  [[nodiscard]] bool pending() const { return !notes_.empty(); }
+
+  /// Calls send(NodeId sender, payload span) for each report that is due, and forgets senders that dropped nothing for
+  /// a while.
+  template <class Send>
+  void flush(std::uint64_t now_ms, Send&& send) {
+    for (std::size_t i = 0; i < notes_.size();) {
+      Note& note = notes_[i];
+      const bool due = now_ms >= note.sent_ms + interval_ms_;
+      if (due && note.count != 0) {
+        std::byte payload[proto::kReportSizeMax];
+        const std::size_t size = encode(note, payload);
+        note.count = 0;
+        note.sent_ms = now_ms;
+        send(note.sender, std::span<const std::byte>(payload, size));
+      } else if (due) {
+        notes_[i] = notes_.back();
+        notes_.pop_back();
+        continue;
+      }
+      ++i;
+    }
+  }
+
+ private:
+  /// Senders and reasons remembered at once; the drops of more are counted but not reported.
+  static constexpr std::size_t kNotesMax = 4096;
+
+  struct Note {
+    NodeId sender;
+    proto::DropReason reason{};
+    std::uint32_t count = 0;
+    std::uint64_t sent_ms = 0;
+    proto::FrameHeader last;
+    std::uint8_t following_size = 0;
+    std::byte following[proto::kReportFollowingMax];
+  };
+
+  void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
+  static std::size_t encode(const Note& note, std::span<std::byte, proto::kReportSizeMax> payload);
+
+  Tally& tally_;
+  const std::uint64_t interval_ms_;
+  std::vector<Note> notes_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/ids.hpp"
+#include "hub/data/budget.hpp"
+#include "hub/data/buffer_pool.hpp"
+#include "hub/data/egress/drop_book.hpp"
+#include "hub/data/tally.hpp"
+#include "hub/limits.hpp"
+#include "proto/frame/flow.hpp"
+
+namespace gimnet::hub {
+
+/// How an outbox reaches the senders that fill it, on whatever shard they are. Called only when a queue is full or has
+/// room again, never per frame.
+class SenderSignals {
+ public:
+  virtual ~SenderSignals() = default;
+  virtual void pause(NodeId sender, const proto::flow::Target& target) = 0;
+  virtual void resume(NodeId sender, const proto::flow::Target& target) = 0;
+  /// The sender ignored its PAUSE past the reserve: stop reading it until release() was called as often as hold().
+  virtual void hold(NodeId sender) = 0;
+  virtual void release(NodeId sender) = 0;
+};
+
+/// What all outboxes of a shard share. Thread safety: one shard.
+struct EgressContext {
+  const Limits& limits;
+  BufferPool& pool;
+  BudgetLease& budget;
+  Tally& tally;
+  DropBook& drops;
+  SenderSignals& signals;
+  std::uint64_t now_ms = 0;      ///< monotonic
+  std::int64_t now_wall_ns = 0;  ///< since 1970, for AGE and TRACE
+  HubId hub{};                   ///< for TRACE
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,171 @@
+#include "hub/data/egress/lane_queue.hpp"
+
+#include <boost/container_hash/hash.hpp>
+
+#include <algorithm>
+
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+bool same_header(const std::byte* a, const std::byte* b) {
+  return load_le<std::uint64_t>(a + 4) == load_le<std::uint64_t>(b + 4) &&
+         load_le<std::uint32_t>(a + 12) == load_le<std::uint32_t>(b + 12);
+}
+
+bool is_plain(const Entry& entry) { return !entry.fragmented && !entry.latest && !entry.extended && !entry.touched; }
+
+}  // namespace
+
+std::size_t hash_value(const LatestStream& stream) {
+  std::size_t seed = 0;
+  boost::hash_combine(seed, stream.addresses);
+  boost::hash_combine(seed, stream.key);
+  boost::hash_combine(seed, stream.kind_and_keyed);
+  return seed;
+}
+
+LatestStream LaneQueue::stream_of(const Entry& entry) {
+  const proto::FrameHeader header = entry.run.header();
+  std::uint64_t key = 0;
+  if (header.has(proto::kFlagKeyed)) {
+    const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
+    if (frame) key = frame->key.value_or(0);
+  }
+  const auto kind = static_cast<std::uint16_t>(static_cast<std::uint16_t>(header.kind) << 8);
+  return {load_le<std::uint64_t>(entry.run.bytes + 4), key,
+          static_cast<std::uint16_t>(kind | (header.flags & proto::kFlagKeyed))};
+}
+
+void LaneQueue::count(const Entry& entry) {
+  bytes_ += entry.size;
+  if (entry.block) block_bytes_ += entry.size;
+  if (entry.latest) latest_bytes_ += entry.size;
+}
+
+void LaneQueue::discount(const Entry& entry) {
+  bytes_ -= entry.size;
+  if (entry.block) block_bytes_ -= entry.size;
+  if (entry.latest) latest_bytes_ -= entry.size;
+}
+
+void LaneQueue::push(Entry entry) {
+  count(entry);
+  if (!entries_.empty()) {
+    Entry& last = entries_.back();
+    if (is_plain(entry) && is_plain(last) && last.frames != 0 && !last.more &&
+        same_header(last.run.bytes, entry.run.bytes) && last.run.extend(entry.run)) {
+      last.size += entry.size;
+      last.frames += entry.frames;
+      return;
+    }
+  }
+  const bool index = streams_ != nullptr && entry.latest && !entry.touched;
+  const Entry& placed = entries_.push_back(std::move(entry));
+  if (index) (*streams_)[stream_of(placed)] = entries_.end_number() - 1;
+}
+
+bool LaneQueue::extend_last(const Run& run, const Buffer& buffer, const std::byte* place) {
+  if (entries_.empty()) return false;
+  Entry& last = entries_.back();
+  if (last.run.buffer.get() != &buffer || last.run.bytes + last.run.size != place || last.frames == 0 || last.more ||
+      !is_plain(last) || !same_header(last.run.bytes, run.bytes)) {
+    return false;
+  }
+  last.run.size += run.size;
+  last.run.frames += run.frames;
+  last.size += run.size;
+  last.frames += run.frames;
+  bytes_ += run.size;
+  if (last.block) block_bytes_ += run.size;
+  return true;
+}
+
+Entry* LaneQueue::find_message(NodeId src, std::uint32_t message_number) {
+  for (std::uint64_t number = entries_.end_number(); number-- > entries_.first_number();) {
+    Entry& entry = entries_.at(number);
+    if (entry.frames != 0 && entry.fragmented && entry.message_number == message_number && !entry.complete &&
+        entry.run.header().src == src.value()) {
+      return &entry;
+    }
+  }
+  return nullptr;
+}
+
+void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last) {
+  discount(entry);
+  entry.append(std::move(fragment));
+  entry.complete = last;
+  count(entry);
+}
+
+bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
+  // Streams that left are forgotten when there are more of them than of others.
+  constexpr std::size_t kForgottenMin = 64;
+  if (streams() > 2 * entries_.size() + kForgottenMin) streams_.reset();
+  if (!streams_) {
+    streams_ = std::make_unique<StreamIndex>();
+    for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+      const Entry& each = entries_.at(number);
+      if (each.frames != 0 && each.latest && !each.touched) (*streams_)[stream_of(each)] = number;
+    }
+  }
+  const auto found = streams_->find(stream_of(entry));
+  if (found == streams_->end() || found->second < entries_.first_number()) return false;
+  Entry& waiting = entries_.at(found->second);
+  if (waiting.frames == 0 || !waiting.latest || waiting.touched) return false;
+  discount(waiting);
+  count(entry);
+  older = std::exchange(waiting, std::move(entry));
+  return true;
+}
+
+bool LaneQueue::drop_oldest(Entry& dropped) {
+  oldest_hint_ = std::max(oldest_hint_, entries_.first_number());
+  for (; oldest_hint_ != entries_.end_number(); ++oldest_hint_) {
+    Entry& entry = entries_.at(oldest_hint_);
+    if (entry.frames == 0 || entry.block || entry.touched) continue;
+    discount(entry);
+    if (entry.fragmented || entry.frames == 1) {
+      dropped = std::exchange(entry, Entry{});
+      entry.frames = 0;
+    } else {
+      dropped = Entry{};
+      dropped.run = entry.run.share();
+      dropped.run.size = entry.run.skip_frame();
+      dropped.run.frames = dropped.frames = 1;
+      dropped.size = dropped.run.size;
+      entry.size -= dropped.size;
+      --entry.frames;
+      count(entry);
+    }
+    skip_dead();
+    return true;
+  }
+  return false;
+}
+
+Entry& LaneQueue::front() {
+  skip_dead();
+  return entries_.front();
+}
+
+void LaneQueue::on_left(const Entry& entry, std::uint32_t bytes) {
+  bytes_ -= bytes;
+  if (entry.block) block_bytes_ -= bytes;
+  if (entry.latest) latest_bytes_ -= bytes;
+}
+
+void LaneQueue::pop_front() {
+  entries_.pop_front();
+  skip_dead();
+}
+
+void LaneQueue::skip_dead() {
+  while (!entries_.empty() && entries_.front().frames == 0) entries_.pop_front();
+  // The index is only worth its memory while something waits.
+  if (entries_.empty()) streams_.reset();
+}
+
+}  // namespace gimnet::hub

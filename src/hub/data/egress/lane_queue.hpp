@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include "hub/data/egress/entry.hpp"
+#include "hub/data/ring_queue.hpp"
+
+namespace gimnet::hub {
+
+/// The identity of a stream of LATEST messages within its lane: src, dst, kind, key.
+struct LatestStream {
+  std::uint64_t addresses = 0;
+  std::uint64_t key = 0;
+  std::uint16_t kind_and_keyed = 0;
+  friend bool operator==(const LatestStream&, const LatestStream&) = default;
+};
+[[nodiscard]] std::size_t hash_value(const LatestStream& stream);
+
+/// One lane of an outbox: entries in order, found again by stream (to replace an older LATEST message) and by message
+/// (to add a fragment). What leaves it by being dropped or replaced is handed to a `lose(Entry&, reason)`.
+/// Thread safety: one shard.
+class LaneQueue {
+ public:
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  /// Bytes of entries that must not be dropped for room.
+  [[nodiscard]] std::uint64_t block_bytes() const { return block_bytes_; }
+  /// Bytes of entries that a newer message may replace.
+  [[nodiscard]] std::uint64_t latest_bytes() const { return latest_bytes_; }
+
+  /// Adds the entry, or joins it to the last one where both are plain runs of the same header in neighbouring memory.
+  void push(Entry entry);
+  /// Counts `run` into the last entry, if that is of the same header and ends at `place` in `buffer`, where the
+  /// caller puts the bytes.
+  [[nodiscard]] bool extend_last(const Run& run, const Buffer& buffer, const std::byte* place);
+  /// The entry that still waits for more fragments of that message, or nullptr.
+  [[nodiscard]] Entry* find_message(NodeId src, std::uint32_t message_number);
+  void append_fragment(Entry& entry, Run fragment, bool last);
+
+  /// Puts `entry`, a LATEST message, in the place of an untouched older one of its stream, which is moved to `older`.
+  /// Returns whether there was one. From the first call on, LATEST entries are looked up by stream.
+  [[nodiscard]] bool replace_latest(Entry& entry, Entry& older);
+
+  /// Takes out the oldest entry (or first frame of a run) that may be dropped for room. Returns false if there is none.
+  [[nodiscard]] bool drop_oldest(Entry& dropped);
+
+  /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
+  [[nodiscard]] Entry& front();
+  /// The front entry's first frame, or first piece, has left: keeps the sums right. The entry itself is changed by the
+  /// caller.
+  void on_left(const Entry& entry, std::uint32_t bytes);
+  void pop_front();
+
+  [[nodiscard]] RingQueue<Entry>& entries() { return entries_; }
+  /// Streams that are remembered.
+  [[nodiscard]] std::size_t streams() const { return streams_ ? streams_->size() : 0; }
+
+ private:
+  using StreamIndex = boost::unordered_flat_map<LatestStream, std::uint64_t>;
+
+  [[nodiscard]] static LatestStream stream_of(const Entry& entry);
+  void count(const Entry& entry);
+  void discount(const Entry& entry);
+  void skip_dead();
+
+  RingQueue<Entry> entries_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t block_bytes_ = 0;
+  std::uint64_t latest_bytes_ = 0;
+  std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
+  std::unique_ptr<StreamIndex> streams_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/egress/egress_context.hpp"
+#include "hub/data/egress/lane_queue.hpp"
+#include "hub/data/egress/pause_book.hpp"
+
+namespace gimnet::hub {
+
+/// How a run came to an outbox.
+struct Handover {
+  bool fan_out = false;  ///< the same bytes go to many: keep a reference instead of a copy
+};
+
+/// What waits to be written to one connection: control frames, and four lanes of messages, with the policies of
+/// docs/protocol.md, section 5. While the connection takes everything at once, push() is a few instructions: policies
+/// begin when something waits. Thread safety: one shard. Ownership: references to buffers.
+class Outbox {
+ public:
+  Outbox() = default;
+  Outbox(const Outbox&) = delete;
+  Outbox& operator=(const Outbox&) = delete;
+
+  /// Data frames for this connection. Every frame ends in a lane or in the drop book.
+  /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if FRAGMENT, EXT or LATEST.
+  void push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context);
+
+  /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that waits: the peer asks
+  /// and does not listen.
+  [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context);
+
+  /// Frames of an earlier connection, to be written again before all lanes.
+  [[nodiscard]] RingQueue<Run>& replay() { return replay_; }
+
+  [[nodiscard]] bool empty() const { return waiting_bytes() == 0; }
+  [[nodiscard]] std::uint64_t waiting_bytes() const;
+  /// Bytes of messages that are not LATEST: what makes a consumer slow.
+  [[nodiscard]] std::uint64_t stale_bytes() const;
+  [[nodiscard]] bool has_block() const;
+  [[nodiscard]] bool paused_anyone() const { return !pauses_.empty(); }
+
+  /// After a flush that left something: what stays is counted against the budget, small frames are copied out of
+  /// their slabs, and policies apply from here on.
+  void settle(EgressContext& context);
+  /// The same for one run, also for what is kept after it was written.
+  void settle_run(Run& run, bool shared, EgressContext& context);
+  /// After a flush that left nothing.
+  void on_emptied(EgressContext& context);
+  /// After frames left: tells paused senders that there is room.
+  void signal_room(EgressContext& context);
+
+  /// The recipient took nothing for too long: every message sent with BLOCK goes.
+  void time_out_block(EgressContext& context);
+  /// The session is over, or its connection and nothing may wait: all lanes go.
+  void drop_all(proto::DropReason reason, EgressContext& context);
+  /// The connection is gone: control frames that wait mean nothing to the next one.
+  void clear_control();
+
+  /// Nothing was written for a while: gives back memory that only a busy connection needs.
+  void trim();
+
+  // For the gather writer, which takes entries out
+  [[nodiscard]] RingQueue<Run>& control() { return control_; }
+  [[nodiscard]] LaneQueue& lane(std::size_t lane) { return lanes_[lane]; }
+  [[nodiscard]] std::array<std::uint64_t, proto::kLaneCount>& owed() { return owed_; }
+  void on_control_left(std::uint32_t bytes) { control_bytes_ -= bytes; }
+  void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
+
+ private:
+  struct CutMessage {
+    NodeId src;
+    std::uint32_t number = 0;
+  };
+  /// Messages of which the rest is still refused; beyond it the rest of the oldest is let through, and the recipient
+  /// finds the gap.
+  static constexpr std::size_t kCutMessagesMax = 64;
+  /// A sender that can't be held (its own CONFIRM is waited for) and does not pause: beyond so many reserves its
+  /// messages are dropped, BLOCK or not.
+  static constexpr std::uint64_t kReservesMax = 8;
+  /// Runs below this are cheaper to copy than to reference (bench/hub/data/egress/outbox_bench.cpp).
+  static constexpr std::uint32_t kCopyBytesMax = 1024;
+  /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
+  static constexpr std::uint32_t kSettleBytesMax = 16 * 1024;
+
+  [[nodiscard]] bool append_copy(const Run& run, const proto::FrameHeader& header, EgressContext& context);
+  [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
+                                 EgressContext& context);
+  [[nodiscard]] Run copy(const Run& run, EgressContext& context);
+  [[nodiscard]] static std::uint64_t lane_limit(std::size_t lane, const Limits& limits);
+  [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
+
+  void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void admit_block(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  void forget_cut(NodeId src, std::uint32_t number);
+  /// Many small messages that cannot form runs take more memory for their entries than for their bytes.
+  void charge_entries(EgressContext& context);
+  void settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context);
+  [[nodiscard]] std::uint64_t data_bytes() const;
+
+  RingQueue<Run> control_;
+  RingQueue<Run> replay_;
+  std::array<LaneQueue, proto::kLaneCount> lanes_;
+  std::array<std::uint64_t, proto::kLaneCount> settled_{};  ///< entries below this number are settled
+  std::array<std::uint64_t, proto::kLaneCount> owed_{};     ///< bytes due to a waiting lane, see GatherWriter
+  std::uint32_t control_bytes_ = 0;
+  std::uint64_t charged_bytes_ = 0;  ///< of the lanes' entries, counted against the budget
+  bool backlog_ = false;
+  BufferRef chunk_;  ///< where copies go
+  std::uint32_t chunk_used_ = 0;
+  std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk
+  PauseBook pauses_;
+  std::vector<CutMessage> cut_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/egress/egress_context.hpp"
+
+namespace gimnet::hub {
+
+/// The senders that one outbox told to pause, and for what. Each is told again now and then if it goes on sending, held
+/// (not read) once it used up the reserve, and told to resume when there is room. Thread safety: one shard.
+class PauseBook {
+ public:
+  [[nodiscard]] bool empty() const { return notes_.empty(); }
+
+  /// A frame with BLOCK of `bytes` came although its lane is full.
+  void on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes, bool past_reserve,
+               SenderSignals& signals);
+  /// The lane has room again.
+  void on_room(proto::Lane lane, SenderSignals& signals);
+  /// The outbox is given up.
+  void release_all(SenderSignals& signals);
+
+ private:
+  struct Note {
+    NodeId sender;
+    proto::flow::Target target;
+    std::uint32_t bytes_since = 0;
+    bool held = false;
+  };
+  /// A sender that still sends after so many bytes has not seen PAUSE, or lost it with a connection: told again.
+  static constexpr std::uint32_t kRemindBytes = 256 * 1024;
+
+  static void let_go(Note& note, SenderSignals& signals);
+
+  std::vector<Note> notes_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,89 @@
+#include "hub/data/egress/drop_book.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using testing::EgressRig;
+
+struct Sent {
+  NodeId sender;
+  std::vector<std::byte> payload;
+};
+
+std::vector<Sent> flush(DropBook& book, std::uint64_t now_ms) {
+  std::vector<Sent> sent;
+  book.flush(now_ms, [&](NodeId sender, std::span<const std::byte> payload) {
+    sent.push_back({sender, {payload.begin(), payload.end()}});
+  });
+  return sent;
+}
+
+void drop(DropBook& book, const std::string& text, std::uint32_t src, DropReason reason,
+          std::uint8_t flags = proto::kFlagReport) {
+  const auto bytes = EgressRig::bytes(text, {.flags = flags, .src = src});
+  book.drop(bytes.data(), static_cast<std::uint32_t>(bytes.size()), 1, reason);
+}
+
+TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
+  Tally tally;
+  DropBook book(tally, 10);
+  drop(book, "quiet", 1, DropReason::queue_full, 0);
+  EXPECT_FALSE(book.pending());
+  drop(book, "loud", 1, DropReason::queue_full);
+  EXPECT_TRUE(book.pending());
+  EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::queue_full)], 2u);
+  const auto sent = flush(book, 1'000);
+  ASSERT_EQ(sent.size(), 1u);
+  const auto report = proto::decode_report(sent[0].payload);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->count, 1u);
+  EXPECT_EQ(report->following.size(), 4u);
+}
+
+TEST(DropBook, MergesBySenderAndReasonAndKeepsTheLastFrame) {
+  Tally tally;
+  DropBook book(tally, 10);
+  drop(book, "one", 1, DropReason::queue_full);
+  EgressRig rig;
+  const hub::Run run = rig.run({"two", "three", "four!"}, {.flags = proto::kFlagReport, .src = 1});
+  book.drop(run.bytes, run.size, run.frames, DropReason::queue_full);
+  drop(book, "another sender", 2, DropReason::queue_full);
+  drop(book, "another reason", 1, DropReason::away);
+  const auto sent = flush(book, 1'000);
+  ASSERT_EQ(sent.size(), 3u);
+  const auto report = proto::decode_report(sent[0].payload);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->count, 4u);
+  EXPECT_EQ(report->header.length, 5u);
+}
+
+TEST(DropBook, SaysNoMoreThanOneAnInterval) {
+  Tally tally;
+  DropBook book(tally, 10);
+  drop(book, "one", 1, DropReason::queue_full);
+  EXPECT_EQ(flush(book, 1'000).size(), 1u);
+  drop(book, "two", 1, DropReason::queue_full);
+  EXPECT_EQ(flush(book, 1'009).size(), 0u);
+  EXPECT_TRUE(book.pending());
+  EXPECT_EQ(flush(book, 1'010).size(), 1u);
+}
+
+// So many senders at once that some are only counted; later ones are heard again.
+TEST(DropBook, ForgetsSendersThatAreQuiet) {
+  Tally tally;
+  DropBook book(tally, 10);
+  for (std::uint32_t src = 1; src <= 5'000; ++src) drop(book, "x", src, DropReason::away);
+  EXPECT_EQ(flush(book, 1'000).size(), 4'096u);
+  for (std::uint64_t now = 1'000; book.pending() && now < 2'000; now += 10) flush(book, now);
+  EXPECT_FALSE(book.pending());
+  drop(book, "x", 9'000, DropReason::away);
+  EXPECT_EQ(flush(book, 3'000).size(), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

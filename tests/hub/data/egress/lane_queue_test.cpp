@@ -1,0 +1,119 @@
+#include "hub/data/egress/lane_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using testing::EgressRig;
+using testing::TestFrame;
+
+class LaneQueueTest : public ::testing::Test {
+ protected:
+  Entry entry(const std::string& payload, const TestFrame& frame = {}) {
+    Entry made;
+    made.run = rig.run({payload}, frame);
+    made.size = made.run.size;
+    made.frames = 1;
+    made.block = frame.flags == 1;
+    made.latest = (frame.flags & 3) == 3;
+    return made;
+  }
+  EgressRig rig;
+  LaneQueue lane;
+};
+
+TEST_F(LaneQueueTest, JoinsNeighboursWithOneHeader) {
+  lane.push(entry("one"));
+  lane.push(entry("two"));
+  EXPECT_EQ(lane.entries().size(), 1u);
+  EXPECT_EQ(lane.front().frames, 2u);
+  lane.push(entry("other source", {.src = 2}));
+  EXPECT_EQ(lane.entries().size(), 2u);
+  lane.push(entry("back again"));
+  EXPECT_EQ(lane.entries().size(), 3u);
+  EXPECT_EQ(lane.bytes(), 3u + 3u + 12u + 10u + 4 * proto::kHeaderSize);
+}
+
+TEST_F(LaneQueueTest, CountsBlockAndLatestBytes) {
+  lane.push(entry("block", {.flags = 1}));
+  lane.push(entry("key_____", {.flags = 3 | proto::kFlagKeyed}));
+  EXPECT_EQ(lane.block_bytes(), proto::kHeaderSize + 5);
+  EXPECT_EQ(lane.latest_bytes(), proto::kHeaderSize + 8);
+}
+
+TEST_F(LaneQueueTest, DropsTheOldestFrameOfARunFirst) {
+  lane.push(entry("one"));
+  lane.push(entry("two"));
+  lane.push(entry("block", {.flags = 1}));
+  lane.push(entry("three"));
+  Entry dropped;
+  for (const std::uint32_t expected : {3u, 3u, 5u}) {
+    ASSERT_TRUE(lane.drop_oldest(dropped));
+    EXPECT_EQ(dropped.size, proto::kHeaderSize + expected);
+    EXPECT_EQ(dropped.frames, 1u);
+  }
+  EXPECT_FALSE(lane.drop_oldest(dropped)) << "only BLOCK is left";
+  EXPECT_EQ(lane.bytes(), proto::kHeaderSize + 5);
+  EXPECT_EQ(lane.front().block, true);
+}
+
+TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
+  Entry part = entry("part", {.src = 3});
+  part.fragmented = true;
+  part.complete = false;
+  part.message_number = 77;
+  lane.push(std::move(part));
+  lane.push(entry("behind it"));
+  EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 4}, 77), nullptr);
+  EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 78), nullptr);
+  Entry* found = lane.find_message(NodeId{7u << 20 | 3}, 77);
+  ASSERT_NE(found, nullptr);
+  lane.append_fragment(*found, rig.run({"the end"}, {.src = 3}), true);
+  EXPECT_EQ(found->frames, 2u);
+  EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "complete";
+  EXPECT_EQ(lane.bytes(), 4u + 9u + 7u + 3 * proto::kHeaderSize);
+}
+
+TEST_F(LaneQueueTest, ReplacesTheLatestOfAStream) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
+  Entry older;
+  Entry first = entry("key____1first", latest);
+  EXPECT_FALSE(lane.replace_latest(first, older));
+  lane.push(std::move(first));
+  lane.push(entry("key____2", latest));
+  Entry second = entry("key____1second!", latest);
+  ASSERT_TRUE(lane.replace_latest(second, older));
+  EXPECT_EQ(older.size, proto::kHeaderSize + 13);
+  EXPECT_EQ(lane.front().size, proto::kHeaderSize + 15);
+  EXPECT_EQ(lane.bytes(), lane.latest_bytes());
+  lane.pop_front();
+  Entry third = entry("key____1", latest);
+  EXPECT_FALSE(lane.replace_latest(third, older)) << "it left";
+}
+
+// A lane that never runs empty, and a sender with an ever new key: what left is not remembered.
+TEST_F(LaneQueueTest, ForgetsStreamsThatLeft) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
+  Entry older;
+  for (int i = 0; i < 10'000; ++i) {
+    std::string key(8, '\0');
+    std::memcpy(key.data(), &i, sizeof i);
+    Entry next = entry(key, latest);
+    EXPECT_FALSE(lane.replace_latest(next, older));
+    lane.push(std::move(next));
+    if (i > 0) lane.pop_front();
+    ASSERT_LE(lane.streams(), 200u);
+  }
+  // The one that waits is still found.
+  std::string key(8, '\0');
+  const int last = 9'999;
+  std::memcpy(key.data(), &last, sizeof last);
+  Entry next = entry(key, latest);
+  EXPECT_TRUE(lane.replace_latest(next, older));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,62 @@
+#include "hub/data/egress/pause_book.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::FakeSignals;
+using ::testing::IsEmpty;
+
+constexpr NodeId kOne{7u << 20 | 1};
+constexpr NodeId kTwo{7u << 20 | 2};
+const proto::flow::Target kNormal{proto::Kind::unicast, proto::Lane::normal, 99};
+const proto::flow::Target kBulk{proto::Kind::unicast, proto::Lane::bulk, 99};
+
+TEST(PauseBook, PausesOncePerSenderAndTarget) {
+  FakeSignals signals;
+  PauseBook book;
+  EXPECT_TRUE(book.empty());
+  book.on_full(kOne, kNormal, 100, false, signals);
+  book.on_full(kOne, kNormal, 100, false, signals);
+  book.on_full(kTwo, kNormal, 100, false, signals);
+  book.on_full(kOne, kBulk, 100, false, signals);
+  EXPECT_THAT(signals.take(), ElementsAre("pause 1", "pause 2", "pause 1"));
+  book.on_room(proto::Lane::normal, signals);
+  EXPECT_THAT(signals.take(), ElementsAre("resume 1", "resume 2"));
+  EXPECT_FALSE(book.empty());
+  book.on_room(proto::Lane::bulk, signals);
+  EXPECT_THAT(signals.take(), ElementsAre("resume 1"));
+  EXPECT_TRUE(book.empty());
+}
+
+TEST(PauseBook, HoldsOnceAndReleasesAsOften) {
+  FakeSignals signals;
+  PauseBook book;
+  book.on_full(kOne, kNormal, 100, false, signals);
+  book.on_full(kOne, kNormal, 100, true, signals);
+  book.on_full(kOne, kNormal, 100, true, signals);
+  EXPECT_THAT(signals.take(), ElementsAre("pause 1", "hold 1"));
+  book.release_all(signals);
+  EXPECT_THAT(signals.take(), ElementsAre("resume 1", "release 1"));
+  book.release_all(signals);
+  EXPECT_THAT(signals.take(), IsEmpty());
+}
+
+TEST(PauseBook, RemindsAt256KiBAndNotBefore) {
+  FakeSignals signals;
+  PauseBook book;
+  book.on_full(kOne, kNormal, 1, false, signals);
+  signals.take();
+  book.on_full(kOne, kNormal, 256 * 1024 - 1, false, signals);
+  EXPECT_THAT(signals.take(), IsEmpty());
+  book.on_full(kOne, kNormal, 1, false, signals);
+  EXPECT_THAT(signals.take(), ElementsAre("pause 1"));
+}
+
+}  // namespace
+}  // namespace gimnet::hub
