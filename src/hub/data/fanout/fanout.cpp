@@ -1,0 +1,130 @@
+#include "hub/data/fanout/fanout.hpp"
+
+#include <bit>
+#include <cstring>
+
+#include "hub/data/egress/resume_buffer.hpp"
+
+namespace gimnet::hub {
+
+Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context)
+    : self_(self), mailboxes_(std::move(mailboxes)), recipients_(recipients), context_(context) {
+  GIMNET_CHECK(mailboxes_.size() <= kShardsMax);
+  open_.resize(mailboxes_.size());
+}
+
+void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
+  if (!recipient.connected && !recipient.waits_when_away) {
+    context_.drops.drop(run.bytes, run.size, run.frames, proto::DropReason::away);
+    return;
+  }
+  // Only the first frame's length is in `header`; what is short altogether has no long frame in it.
+  if (run.size - proto::kHeaderSize <= recipient.frame_bytes || recipient.frame_bytes >= context_.limits.frame_bytes) {
+    push(recipient, run, header, handover);
+    return;
+  }
+  Run rest = run.share();
+  while (rest.frames != 0) {
+    Run frame = rest.share();
+    frame.size = rest.skip_frame();
+    frame.frames = 1;
+    if (frame.size - proto::kHeaderSize <= recipient.frame_bytes) {
+      push(recipient, frame, frame.header(), handover);
+    } else {
+      context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::too_large);
+    }
+  }
+}
+
+void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
+  recipient.outbox.push(run, header, handover, context_);
+  recipients_.mark_dirty(recipient);
+}
+
+void Fanout::hand_over(ShardIndex to, const Run& run) {
+  Run& open = open_[to.value()];
+  if (open.frames != 0) {
+    if (open.extend(run)) return;
+    post(to);
+  }
+  open_[to.value()] = run.share();
+  open_shards_ |= std::uint64_t{1} << to.value();
+}
+
+void Fanout::post_all() {
+  while (open_shards_ != 0) {
+    post(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(open_shards_))});
+  }
+}
+
+void Fanout::post(ShardIndex to) {
+  Run run = std::exchange(open_[to.value()], Run{});
+  open_shards_ &= ~(std::uint64_t{1} << to.value());
+  posted_ |= std::uint64_t{1} << to.value();
+  if (mailboxes_[to.value()]->full(self_, run.size)) {
+    put_blocking_only(to, run);
+  } else {
+    put(to, run);
+  }
+  if (mailboxes_[to.value()]->crowded(self_)) crowded_ |= std::uint64_t{1} << to.value();
+}
+
+void Fanout::put_blocking_only(ShardIndex to, const Run& run) {
+  Run rest = run.share();
+  Run blocking;
+  while (rest.frames != 0) {
+    Run frame = rest.share();
+    frame.size = rest.skip_frame();
+    frame.frames = 1;
+    const bool block = is_block(frame.header());
+    if (block && blocking.extend(frame)) continue;
+    if (blocking.frames != 0) put(to, std::exchange(blocking, Run{}));
+    if (block) {
+      blocking = std::move(frame);
+    } else {
+      context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::shard_full);
+    }
+  }
+  if (blocking.frames != 0) put(to, blocking);
+}
+
+void Fanout::put(ShardIndex to, const Run& run) {
+  context_.tally.queued += run.frames;
+  context_.tally.mailbox_entries += 1;
+  context_.tally.mailbox_frames += run.frames;
+  Mail mail;
+  mail.kind = MailKind::frames;
+  mail.bytes = run.bytes;
+  mail.size = run.size;
+  mail.frames = run.frames;
+  mail.lent = BufferPool::lend(*run.buffer.get());
+  if (mailboxes_[to.value()]->post(self_, mail)) ++wakeups_;
+}
+
+Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size) {
+  const auto size = static_cast<std::uint32_t>(header.frame_size());
+  if (lists_ && lists_->references == 1) lists_used_ = 0;
+  if (!lists_ || lists_->capacity - lists_used_ < size) {
+    lists_ = size <= kListChunkBytes ? context_.pool.take_chunk(kListChunkBytes) : context_.pool.take_slab();
+    lists_used_ = 0;
+  }
+  std::byte* place = lists_->data + lists_used_;
+  proto::store_header(place, header);
+  std::memcpy(place + proto::kHeaderSize, frame.bytes + proto::kHeaderSize + ids_size, header.length);
+  lists_used_ += size;
+  context_.tally.copied_bytes += header.length;
+  return Run{lists_.share(), place, size, 1};
+}
+
+void Fanout::look_for_room() {
+  for (std::uint64_t shards = crowded_; shards != 0; shards &= shards - 1) {
+    const int shard = std::countr_zero(shards);
+    if (!mailboxes_[static_cast<std::size_t>(shard)]->crowded(self_)) crowded_ &= ~(std::uint64_t{1} << shard);
+  }
+}
+
+void Fanout::post_word(ShardIndex to, Mail mail) {
+  if (mailboxes_[to.value()]->post(self_, mail)) ++wakeups_;
+}
+
+}  // namespace gimnet::hub

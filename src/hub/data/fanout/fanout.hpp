@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/egress/egress_context.hpp"
+#include "hub/data/fanout/mailbox.hpp"
+#include "hub/data/fanout/recipient.hpp"
+
+namespace gimnet::hub {
+
+/// Hands frames to their recipients: a reference or a small copy into each outbox on this shard, and for other shards
+/// one mailbox entry for a whole stretch of neighbouring frames. Thread safety: one shard.
+class Fanout {
+ public:
+  /// mailboxes: of all shards, by index.
+  Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context);
+
+  /// To one recipient here. Frames larger than it takes are dropped.
+  void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
+  /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one entry.
+  void hand_over(ShardIndex to, const Run& run);
+  /// No frame behind the last one will come: what was handed over is posted.
+  void post_all();
+
+  /// A LIST frame as its recipients get it: `header`, and what follows the first `ids_size` bytes behind the old one.
+  /// One copy for all recipients on this shard.
+  [[nodiscard]] Run cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size);
+
+  /// The shards (a bit set) that frames were handed over to since the last call.
+  [[nodiscard]] std::uint64_t take_posted() { return std::exchange(posted_, 0); }
+  /// The shards whose mailbox is more than half full: who sends to them should be read later.
+  [[nodiscard]] std::uint64_t crowded() const { return crowded_; }
+  /// Looks again; the other shard wakes this one when it has room.
+  void look_for_room();
+
+  [[nodiscard]] ShardIndex self() const { return self_; }
+  [[nodiscard]] std::size_t shards() const { return mailboxes_.size(); }
+  [[nodiscard]] RecipientTable& recipients() { return recipients_; }
+  [[nodiscard]] EgressContext& context() { return context_; }
+  [[nodiscard]] std::uint64_t take_wakeups() { return std::exchange(wakeups_, 0); }
+  /// A word for a sender on another shard.
+  void post_word(ShardIndex to, Mail mail);
+
+ private:
+  static constexpr std::uint32_t kListChunkBytes = 16 * 1024;
+
+  void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
+  void post(ShardIndex to);
+  void put(ShardIndex to, const Run& run);
+  /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is not read until there
+  /// is room; the rest is dropped.
+  void put_blocking_only(ShardIndex to, const Run& run);
+
+  const ShardIndex self_;
+  const std::vector<Mailbox*> mailboxes_;
+  RecipientTable& recipients_;
+  EgressContext& context_;
+  std::vector<Run> open_;          ///< by shard: what was handed over and may still grow
+  std::uint64_t open_shards_ = 0;  ///< bit set of those with frames
+  BufferRef lists_;                ///< where LIST frames without their ids are put
+  std::uint32_t lists_used_ = 0;
+  std::uint64_t posted_ = 0;
+  std::uint64_t crowded_ = 0;
+  std::uint64_t wakeups_ = 0;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/concurrent/mpsc_queue.hpp"
+#include "hub/concurrent/waker.hpp"
+#include "hub/data/buffer.hpp"
+#include "hub/data/route/node_table.hpp"
+#include "proto/frame/flow.hpp"
+
+namespace gimnet::hub {
+
+enum class MailKind : std::uint8_t {
+  frames,   ///< admitted frames, to be routed to recipients on the receiving shard
+  control,  ///< one whole frame of FLOW or REPORT in `small`, for the node
+  hold,     ///< stop reading the node until as many `release`
+  release,
+};
+
+/// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a word about a sender.
+struct Mail {
+  MailKind kind = MailKind::frames;
+  std::uint8_t small_size = 0;
+  std::uint32_t size = 0;
+  std::uint32_t frames = 0;
+  NodeId node;
+  Buffer* lent = nullptr;  ///< the loan that goes with the bytes (BufferPool::lend)
+  const std::byte* bytes = nullptr;
+  std::byte small[72];
+};
+
+/// The queues into one shard, one per sending shard as far as order and bounds go. It never makes a shard wait: the
+/// sender asks full() and crowded() first. Thread safety: post() and what a sender asks only from that sender's thread;
+/// drain() from the receiver's.
+class Mailbox {
+ public:
+  struct Bounds {
+    std::uint64_t entries;
+    std::uint64_t bytes;
+  };
+  Mailbox(std::size_t shards, Bounds bounds, Waker& waker);
+
+  /// Sender: no room for another entry of that many bytes.
+  [[nodiscard]] bool full(ShardIndex from, std::uint32_t bytes) const;
+  /// Sender: more than half full. If so, room() will be told once it is not.
+  [[nodiscard]] bool crowded(ShardIndex from);
+  /// Sender: returns whether the receiver had to be woken. Frames are only posted if not full(); words always are.
+  bool post(ShardIndex from, Mail mail);
+
+  /// Receiver: calls take(Mail&) for up to `most` entries, and before_taking() once for every few of them that were
+  /// fetched; returns how many.
+  template <class Before, class Take>
+  std::size_t drain(std::size_t most, Before&& before_taking, Take&& take);
+  [[nodiscard]] bool empty() const { return queue_.empty(); }
+  /// Receiver: senders that found it crowded and now may go on; each once.
+  template <class Tell>
+  void tell_room(Tell&& tell);
+
+ private:
+  struct Letter {
+    std::uint8_t from = 0;
+    Mail mail;
+  };
+  /// What is between one sender and this receiver; each half on its own cache line.
+  struct Pair {
+    // The sender's
+    alignas(64) std::uint64_t sent_entries = 0;
+    std::uint64_t sent_bytes = 0;
+    // Written by the receiver, read by the sender
+    alignas(64) std::atomic<std::uint64_t> taken_entries{0};
+    std::atomic<std::uint64_t> taken_bytes{0};
+    // Set by the sender, cleared by the receiver
+    alignas(64) std::atomic<bool> sender_waits{false};
+  };
+  static void on_taken(Pair& pair, std::uint32_t bytes) {
+    // relaxed: counts for a bound; only the receiver writes them, and the sender may see them late.
+    pair.taken_entries.store(pair.taken_entries.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    // relaxed: as above
+    pair.taken_bytes.store(pair.taken_bytes.load(std::memory_order_relaxed) + bytes, std::memory_order_relaxed);
+  }
+  [[nodiscard]] static bool over(const Pair& pair, std::uint64_t entries, std::uint64_t bytes);
+
+  const Bounds bounds_;
+  Waker& waker_;
+  MpscQueue<Letter> queue_;
+  std::unique_ptr<Pair[]> pairs_;
+  const std::size_t shards_;
+};
+
+template <class Before, class Take>
+std::size_t Mailbox::drain(std::size_t most, Before&& before_taking, Take&& take) {
+  return queue_.drain(most, before_taking, [&](Letter&& letter) {
+    const std::uint32_t bytes = letter.mail.size;
+    take(letter.mail);
+    on_taken(pairs_[letter.from], bytes);
+  });
+}
+
+template <class Tell>
+void Mailbox::tell_room(Tell&& tell) {
+  for (std::size_t from = 0; from < shards_; ++from) {
+    Pair& pair = pairs_[from];
+    // The fence's partner is the one in crowded(): either the sender saw the room, or this thread sees that it waits.
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    // relaxed: ordered by the fence
+    if (!pair.sender_waits.load(std::memory_order_relaxed)) continue;
+    if (pair.sender_waits.exchange(false, std::memory_order_relaxed)) {  // relaxed: ordered by the fence
+      tell(ShardIndex{static_cast<std::uint8_t>(from)});
+    }
+  }
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/check.hpp"
+#include "base/ids.hpp"
+#include "hub/data/egress/outbox.hpp"
+
+namespace gimnet::hub {
+
+/// A session as the data plane sees it: somebody on this shard to whom frames go. Thread safety: one shard.
+struct Recipient {
+  NodeId node;
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+  std::uint32_t frame_bytes = proto::kFrameLengthDefault;  ///< largest `length` that it takes
+  bool connected = false;
+  bool waits_when_away = false;  ///< asked for resume: frames wait during its grace time
+  bool dirty = false;            ///< is in the list of those to be flushed
+  Outbox outbox;
+};
+
+/// The sessions of a shard by slot, and those that this turn has something to write for. Thread safety: one shard.
+/// Ownership: none; who owns a recipient takes it out before it goes.
+class RecipientTable {
+ public:
+  void put(Recipient& recipient) {
+    const std::size_t slot = recipient.slot.value();
+    if (slot >= by_slot_.size()) by_slot_.resize(slot + 1);
+    GIMNET_CHECK(by_slot_[slot] == nullptr);
+    by_slot_[slot] = &recipient;
+  }
+  void remove(Recipient& recipient) {
+    by_slot_[recipient.slot.value()] = nullptr;
+    if (recipient.dirty) std::erase(dirty_, &recipient);
+  }
+  /// nullptr unless exactly that session is there.
+  [[nodiscard]] Recipient* find(ConnectionSlot slot, std::uint32_t generation) const {
+    if (slot.value() >= by_slot_.size()) return nullptr;
+    Recipient* recipient = by_slot_[slot.value()];
+    return recipient != nullptr && recipient->generation == generation ? recipient : nullptr;
+  }
+  [[nodiscard]] const std::vector<Recipient*>& by_slot() const { return by_slot_; }  ///< with holes (nullptr)
+
+  void mark_dirty(Recipient& recipient) {
+    if (recipient.dirty) return;
+    recipient.dirty = true;
+    dirty_.push_back(&recipient);
+  }
+  [[nodiscard]] std::vector<Recipient*>& dirty() { return dirty_; }
+
+ private:
+  std::vector<Recipient*> by_slot_;
+  std::vector<Recipient*> dirty_;
+};
+
+}  // namespace gimnet::hub

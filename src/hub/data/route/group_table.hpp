@@ -1,0 +1,47 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "base/ids.hpp"
+
+namespace gimnet::hub {
+
+/// A recipient of a group on one shard.
+struct GroupMember {
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+};
+
+/// The recipients of one group at one moment. Thread safety: immutable once published. Ownership: the table
+/// publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
+struct GroupMembers {
+  NodeId provider;
+  /// One entry per shard of the hub, each with the members that live there.
+  std::vector<std::vector<GroupMember>> by_shard;
+};
+
+/// Group index to recipients, for the groups that this hub owns. Thread safety: one writer (the conductor), any
+/// number of readers; reads are wait-free. A reader's pointer is good until its shard's turn ends.
+class GroupTable {
+ public:
+  GroupTable();
+  ~GroupTable();
+  GroupTable(const GroupTable&) = delete;
+  GroupTable& operator=(const GroupTable&) = delete;
+
+  /// Puts `members` (or nullptr: no such group) in place and returns what stood there, which the caller frees after
+  /// a grace period. REQUIRES: index < 2^20.
+  [[nodiscard]] const GroupMembers* exchange(std::uint32_t index, const GroupMembers* members);
+
+  /// REQUIRES: index < 2^20. nullptr when no group has that index.
+  [[nodiscard]] const GroupMembers* find(std::uint32_t index) const {
+    return members_[index].load(std::memory_order_acquire);  // pairs with the exchange in exchange()
+  }
+
+ private:
+  std::atomic<const GroupMembers*>* members_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,43 @@
+#include "hub/data/route/node_table.hpp"
+
+#include <sys/mman.h>
+
+#include <new>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+constexpr std::size_t kWords = std::size_t{1} << kIndexBits;
+constexpr std::size_t kBytes = kWords * sizeof(std::atomic<std::uint64_t>);
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+}  // namespace
+
+NodeTable::NodeTable() {
+  // Anonymous memory is zero, which is the empty entry, and costs nothing until an index is used.
+  void* memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc{};
+  words_ = static_cast<std::atomic<std::uint64_t>*>(memory);
+}
+
+NodeTable::~NodeTable() { ::munmap(static_cast<void*>(words_), kBytes); }
+
+void NodeTable::publish(std::uint32_t index, NodePlace place) {
+  GIMNET_CHECK(index < kWords && place.slot.value() < kSlotsMax && place.shard.value() < kShardsMax);
+  const NodePlace before = find(index);
+  const std::uint64_t word = place.exists()
+                                 ? (static_cast<std::uint64_t>(place.generation) << 32) |
+                                       (static_cast<std::uint64_t>(place.shard.value()) << 24) | place.slot.value()
+                                 : 0;
+  words_[index].store(word, std::memory_order_release);            // pairs with the acquire load in find()
+  std::uint64_t shards = shards_.load(std::memory_order_relaxed);  // relaxed: this thread wrote it
+  if (before.exists() && --nodes_by_shard_[before.shard.value()] == 0) {
+    shards &= ~(std::uint64_t{1} << before.shard.value());
+  }
+  if (place.exists() && nodes_by_shard_[place.shard.value()]++ == 0) {
+    shards |= std::uint64_t{1} << place.shard.value();
+  }
+  shards_.store(shards, std::memory_order_relaxed);  // relaxed: see shards()
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/ids.hpp"
+
+namespace gimnet::hub {
+
+/// Where a node's session lives. A generation is never 0 for a session that exists; it is compared again when a
+/// waiting frame is sent, so that a frame for a node that left never reaches the next holder of its slot.
+struct NodePlace {
+  ShardIndex shard;
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+
+  [[nodiscard]] bool exists() const { return generation != 0; }
+  friend bool operator==(const NodePlace&, const NodePlace&) = default;
+};
+/// Slots fit in 24 bits beside shard (8) and generation (32) in one atomic word.
+inline constexpr std::uint32_t kSlotsMax = 1u << 24;
+/// The most shards that a hub can have: as many as bits in a set of them.
+inline constexpr std::size_t kShardsMax = 64;
+
+/// Node index to place, for the nodes of this hub: a flat array of 2^20 words in memory that the kernel hands out
+/// page by page. Thread safety: one writer (the conductor), any number of readers; reads are wait-free.
+class NodeTable {
+ public:
+  NodeTable();
+  ~NodeTable();
+  NodeTable(const NodeTable&) = delete;
+  NodeTable& operator=(const NodeTable&) = delete;
+
+  /// REQUIRES: index < 2^20, place.slot < kSlotsMax, place.shard < kShardsMax. A place with generation 0 clears the
+  /// entry.
+  void publish(std::uint32_t index, NodePlace place);
+
+  /// REQUIRES: index < 2^20. Generation 0 when no session has that index.
+  [[nodiscard]] NodePlace find(std::uint32_t index) const {
+    return unpack(words_[index].load(std::memory_order_acquire));  // pairs with the release store in publish()
+  }
+
+  /// The shards (a bit set) on which a node lives.
+  [[nodiscard]] std::uint64_t shards() const {
+    return shards_.load(std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
+  }
+
+ private:
+  static NodePlace unpack(std::uint64_t word) {
+    return NodePlace{ShardIndex{static_cast<std::uint8_t>(word >> 24)},
+                     ConnectionSlot{static_cast<std::uint32_t>(word & (kSlotsMax - 1))},
+                     static_cast<std::uint32_t>(word >> 32)};
+  }
+
+  std::atomic<std::uint64_t>* words_;
+  std::atomic<std::uint64_t> shards_{0};
+  std::array<std::uint32_t, kShardsMax> nodes_by_shard_{};  ///< the writer's
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,167 @@
+#include "hub/data/route/router.hpp"
+
+#include <bit>
+#include <cstring>
+
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+/// From so many recipients on a shard on, a reference each beats a copy each, however small the frames are
+/// (bench/hub/data/fanout/fanout_bench.cpp).
+constexpr std::size_t kReferenceRecipients = 4;
+
+}  // namespace
+
+void Router::drop(const Run& run, proto::DropReason reason) {
+  fanout_.context().drops.drop(run.bytes, run.size, run.frames, reason);
+}
+
+/// A frame that was counted once has `outcomes` outcomes now.
+void Router::settle(const Run& run, std::uint32_t outcomes) {
+  if (outcomes == 0) {
+    drop(run, proto::DropReason::no_subscriber);
+  } else {
+    fanout_.context().tally.copies += std::uint64_t{outcomes - 1} * run.frames;
+  }
+}
+
+NodePlace Router::place_of(NodeId node) const {
+  return hub_of(node) == hub_ ? nodes_.find(index_of(node)) : NodePlace{};
+}
+
+void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  switch (header.kind) {
+    case proto::Kind::group:
+      return to_group(run, header, handed_over);
+    case proto::Kind::list:
+      return to_list(run, header, handed_over);
+    case proto::Kind::broadcast:
+      return to_everybody(run, header, handed_over);
+    case proto::Kind::service:
+      return to_provider(run, header, handed_over);
+    default:
+      return to_node(run, header, NodeId{header.dst}, handed_over);
+  }
+}
+
+void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
+  const std::byte* next = frames.bytes;
+  const std::byte* const end = frames.bytes + frames.size;
+  while (next < end) {
+    const proto::NextRun found = proto::next_run(next, end, length_max);
+    GIMNET_CHECK(found.found == proto::Found::run);  // the sending shard parsed them
+    const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
+    fanout_.context().tally.queued -= run.frames;
+    dispatch(run, run.header(), true);
+    next += found.run.size;
+  }
+}
+
+void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over) {
+  if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
+  const NodePlace place = nodes_.find(index_of(node));
+  if (!place.exists()) return drop(run, proto::DropReason::no_such_node);
+  if (place.shard != fanout_.self()) {
+    // A frame that was handed over here and would have to go on is for a node that left meanwhile.
+    if (handed_over) return drop(run, proto::DropReason::no_such_node);
+    return fanout_.hand_over(place.shard, run);
+  }
+  Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
+  if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
+  fanout_.deliver(*recipient, run, header, Handover{});
+}
+
+const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader& header) {
+  const GroupId group{header.dst};
+  if (hub_of(group) != hub_) {
+    drop(run, proto::DropReason::no_route);
+    return nullptr;
+  }
+  const GroupMembers* members = groups_.find(index_of(group));
+  if (members == nullptr) drop(run, proto::DropReason::no_such_group);
+  return members;
+}
+
+void Router::to_group(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  const GroupMembers* members = find_group(run, header);
+  if (members == nullptr) return;
+  if (members->provider != NodeId{header.src}) return drop(run, proto::DropReason::not_allowed);
+  const std::vector<GroupMember>& here = members->by_shard[fanout_.self().value()];
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
+  std::uint32_t outcomes = 0;
+  for (const GroupMember& member : here) {
+    Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
+    if (recipient == nullptr) continue;
+    fanout_.deliver(*recipient, run, header, handover);
+    ++outcomes;
+  }
+  if (!handed_over) {
+    std::uint64_t shards = 0;
+    for (std::size_t shard = 0; shard < members->by_shard.size(); ++shard) {
+      if (!members->by_shard[shard].empty()) shards |= std::uint64_t{1} << shard;
+    }
+    to_other_shards(run, shards, outcomes);
+  }
+  settle(run, outcomes);
+}
+
+void Router::to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes) {
+  for (shards &= ~(std::uint64_t{1} << fanout_.self().value()); shards != 0; shards &= shards - 1) {
+    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(shards))}, run);
+    ++outcomes;
+  }
+}
+
+void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  const GroupMembers* members = find_group(run, header);
+  if (members != nullptr) to_node(run, header, members->provider, handed_over);
+}
+
+void Router::to_list(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  const std::uint32_t ids_size = 4 * header.dst;
+  const std::byte* ids = run.bytes + proto::kHeaderSize;
+  proto::FrameHeader local = header;
+  local.dst = 0;
+  local.length = header.length - ids_size;
+  Run shared;  // header and payload without the ids, one for all recipients on this shard
+  std::uint64_t shards = 0;
+  std::uint32_t outcomes = 0;
+  for (std::uint32_t i = 0; i < header.dst; ++i) {
+    const NodePlace place = place_of(NodeId{load_le<std::uint32_t>(ids + std::size_t{4} * i)});
+    if (place.exists() && place.shard != fanout_.self()) {
+      shards |= std::uint64_t{1} << place.shard.value();
+      continue;
+    }
+    Recipient* recipient = place.exists() ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
+    if (recipient == nullptr) {
+      // Counted by the shard that took the frame in; on the others the id is somebody else's business.
+      if (handed_over) continue;
+      drop(run, proto::DropReason::no_such_node);
+      ++outcomes;
+      continue;
+    }
+    if (shared.frames == 0) shared = fanout_.cut_ids(run, local, ids_size);
+    fanout_.deliver(*recipient, shared, local, Handover{.fan_out = true});
+    ++outcomes;
+  }
+  if (!handed_over) to_other_shards(run, shards, outcomes);
+  settle(run, outcomes);
+}
+
+void Router::to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  const NodeId dst{header.dst};
+  if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub) return drop(run, proto::DropReason::no_route);
+  if (index_of(dst) != kEveryIndex) return drop(run, proto::DropReason::no_such_node);
+  std::uint32_t outcomes = 0;
+  for (Recipient* recipient : fanout_.recipients().by_slot()) {
+    if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
+    fanout_.deliver(*recipient, run, header, Handover{.fan_out = true});
+    ++outcomes;
+  }
+  if (!handed_over) to_other_shards(run, nodes_.shards(), outcomes);
+  settle(run, outcomes);
+}
+
+}  // namespace gimnet::hub

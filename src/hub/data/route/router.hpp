@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/ids.hpp"
+#include "hub/data/fanout/fanout.hpp"
+#include "hub/data/route/group_table.hpp"
+#include "hub/data/route/node_table.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::hub {
+
+/// Decides where admitted frames go, by table look-up alone, and hands them on. Thread safety: one shard; the tables
+/// are published by the conductor.
+class Router {
+ public:
+  Router(HubId hub, const NodeTable& nodes, const GroupTable& groups, Fanout& fanout)
+      : hub_(hub), nodes_(nodes), groups_(groups), fanout_(fanout) {}
+
+  /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for the length, alone if
+  /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate.
+  void route(const Run& run, const proto::FrameHeader& header) { dispatch(run, header, false); }
+
+  /// Frames that another shard handed over, any mix: to their recipients on this shard.
+  void route_handed_over(const Run& frames, std::uint32_t length_max);
+
+  /// A frame that the hub itself made, to a node on whatever shard (a REPORT).
+  [[nodiscard]] NodePlace place_of(NodeId node) const;
+
+ private:
+  void dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
+  void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes);
+  [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header);
+  void drop(const Run& run, proto::DropReason reason);
+  void settle(const Run& run, std::uint32_t outcomes);
+
+  const HubId hub_;
+  const NodeTable& nodes_;
+  const GroupTable& groups_;
+  Fanout& fanout_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,42 @@
+#include "hub/data/route/node_table.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+TEST(NodeTable, IsEmptyAtFirst) {
+  const NodeTable table;
+  for (const std::uint32_t index : {0u, 1u, 1'000u, kEveryIndex}) EXPECT_FALSE(table.find(index).exists());
+  EXPECT_EQ(table.shards(), 0u);
+}
+
+TEST(NodeTable, RemembersPlacesToTheLastBit) {
+  NodeTable table;
+  const NodePlace place{ShardIndex{63}, ConnectionSlot{kSlotsMax - 1}, 0xFFFFFFFF};
+  table.publish(kEveryIndex - 1, place);
+  EXPECT_EQ(table.find(kEveryIndex - 1), place);
+  EXPECT_FALSE(table.find(kEveryIndex - 2).exists());
+  table.publish(kEveryIndex - 1, {});
+  EXPECT_FALSE(table.find(kEveryIndex - 1).exists());
+}
+
+TEST(NodeTable, KnowsTheShardsWithNodes) {
+  NodeTable table;
+  table.publish(1, {ShardIndex{0}, ConnectionSlot{1}, 1});
+  table.publish(2, {ShardIndex{5}, ConnectionSlot{2}, 1});
+  table.publish(3, {ShardIndex{5}, ConnectionSlot{3}, 1});
+  EXPECT_EQ(table.shards(), 0b100001u);
+  table.publish(2, {});
+  EXPECT_EQ(table.shards(), 0b100001u);
+  table.publish(3, {ShardIndex{0}, ConnectionSlot{3}, 2});
+  EXPECT_EQ(table.shards(), 1u);
+  table.publish(3, {ShardIndex{0}, ConnectionSlot{3}, 2});
+  table.publish(1, {});
+  table.publish(3, {});
+  table.publish(3, {});
+  EXPECT_EQ(table.shards(), 0u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,172 @@
+#include "hub/data/route/router.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/route_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::Kind;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using testing::RouteRig;
+
+constexpr std::uint32_t kHub = 7u << 20;
+
+class RouterTest : public ::testing::Test {
+ protected:
+  void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
+  std::uint64_t dropped(DropReason reason) { return rig.egress.dropped(reason); }
+  RouteRig rig;
+};
+
+TEST_F(RouterTest, UnicastHere) {
+  Recipient& a = rig.add_here(2);
+  rig.route(kHub | 2, {"one", "two"});
+  EXPECT_EQ(a.outbox.lane(1).front().frames, 2u);
+  EXPECT_TRUE(a.dirty);
+  EXPECT_EQ(rig.egress.tally.queued, 2);
+  EXPECT_EQ(rig.egress.tally.copies, 0u);
+}
+
+TEST_F(RouterTest, UnicastThere) {
+  rig.add_there(3);
+  rig.route(kHub | 3, {"one", "two", "three"});
+  EXPECT_THAT(rig.take_mail(), ElementsAre(3u));
+  EXPECT_EQ(rig.egress.tally.queued, 3) << "a mailbox is a queue";
+}
+
+TEST_F(RouterTest, UnicastToNobody) {
+  rig.route(kHub | 9, {"x"});
+  rig.route(kHub, {"the hub itself"});
+  rig.route(8u << 20 | 1, {"another hub"});
+  EXPECT_EQ(dropped(DropReason::no_such_node), 2u);
+  EXPECT_EQ(dropped(DropReason::no_route), 1u);
+}
+
+TEST_F(RouterTest, UnicastToASlotThatIsSomebodyElses) {
+  rig.add_here(2);
+  rig.nodes.publish(2, {ShardIndex{0}, ConnectionSlot{2}, 99});
+  rig.route(kHub | 2, {"x"});
+  EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
+}
+
+TEST_F(RouterTest, UnicastToSomebodyAway) {
+  Recipient& a = rig.add_here(2);
+  a.connected = false;
+  rig.route(kHub | 2, {"x"});
+  EXPECT_EQ(dropped(DropReason::away), 1u);
+  a.waits_when_away = true;
+  rig.route(kHub | 2, {"x"});
+  EXPECT_EQ(dropped(DropReason::away), 1u);
+  EXPECT_FALSE(a.outbox.empty());
+}
+
+TEST_F(RouterTest, GroupHereAndThere) {
+  Recipient& a = rig.add_here(2);
+  Recipient& b = rig.add_here(3);
+  rig.publish_group(5, 1, {2, 3, 77}, {4, 5});
+  rig.route(kHub | 5, {"x", "y"}, {.kind = Kind::group});
+  EXPECT_FALSE(a.outbox.empty());
+  EXPECT_FALSE(b.outbox.empty());
+  EXPECT_THAT(rig.take_mail(), ElementsAre(2u)) << "one entry, however many subscribers are there";
+  EXPECT_EQ(rig.egress.tally.copies, 4u) << "3 recipients: 2 here, and the other shard";
+}
+
+TEST_F(RouterTest, GroupDrops) {
+  rig.publish_group(5, 1, {}, {});
+  rig.route(kHub | 5, {"x"}, {.kind = Kind::group});
+  EXPECT_EQ(dropped(DropReason::no_subscriber), 1u);
+  rig.route(kHub | 5, {"x"}, {.kind = Kind::group, .src = 2});
+  EXPECT_EQ(dropped(DropReason::not_allowed), 1u);
+  rig.route(kHub | 6, {"x"}, {.kind = Kind::group});
+  EXPECT_EQ(dropped(DropReason::no_such_group), 1u);
+  rig.route(8u << 20 | 5, {"x"}, {.kind = Kind::group});
+  EXPECT_EQ(dropped(DropReason::no_route), 1u);
+}
+
+TEST_F(RouterTest, FewSubscribersGetCopiesAndManyReferences) {
+  for (std::uint32_t count : {3u, 4u}) {
+    RouteRig fresh;
+    std::vector<std::uint32_t> members;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      fresh.add_here(2 + i);
+      members.push_back(2 + i);
+    }
+    fresh.publish_group(5, 1, members, {});
+    fresh.route(kHub | 5, {"x"}, {.kind = Kind::group});
+    EXPECT_EQ(fresh.egress.tally.copied_bytes == 0, count >= 4);
+    EXPECT_TRUE(fresh.ledger_exact());
+  }
+}
+
+TEST_F(RouterTest, LargeFramesAreNeverCopied) {
+  std::vector<std::uint32_t> members;
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    rig.add_here(2 + i);
+    members.push_back(2 + i);
+  }
+  rig.publish_group(5, 1, members, {});
+  rig.route(kHub | 5, {std::string(65'536, 'x')}, {.kind = Kind::group});
+  EXPECT_EQ(rig.egress.tally.copied_bytes, 0u);
+  EXPECT_EQ(rig.egress.tally.queued, 100);
+}
+
+TEST_F(RouterTest, ServiceGoesToTheProvider) {
+  Recipient& provider = rig.add_here(2);
+  rig.publish_group(5, 2, {}, {});
+  rig.route(kHub | 5, {"request"}, {.kind = Kind::service});
+  EXPECT_FALSE(provider.outbox.empty());
+  rig.route(kHub | 6, {"request"}, {.kind = Kind::service});
+  EXPECT_EQ(dropped(DropReason::no_such_group), 1u);
+}
+
+TEST_F(RouterTest, ListHereThereAndNowhere) {
+  Recipient& a = rig.add_here(2);
+  rig.add_there(3);
+  std::string ids(16, '\0');
+  const std::uint32_t all[] = {kHub | 2, kHub | 3, kHub | 9, 8u << 20 | 1};
+  std::memcpy(ids.data(), all, sizeof all);
+  rig.route(4, {ids + "payload"}, {.kind = Kind::list});
+  EXPECT_EQ(a.outbox.lane(1).front().run.header().length, 7u);
+  EXPECT_EQ(a.outbox.lane(1).front().run.header().dst, 0u);
+  EXPECT_THAT(rig.take_mail(), ElementsAre(1u));
+  EXPECT_EQ(dropped(DropReason::no_such_node), 2u);
+  EXPECT_EQ(rig.egress.tally.copies, 3u);
+}
+
+TEST_F(RouterTest, BroadcastToAllButTheSender) {
+  Recipient& sender = rig.add_here(1);
+  Recipient& a = rig.add_here(2);
+  rig.route(kHub | kEveryIndex, {"x"}, {.kind = Kind::broadcast});
+  EXPECT_TRUE(sender.outbox.empty());
+  EXPECT_FALSE(a.outbox.empty());
+  EXPECT_THAT(rig.take_mail(), IsEmpty()) << "nobody lives there";
+  rig.add_there(3);
+  rig.route(0xFFFFFFFF, {"x"}, {.kind = Kind::broadcast});
+  EXPECT_THAT(rig.take_mail(), ElementsAre(1u));
+  rig.route(kHub | 5, {"x"}, {.kind = Kind::broadcast});
+  EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
+  rig.route(8u << 20 | kEveryIndex, {"x"}, {.kind = Kind::broadcast});
+  EXPECT_EQ(dropped(DropReason::no_route), 1u);
+}
+
+TEST_F(RouterTest, WhatWasHandedOverStaysHere) {
+  Recipient& a = rig.add_here(2);
+  rig.add_there(3);
+  // As it comes out of a mailbox: mixed frames, already counted by the sending shard.
+  hub::Run frames = rig.make_run(kHub | 2, {"one", "two"});
+  const hub::Run gone = rig.make_run(kHub | 3, {"left meanwhile"});
+  ASSERT_TRUE(frames.extend(gone));
+  rig.egress.tally.queued += 3;
+  rig.router.route_handed_over(frames, 65'536);
+  EXPECT_EQ(a.outbox.lane(1).front().frames, 2u);
+  EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
+  EXPECT_THAT(rig.take_mail(), IsEmpty()) << "nothing is handed on";
+}
+
+}  // namespace
+}  // namespace gimnet::hub
