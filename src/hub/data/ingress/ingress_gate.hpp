@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "base/ids.hpp"
+#include "hub/data/tally.hpp"
+#include "hub/limits.hpp"
+#include "proto/frame/frame_error.hpp"
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+
+/// What is to be done with frames that a connection sent.
+enum class Admission : std::uint8_t {
+  data,          ///< kinds 0 to 15 but FLOW: to the router
+  flow,          ///< FLOW, for this connection
+  link,          ///< LINK, for this connection
+  control,       ///< NS or CTRL, for the conductor
+  malformed,     ///< breaks docs/protocol.md, section 2: close
+  wrong_source,  ///< speaks for somebody else: close
+};
+
+/// What the gate remembers of one connection. Thread safety: one shard.
+struct IngressState {
+  /// Equal to no frame's attributes, which are 32 bits.
+  static constexpr std::uint64_t kNoneAdmitted = ~std::uint64_t{0};
+
+  NodeId node;
+  std::uint64_t admitted_attributes = kNoneAdmitted;  ///< kind, flags, hops and lane of the last plain data run
+  std::uint64_t lane0_bytes = 0;                      ///< since lane0_since_ms
+  std::uint64_t lane0_since_ms = 0;
+  std::uint64_t demoted_until_ms = 0;
+  /// Fragmented messages whose first fragment was moved to lane 1: the rest follows it, whatever the rate is by then.
+  std::array<std::uint32_t, 4> demoted_messages{};
+  std::uint8_t demoted_message_count = 0;
+  proto::FrameError error = proto::FrameError::none;  ///< why the last frame was malformed
+};
+
+/// The one gate that every frame from a connection passes, whatever the connection is: is it legal, and does its sender
+/// speak for itself? Frames of a node that sends more in lane 0 than it may are moved to lane 1.
+/// Thread safety: one shard.
+class IngressGate {
+ public:
+  IngressGate(const Limits& limits, Tally& tally) : limits_(limits), tally_(tally) {}
+
+  /// One run of the parser (neighbouring frames with one header but for the length). `run` may be changed in its lane
+  /// byte: its bytes belong to the reading connection alone until they are handed on. Where a later frame of the run is
+  /// malformed, `view` is shortened to the frames before it, and the next run begins with that one.
+  [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms);
+
+ private:
+  [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header, proto::RunView& view);
+  [[nodiscard]] static bool follows_to_lane1(IngressState& state, const proto::RunView& view, bool demoting);
+  void limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms);
+
+  const Limits& limits_;
+  Tally& tally_;
+};
+
+}  // namespace gimnet::hub

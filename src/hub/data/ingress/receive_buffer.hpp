@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "hub/data/buffer_pool.hpp"
+#include "hub/data/tally.hpp"
+
+namespace gimnet::hub {
+
+/// The frame that a connection has begun and not finished. Lies in a slab that the connection then has for itself, or,
+/// when it is small, in a copy.
+struct FrameTail {
+  BufferRef buffer;
+  std::uint32_t begin = 0;
+  std::uint32_t size = 0;
+  std::uint32_t needed = 0;  ///< bytes of the whole frame, as far as known
+  bool owns_slab = false;
+
+  [[nodiscard]] bool empty() const { return size == 0; }
+};
+
+/// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps a reference, so
+/// that it stays in the cache. A large frame that ends in a later read stays where it began, and its connection goes
+/// on reading behind it: no payload byte is moved.
+/// Thread safety: one shard.
+class ReceiveBuffer {
+ public:
+  /// tail_bytes_max: what all begun frames together may keep.
+  ReceiveBuffer(BufferPool& pool, Tally& tally, std::uint64_t tail_bytes_max)
+      : pool_(pool), tally_(tally), tail_bytes_max_(tail_bytes_max) {}
+
+  /// Where the connection with that tail reads next.
+  [[nodiscard]] std::span<std::byte> prepare(FrameTail& tail);
+
+  struct Received {
+    const std::byte* begin = nullptr;  ///< the tail, and what came behind it
+    const std::byte* end = nullptr;
+  };
+  /// `bytes` were read into what prepare() gave; the tail is part of it now.
+  [[nodiscard]] Received commit(FrameTail& tail, std::size_t bytes);
+  /// The buffer that holds what commit() returned, to take references of.
+  [[nodiscard]] const BufferRef& buffer() const { return reading_; }
+
+  /// After all whole frames were handed on: [begin, end) of buffer() is left over, the start of a frame of `needed`
+  /// bytes. Returns false if too much is kept for begun frames already; nothing is kept then.
+  [[nodiscard]] bool keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed);
+  /// The connection is gone.
+  void forget(FrameTail& tail);
+
+ private:
+  /// A begun frame up to this size is copied; keeping a slab for it would cost more than that.
+  static constexpr std::uint32_t kCopyTailBytes = 1024;
+  /// A slab with less room than this is not read into any more.
+  static constexpr std::uint32_t kLeastRoom = 64 * 1024;
+
+  BufferPool& pool_;
+  Tally& tally_;
+  const std::uint64_t tail_bytes_max_;
+  BufferRef slab_;
+  std::uint32_t used_ = 0;   ///< bytes of slab_ that may still be referenced
+  BufferRef reading_;        ///< of the read that is under way
+  std::uint32_t begin_ = 0;  ///< where its bytes begin
+  std::uint64_t tail_bytes_ = 0;
+};
+
+}  // namespace gimnet::hub

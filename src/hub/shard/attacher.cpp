@@ -1,0 +1,131 @@
+#include "hub/shard/attacher.hpp"
+
+#include <sys/random.h>
+
+#include "hub/shard/control_frame.hpp"
+#include "hub/shard/flusher.hpp"
+#include "hub/shard/reader.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+std::uint64_t random_epoch() {
+  std::uint64_t epoch = 0;
+  // Epochs only have to differ from earlier ones; 0 means none.
+  while (epoch == 0) {
+    if (::getrandom(&epoch, sizeof epoch, 0) != sizeof epoch) epoch = 0;
+  }
+  return epoch;
+}
+
+}  // namespace
+
+void Attacher::attach(AttachCommand command) {
+  Connection& connection = session_of(command);
+  closer_.fence(connection);
+  connection.transport = std::move(command.transport);
+  connection.transport->limit_unsent(kFirstUnsentBytes);
+  connection.unsent_limit = kFirstUnsentBytes;
+  connection.attachment = command.attachment;
+  connection.connected = true;
+  connection.frame_bytes = command.peer_frame_bytes;
+  connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
+  connection.tail_since_ms = 0;
+  connection.ingress = IngressState{};
+  connection.ingress.node = connection.node;
+  connection.posted_shards = ~std::uint64_t{0};
+  state_.counters.connections.add(1);
+  const std::uint64_t gap = settle_counts(connection, command);
+  connection.armed = Interest{.read = connection.holds == 0, .write = false};
+  const int descriptor = connection.transport->descriptor();
+  if (descriptor >= 0 && !state_.poller.add(descriptor, connection.token(), connection.armed)) {
+    closer_.close(connection, proto::GoodbyeCode::no_memory, "the hub cannot wait for another connection; try later");
+    return;
+  }
+  welcome(connection, command.welcome, gap);
+}
+
+Connection& Attacher::session_of(const AttachCommand& command) {
+  if (Connection* known = state_.find(command.session)) return *known;
+  const std::size_t slot = command.session.slot.value();
+  if (slot >= state_.connections.size()) state_.connections.resize(slot + 1);
+  GIMNET_CHECK(state_.connections[slot] == nullptr);  // released before the conductor gives the slot to another session
+  auto connection = std::make_unique<Connection>();
+  connection->node = command.node;
+  connection->slot = command.session.slot;
+  connection->generation = command.session.generation;
+  state_.recipients.put(*connection);
+  state_.counters.sessions.add(1);
+  state_.connections[slot] = std::move(connection);
+  return *state_.connections[slot];
+}
+
+std::uint64_t Attacher::settle_counts(Connection& connection, AttachCommand& command) {
+  Run partial = connection.writer.take_partial();
+  const bool same_life = command.resume_wanted && connection.resume != nullptr &&
+                         command.known_hub_epoch == connection.resume->hub_epoch &&
+                         command.peer_epoch == connection.resume->peer_epoch;
+  std::uint64_t gap = 0;
+  command.welcome.resumed = same_life && go_on(connection, command, partial, gap);
+  if (!command.welcome.resumed) begin_anew(connection, command, partial);
+  connection.waits_when_away = connection.resume != nullptr;
+  if (connection.resume) {
+    command.welcome.epoch = connection.resume->hub_epoch;
+    command.welcome.taken = connection.resume->taken;
+    command.welcome.resume_buffer_bytes = static_cast<std::uint32_t>(state_.limits.resume_bytes);
+  }
+  return gap;
+}
+
+bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& partial, std::uint64_t& gap) {
+  RingQueue<Run> replay;
+  const ResumeBuffer::Rewind rewind = connection.resume->kept.rewind(command.known_taken, replay);
+  // A count that cannot be: this peer's life is not the one that we know.
+  if (!rewind.possible) return false;
+  state_.counters.resumed.add(1);
+  state_.counters.gap_frames.add(rewind.lost);
+  state_.tally.delivered += rewind.confirmed;
+  state_.tally.drop(proto::DropReason::link_lost, rewind.lost);
+  state_.tally.queued -= static_cast<std::int64_t>(rewind.confirmed + rewind.lost);
+  if (partial.frames != 0) replay.push_back(std::move(partial));
+  RingQueue<Run>& waiting = connection.outbox.replay();
+  for (; !waiting.empty(); waiting.pop_front()) replay.push_back(std::move(waiting.front()));
+  waiting = std::move(replay);
+  connection.resume->taken_told = connection.resume->taken;
+  connection.resume->bytes_since_told = 0;
+  connection.resume->peer_resume_bytes = command.peer_resume_bytes;
+  gap = rewind.gap;
+  return true;
+}
+
+void Attacher::begin_anew(Connection& connection, const AttachCommand& command, const Run& partial) {
+  std::uint64_t lost = partial.frames;
+  if (connection.resume) lost += connection.resume->kept.clear();
+  RingQueue<Run>& waiting = connection.outbox.replay();
+  for (; !waiting.empty(); waiting.pop_front()) lost += waiting.front().frames;
+  state_.tally.drop(proto::DropReason::link_lost, lost);
+  state_.tally.queued -= static_cast<std::int64_t>(lost);
+  connection.resume.reset();
+  if (!command.resume_wanted) return;
+  connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);
+  connection.resume->hub_epoch = random_epoch();
+  connection.resume->peer_epoch = command.peer_epoch;
+  connection.resume->peer_resume_bytes = command.peer_resume_bytes;
+}
+
+void Attacher::welcome(Connection& connection, const proto::Welcome& welcome, std::uint64_t gap) {
+  std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
+  const std::vector<std::byte> frame =
+      control_frame(proto::Kind::link, connection.node, state_.shared.hub, proto::encode(welcome));
+  bytes.insert(bytes.end(), frame.begin(), frame.end());
+  // The opening is no frame: it goes past the outbox. A fresh connection takes this much at once, or it is of no use.
+  const iovec piece{bytes.data(), bytes.size()};
+  const IoResult sent = connection.transport->send({&piece, 1});
+  if (sent.status != IoStatus::ok || sent.bytes != bytes.size()) return closer_.on_broken(connection);
+  if (gap != 0) {
+    send_flow(state_, connection, proto::flow::Skip{proto::DropReason::link_lost, gap});
+  }
+  state_.recipients.mark_dirty(connection);
+}
+
+}  // namespace gimnet::hub

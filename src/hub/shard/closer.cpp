@@ -1,0 +1,99 @@
+#include "hub/shard/closer.hpp"
+
+#include <utility>
+
+#include "hub/shard/control_frame.hpp"
+
+namespace gimnet::hub {
+
+void Closer::close(Connection& connection, proto::GoodbyeCode code, std::string sentence) {
+  if (!connection.connected) return;
+  if (code == proto::GoodbyeCode::too_many_requests) state_.counters.too_many_requests.add(1);
+  if (code == proto::GoodbyeCode::no_memory) state_.counters.no_memory.add(1);
+  detach(connection, say_goodbye(connection, code, sentence));
+  tell(connection, false, code, std::move(sentence));
+}
+
+void Closer::on_broken(Connection& connection) {
+  detach(connection, false);
+  tell(connection, false, proto::GoodbyeCode::done, {});
+}
+
+void Closer::on_goodbye(Connection& connection, proto::GoodbyeCode code, std::string sentence) {
+  detach(connection, false);
+  tell(connection, true, code, std::move(sentence));
+}
+
+void Closer::fence(Connection& connection) {
+  if (!connection.connected) return;
+  detach(connection, say_goodbye(connection, proto::GoodbyeCode::replaced,
+                                 "a newer connection of this session took its place; do not come back by yourself"));
+}
+
+/// Returns whether it was written.
+bool Closer::say_goodbye(Connection& connection, proto::GoodbyeCode code, const std::string& sentence) {
+  // In the middle of a frame a GOODBYE would be read as the rest of it.
+  if (connection.writer.in_frame()) return false;
+  const std::vector<std::byte> frame = control_frame(proto::Kind::link, connection.node, state_.shared.hub,
+                                                     proto::encode(proto::Goodbye{code, sentence}));
+  // Past the outbox: nothing follows a GOODBYE. A peer that takes nothing any more does not get it.
+  const iovec piece{const_cast<std::byte*>(frame.data()), frame.size()};
+  const IoResult sent = connection.transport->send({&piece, 1});
+  return sent.status == IoStatus::ok && sent.bytes == frame.size();
+}
+
+void Closer::detach(Connection& connection, bool said_goodbye) {
+  std::unique_ptr<Transport> transport = std::move(connection.transport);
+  if (transport->descriptor() >= 0) {
+    state_.poller.remove(transport->descriptor());
+    if (said_goodbye) state_.tell_conductor({state_.self, FarewellEvent{std::move(transport)}});
+  }
+  connection.connected = false;
+  connection.blocked = false;
+  connection.missed_resume = false;
+  connection.must_confirm = false;
+  connection.draining = false;
+  connection.armed = Interest{};
+  connection.requests = 0;
+  connection.progress.reset();
+  state_.receive_buffer.forget(connection.tail);
+  if (connection.waits_for_room) {
+    connection.waits_for_room = false;
+    std::erase(state_.waiting_for_room, &connection);
+  }
+  state_.counters.connections.subtract(1);
+  connection.outbox.clear_control();
+  if (connection.waits_when_away) return;
+  const Run partial = connection.writer.take_partial();
+  if (partial.frames != 0) {
+    state_.tally.queued -= partial.frames;
+    state_.drops.drop(partial.bytes, partial.size, partial.frames, proto::DropReason::link_lost);
+  }
+  connection.outbox.drop_all(proto::DropReason::link_lost, state_.egress);
+  if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
+}
+
+void Closer::tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code, std::string sentence) {
+  state_.tell_conductor({state_.self, DetachedEvent{connection.session(), connection.attachment, connection.node,
+                                                    said_by_peer, code, std::move(sentence)}});
+}
+
+void Closer::release(SessionRef session) {
+  Connection* connection = state_.find(session);
+  if (connection == nullptr) return;
+  if (connection->connected) {
+    detach(*connection, say_goodbye(*connection, proto::GoodbyeCode::kicked, "the session is over"));
+  }
+  const Run partial = connection->writer.take_partial();
+  std::uint64_t lost = partial.frames;
+  if (connection->resume) lost += connection->resume->kept.clear();
+  state_.tally.queued -= static_cast<std::int64_t>(lost);
+  state_.tally.drop(proto::DropReason::link_lost, lost);
+  connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);
+  state_.queues.set(connection->slot, 0);
+  state_.recipients.remove(*connection);
+  state_.counters.sessions.subtract(1);
+  state_.connections[session.slot.value()].reset();
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+
+/// How connections and sessions of a shard end. Thread safety: one shard.
+class Closer {
+ public:
+  explicit Closer(ShardState& state) : state_(state) {}
+
+  /// Says GOODBYE, as far as the peer still listens, ends the connection, and tells the conductor.
+  void close(Connection& connection, proto::GoodbyeCode code, std::string sentence);
+  /// The connection broke.
+  void on_broken(Connection& connection);
+  /// The peer said GOODBYE.
+  void on_goodbye(Connection& connection, proto::GoodbyeCode code, std::string sentence);
+  /// A newer connection of the same session is there: the old one is told `replaced`, the conductor knows.
+  void fence(Connection& connection);
+  /// The session is over.
+  void release(SessionRef session);
+
+ private:
+  [[nodiscard]] bool say_goodbye(Connection& connection, proto::GoodbyeCode code, const std::string& sentence);
+  void detach(Connection& connection, bool said_goodbye);
+  void tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code, std::string sentence);
+
+  ShardState& state_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/transport/transport.hpp"
+#include "proto/control/link.hpp"
+
+// All that the conductor tells a shard, one type each, and all that a shard tells the conductor. Nothing else crosses
+// between the two threads, but for the tables that control publishes.
+//
+// Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and sends AttachCommand
+// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send. So
+// commands that wait are carried out before mail that came after them: a frame neither finds its recipient unattached
+// nor overtakes the event about it.
+
+namespace gimnet::hub {
+
+/// A session on a shard, as the conductor names it.
+struct SessionRef {
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+};
+
+// ---- conductor -> shard --------------------------------------------------------------------------------------------
+
+/// An admitted connection for a session, new or come back. The shard fences the session's earlier connection, if it has
+/// one (told `replaced`), fixes its counts, writes the 8 bytes of the opening and WELCOME, then carries data.
+struct AttachCommand {
+  SessionRef session;
+  /// Numbers the connections of a session, from 1. What was said to or by an earlier one is told apart by it.
+  std::uint32_t attachment = 0;
+  NodeId node;
+  bool new_session = true;
+  std::unique_ptr<Transport> transport;
+  /// All of WELCOME but what only the shard knows: resumed, taken, epoch.
+  proto::Welcome welcome;
+  /// What HELLO said of resume: wanted, epochs, count, buffer.
+  bool resume_wanted = false;
+  std::uint64_t peer_epoch = 0;
+  std::uint64_t known_hub_epoch = 0;
+  std::uint64_t known_taken = 0;
+  std::uint32_t peer_resume_bytes = 0;
+  std::uint32_t peer_frame_bytes = 0;
+};
+
+/// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how many of the
+/// session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer is for the connection that
+/// asked: it is dropped if `attachment` is not the present one. 0 is whichever there is; without one it is dropped.
+struct SendControlCommand {
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  std::vector<std::byte> frame;
+  std::uint32_t answers = 0;
+};
+
+/// Say GOODBYE and close the session's connection. The session itself stays until ReleaseCommand.
+struct CloseCommand {
+  SessionRef session;
+  proto::GoodbyeCode code{};
+  std::string sentence;
+};
+
+/// The session is over: what waits for it is dropped (`link_lost`), its slot is free for a later generation.
+struct ReleaseCommand {
+  SessionRef session;
+};
+
+/// Say GOODBYE `draining` to everybody after what waits was written, or at the deadline; then answer DrainedEvent.
+struct DrainCommand {
+  std::uint64_t deadline_ms = 0;  ///< from now
+};
+
+/// End the shard's thread.
+struct StopCommand {};
+
+using ShardCommand =
+    std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, DrainCommand, StopCommand>;
+
+// ---- shard -> conductor --------------------------------------------------------------------------------------------
+
+/// A frame of kind NS, CTRL or ROUTE for this hub; `frame` is header and payload.
+struct ControlFrameEvent {
+  SessionRef session;
+  std::uint32_t attachment = 0;  ///< of the connection that it came by
+  NodeId node;
+  std::vector<std::byte> frame;
+};
+
+/// A session has no connection any more. `code` is `done` only if the node said so itself: then the session is over,
+/// otherwise its grace time begins. `said_by_peer` tells who said GOODBYE; `sentence` is for the record. A connection
+/// that broke without a GOODBYE has code `done` and `said_by_peer` false. None is sent for a connection that was fenced
+/// by a newer one of its session.
+struct DetachedEvent {
+  SessionRef session;
+  std::uint32_t attachment = 0;  ///< of the connection that ended
+  NodeId node;
+  bool said_by_peer = false;
+  proto::GoodbyeCode code{};
+  std::string sentence;
+};
+
+/// A connection to which GOODBYE was written: what its peer still sends is thrown away for a moment, since closing with
+/// unread bytes would reset the connection and could take the GOODBYE with it.
+struct FarewellEvent {
+  std::unique_ptr<Transport> transport;
+};
+
+/// The shard has nothing left to write (answer to DrainCommand).
+struct DrainedEvent {};
+
+struct ShardEvent {
+  ShardIndex shard;
+  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent> what;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "proto/control/link.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::hub {
+
+/// A whole frame of kind LINK, NS or CTRL from this hub to a node, in lane 0.
+[[nodiscard]] inline std::vector<std::byte> control_frame(proto::Kind kind, NodeId to, HubId hub,
+                                                          std::span<const std::byte> payload) {
+  proto::FrameHeader header;
+  header.length = static_cast<std::uint32_t>(payload.size());
+  header.dst = to.value();
+  header.src = make_id<NodeId>(hub, kHubIndex).value();
+  header.kind = kind;
+  header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
+  std::vector<std::byte> frame(proto::kHeaderSize);
+  proto::store_header(frame.data(), header);
+  frame.insert(frame.end(), payload.begin(), payload.end());
+  return frame;
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,155 @@
+#include "hub/shard/flusher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace gimnet::hub {
+namespace {
+
+/// What may wait unsent in the kernel on a connection that does not take everything at once: about so long at its
+/// measured rate, between these bounds (docs/architecture.md, "Freshness").
+constexpr std::uint64_t kUnsentMs = 40;
+constexpr std::uint64_t kUnsentBytesMin = 4 * 1024;
+constexpr std::uint64_t kUnsentBytesMax = 128 * 1024;
+constexpr std::uint64_t kRateWindowMs = 200;
+/// Above this rate what waits in the kernel is gone in a moment, and bounding it costs a quarter of the throughput.
+constexpr std::uint64_t kFastBytesPerS = 10 << 20;
+
+/// That left the send queue. WELCOME went past the flusher and may still be unsent.
+std::uint64_t taken_bytes(const Connection& connection) {
+  return connection.sent_bytes - std::min(connection.transport->unsent_bytes(), connection.sent_bytes);
+}
+
+}  // namespace
+
+bool Flusher::flush_dirty() {
+  std::vector<Recipient*>& dirty = state_.recipients.dirty();
+  // Flushing may mark others (a sender that is told to go on): they come at the end of the same list.
+  for (std::size_t i = 0; i < dirty.size(); ++i) {
+    auto& connection = static_cast<Connection&>(*dirty[i]);
+    connection.dirty = false;
+    flush(connection);
+  }
+  dirty.clear();
+  for (Connection* connection : again_) state_.recipients.mark_dirty(*connection);
+  again_.clear();
+  return !dirty.empty();
+}
+
+void Flusher::flush(Connection& connection) {
+  if (!connection.connected || connection.blocked) return let_wait(connection);
+  const std::uint64_t sent_before = state_.tally.sent_bytes;
+  const Flush result = connection.writer.flush(
+      connection.outbox, connection.resume ? &connection.resume->kept : nullptr, *connection.transport, state_.egress);
+  const std::uint64_t sent = state_.tally.sent_bytes - sent_before;
+  if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
+    connection.must_confirm = must_confirm;
+    state_.signals.arm(connection);
+  }
+  connection.sent_bytes += sent;
+  if (sent != 0) connection.last_sent_ms = state_.now_ms;
+  switch (result) {
+    case Flush::emptied:
+      return on_emptied(connection);
+    case Flush::blocked:
+      let_wait(connection);
+      return on_blocked(connection);
+    case Flush::waits:
+      let_wait(connection);
+      return watch(connection);
+    case Flush::more:
+      let_wait(connection);
+      again_.push_back(&connection);
+      return;
+    case Flush::failed:
+      return closer_.on_broken(connection);
+  }
+}
+
+/// What was not written stays: for a transport that takes no more, for a confirmation, or for the node to come back.
+void Flusher::let_wait(Connection& connection) {
+  connection.outbox.settle(state_.egress);
+  connection.outbox.signal_room(state_.egress);
+  state_.queues.set(connection.slot, connection.outbox.waiting_bytes());
+  connection.gauged = true;
+}
+
+void Flusher::on_emptied(Connection& connection) {
+  connection.outbox.on_emptied(state_.egress);
+  connection.outbox.signal_room(state_.egress);
+  if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
+  if (connection.draining) {
+    closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
+  }
+}
+
+void Flusher::on_blocked(Connection& connection) {
+  connection.blocked = true;
+  state_.signals.arm(connection);
+  watch(connection);
+}
+
+void Flusher::watch(Connection& connection) {
+  if (connection.progress) return;
+  connection.progress = std::make_unique<Progress>();
+  Progress& progress = *connection.progress;
+  progress.since_ms = progress.block_since_ms = progress.rate_since_ms = state_.now_ms;
+  progress.taken_bytes = progress.block_taken_bytes = progress.rate_bytes = taken_bytes(connection);
+}
+
+void Flusher::on_writable(Connection& connection) {
+  connection.blocked = false;
+  state_.signals.arm(connection);
+  state_.recipients.mark_dirty(connection);
+}
+
+void Flusher::look_after(Connection& connection) {
+  if (!connection.connected || !connection.progress) return;
+  Progress& progress = *connection.progress;
+  // Where messages were dropped because it took nothing, an empty queue does not say that it has caught up.
+  const bool caught_up = taken_bytes(connection) >= progress.owed_bytes;
+  if (connection.outbox.empty() && !connection.writer.in_frame() && caught_up) {
+    connection.progress.reset();
+    return;
+  }
+  // What the kernel calls unsent counts its own bookkeeping on some transports: never less than before.
+  const std::uint64_t taken = std::max(taken_bytes(connection), progress.rate_bytes);
+  adapt_unsent_limit(connection, taken);
+  if (taken != progress.block_taken_bytes || !connection.outbox.has_block()) {
+    progress.block_taken_bytes = taken;
+    progress.block_since_ms = state_.now_ms;
+  } else if (state_.now_ms - progress.block_since_ms >= state_.limits.block_ms) {
+    connection.outbox.time_out_block(state_.egress);
+    progress.block_since_ms = state_.now_ms;
+    progress.owed_bytes = connection.sent_bytes;
+  }
+  const bool nothing_waits = connection.outbox.stale_bytes() == 0 && taken >= progress.owed_bytes;
+  if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
+    progress.taken_bytes = taken;
+    progress.since_ms = state_.now_ms;
+  } else if (state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
+    state_.counters.slow_consumers.add(1);
+    closer_.close(connection, proto::GoodbyeCode::slow_consumer,
+                  "took less than " + std::to_string(state_.limits.slow_consumer_bytes) + " bytes in " +
+                      std::to_string(state_.limits.slow_consumer_ms) +
+                      " ms while messages waited; read faster, or subscribe with delivery latest");
+  }
+}
+
+void Flusher::adapt_unsent_limit(Connection& connection, std::uint64_t taken) {
+  Progress& progress = *connection.progress;
+  const std::uint64_t passed_ms = state_.now_ms - progress.rate_since_ms;
+  if (passed_ms < kRateWindowMs) return;
+  const std::uint64_t rate = (taken - progress.rate_bytes) * 1'000 / passed_ms;
+  progress.rate_bytes = taken;
+  progress.rate_since_ms = state_.now_ms;
+  const std::uint64_t wanted = std::clamp(rate * kUnsentMs / 1'000, kUnsentBytesMin, kUnsentBytesMax);
+  const auto limit = rate > kFastBytesPerS ? 0u : static_cast<std::uint32_t>(wanted);
+  // A change that matters; each is a system call.
+  if (limit > connection.unsent_limit / 4 * 5 || limit < connection.unsent_limit / 4 * 3) {
+    connection.unsent_limit = limit;
+    connection.transport->limit_unsent(limit);
+  }
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,39 @@
+#pragma once
+
+#include "hub/shard/closer.hpp"
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+
+/// What may wait unsent in the kernel on a connection of which nothing is known yet. A fast one loses nothing by it
+/// that could be felt, and behind a slow one the first real-time message has little to wait for.
+inline constexpr std::uint32_t kFirstUnsentBytes = 64 * 1024;
+
+/// Writes what the turn left in outboxes, once per connection, and looks after those that do not take everything.
+/// Thread safety: one shard.
+class Flusher {
+ public:
+  Flusher(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
+
+  /// All connections that have something to write. Returns whether some of them could have written more.
+  bool flush_dirty();
+  /// The connection's transport takes more again.
+  void on_writable(Connection& connection);
+  /// A connection that has waiting messages: is it too slow? Called each tick. May close it.
+  void look_after(Connection& connection);
+
+ private:
+  void flush(Connection& connection);
+  void let_wait(Connection& connection);
+  void on_blocked(Connection& connection);
+  /// From here on look_after() asks whether the connection gets on.
+  void watch(Connection& connection);
+  void on_emptied(Connection& connection);
+  void adapt_unsent_limit(Connection& connection, std::uint64_t taken);
+
+  ShardState& state_;
+  Closer& closer_;
+  std::vector<Connection*> again_;  ///< used up their share of this turn
+};
+
+}  // namespace gimnet::hub

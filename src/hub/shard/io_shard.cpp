@@ -1,0 +1,196 @@
+#include "hub/shard/io_shard.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <string>
+
+#include "base/clock.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+
+template <class... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+
+}  // namespace
+
+IoShard::IoShard(ShardIndex index, const HubShared& shared, Options options)
+    : state_(index, shared),
+      closer_(state_),
+      flusher_(state_, closer_),
+      reader_(state_, closer_),
+      attacher_(state_, closer_),
+      keeper_(state_, closer_, flusher_),
+      commands_(1),
+      options_(options) {
+  Waker& waker = *shared.wakers[index.value()];
+  GIMNET_CHECK(state_.poller.add(waker.descriptor(), Poller::kOwnToken, Interest{.read = true, .write = false}));
+}
+
+IoShard::~IoShard() { join(); }
+
+void IoShard::start() {
+  thread_ = std::thread([this] { run(); });
+  const std::string name = "shard-" + std::to_string(state_.self.value());
+  ::pthread_setname_np(thread_.native_handle(), name.c_str());
+}
+
+void IoShard::join() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void IoShard::let_go() {
+  state_.connections.clear();
+  const auto end_loan = [](const Mail& mail) {
+    if (mail.lent != nullptr) BufferPool::end_loan(mail.lent);
+  };
+  state_.shared.mailboxes[state_.self.value()]->drain(SIZE_MAX, [] {}, end_loan);
+}
+
+void IoShard::send(ShardCommand command) {
+  commands_.push(0, std::move(command));
+  state_.shared.wakers[state_.self.value()]->wake();
+}
+
+void IoShard::run() {
+  Waker& waker = *state_.shared.wakers[state_.self.value()];
+  while (!stopped_) {
+    int timeout_ms = options_.spin ? 0 : sleep_ms();
+    if (timeout_ms != 0) {
+      state_.shared.quiescence.leave(state_.self.value());
+      waker.prepare_to_sleep();
+      if (has_work()) timeout_ms = 0;
+    }
+    const std::span<const Ready> ready = state_.poller.wait(timeout_ms);
+    waker.awake();
+    turn(ready, static_cast<std::uint64_t>(steady_now_ns() / kNsPerMs));
+  }
+  state_.shared.quiescence.leave(state_.self.value());
+}
+
+int IoShard::sleep_ms() {
+  if (flush_again_ || !state_.recipients.dirty().empty()) return 0;
+  int timeout_ms = keeper_.next_tick_ms();
+  if (state_.drops.pending()) {
+    const auto report_ms = static_cast<int>(std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
+    timeout_ms = timeout_ms < 0 ? report_ms : std::min(timeout_ms, report_ms);
+  }
+  return timeout_ms;
+}
+
+bool IoShard::has_work() {
+  return !commands_.empty() || !state_.shared.mailboxes[state_.self.value()]->empty() || room_came();
+}
+
+/// The word that a mailbox has room is said once, and is only heard asleep: one that came since the last look is found
+/// by looking, and the next one wakes.
+bool IoShard::room_came() {
+  if (state_.waiting_for_room.empty()) return false;
+  state_.fanout.look_for_room();
+  return state_.fanout.crowded() == 0;
+}
+
+void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
+  state_.now_ms = state_.egress.now_ms = now_ms;
+  state_.egress.now_wall_ns = wall_now_ns();
+  state_.shared.quiescence.enter(state_.self.value());
+  take_commands();
+  take_mail();
+  serve(ready);
+  read_waiting();
+  keeper_.tick();
+  flush();
+  state_.signals.send_reports();
+  finish_turn();
+}
+
+void IoShard::take_commands() {
+  if (commands_.empty()) return;
+  commands_.drain(kCommandsPerTurn, [this](ShardCommand&& command) { execute(command); });
+}
+
+void IoShard::take_mail() {
+  Mailbox& mailbox = *state_.shared.mailboxes[state_.self.value()];
+  if (mailbox.empty()) return;
+  // A session whose node was seen by another shard has its AttachCommand waiting here: first all commands, then the
+  // frames.
+  const auto before_taking = [this] {
+    while (!commands_.empty()) take_commands();
+  };
+  mailbox.drain(kMailPerTurn, before_taking, [this](const Mail& mail) { reader_.take_mail(mail); });
+  mailbox.tell_room([this](ShardIndex sender) { state_.shared.wakers[sender.value()]->wake(); });
+}
+
+void IoShard::serve(std::span<const Ready> ready) {
+  std::uint64_t flushed_at = state_.tally.received_bytes;
+  for (const Ready& each : ready) {
+    if (each.token == Poller::kOwnToken) {
+      state_.shared.wakers[state_.self.value()]->clear();
+      continue;
+    }
+    const std::size_t slot = each.token & (kSlotsMax - 1);
+    Connection* connection = slot < state_.connections.size() ? state_.connections[slot].get() : nullptr;
+    if (connection == nullptr || !connection->connected || connection->token() != each.token) continue;
+    if (each.writable && connection->blocked) flusher_.on_writable(*connection);
+    if (each.readable && connection->armed.read) reader_.read(*connection);
+    if (state_.tally.received_bytes - flushed_at >= kReadBytesPerFlush) {
+      flush();
+      flushed_at = state_.tally.received_bytes;
+    }
+  }
+}
+
+void IoShard::read_waiting() {
+  if (!room_came()) return;
+  for (Connection* connection : std::exchange(state_.waiting_for_room, {})) {
+    connection->waits_for_room = false;
+    connection->on_read_again(state_.now_ms);
+    state_.signals.arm(*connection);
+  }
+}
+
+void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }
+
+void IoShard::finish_turn() {
+  state_.counters.turns.add(1);
+  state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
+  state_.counters.pinned_bytes.store(state_.pool.pinned_bytes());
+  state_.counters.pinned_bytes_max.raise_to(state_.pool.pinned_bytes());
+  state_.tally.publish(state_.counters);
+  if (keeper_.take_drained()) state_.tell_conductor({state_.self, DrainedEvent{}});
+}
+
+void IoShard::execute(ShardCommand& command) {
+  std::visit(Overloaded{
+                 [&](AttachCommand& attach) { attacher_.attach(std::move(attach)); },
+                 [&](SendControlCommand& control) {
+                   Connection* connection = state_.find(control.session);
+                   if (connection == nullptr || !connection->connected) return;
+                   if (control.attachment != 0 && control.attachment != connection->attachment) return;
+                   connection->requests -=
+                       static_cast<std::uint16_t>(std::min<std::uint32_t>(control.answers, connection->requests));
+                   if (connection->outbox.push_control(control.frame, state_.egress)) {
+                     state_.recipients.mark_dirty(*connection);
+                     return;
+                   }
+                   closer_.close(*connection, proto::GoodbyeCode::too_many_requests,
+                                 "answers wait and are not taken; read what you asked for");
+                 },
+                 [&](CloseCommand& close) {
+                   if (Connection* connection = state_.find(close.session)) {
+                     closer_.close(*connection, close.code, std::move(close.sentence));
+                   }
+                 },
+                 [&](ReleaseCommand& release) { closer_.release(release.session); },
+                 [&](DrainCommand& drain) { keeper_.drain(drain.deadline_ms); },
+                 [&](StopCommand&) { stopped_ = true; },
+             },
+             command);
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <thread>
+
+#include "hub/shard/attacher.hpp"
+#include "hub/shard/closer.hpp"
+#include "hub/shard/flusher.hpp"
+#include "hub/shard/keeper.hpp"
+#include "hub/shard/reader.hpp"
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+
+/// One io thread: its connections, their queues, and the turn that serves them. A turn takes commands and mail, reads
+/// every ready connection up to its share, routes all of it, then writes each connection once. Every step is bounded.
+/// Thread safety: send() from the conductor; start() and join() from who made it; the rest is the shard's own thread.
+class IoShard {
+ public:
+  /// How the thread waits for work.
+  struct Options {
+    bool spin = false;  ///< never sleep: less latency for a whole CPU
+  };
+  IoShard(ShardIndex index, const HubShared& shared, Options options);
+  ~IoShard();
+  IoShard(const IoShard&) = delete;
+  IoShard& operator=(const IoShard&) = delete;
+
+  void start();
+  /// After a StopCommand.
+  void join();
+  /// Lets go what this shard holds of others: before any of them goes, when no shard's thread runs any more.
+  void let_go();
+
+  /// Conductor: hands a command over; order is kept.
+  void send(ShardCommand command);
+
+  /// One turn, for tests that drive a shard without its thread: `ready` are connections of a transport that no poller
+  /// knows. now_ms is monotonic.
+  void turn(std::span<const Ready> ready, std::uint64_t now_ms);
+  [[nodiscard]] ShardState& state() { return state_; }
+
+ private:
+  /// Mailbox entries and commands that one turn takes.
+  static constexpr std::size_t kMailPerTurn = 1024;
+  static constexpr std::size_t kCommandsPerTurn = 256;
+  /// What is read before it is written: more would leave the cache.
+  static constexpr std::uint64_t kReadBytesPerFlush = 256 * 1024;
+
+  void run();
+  [[nodiscard]] int sleep_ms();
+  /// After prepare_to_sleep(): is there something that nobody will wake this thread for any more?
+  [[nodiscard]] bool has_work();
+  [[nodiscard]] bool room_came();
+  void take_commands();
+  void take_mail();
+  void serve(std::span<const Ready> ready);
+  void read_waiting();
+  void flush();
+  void finish_turn();
+  void execute(ShardCommand& command);
+
+  ShardState state_;
+  Closer closer_;
+  Flusher flusher_;
+  Reader reader_;
+  Attacher attacher_;
+  Keeper keeper_;
+  MpscQueue<ShardCommand> commands_;
+  const Options options_;
+  bool stopped_ = false;
+  bool flush_again_ = false;
+  std::thread thread_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,72 @@
+#include "hub/shard/keeper.hpp"
+
+#include "base/clock.hpp"
+#include "hub/shard/reader.hpp"
+
+namespace gimnet::hub {
+
+void Keeper::tick() {
+  if (state_.now_ms < next_tick_at_ms_) return;
+  next_tick_at_ms_ = state_.now_ms + kTickMs;
+  for (const std::unique_ptr<Connection>& connection : state_.connections) {
+    if (connection != nullptr && connection->connected) look_at(*connection);
+  }
+}
+
+int Keeper::next_tick_ms() const {
+  if (state_.counters.connections.value() == 0 && drain_deadline_ms_ == 0) return -1;
+  return next_tick_at_ms_ > state_.now_ms ? static_cast<int>(next_tick_at_ms_ - state_.now_ms) : 0;
+}
+
+void Keeper::look_at(Connection& connection) {
+  const Limits& limits = state_.limits;
+  const bool written = connection.outbox.empty() && !connection.writer.in_frame();
+  if (drain_deadline_ms_ != 0 && (state_.now_ms >= drain_deadline_ms_ || written)) {
+    return closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down; dial again");
+  }
+  if (connection.missed_resume) {
+    return closer_.close(
+        connection, proto::GoodbyeCode::too_many_requests,
+        "the hub's words wait and are not taken, RESUME among them; read what the hub says, come back");
+  }
+  const bool heard = connection.holds == 0 && !connection.waits_for_room && !connection.draining;
+  if (heard && state_.now_ms - connection.last_heard_ms >= limits.silent_ms) {
+    state_.counters.silent.add(1);
+    return closer_.close(connection, proto::GoodbyeCode::silent,
+                         "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");
+  }
+  if (heard && connection.tail_since_ms != 0 && state_.now_ms - connection.tail_since_ms >= limits.stalled_frame_ms) {
+    state_.counters.stalled_frames.add(1);
+    return closer_.close(connection, proto::GoodbyeCode::stalled_frame,
+                         "a frame was begun and not finished for " + std::to_string(limits.stalled_frame_ms) + " ms");
+  }
+  if (state_.now_ms - connection.last_sent_ms >= limits.keep_alive_ms) {
+    // Sent or not, not again before another interval: a peer that does not read gets no heap of them.
+    connection.last_sent_ms = state_.now_ms;
+    connection.outbox.trim();
+    if (connection.resume) connection.resume->kept.trim();
+    if (!connection.blocked)
+      send_flow(state_, connection, proto::flow::Ping{++connection.ping_sequence, wall_now_ns()});
+    if (connection.resume) send_confirm(state_, connection);
+  }
+  flusher_.look_after(connection);
+}
+
+void Keeper::drain(std::uint64_t deadline_ms) {
+  drain_deadline_ms_ = state_.now_ms + deadline_ms;
+  next_tick_at_ms_ = 0;
+  for (const std::unique_ptr<Connection>& connection : state_.connections) {
+    if (connection == nullptr || !connection->connected) continue;
+    connection->draining = true;
+    state_.signals.arm(*connection);
+    state_.recipients.mark_dirty(*connection);
+  }
+}
+
+bool Keeper::take_drained() {
+  if (drain_deadline_ms_ == 0 || drained_told_ || state_.counters.connections.value() != 0) return false;
+  drained_told_ = true;
+  return true;
+}
+
+}  // namespace gimnet::hub

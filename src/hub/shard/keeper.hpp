@@ -1,0 +1,39 @@
+#pragma once
+
+#include "hub/shard/closer.hpp"
+#include "hub/shard/flusher.hpp"
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+
+/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that waited too long.
+/// Thread safety: one shard.
+class Keeper {
+ public:
+  Keeper(ShardState& state, Closer& closer, Flusher& flusher) : state_(state), closer_(closer), flusher_(flusher) {}
+
+  /// Between two looks at all connections.
+  static constexpr std::uint64_t kTickMs = 100;
+
+  /// Looks at all connections, if a tick has passed.
+  void tick();
+  /// ms until the next tick, or -1 if there is nobody to look at.
+  [[nodiscard]] int next_tick_ms() const;
+
+  /// Every connection ends once what waits for it was written, or at the deadline.
+  void drain(std::uint64_t deadline_ms);
+  /// True once after drain(): the last connection ended.
+  [[nodiscard]] bool take_drained();
+
+ private:
+  void look_at(Connection& connection);
+
+  ShardState& state_;
+  Closer& closer_;
+  Flusher& flusher_;
+  std::uint64_t next_tick_at_ms_ = 0;
+  std::uint64_t drain_deadline_ms_ = 0;  ///< 0: not draining
+  bool drained_told_ = false;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <sys/epoll.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "hub/transport/transport.hpp"
+
+namespace gimnet::hub {
+
+/// What a descriptor is waited for.
+struct Interest {
+  bool read = false;
+  bool write = false;
+  friend bool operator==(const Interest&, const Interest&) = default;
+};
+
+/// A descriptor that is ready. Errors show as readable: the next receive() tells.
+struct Ready {
+  std::uint64_t token = 0;
+  bool readable = false;
+  bool writable = false;
+};
+
+/// Waits for many descriptors: level-triggered epoll, so that a turn costs one wait, one receive and one send, and
+/// nothing to arm again (docs/adr/0005-readiness-by-epoll.md has the measurement against Boost.Asio's).
+/// Thread safety: one thread.
+class Poller {
+ public:
+  Poller();
+  ~Poller();
+  Poller(const Poller&) = delete;
+  Poller& operator=(const Poller&) = delete;
+
+  /// Token of what the poller's owner adds for itself.
+  static constexpr std::uint64_t kOwnToken = ~std::uint64_t{0};
+
+  /// Returns false if the kernel refuses (out of memory or watches).
+  [[nodiscard]] bool add(int descriptor, std::uint64_t token, Interest interest);
+  void change(int descriptor, std::uint64_t token, Interest interest);
+  void remove(int descriptor);
+
+  /// Waits up to `timeout_ms` (-1: for ever). Valid until: the next call.
+  [[nodiscard]] std::span<const Ready> wait(int timeout_ms);
+
+ private:
+  static constexpr std::size_t kReadyMax = 256;
+
+  int epoll_;
+  std::array<epoll_event, kReadyMax> events_;
+  std::array<Ready, kReadyMax> ready_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,209 @@
+#include "hub/shard/reader.hpp"
+
+#include "base/clock.hpp"
+#include "proto/frame/extensions.hpp"
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+
+void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
+  std::byte frame[proto::flow::kFrameSizeMax];
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{}, frame);
+  if (connection.outbox.push_control({frame, size}, state.egress)) state.recipients.mark_dirty(connection);
+}
+
+void send_confirm(ShardState& state, Connection& connection) {
+  ResumeState& resume = *connection.resume;
+  if (resume.taken == resume.taken_told) return;
+  resume.taken_told = resume.taken;
+  resume.bytes_since_told = 0;
+  send_flow(state, connection, proto::flow::Confirm{resume.taken});
+}
+
+void Reader::read(Connection& connection) {
+  if ((connection.posted_shards & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+  const std::span<std::byte> room = state_.receive_buffer.prepare(connection.tail);
+  const std::span<std::byte> share = room.first(std::min<std::size_t>(room.size(), state_.limits.turn_bytes));
+  const IoResult result = connection.transport->receive(share);
+  ++state_.tally.receive_calls;
+  if (result.status == IoStatus::would_block) return;
+  if (result.status != IoStatus::ok) return closer_.on_broken(connection);
+  state_.tally.received_bytes += result.bytes;
+  connection.last_heard_ms = state_.now_ms;
+  const bool open = process(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
+  state_.fanout.post_all();
+  const std::uint64_t posted = state_.fanout.take_posted();
+  if (!open) return;
+  connection.posted_shards = posted;
+  if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+}
+
+void Reader::wait_for_room(Connection& connection) {
+  if (connection.waits_for_room) return;
+  connection.waits_for_room = true;
+  state_.waiting_for_room.push_back(&connection);
+  state_.signals.arm(connection);
+}
+
+bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
+  const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
+  const std::byte* next = received.begin;
+  while (true) {
+    proto::NextRun found = proto::next_run(next, received.end, length_max);
+    if (found.found == proto::Found::run) {
+      if (!handle_run(connection, found.run)) return false;
+      next += found.run.size;
+      continue;
+    }
+    if (found.found == proto::Found::too_long) {
+      const proto::RunView header{next, proto::kHeaderSize, 1};
+      connection.ingress.error = proto::FrameError::too_long;
+      return refuse(connection, header, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                    "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
+    }
+    if (connection.tail_since_ms == 0 || next != received.begin) connection.tail_since_ms = state_.now_ms;
+    if (next == received.end) connection.tail_since_ms = 0;
+    if (state_.receive_buffer.keep(connection.tail, next, received.end, found.needed)) return true;
+    closer_.close(connection, proto::GoodbyeCode::no_memory,
+                  "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
+    return false;
+  }
+}
+
+bool Reader::handle_run(Connection& connection, proto::RunView& view) {
+  auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
+  switch (state_.gate.admit(connection.ingress, bytes, view, state_.now_ms)) {
+    case Admission::data:
+      route(connection, view);
+      return true;
+    case Admission::flow:
+      return handle_flow(connection, view);
+    case Admission::link:
+      return handle_link(connection, view);
+    case Admission::control:
+      return handle_control(connection, view);
+    case Admission::wrong_source:
+      state_.counters.wrong_source.add(1);
+      return refuse(connection, view, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
+                    "a frame's source is not this connection's node id; put the id from WELCOME into src");
+    case Admission::malformed:
+      break;
+  }
+  return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
+}
+
+bool Reader::refuse(Connection& connection, const proto::RunView& view, proto::DropReason reason,
+                    proto::GoodbyeCode code, const std::string& sentence) {
+  static_cast<void>(view);
+  // One frame came and ended here; what stands behind it is not looked at and so was never a frame.
+  state_.tally.accepted += 1;
+  state_.tally.drop(reason, 1);
+  if (reason == proto::DropReason::malformed) state_.counters.malformed.add(1);
+  closer_.close(connection, code, sentence);
+  return false;
+}
+
+void Reader::route(Connection& connection, const proto::RunView& view) {
+  state_.tally.accepted += view.frames;
+  if (connection.resume) count_taken(connection, view);
+  const proto::FrameHeader header = proto::load_header(view.bytes);
+  if (header.has(proto::kFlagExt)) fill_trace(view);
+  const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
+  state_.router.route(run, header);
+}
+
+void Reader::count_taken(Connection& connection, const proto::RunView& view) {
+  ResumeState& resume = *connection.resume;
+  resume.taken += view.frames;
+  resume.bytes_since_told += view.size;
+  if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state_, connection);
+}
+
+void Reader::fill_trace(const proto::RunView& view) {
+  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+  if (!frame) return;
+  const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()), frame->extensions.size());
+  // Departure is set again when the frame is written; a frame that never waits leaves in the turn in which it came.
+  // Both are the time of their turn: read anew, an arrival could be later than a departure.
+  const std::int64_t now_ns = state_.egress.now_wall_ns;
+  static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
+}
+
+bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
+  const auto message = proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
+  if (!message) {
+    return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                  "malformed FLOW frame: unknown operation, or too short for it");
+  }
+  if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
+  if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
+  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) on_skip(connection, *skip);
+  return true;
+}
+
+void Reader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
+  send_flow(state_, connection, proto::flow::Pong{ping.sequence, ping.sent_ns, wall_now_ns()});
+  if (connection.resume) send_confirm(state_, connection);
+}
+
+void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {
+  if (!connection.resume) return;
+  const std::uint64_t confirmed = connection.resume->kept.confirm(confirm.count);
+  state_.tally.delivered += confirmed;
+  state_.tally.queued -= static_cast<std::int64_t>(confirmed);
+  state_.recipients.mark_dirty(connection);
+}
+
+void Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
+  if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return;
+  connection.resume->taken += skip.count;
+  state_.counters.gap_frames.add(skip.count);
+}
+
+bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
+  const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize);
+  const auto goodbye = proto::decode<proto::Goodbye>(payload);
+  if (!goodbye) {
+    return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                  "after WELCOME the only LINK message is GOODBYE");
+  }
+  closer_.on_goodbye(connection, goodbye->code, goodbye->sentence);
+  return false;
+}
+
+bool Reader::handle_control(Connection& connection, const proto::RunView& view) {
+  const NodeId dst{proto::load_header(view.bytes).dst};
+  const NodeId own = make_id<NodeId>(state_.shared.hub, kHubIndex);
+  if (dst != NodeId{} && dst != own) {
+    return refuse(connection, view, proto::DropReason::no_route, proto::GoodbyeCode::not_allowed,
+                  "a request for another hub; this hub has no links: ask the own hub (dst 0)");
+  }
+  if (++connection.requests > state_.limits.requests) {
+    closer_.close(connection, proto::GoodbyeCode::too_many_requests,
+                  "more than " + std::to_string(state_.limits.requests) +
+                      " requests are unanswered; wait for answers before asking more");
+    return false;
+  }
+  ControlFrameEvent event{connection.session(), connection.attachment, connection.node, {}};
+  event.frame.assign(view.bytes, view.bytes + view.size);
+  state_.tell_conductor({state_.self, std::move(event)});
+  return true;
+}
+
+void Reader::take_mail(const Mail& mail) {
+  switch (mail.kind) {
+    case MailKind::frames: {
+      const Run frames{state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames};
+      return state_.router.route_handed_over(frames, static_cast<std::uint32_t>(state_.limits.frame_bytes));
+    }
+    case MailKind::control:
+      return state_.signals.apply_control(mail.node, {mail.small, mail.small_size});
+    case MailKind::hold:
+      return state_.signals.apply_hold(mail.node, true);
+    case MailKind::release:
+      return state_.signals.apply_hold(mail.node, false);
+  }
+}
+
+}  // namespace gimnet::hub

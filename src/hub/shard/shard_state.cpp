@@ -1,0 +1,39 @@
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+
+ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
+    : self(index),
+      shared(hub_shared),
+      limits(hub_shared.limits),
+      counters(*hub_shared.counters[index.value()]),
+      queues(*hub_shared.queues[index.value()]),
+      budget(hub_shared.budget),
+      pool(static_cast<std::uint32_t>(hub_shared.limits.frame_bytes), budget),
+      drops(tally, hub_shared.limits.report_interval_ms),
+      signals(*this),
+      egress{.limits = hub_shared.limits,
+             .pool = pool,
+             .budget = budget,
+             .tally = tally,
+             .drops = drops,
+             .signals = signals,
+             .hub = hub_shared.hub},
+      fanout(index, hub_shared.mailboxes, recipients, egress),
+      router(hub_shared.hub, hub_shared.nodes, hub_shared.groups, fanout),
+      receive_buffer(pool, tally, hub_shared.limits.partial_bytes),
+      gate(hub_shared.limits, tally) {}
+
+Connection* ShardState::find(SessionRef session) const {
+  if (session.slot.value() >= connections.size()) return nullptr;
+  Connection* connection = connections[session.slot.value()].get();
+  return connection != nullptr && connection->generation == session.generation ? connection : nullptr;
+}
+
+Connection* ShardState::find(NodeId node) const {
+  const NodePlace place = router.place_of(node);
+  if (!place.exists() || place.shard != self) return nullptr;
+  return find(SessionRef{place.slot, place.generation});
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/concurrent/quiescence.hpp"
+#include "hub/data/budget.hpp"
+#include "hub/data/buffer_pool.hpp"
+#include "hub/data/fanout/fanout.hpp"
+#include "hub/data/ingress/ingress_gate.hpp"
+#include "hub/data/ingress/receive_buffer.hpp"
+#include "hub/data/route/router.hpp"
+#include "hub/limits.hpp"
+#include "hub/observe/counters.hpp"
+#include "hub/observe/queue_gauges.hpp"
+#include "hub/shard/connection.hpp"
+#include "hub/shard/control_inbox.hpp"
+#include "hub/shard/poller.hpp"
+#include "hub/shard/signals.hpp"
+
+namespace gimnet::hub {
+
+/// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime: longer than any
+/// shard.
+struct HubShared {
+  HubId hub;
+  const Limits& limits;
+  const NodeTable& nodes;
+  const GroupTable& groups;
+  Quiescence& quiescence;
+  Budget& budget;
+  ControlInbox& inbox;
+  std::vector<Mailbox*> mailboxes;       ///< by shard
+  std::vector<Waker*> wakers;            ///< by shard
+  std::vector<ShardCounters*> counters;  ///< by shard
+  std::vector<QueueGauges*> queues;      ///< by shard
+};
+
+/// All that a shard's parts work on. Thread safety: one shard. The members are in the order in which they need each
+/// other.
+struct ShardState {
+  ShardState(ShardIndex index, const HubShared& hub_shared);
+
+  const ShardIndex self;
+  const HubShared& shared;
+  const Limits& limits;
+  ShardCounters& counters;
+  QueueGauges& queues;
+  Tally tally;
+  BudgetLease budget;
+  BufferPool pool;
+  DropBook drops;
+  Signals signals;
+  EgressContext egress;
+  RecipientTable recipients;
+  Fanout fanout;
+  Router router;
+  ReceiveBuffer receive_buffer;
+  IngressGate gate;
+  Poller poller;
+  std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
+  std::vector<Connection*> waiting_for_room;
+  std::uint64_t now_ms = 0;
+
+  [[nodiscard]] Connection* find(SessionRef session) const;
+  /// A node whose session is on this shard; nullptr if it is not.
+  [[nodiscard]] Connection* find(NodeId node) const;
+  void tell_conductor(ShardEvent event) { shared.inbox.push(std::move(event)); }
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,117 @@
+#include "hub/shard/signals.hpp"
+
+#include <cstring>
+
+#include "hub/shard/shard_state.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+bool is_resume(std::span<const std::byte> frame) {
+  if (proto::load_header(frame.data()).kind != proto::Kind::flow) return false;
+  const auto message = proto::flow::decode(frame.subspan(proto::kHeaderSize));
+  return message && std::holds_alternative<proto::flow::Resume>(*message);
+}
+
+}  // namespace
+
+void Signals::pause(NodeId sender, const proto::flow::Target& target) {
+  state_.counters.pauses.add(1);
+  flow(sender, proto::flow::Pause{target});
+}
+
+void Signals::resume(NodeId sender, const proto::flow::Target& target) {
+  state_.counters.resumes.add(1);
+  flow(sender, proto::flow::Resume{target});
+}
+
+void Signals::flow(NodeId sender, const proto::flow::Message& message) {
+  std::byte frame[proto::flow::kFrameSizeMax];
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{}, frame);
+  send_control(sender, {frame, size});
+}
+
+void Signals::send_control(NodeId node, std::span<const std::byte> frame) {
+  const NodePlace place = state_.router.place_of(node);
+  if (!place.exists()) return;
+  if (place.shard == state_.self) return apply_control(node, frame);
+  Mail mail;
+  mail.kind = MailKind::control;
+  mail.node = node;
+  GIMNET_CHECK(frame.size() <= sizeof mail.small);
+  mail.small_size = static_cast<std::uint8_t>(frame.size());
+  std::memcpy(mail.small, frame.data(), frame.size());
+  state_.fanout.post_word(place.shard, mail);
+}
+
+void Signals::apply_control(NodeId node, std::span<const std::byte> frame) {
+  Connection* connection = state_.find(node);
+  if (connection == nullptr || !connection->connected) return;
+  if (connection->outbox.push_control(frame, state_.egress)) return state_.recipients.mark_dirty(*connection);
+  // PAUSE is told again, a REPORT may be missed; RESUME is said once.
+  if (is_resume(frame)) connection->missed_resume = true;
+}
+
+void Signals::hold(NodeId sender) {
+  const NodePlace place = state_.router.place_of(sender);
+  if (!place.exists()) return;
+  if (place.shard == state_.self) return apply_hold(sender, true);
+  Mail mail;
+  mail.kind = MailKind::hold;
+  mail.node = sender;
+  state_.fanout.post_word(place.shard, mail);
+}
+
+void Signals::release(NodeId sender) {
+  const NodePlace place = state_.router.place_of(sender);
+  if (!place.exists()) return;
+  if (place.shard == state_.self) return apply_hold(sender, false);
+  Mail mail;
+  mail.kind = MailKind::release;
+  mail.node = sender;
+  state_.fanout.post_word(place.shard, mail);
+}
+
+void Signals::apply_hold(NodeId node, bool hold) {
+  Connection* connection = state_.find(node);
+  if (connection == nullptr) return;
+  if (hold) {
+    ++connection->holds;
+    state_.counters.held_reads.add(1);
+  } else if (connection->holds != 0) {
+    --connection->holds;
+    connection->on_read_again(state_.now_ms);
+  }
+  arm(*connection);
+}
+
+void Signals::send_reports() {
+  if (!state_.drops.pending()) return;
+  state_.drops.flush(state_.now_ms, [this](NodeId sender, std::span<const std::byte> payload) {
+    std::byte frame[proto::kHeaderSize + proto::kReportSizeMax];
+    proto::FrameHeader header;
+    header.length = static_cast<std::uint32_t>(payload.size());
+    header.dst = sender.value();
+    header.src = make_id<NodeId>(state_.shared.hub, kHubIndex).value();
+    header.kind = proto::Kind::report;
+    header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
+    proto::store_header(frame, header);
+    std::memcpy(frame + proto::kHeaderSize, payload.data(), payload.size());
+    state_.counters.reports.add(1);
+    send_control(sender, {frame, header.frame_size()});
+  });
+}
+
+void Signals::arm(Connection& connection) {
+  if (!connection.connected) return;
+  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would wait for ever.
+  const bool may_read = connection.holds == 0 || connection.must_confirm;
+  const Interest wanted{.read = may_read && !connection.draining && !connection.waits_for_room,
+                        .write = connection.blocked};
+  if (wanted == connection.armed) return;
+  connection.armed = wanted;
+  const int descriptor = connection.transport->descriptor();
+  if (descriptor >= 0) state_.poller.change(descriptor, connection.token(), wanted);
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,140 @@
+#include "hub/shard/closer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::GoodbyeCode;
+using ::testing::ElementsAre;
+using testing::FakeNode;
+using testing::HubRig;
+using ::testing::IsEmpty;
+
+TEST(Closer, SaysGoodbyeAndTellsTheConductor) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  rig.command(0, CloseCommand{a.session, GoodbyeCode::kicked, "an administrator wants it"});
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::kicked);
+  EXPECT_EQ(a.goodbye->sentence, "an administrator wants it");
+  EXPECT_TRUE(a.pipe.transport_gone());
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(detached->node, a.id);
+  EXPECT_EQ(detached->attachment, 1u);
+  EXPECT_EQ(detached->code, GoodbyeCode::kicked);
+}
+
+TEST(Closer, CountsWhoAskedForTooMuchAndWhoFoundNoMemory) {
+  HubRig rig;
+  rig.command(0, CloseCommand{rig.join(0).session, GoodbyeCode::too_many_requests, "slower"});
+  rig.command(0, CloseCommand{rig.join(0).session, GoodbyeCode::no_memory, "later"});
+  rig.command(0, CloseCommand{rig.join(0).session, GoodbyeCode::kicked, "go"});
+  rig.settle();
+  EXPECT_EQ(rig.sum(&ShardCounters::too_many_requests), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::no_memory), 1u);
+}
+
+TEST(Closer, ClosingTwiceTellsOnce) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  rig.command(0, CloseCommand{a.session, GoodbyeCode::kicked, "first"});
+  rig.command(0, CloseCommand{a.session, GoodbyeCode::silent, "second"});
+  rig.settle();
+  EXPECT_EQ(rig.take_events().size(), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::connections), 0u);
+}
+
+// In the middle of a frame a GOODBYE would be read as the rest of it.
+TEST(Closer, SaysNothingInTheMiddleOfAFrame) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(10);
+  rig.send(a, b.id.value(), "a frame of which ten bytes are written");
+  rig.settle_without_reading();
+  b.pipe.set_room(MemoryPeer::kAll);
+  rig.command(0, CloseCommand{b.session, GoodbyeCode::kicked, "kicked"});
+  rig.turn();
+  std::vector<std::byte> bytes;
+  EXPECT_EQ(b.pipe.read(bytes), 10u);
+  EXPECT_EQ(rig.dropped(DropReason::link_lost), 1u);
+}
+
+TEST(Closer, ForgetsABegunFrame) {
+  Limits limits;
+  limits.partial_bytes = 1 << 20;
+  HubRig rig(1, limits);
+  // More often than there is room for at once.
+  for (int i = 0; i < 10; ++i) {
+    FakeNode& a = rig.join(0);
+    const auto frame = HubRig::frame(a, a.id.value(), std::string(5'000, 'x'));
+    rig.write(a, std::span(frame).first(4'000));
+    rig.turn();
+    EXPECT_FALSE(a.pipe.transport_gone());
+    a.pipe.close();
+    rig.settle();
+    EXPECT_TRUE(a.pipe.transport_gone());
+  }
+  EXPECT_EQ(rig.ledger().accepted, 0u) << "nothing partial counts";
+}
+
+TEST(Closer, AReleasedSessionTakesEverythingWithIt) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  rig.send(a, b.id.value(), "written, not confirmed");
+  rig.settle();
+  b.pipe.set_room(0);
+  rig.send(a, b.id.value(), "waits");
+  rig.settle_without_reading();
+  EXPECT_EQ(rig.ledger().queued, 2u);
+  rig.release(b);
+  rig.settle();
+  EXPECT_EQ(rig.ledger().queued, 0u);
+  EXPECT_EQ(rig.dropped(DropReason::link_lost), 2u);
+  EXPECT_EQ(rig.sum(&ShardCounters::sessions), 1u);
+  EXPECT_THAT(rig.take_events(), IsEmpty()) << "the conductor asked for it";
+  rig.send(a, b.id.value(), "nobody");
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
+}
+
+// The slot goes to another session; a frame that waited or still comes for the old one is not for it.
+TEST(Closer, ASlotIsReusedWithoutItsPast) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(1);
+  FakeNode& old = rig.join(0);
+  const NodePlace place{old.shard, old.session.slot, old.session.generation};
+  rig.turn();
+  rig.release(old);
+  rig.turn();
+  FakeNode& next = rig.join(0);
+  AttachCommand command;
+  auto [transport, peer] = make_memory_pipe();
+  command.session = {old.session.slot, old.session.generation + 1};
+  command.attachment = 1;
+  command.node = make_id<NodeId>(rig.hub(), 500);
+  command.transport = std::move(transport);
+  command.peer_frame_bytes = 65'536;
+  rig.command(0, std::move(command));
+  rig.turn();
+  // The table still says that the old node lives in that slot.
+  rig.nodes().publish(index_of(old.id), place);
+  const std::size_t before = peer.readable();
+  rig.send(a, old.id.value(), "for the old one");
+  rig.send(a, next.id.value(), "for the next one");
+  rig.settle();
+  EXPECT_EQ(peer.readable(), before);
+  EXPECT_THAT(next.texts(), ElementsAre("for the next one"));
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

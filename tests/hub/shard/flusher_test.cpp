@@ -1,0 +1,214 @@
+#include "hub/shard/flusher.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::GoodbyeCode;
+using ::testing::ElementsAre;
+using testing::FakeNode;
+using testing::HubRig;
+using ::testing::SizeIs;
+
+constexpr std::uint8_t kLatestKeyed = static_cast<std::uint8_t>(proto::Policy::latest) | proto::kFlagKeyed;
+
+TEST(Flusher, WritesManyFramesInOneCall) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const std::uint64_t calls = b.pipe.send_calls();
+  for (int i = 0; i < 50; ++i) rig.send(a, b.id.value(), std::to_string(i), {.lane = static_cast<std::uint8_t>(i % 4)});
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(50));
+  EXPECT_EQ(b.pipe.send_calls() - calls, 1u);
+}
+
+TEST(Flusher, GoesOnWhereTheTransportStopped) {
+  for (std::size_t room = 1; room < 60; ++room) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    b.pipe.set_room(room);
+    for (int i = 0; i < 5; ++i) rig.send(a, b.id.value(), std::to_string(i));
+    rig.settle();
+    EXPECT_THAT(b.texts(), ElementsAre("0", "1", "2", "3", "4")) << "room " << room;
+  }
+}
+
+TEST(Flusher, ClosesASlowConsumerAndTellsIt) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& slow = rig.join(0);
+  slow.pipe.set_room(1'000);
+  for (int i = 0; i < 20; ++i) rig.send(a, slow.id.value(), std::string(1'000, 'x'), {.flags = 2});
+  rig.pass_ms(9'900);
+  EXPECT_FALSE(slow.pipe.transport_gone());
+  rig.pass_ms(400);
+  EXPECT_TRUE(slow.pipe.transport_gone());
+  EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 1u);
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(detached->code, GoodbyeCode::slow_consumer);
+  EXPECT_EQ(rig.dropped(DropReason::link_lost), 20u);
+}
+
+TEST(Flusher, KeepsAConsumerThatTakesJustEnough) {
+  for (const std::size_t bytes_per_s : {350u, 450u}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& slow = rig.join(0);
+    slow.pipe.set_room(1'000);
+    for (int i = 0; i < 50; ++i) rig.send(a, slow.id.value(), std::string(1'000, 'x'), {.flags = 2});
+    for (int second = 0; second < 25; ++second) {
+      slow.read(bytes_per_s);
+      rig.pass_ms(1'000);
+    }
+    EXPECT_EQ(slow.pipe.transport_gone(), bytes_per_s < 400u);
+  }
+}
+
+TEST(Flusher, DoesNotCallAConsumerSlowForWaitingLatest) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& slow = rig.join(0);
+  slow.pipe.set_room(0);
+  for (int i = 0; i < 200; ++i) {
+    rig.send(a, slow.id.value(), "12345678" + std::to_string(i), {.flags = kLatestKeyed});
+    rig.pass_ms(100);
+  }
+  EXPECT_FALSE(slow.pipe.transport_gone());
+  EXPECT_EQ(rig.dropped(DropReason::replaced), 199u);
+  slow.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_THAT(slow.texts(), ElementsAre("12345678199"));
+}
+
+TEST(Flusher, DropsBlockedMessagesAfterFiveSecondsWithoutProgress) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(0);
+  rig.send(a, b.id.value(), "waits", {.flags = proto::kFlagReport});
+  rig.pass_ms(4'900);
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+  rig.pass_ms(400);
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::timed_out), 1u);
+  ASSERT_THAT(a.reports(), SizeIs(1));
+  EXPECT_EQ(a.reports()[0].reason, DropReason::timed_out);
+  EXPECT_EQ(a.reports()[0].count, 1u);
+  EXPECT_EQ(a.reports()[0].header.dst, b.id.value());
+}
+
+// Its queue is empty each time that messages time out, but it has caught up with nothing.
+TEST(Flusher, ClosesASlowConsumerWhoseMessagesTimeOut) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& slow = rig.join(0);
+  slow.pipe.set_room(1'000);
+  for (int i = 0; i < 20; ++i) {
+    rig.send(a, slow.id.value(), std::string(1'000, 'x'));
+    rig.pass_ms(600);
+  }
+  EXPECT_TRUE(slow.pipe.transport_gone());
+  EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 1u);
+}
+
+TEST(Flusher, KeepsAConsumerThatCatchesUpAfterMessagesTimedOut) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& late = rig.join(0);
+  late.pipe.set_room(1'000);
+  for (int i = 0; i < 3; ++i) rig.send(a, late.id.value(), std::string(1'000, 'x'));
+  rig.pass_ms(6'000);
+  EXPECT_GT(rig.dropped(DropReason::timed_out), 0u);
+  late.pipe.set_room(MemoryPeer::kAll);
+  for (int second = 0; second < 12; ++second) {
+    late.read(10'000);
+    rig.pass_ms(1'000);
+  }
+  EXPECT_FALSE(late.pipe.transport_gone());
+}
+
+TEST(Flusher, ByteByByteIsProgressForBlock) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(10);
+  for (int i = 0; i < 3; ++i) rig.send(a, b.id.value(), std::string(100, 'x'));
+  for (int i = 0; i < 9; ++i) {
+    rig.pass_ms(1'000);
+    b.read(1);
+  }
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+// A node that reads, says PING and never confirms what it asked to be kept: nothing waits for it for ever.
+TEST(Flusher, TimesOutANodeThatNeverConfirms) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(4)) << "as many as the resume buffer holds";
+  rig.pass_ms(5'400);
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::timed_out), 16u);
+}
+
+TEST(Flusher, GoesOnAfterAConfirm) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  for (int i = 0; i < 5; ++i) {
+    rig.settle();
+    rig.send_flow(b, proto::flow::Confirm{b.data_frames});
+  }
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(20));
+  EXPECT_EQ(rig.ledger().delivered, 20u);
+}
+
+TEST(Flusher, BoundsWhatWaitsUnsentBehindASlowConnection) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(60'000);
+  for (int i = 0; i < 60; ++i) rig.send(a, b.id.value(), std::string(10'000, 'x'));
+  for (int step = 0; step < 10; ++step) {
+    rig.pass_ms(100);
+    b.read(20'000);  // 200 KB/s
+  }
+  EXPECT_GE(b.pipe.unsent_limit(), 4'096u);
+  EXPECT_LE(b.pipe.unsent_limit(), 20'000u) << "at most 100 ms of it";
+}
+
+TEST(Flusher, ABrokenTransportEndsTheConnectionOnly) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(0);
+  b.pipe.reset_after(5);
+  rig.send(a, b.id.value(), "lost");
+  rig.send(a, c.id.value(), "arrives");
+  rig.settle();
+  EXPECT_THAT(c.texts(), ElementsAre("arrives"));
+  EXPECT_EQ(rig.dropped(DropReason::link_lost), 1u);
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(detached->node, b.id);
+  EXPECT_FALSE(detached->said_by_peer);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,258 @@
+#include "hub/shard/io_shard.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::Kind;
+using ::testing::ElementsAre;
+using testing::FakeNode;
+using testing::HubRig;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::uint32_t kEverybody = 7u << 20 | kEveryIndex;
+
+std::string list_payload(std::initializer_list<std::uint32_t> ids, const std::string& payload) {
+  std::string text(4 * ids.size(), '\0');
+  std::memcpy(text.data(), std::data(ids), text.size());
+  return text + payload;
+}
+
+TEST(IoShard, CarriesFramesBetweenShardsInOrder) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(1);
+  std::vector<std::string> sent;
+  for (int i = 0; i < 300; ++i) {
+    sent.push_back(std::to_string(i));
+    rig.send(a, b.id.value(), sent.back());
+    if (i % 7 == 0) rig.turn();
+  }
+  rig.settle();
+  EXPECT_EQ(b.texts(), sent);
+  EXPECT_EQ(rig.sum(&ShardCounters::mailbox_frames), 300u);
+  EXPECT_LE(rig.sum(&ShardCounters::mailbox_entries), 44u) << "one entry a burst, not a frame";
+}
+
+TEST(IoShard, BroadcastReachesEverybodyButItsSender) {
+  HubRig rig(3);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(1);
+  FakeNode& d = rig.join(1);
+  rig.send(a, kEverybody, "own hub", {.kind = Kind::broadcast});
+  rig.send(a, 0xFFFFFFFF, "every hub", {.kind = Kind::broadcast});
+  rig.send(a, 8u << 20 | kEveryIndex, "another hub", {.kind = Kind::broadcast});
+  rig.settle();
+  for (const FakeNode* node : {&b, &c, &d}) EXPECT_THAT(node->texts(), ElementsAre("own hub", "every hub"));
+  EXPECT_THAT(a.frames, IsEmpty());
+  EXPECT_EQ(rig.ledger().delivered, 6u);
+  EXPECT_EQ(rig.dropped(DropReason::no_route), 1u);
+  EXPECT_EQ(rig.dropped(DropReason::no_subscriber), 0u) << "a shard without nodes is nobody's loss";
+}
+
+TEST(IoShard, ABroadcastWithoutRecipientIsCountedOnce) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  rig.send(a, kEverybody, "alone", {.kind = Kind::broadcast, .flags = proto::kFlagReport});
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::no_subscriber), 1u);
+  EXPECT_EQ(rig.ledger().dropped, 1u);
+  EXPECT_THAT(a.reports(), SizeIs(1));
+}
+
+TEST(IoShard, GroupReachesSubscribersOnAllShards) {
+  HubRig rig(2);
+  FakeNode& provider = rig.join(0);
+  std::vector<FakeNode*> members;
+  for (std::size_t i = 0; i < 11; ++i) members.push_back(&rig.join(i % 2));
+  FakeNode& other = rig.join(1);
+  rig.publish_group(5, provider.id, members);
+  rig.send(provider, HubRig::group(5), "small", {.kind = Kind::group});
+  rig.send(provider, HubRig::group(5), std::string(5'000, 'L'), {.kind = Kind::group});
+  rig.send(other, HubRig::group(5), "not the provider", {.kind = Kind::group});
+  rig.send(provider, HubRig::group(6), "no such group", {.kind = Kind::group});
+  rig.settle();
+  for (const FakeNode* member : members) EXPECT_THAT(member->texts(), ElementsAre("small", std::string(5'000, 'L')));
+  EXPECT_THAT(other.frames, IsEmpty());
+  EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
+  EXPECT_EQ(rig.dropped(DropReason::no_such_group), 1u);
+  EXPECT_EQ(rig.ledger().delivered, 22u);
+}
+
+TEST(IoShard, AGroupWithoutMembersDropsItsFrames) {
+  HubRig rig(2);
+  FakeNode& provider = rig.join(0);
+  rig.publish_group(5, provider.id, {});
+  rig.send(provider, HubRig::group(5), "nobody listens", {.kind = Kind::group});
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::no_subscriber), 1u);
+}
+
+TEST(IoShard, ServiceReachesTheProvider) {
+  for (const std::size_t shard : {0u, 1u}) {
+    HubRig rig(2);
+    FakeNode& provider = rig.join(shard);
+    FakeNode& client = rig.join(0);
+    rig.publish_group(5, provider.id, {});
+    rig.send(client, HubRig::group(5), "request", {.kind = Kind::service});
+    rig.settle();
+    EXPECT_THAT(provider.texts(), ElementsAre("request"));
+    EXPECT_EQ(provider.frames[0].header.dst, HubRig::group(5));
+  }
+}
+
+TEST(IoShard, ListReachesEachOfItsNodesOnceAndWithoutTheIds) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(1);
+  FakeNode& d = rig.join(1);
+  const std::uint32_t nobody = 7u << 20 | 900;
+  rig.send(a, 4, list_payload({b.id.value(), c.id.value(), d.id.value(), nobody}, "to three"), {.kind = Kind::list});
+  rig.send(a, 1, list_payload({c.id.value()}, "to one far away"), {.kind = Kind::list});
+  rig.send(a, 1, list_payload({b.id.value()}, ""), {.kind = Kind::list});
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("to three", ""));
+  EXPECT_THAT(c.texts(), ElementsAre("to three", "to one far away"));
+  EXPECT_THAT(d.texts(), ElementsAre("to three"));
+  for (const FakeNode* node : {&b, &c, &d}) {
+    EXPECT_EQ(node->frames[0].header.dst, 0u);
+    EXPECT_EQ(node->frames[0].header.kind, Kind::list);
+    EXPECT_EQ(node->frames[0].header.src, a.id.value());
+  }
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
+  EXPECT_EQ(rig.ledger().delivered, 5u);
+}
+
+TEST(IoShard, ListOf1024NodesAndPayloadsOfEverySize) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  std::vector<FakeNode*> nodes;
+  std::string ids;
+  for (std::size_t i = 0; i < 1'024; ++i) {
+    nodes.push_back(&rig.join(i % 2));
+    const std::uint32_t id = nodes.back()->id.value();
+    ids.append(reinterpret_cast<const char*>(&id), sizeof id);
+  }
+  for (const std::size_t size : {0u, 1u, 100u, 20'000u, 61'440u}) {
+    rig.send(a, 1'024, ids + std::string(size, 'x'), {.kind = Kind::list});
+    rig.settle();
+    for (FakeNode* node : nodes) {
+      ASSERT_THAT(node->frames, SizeIs(1)) << size;
+      EXPECT_EQ(node->frames[0].body.size(), size);
+      node->frames.clear();
+    }
+  }
+}
+
+TEST(IoShard, AFrameLargerThanItsRecipientTakesIsDropped) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(1, {.frame_bytes = 1'000});
+  rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  rig.send(a, b.id.value(), std::string(1'001, 'x'), {.lane = 2});
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(1));
+  EXPECT_EQ(rig.dropped(DropReason::too_large), 1u);
+}
+
+// In one run with the same header: only those that are too large go.
+TEST(IoShard, SmallFramesBesideALargeOneArrive) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.frame_bytes = 1'000});
+  rig.send(a, b.id.value(), "small");
+  rig.send(a, b.id.value(), std::string(1'001, 'x'));
+  rig.send(a, b.id.value(), "another");
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("small", "another"));
+  EXPECT_EQ(rig.dropped(DropReason::too_large), 1u);
+}
+
+// The receiving shard is busy with 256 other commands: the session's frames come after its AttachCommand all the same.
+TEST(IoShard, FramesFromAnotherShardFindASessionWhoseAttachWaits) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  for (int i = 0; i < 1'000; ++i) rig.command(1, CloseCommand{{ConnectionSlot{9'999}, 1}, {}, ""});
+  auto [transport, peer] = make_memory_pipe();
+  AttachCommand command;
+  command.session = {ConnectionSlot{40}, 1};
+  command.attachment = 1;
+  command.node = make_id<NodeId>(rig.hub(), 40);
+  command.transport = std::move(transport);
+  command.peer_frame_bytes = 65'536;
+  rig.command(1, std::move(command));
+  rig.nodes().publish(40, {ShardIndex{1}, ConnectionSlot{40}, 1});
+  rig.send(a, make_id<NodeId>(rig.hub(), 40).value(), "early");
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 0u);
+  EXPECT_EQ(rig.ledger().delivered, 1u);
+}
+
+// Small frames that alternate between shards fill the mailbox by entries; those with BLOCK are never dropped for it.
+TEST(IoShard, ABurstThatFillsTheMailboxLosesNothingSentWithBlock) {
+  Limits limits;
+  limits.mailbox_entries = 64;
+  HubRig rig(2, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(1);
+  for (int i = 0; i < 2'000; ++i) {
+    rig.send(a, b.id.value(), std::to_string(i));
+    rig.send(a, c.id.value(), std::to_string(i));
+  }
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(2'000));
+  EXPECT_THAT(c.frames, SizeIs(2'000));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+TEST(IoShard, ReadsLaterWhileAnotherShardHasTooMuchToDo) {
+  Limits limits;
+  limits.mailbox_bytes = 256 * 1024;
+  HubRig rig(2, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& c = rig.join(1);
+  for (int i = 0; i < 1'000; ++i) rig.send(a, c.id.value(), std::string(1'000, 'x'), {.flags = 2});
+  for (int i = 0; i < 50; ++i) rig.turn_shard(0);
+  EXPECT_TRUE(a.pipe.transport_readable()) << "the mailbox is more than half full";
+  rig.settle();
+  EXPECT_THAT(c.frames, SizeIs(1'000));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+// What waits between shards when the hub ends is let go on both sides.
+TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(1);
+  FakeNode& c = rig.join(0);
+  b.pipe.set_room(0);
+  c.pipe.set_room(0);
+  for (int i = 0; i < 20; ++i) {
+    rig.send(a, b.id.value(), std::string(30'000, 'x'));
+    rig.send(b, c.id.value(), std::string(30'000, 'x'));
+    rig.turn();
+  }
+  rig.send(a, b.id.value(), "in the mailbox");
+  rig.turn_shard(0);
+}
+
+TEST(IoShard, RunsOnAThreadOfItsOwnUntilItIsStopped) {
+  HubRig rig(1);
+  rig.command(0, StopCommand{});
+  rig.run_threads();
+  EXPECT_GE(rig.sum(&ShardCounters::turns), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,344 @@
+#include "hub/shard/reader.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "proto/frame/extensions.hpp"
+#include "proto/frame/frame_builder.hpp"
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::GoodbyeCode;
+using proto::Kind;
+using ::testing::ElementsAre;
+using testing::FakeNode;
+using testing::FrameSpec;
+using testing::HubRig;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+TEST(Reader, CarriesFramesFromOneNodeToAnother) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  rig.send(a, b.id.value(), "one");
+  rig.send(a, b.id.value(), "");
+  rig.send(a, b.id.value(), "three", {.lane = 0});
+  rig.settle();
+  // Lane 0 goes first.
+  EXPECT_THAT(b.texts(), ElementsAre("three", "one", ""));
+  EXPECT_EQ(b.frames[1].header.src, a.id.value());
+  EXPECT_EQ(rig.ledger().delivered, 3u);
+  EXPECT_EQ(rig.ledger().queued, 0u);
+}
+
+TEST(Reader, GivesTheSameFramesHoweverTheBytesAreSplit) {
+  for (const std::size_t split : {1u, 2u, 3u, 7u, 15u, 16u, 17u, 100u}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    std::vector<std::string> sent;
+    for (std::size_t size : {0u, 1u, 15u, 16u, 17u, 300u, 1100u}) {
+      sent.push_back(std::string(size, static_cast<char>('a' + size % 26)));
+      rig.send(a, b.id.value(), sent.back());
+    }
+    a.pipe.plan_receives(std::vector<std::size_t>(3000, split));
+    rig.settle();
+    EXPECT_EQ(b.texts(), sent) << "split " << split;
+  }
+}
+
+TEST(Reader, CarriesTheLargestFrameAndRefusesOneByteMore) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const std::string largest(65'536, 'x');
+  rig.send(a, b.id.value(), largest);
+  rig.settle();
+  ASSERT_THAT(b.frames, SizeIs(1));
+  EXPECT_EQ(b.frames[0].text(), largest);
+  rig.send(a, b.id.value(), largest + "y");
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::malformed), 1u);
+  EXPECT_TRUE(a.pipe.transport_gone());
+}
+
+TEST(Reader, ClosesForALengthThatClaimsFourGiB) {
+  for (const std::uint32_t length : {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    std::vector<std::byte> bytes = HubRig::frame(a, b.id.value(), "x");
+    std::memcpy(bytes.data(), &length, sizeof length);
+    rig.write(a, bytes);
+    rig.settle();
+    ASSERT_TRUE(a.goodbye) << length;
+    EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
+    EXPECT_THAT(b.frames, IsEmpty());
+  }
+}
+
+TEST(Reader, ClosesAConnectionThatSpeaksForAnother) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  rig.send(a, b.id.value(), "mine");
+  rig.send(a, b.id.value(), "not mine", {.src = b.id.value()});
+  rig.send(a, b.id.value(), "after it");
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("mine"));
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::wrong_source);
+  EXPECT_EQ(rig.dropped(DropReason::wrong_source), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::wrong_source), 1u);
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(detached->code, GoodbyeCode::wrong_source);
+  EXPECT_FALSE(detached->said_by_peer);
+}
+
+struct Malformed {
+  const char* what;
+  FrameSpec spec;
+  std::uint32_t dst;
+  std::string payload;
+};
+
+std::string ids(std::initializer_list<std::uint32_t> values) {
+  std::string text(4 * values.size(), '\0');
+  std::memcpy(text.data(), std::data(values), text.size());
+  return text;
+}
+
+std::string fragment(std::uint32_t offset, std::uint32_t total, const std::string& payload) {
+  return ids({1, offset, total}) + payload;
+}
+
+TEST(Reader, AnswersEachMalformedFrameWithGoodbye) {
+  const Malformed cases[] = {
+      {"reserved flag", {.flags = 0x40}, 1, ""},
+      {"reserved flag 2", {.flags = 0x80}, 1, ""},
+      {"reserved lane bit", {.lane = 4}, 1, ""},
+      {"reserved lane bits", {.lane = 0x80}, 1, ""},
+      {"kind 20", {.kind = static_cast<Kind>(20)}, 1, ""},
+      {"kind 255", {.kind = static_cast<Kind>(255)}, 1, ""},
+      {"a node's REPORT", {.kind = Kind::report}, 1, ""},
+      {"a node's ROUTE", {.kind = Kind::route}, 1, ""},
+      {"BLOCK on GROUP", {.kind = Kind::group, .flags = 1}, 1, ""},
+      {"BLOCK on LIST", {.kind = Kind::list, .flags = 1}, 1, ids({1})},
+      {"BLOCK on BROADCAST", {.kind = Kind::broadcast, .flags = 1}, 0xFFFFFFFF, ""},
+      {"LATEST without key", {.flags = 3}, 1, ""},
+      {"LATEST SERVICE without key", {.kind = Kind::service, .flags = 3}, 1, ""},
+      {"key too short", {.flags = 0x20}, 1, "1234567"},
+      {"LIST of none", {.kind = Kind::list}, 0, ""},
+      {"LIST of 1025", {.kind = Kind::list}, 1025, std::string(4 * 1025, '\0')},
+      {"LIST too short", {.kind = Kind::list}, 2, ids({1})},
+      {"LIST unsorted", {.kind = Kind::list}, 2, ids({2, 1})},
+      {"LIST repeated", {.kind = Kind::list}, 2, ids({2, 2})},
+      {"EXT too short", {.flags = 0x10}, 1, "\x01"},
+      {"EXT beyond the end", {.flags = 0x10}, 1, std::string("\x05\x00\x00\x02", 4)},
+      {"fragment header too short", {.flags = 8}, 1, "12345678901"},
+      {"fragment without payload", {.flags = 8}, 1, fragment(0, 10, "")},
+      {"fragment over its total", {.flags = 8}, 1, fragment(8, 10, "abc")},
+      {"fragment that wraps", {.flags = 8}, 1, fragment(0xFFFFFFFF, 10, "abc")},
+      {"FLOW of unknown operation", {.kind = Kind::flow}, 0, std::string(24, '\x63')},
+      {"FLOW too short", {.kind = Kind::flow}, 0, "\x01"},
+      {"LINK that is no GOODBYE", {.kind = Kind::link}, 0, "junk"},
+  };
+  for (const Malformed& each : cases) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    rig.send(a, b.id.value(), "before");
+    rig.send(a, each.dst, each.payload, each.spec);
+    rig.send(a, b.id.value(), "after");
+    rig.settle();
+    ASSERT_TRUE(a.goodbye) << each.what;
+    EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed) << each.what;
+    EXPECT_THAT(b.texts(), ElementsAre("before")) << each.what;
+    EXPECT_EQ(rig.dropped(DropReason::malformed), 1u) << each.what;
+    EXPECT_EQ(rig.sum(&ShardCounters::malformed), 1u) << each.what;
+    EXPECT_EQ(rig.ledger().queued, 0u) << each.what;
+  }
+}
+
+TEST(Reader, RefusesHopsFromANode) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  std::vector<std::byte> bytes = HubRig::frame(a, a.id.value(), "x");
+  bytes[14] = std::byte{1};
+  rig.write(a, bytes);
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
+}
+
+// Frames before a malformed one were legal when they came, also where all have one header.
+TEST(Reader, DeliversTheFramesBeforeAMalformedOneOfTheSameHeader) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const FrameSpec keyed{.flags = proto::kFlagKeyed};
+  rig.send(a, b.id.value(), "12345678one", keyed);
+  rig.send(a, b.id.value(), "12345678two", keyed);
+  rig.send(a, b.id.value(), "short", keyed);
+  rig.send(a, b.id.value(), "12345678not", keyed);
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("12345678one", "12345678two"));
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(rig.ledger().accepted, 3u);
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
+}
+
+TEST(Reader, AnswersPingWithPong) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  rig.send_flow(a, proto::flow::Ping{.sequence = 9, .sent_ns = 1234});
+  rig.settle();
+  const auto pongs = a.flow_of<proto::flow::Pong>();
+  ASSERT_THAT(pongs, SizeIs(1));
+  EXPECT_EQ(pongs[0].sequence, 9u);
+  EXPECT_EQ(pongs[0].sent_ns, 1234);
+  EXPECT_GT(pongs[0].now_ns, 0);
+}
+
+TEST(Reader, TellsTheConductorOfAGoodbye) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  rig.write(a, HubRig::frame(a, 0,
+                             [] {
+                               const auto payload = proto::encode(proto::Goodbye{GoodbyeCode::done, "bye"});
+                               return std::string(reinterpret_cast<const char*>(payload.data()), payload.size());
+                             }(),
+                             {.kind = Kind::link, .src = 0}));
+  rig.settle();
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_TRUE(detached->said_by_peer);
+  EXPECT_EQ(detached->code, GoodbyeCode::done);
+  EXPECT_EQ(detached->sentence, "bye");
+  EXPECT_FALSE(a.goodbye) << "nothing follows a GOODBYE";
+}
+
+TEST(Reader, HandsControlFramesToTheConductor) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  rig.send(a, 0, "request", {.kind = Kind::ns});
+  rig.settle();
+  auto events = rig.take_events();
+  ASSERT_THAT(events, SizeIs(1));
+  const auto* event = std::get_if<ControlFrameEvent>(&events[0].what);
+  ASSERT_NE(event, nullptr);
+  EXPECT_EQ(event->node, a.id);
+  EXPECT_EQ(event->attachment, 1u);
+  EXPECT_EQ(event->frame.size(), proto::kHeaderSize + 7);
+}
+
+TEST(Reader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
+  Limits limits;
+  limits.requests = 3;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  for (int i = 0; i < 3; ++i) rig.send(a, 0, "request", {.kind = Kind::ns});
+  rig.settle();
+  EXPECT_FALSE(a.goodbye);
+  SendControlCommand answer{.session = a.session, .attachment = 1, .frame = {}, .answers = 1};
+  answer.frame = HubRig::frame(a, a.id.value(), "answer", {.kind = Kind::ns});
+  rig.command(0, std::move(answer));
+  rig.send(a, 0, "request", {.kind = Kind::ns});
+  rig.settle();
+  EXPECT_FALSE(a.goodbye) << "an answer made room for another request";
+  rig.send(a, 0, "request", {.kind = Kind::ns});
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
+}
+
+TEST(Reader, FillsInTraceAndCarriesWhatItDoesNotKnow) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  std::byte memory[128];
+  proto::ExtensionWriter writer(memory);
+  ASSERT_TRUE(writer.add(static_cast<proto::ExtensionType>(200), std::as_bytes(std::span("unknown", 7))));
+  ASSERT_TRUE(writer.add_trace(2));
+  proto::FrameParts parts;
+  parts.header.dst = b.id.value();
+  parts.header.src = a.id.value();
+  parts.extensions = writer.written();
+  std::byte bytes[256];
+  const std::size_t size = proto::write_frame(parts, std::as_bytes(std::span("hello", 5)), bytes);
+  rig.write(a, {bytes, size});
+  rig.settle();
+  ASSERT_THAT(b.frames, SizeIs(1));
+  std::vector<std::byte> whole(proto::kHeaderSize);
+  proto::store_header(whole.data(), b.frames[0].header);
+  whole.insert(whole.end(), b.frames[0].body.begin(), b.frames[0].body.end());
+  const auto frame = proto::parse_frame(whole, proto::Origin::hub);
+  ASSERT_TRUE(frame);
+  const auto trace = proto::find_trace(frame->extensions);
+  ASSERT_TRUE(trace);
+  EXPECT_EQ(trace->used(), 1u);
+  EXPECT_EQ(trace->slot(0).hub, rig.hub());
+  EXPECT_GT(trace->slot(0).arrival_ns, 0);
+  EXPECT_GE(trace->slot(0).departure_ns, trace->slot(0).arrival_ns);
+  EXPECT_EQ(static_cast<char>(frame->extensions[2]), 'u');
+}
+
+TEST(Reader, ClosesWhenTooMuchIsKeptForBegunFrames) {
+  Limits limits;
+  limits.partial_bytes = 1 << 20;  // a slab each for three, not for four
+  HubRig rig(1, limits);
+  std::vector<FakeNode*> nodes;
+  for (int i = 0; i < 4; ++i) nodes.push_back(&rig.join(0));
+  for (FakeNode* node : nodes) {
+    const auto bytes = HubRig::frame(*node, node->id.value(), std::string(5000, 'x'));
+    rig.write(*node, std::span(bytes).first(4000));
+  }
+  rig.settle();
+  EXPECT_FALSE(nodes[0]->goodbye || nodes[1]->goodbye || nodes[2]->goodbye);
+  ASSERT_TRUE(nodes[3]->goodbye);
+  EXPECT_EQ(nodes[3]->goodbye->code, GoodbyeCode::no_memory);
+}
+
+std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t total, std::size_t size) {
+  std::string bytes(proto::kFragmentHeaderSize + size, 'x');
+  proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()), {message, offset, total});
+  return bytes;
+}
+
+// A message that goes on in another lane than it began in could not be put together.
+TEST(Reader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
+  Limits limits;
+  limits.lane0_bytes_per_s = 10'000;  // 1,000 in 100 ms
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  const FrameSpec spec{.flags = proto::kFlagFragment, .lane = 0};
+  for (std::uint32_t part = 0; part < 4; ++part) {
+    rig.send(a, b.id.value(), fragment(1, part * 500, 2'000, 500), spec);
+    rig.settle();
+  }
+  for (std::uint32_t part = 0; part < 4; ++part) {
+    rig.send(a, b.id.value(), fragment(2, part * 500, 2'000, 500), spec);
+    rig.settle();
+    if (part == 1) rig.pass_ms(1'500);  // the rate is fine again in the middle of it
+  }
+  rig.pass_ms(1'500);
+  rig.send(a, b.id.value(), fragment(3, 0, 500, 500), spec);
+  rig.settle();
+  std::vector<int> lanes;
+  for (const auto& frame : b.frames) lanes.push_back(frame.header.lane);
+  EXPECT_THAT(lanes, ::testing::ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 0));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

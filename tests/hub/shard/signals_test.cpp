@@ -1,0 +1,194 @@
+#include "hub/shard/signals.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::flow::Pause;
+using proto::flow::Resume;
+using proto::flow::Target;
+using ::testing::ElementsAre;
+using testing::FakeNode;
+using testing::HubRig;
+using ::testing::SizeIs;
+
+Limits small_limits() {
+  Limits limits;
+  limits.lane1_bytes = 64 * 1024;
+  limits.reserve_bytes = 32 * 1024;
+  limits.mailbox_bytes = 1 << 20;
+  return limits;
+}
+
+class SignalsAcross : public ::testing::TestWithParam<std::size_t> {};
+
+// The sender on the recipient's shard, and on another one.
+INSTANTIATE_TEST_SUITE_P(Shards, SignalsAcross, ::testing::Values(0, 1));
+
+TEST_P(SignalsAcross, PausesASenderAndResumesIt) {
+  HubRig rig(2, small_limits());
+  FakeNode& a = rig.join(GetParam());
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(0);
+  const std::string payload(1024 - proto::kHeaderSize, 'x');
+  for (int i = 0; i < 64; ++i) {
+    rig.send(a, b.id.value(), payload);
+    rig.turn();
+  }
+  rig.settle();
+  EXPECT_THAT(a.flow_of<Pause>(), SizeIs(0)) << "at the limit";
+  rig.send(a, b.id.value(), payload);
+  rig.settle_without_reading();
+  a.read();
+  const Target target{proto::Kind::unicast, proto::Lane::normal, b.id.value()};
+  EXPECT_THAT(a.flow_of<Pause>(), ElementsAre(Pause{target}));
+  EXPECT_THAT(a.flow_of<Resume>(), SizeIs(0));
+  b.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_THAT(a.flow_of<Resume>(), ElementsAre(Resume{target}));
+  EXPECT_THAT(b.frames, SizeIs(65));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+  EXPECT_EQ(rig.sum(&ShardCounters::pauses), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::resumes), 1u);
+}
+
+TEST_P(SignalsAcross, ASenderThatIgnoresPauseIsNotReadUntilThereIsRoom) {
+  HubRig rig(2, small_limits());
+  FakeNode& a = rig.join(GetParam());
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(1);
+  b.pipe.set_room(0);
+  const std::string payload(1024 - proto::kHeaderSize, 'x');
+  a.pipe.plan_receives(std::vector<std::size_t>(100'000, 4'096));
+  for (int i = 0; i < 1'000; ++i) rig.send(a, b.id.value(), payload);
+  rig.send(a, c.id.value(), "behind it");
+  rig.settle_without_reading();
+  EXPECT_TRUE(a.pipe.transport_readable()) << "held";
+  EXPECT_EQ(rig.sum(&ShardCounters::held_reads), 1u);
+  EXPECT_LE(rig.ledger().accepted, 64u + 32u + 3 * 4u);
+  // Its keep-alive clock stands still meanwhile; the recipient is slow, not silent.
+  rig.send_flow(b, proto::flow::Pong{});
+  for (int i = 0; i < 4; ++i) {
+    rig.pass_ms(1'000, false);
+    rig.send_flow(b, proto::flow::Pong{});
+    rig.send_flow(c, proto::flow::Pong{});
+  }
+  EXPECT_FALSE(a.pipe.transport_gone());
+  b.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(1'000));
+  EXPECT_THAT(c.texts(), ElementsAre("behind it"));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+TEST_P(SignalsAcross, AHeldSenderGoesOnWhenTheRecipientLeaves) {
+  HubRig rig(2, small_limits());
+  FakeNode& a = rig.join(GetParam());
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(0);
+  const std::string payload(1024 - proto::kHeaderSize, 'x');
+  a.pipe.plan_receives(std::vector<std::size_t>(100'000, 4'096));
+  for (int i = 0; i < 300; ++i) rig.send(a, b.id.value(), payload);
+  rig.settle_without_reading();
+  EXPECT_TRUE(a.pipe.transport_readable());
+  rig.release(b);
+  rig.settle();
+  EXPECT_FALSE(a.pipe.transport_readable());
+  EXPECT_EQ(rig.ledger().queued, 0u);
+  EXPECT_EQ(rig.ledger().dropped, 300u);
+  EXPECT_THAT(a.flow_of<Resume>(), SizeIs(1));
+}
+
+TEST_P(SignalsAcross, ReportsToASenderThatAskedForIt) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(GetParam());
+  const std::uint32_t nobody = 7u << 20 | 999;
+  rig.send(a, nobody, "0123456789abcdefXYZ", {.flags = proto::kFlagReport});
+  rig.send(a, nobody, "not asked for");
+  rig.settle();
+  ASSERT_THAT(a.reports(), SizeIs(1));
+  const proto::Report report = a.reports()[0];
+  EXPECT_EQ(report.reason, DropReason::no_such_node);
+  EXPECT_EQ(report.count, 1u);
+  EXPECT_EQ(report.header.dst, nobody);
+  EXPECT_EQ(report.following.size(), 16u);
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 2u);
+}
+
+TEST(Signals, MergesReportsWithinTheInterval) {
+  HubRig rig(1);
+  FakeNode& a = rig.join(0);
+  const std::uint32_t nobody = 7u << 20 | 999;
+  for (int i = 0; i < 5; ++i) {
+    rig.send(a, nobody, std::to_string(i), {.flags = proto::kFlagReport});
+    rig.turn();
+  }
+  rig.settle();
+  EXPECT_THAT(a.reports(), SizeIs(1));
+  rig.now_ms += 10;
+  rig.settle();
+  ASSERT_THAT(a.reports(), SizeIs(2));
+  EXPECT_EQ(a.reports()[0].count + a.reports()[1].count, 5u);
+}
+
+TEST(Signals, TwoNodesThatFloodEachOtherDoNotStandStill) {
+  HubRig rig(2, small_limits());
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(1);
+  a.pipe.set_room(8'192);
+  b.pipe.set_room(8'192);
+  const std::string payload(1024 - proto::kHeaderSize, 'x');
+  for (int i = 0; i < 2'000; ++i) {
+    rig.send(a, b.id.value(), payload);
+    rig.send(b, a.id.value(), payload);
+  }
+  rig.settle();
+  EXPECT_THAT(a.frames, SizeIs(2'000));
+  EXPECT_THAT(b.frames, SizeIs(2'000));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+// A peer that was told PAUSE and cannot be told RESUME starts anew: a connection begins with nothing paused.
+TEST(Signals, WhoHasNoRoomForResumeIsClosed) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  a.pipe.set_room(0);
+  const std::vector<std::byte> word(64);
+  while (rig.connection(a)->outbox.push_control(word, rig.state(0).egress)) {
+  }
+  const proto::flow::Target target{proto::Kind::unicast, proto::Lane::normal, a.id.value()};
+  rig.state(0).signals.pause(a.id, target);
+  rig.pass_ms(200, false);
+  EXPECT_TRUE(rig.connection(a)->connected) << "PAUSE is told again";
+  rig.state(0).signals.resume(a.id, target);
+  rig.pass_ms(200, false);
+  EXPECT_FALSE(rig.connection(a)->connected);
+}
+
+// What a node has to say about what it took may lie behind the data for which it is held.
+TEST(Signals, AHeldNodeThatMustConfirmIsRead) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& flooder = rig.join(0);
+  FakeNode& confirmer = rig.join(0, {.resume = true});
+  for (int i = 0; i < 8; ++i) rig.send(flooder, confirmer.id.value(), std::string(1'000, 'x'));
+  rig.settle();
+  ASSERT_LT(confirmer.frames.size(), 8u) << "the rest waits for a CONFIRM";
+  rig.state(0).signals.apply_hold(confirmer.id, true);
+  rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
+  rig.settle();
+  EXPECT_GT(confirmer.frames.size(), 4u);
+  rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
+  rig.settle();
+  EXPECT_EQ(confirmer.frames.size(), 8u);
+  EXPECT_FALSE(rig.connection(confirmer)->armed.read) << "with nothing left to write it is held as any other";
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,305 @@
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+namespace gimnet::hub::testing {
+
+void FakeNode::on_frame(const GotFrame& frame) {
+  const bool is_data = static_cast<std::uint8_t>(frame.header.kind) < proto::kFirstControlKind &&
+                       frame.header.kind != proto::Kind::flow && frame.header.kind != proto::Kind::report;
+  if (is_data) {
+    frames.push_back(frame);
+    ++data_frames;
+    return;
+  }
+  control.push_back(frame);
+  if (frame.header.kind == proto::Kind::link) {
+    if (const auto message = proto::decode<proto::Welcome>(frame.body)) welcome = *message;
+    if (const auto message = proto::decode<proto::Goodbye>(frame.body)) goodbye = *message;
+  } else if (frame.header.kind == proto::Kind::flow) {
+    const auto message = proto::flow::decode(frame.body);
+    if (!message) ADD_FAILURE() << "the hub sent FLOW that nobody can read";
+    if (const auto* skip = message ? std::get_if<proto::flow::Skip>(&*message) : nullptr) {
+      data_frames += skip->count;
+      skipped += skip->count;
+    }
+  }
+}
+
+void FakeNode::read(std::size_t most) {
+  pipe.read(stream, most);
+  std::size_t begin = 0;
+  if (!opened && stream.size() >= proto::kOpeningSize) {
+    if (!std::equal(proto::kOpening.begin(), proto::kOpening.end(), stream.begin())) ADD_FAILURE() << "no opening";
+    opened = true;
+    begin = proto::kOpeningSize;
+  }
+  while (opened && stream.size() - begin >= proto::kHeaderSize) {
+    const proto::FrameHeader header = proto::load_header(stream.data() + begin);
+    if (header.length > proto::kFrameLengthMax) {
+      ADD_FAILURE() << "the hub sent a header with length " << header.length;
+      stream.clear();
+      return;
+    }
+    if (stream.size() - begin < header.frame_size()) break;
+    const auto body = stream.begin() + static_cast<std::ptrdiff_t>(begin + proto::kHeaderSize);
+    begin += header.frame_size();
+    on_frame({header, {body, body + header.length}});
+  }
+  stream.erase(stream.begin(), stream.begin() + static_cast<std::ptrdiff_t>(begin));
+}
+
+std::vector<std::string> FakeNode::texts() const {
+  std::vector<std::string> all;
+  for (const GotFrame& frame : frames) all.push_back(frame.text());
+  return all;
+}
+
+std::vector<proto::flow::Message> FakeNode::flow() const {
+  std::vector<proto::flow::Message> all;
+  for (const GotFrame& frame : control) {
+    if (frame.header.kind != proto::Kind::flow) continue;
+    if (const auto message = proto::flow::decode(frame.body)) all.push_back(*message);
+  }
+  return all;
+}
+
+std::vector<proto::Report> FakeNode::reports() const {
+  std::vector<proto::Report> all;
+  for (const GotFrame& frame : control) {
+    if (frame.header.kind != proto::Kind::report) continue;
+    if (const auto report = proto::decode_report(frame.body)) all.push_back(*report);
+  }
+  return all;
+}
+
+HubRig::HubRig(std::size_t shards, Limits limits)
+    : limits_(limits), quiescence_(shards), budget_(limits.budget_bytes), inbox_(shards) {
+  std::vector<Mailbox*> mailboxes;
+  std::vector<Waker*> wakers;
+  std::vector<ShardCounters*> counters;
+  std::vector<QueueGauges*> queues;
+  for (std::size_t i = 0; i < shards; ++i) {
+    wakers_.push_back(std::make_unique<Waker>());
+    mailboxes_.push_back(std::make_unique<Mailbox>(
+        shards, Mailbox::Bounds{limits_.mailbox_entries, limits_.mailbox_bytes}, *wakers_.back()));
+    counters_.push_back(std::make_unique<ShardCounters>());
+    wakers.push_back(wakers_.back().get());
+    mailboxes.push_back(mailboxes_.back().get());
+    counters.push_back(counters_.back().get());
+    queues_.push_back(std::make_unique<QueueGauges>(kGaugedSlots));
+    queues.push_back(queues_.back().get());
+  }
+  shared_.emplace(
+      HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_, mailboxes, wakers, counters, queues});
+  for (std::size_t i = 0; i < shards; ++i) {
+    shards_.push_back(
+        std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_, IoShard::Options{}));
+  }
+}
+
+HubRig::~HubRig() {
+  for (const auto& shard : shards_) shard->let_go();
+}
+
+FakeNode& HubRig::join(std::size_t shard, const JoinSpec& spec) {
+  FakeNode& node = nodes_played_.emplace_back();
+  const std::uint32_t index = next_index_++;
+  node.id = make_id<NodeId>(hub(), index);
+  node.shard = ShardIndex{static_cast<std::uint8_t>(shard)};
+  node.session = {ConnectionSlot{index}, 1000 + index};
+  attach(node, spec, true);
+  return node;
+}
+
+void HubRig::rejoin(FakeNode& node, const JoinSpec& spec) { attach(node, spec, false); }
+
+void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
+  auto [transport, peer] = make_memory_pipe();
+  node.pipe = std::move(peer);
+  node.stream.clear();
+  node.opened = false;
+  AttachCommand command;
+  command.session = node.session;
+  command.attachment = ++node.attachment;
+  command.node = node.id;
+  command.new_session = new_session;
+  command.transport = std::move(transport);
+  command.welcome.node = node.id;
+  command.welcome.hub = hub();
+  command.welcome.token = {std::byte{1}};
+  command.resume_wanted = spec.resume;
+  command.peer_epoch = spec.epoch;
+  command.known_hub_epoch = !new_session && node.welcome ? node.welcome->epoch : 0;
+  command.known_taken = new_session ? 0 : node.data_frames;
+  command.peer_resume_bytes = spec.resume_bytes;
+  command.peer_frame_bytes = spec.frame_bytes;
+  node.welcome.reset();
+  node.goodbye.reset();
+  this->command(node.shard.value(), std::move(command));
+  nodes_.publish(index_of(node.id), {node.shard, node.session.slot, node.session.generation});
+  turn_shard(node.shard.value());
+  node.read();
+  if (node.welcome && !node.welcome->resumed) node.data_frames = 0;
+}
+
+void HubRig::release(FakeNode& node) {
+  nodes_.publish(index_of(node.id), {});
+  command(node.shard.value(), ReleaseCommand{node.session});
+}
+
+void HubRig::command(std::size_t shard, ShardCommand command) { shards_[shard]->send(std::move(command)); }
+
+void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members) {
+  auto group = std::make_unique<GroupMembers>();
+  group->provider = provider;
+  group->by_shard.resize(shards_.size());
+  for (const FakeNode* member : members) {
+    group->by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});
+  }
+  static_cast<void>(groups_.exchange(index, group.get()));
+  members_.push_back(std::move(group));
+}
+
+std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,
+                                     const FrameSpec& spec) {
+  proto::FrameHeader header;
+  header.length = static_cast<std::uint32_t>(payload.size());
+  header.dst = dst;
+  header.src = spec.src.value_or(from.id.value());
+  header.kind = spec.kind;
+  header.flags = spec.flags;
+  header.lane = spec.lane;
+  std::vector<std::byte> bytes(header.frame_size());
+  proto::store_header(bytes.data(), header);
+  if (!payload.empty()) std::memcpy(bytes.data() + proto::kHeaderSize, payload.data(), payload.size());
+  return bytes;
+}
+
+void HubRig::send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec) {
+  write(from, frame(from, dst, payload, spec));
+}
+
+void HubRig::send_flow(FakeNode& from, const proto::flow::Message& message) {
+  std::byte bytes[proto::flow::kFrameSizeMax];
+  const std::size_t size = proto::flow::encode_frame(message, from.id, bytes);
+  write(from, {bytes, size});
+}
+
+std::vector<Ready> HubRig::ready(std::size_t shard) {
+  std::vector<Ready> ready;
+  for (const FakeNode& node : nodes_played_) {
+    if (node.shard.value() != shard || node.attachment == 0) continue;
+    const Connection* connection = state(shard).find(node.session);
+    if (connection == nullptr || !connection->connected) continue;
+    ready.push_back({connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
+  }
+  return ready;
+}
+
+void HubRig::turn_shard(std::size_t shard) {
+  shards_[shard]->turn(ready(shard), now_ms);
+  const Ledger sums = ledger();
+  EXPECT_TRUE(sums.exact()) << "accepted " << sums.accepted << " + copies " << sums.copies << " != delivered "
+                            << sums.delivered << " + dropped " << sums.dropped << " + queued " << sums.queued;
+}
+
+void HubRig::turn() {
+  for (std::size_t shard = 0; shard < shards_.size(); ++shard) turn_shard(shard);
+}
+
+std::uint64_t HubRig::activity() const {
+  std::uint64_t sum = 0;
+  for (const auto& counters : counters_) {
+    sum += counters->received_bytes.value() + counters->sent_bytes.value() + counters->mailbox_entries.value() +
+           counters->connections.value() + counters->reports.value();
+  }
+  const Ledger sums = ledger();
+  return sum + sums.accepted + sums.delivered + 3 * sums.dropped;
+}
+
+void HubRig::settle_without_reading() {
+  constexpr int kTurnsMax = 100'000;
+  int quiet = 0;
+  for (int turns = 0; quiet < 4; ++turns) {
+    if (turns == kTurnsMax) {
+      ADD_FAILURE() << "never quiet";
+      return;
+    }
+    const std::uint64_t before = activity();
+    turn();
+    quiet = activity() == before ? quiet + 1 : 0;
+  }
+}
+
+void HubRig::settle() {
+  std::size_t read_before = 0;
+  do {
+    settle_without_reading();
+    read_before = 0;
+    for (FakeNode& node : nodes_played_) {
+      read_before += node.pipe.readable();
+      node.read();
+    }
+  } while (read_before != 0);
+}
+
+void HubRig::run_threads() {
+  for (const auto& shard : shards_) shard->start();
+  for (const auto& shard : shards_) shard->join();
+}
+
+void HubRig::pass_ms(std::uint64_t ms, bool answer_pings) {
+  constexpr std::uint64_t kStepMs = 100;
+  for (std::uint64_t passed = 0; passed < ms; passed += kStepMs) {
+    now_ms += std::min(kStepMs, ms - passed);
+    if (answer_pings) {
+      for (FakeNode& node : nodes_played_) {
+        if (!node.pipe.transport_gone()) send_flow(node, proto::flow::Pong{});
+      }
+    }
+    turn();
+  }
+}
+
+Ledger HubRig::ledger() const {
+  Ledger sums;
+  for (const auto& counters : counters_) {
+    sums.accepted += counters->accepted.value();
+    sums.copies += counters->copies.value();
+    sums.delivered += counters->delivered.value();
+    sums.queued += counters->queued.value();
+    for (const Counter& dropped : counters->dropped) sums.dropped += dropped.value();
+  }
+  return sums;
+}
+
+std::uint64_t HubRig::dropped(proto::DropReason reason) const {
+  std::uint64_t sum = 0;
+  for (const auto& counters : counters_) sum += counters->dropped[static_cast<std::size_t>(reason)].value();
+  return sum;
+}
+
+std::uint64_t HubRig::sum(Counter ShardCounters::* counter) const {
+  std::uint64_t sum = 0;
+  for (const auto& counters : counters_) sum += ((*counters).*counter).value();
+  return sum;
+}
+
+std::vector<ShardEvent> HubRig::take_events() {
+  std::vector<ShardEvent> events;
+  inbox_.drain(10'000, [&](ShardEvent&& event) { events.push_back(std::move(event)); });
+  return events;
+}
+
+std::optional<DetachedEvent> HubRig::take_detached() {
+  for (ShardEvent& event : take_events()) {
+    if (auto* detached = std::get_if<DetachedEvent>(&event.what)) return std::move(*detached);
+  }
+  return std::nullopt;
+}
+
+}  // namespace gimnet::hub::testing

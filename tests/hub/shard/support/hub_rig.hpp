@@ -1,0 +1,159 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hub/shard/io_shard.hpp"
+#include "hub/transport/memory_transport.hpp"
+#include "proto/control/link.hpp"
+#include "proto/frame/flow.hpp"
+#include "proto/frame/frame_header.hpp"
+#include "proto/frame/report.hpp"
+
+namespace gimnet::hub::testing {
+
+/// A frame as a node got it.
+struct GotFrame {
+  proto::FrameHeader header;
+  std::vector<std::byte> body;  ///< everything after the header
+  [[nodiscard]] std::string text() const { return {reinterpret_cast<const char*>(body.data()), body.size()}; }
+};
+
+struct FrameSpec {
+  proto::Kind kind = proto::Kind::unicast;
+  std::uint8_t flags = 0;
+  std::uint8_t lane = 1;
+  std::optional<std::uint32_t> src = std::nullopt;  ///< absent: the sending node's id
+};
+
+/// How a node joins, or comes back.
+struct JoinSpec {
+  bool resume = false;
+  std::uint64_t epoch = 77;
+  std::uint32_t frame_bytes = proto::kFrameLengthDefault;
+  std::uint32_t resume_bytes = 1u << 20;
+};
+
+/// A node played by a test: the far end of its connection, and what came out of it.
+struct FakeNode {
+  NodeId id;
+  ShardIndex shard;
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  MemoryPeer pipe;
+  std::vector<std::byte> stream;  ///< read and not taken apart yet
+  bool opened = false;            ///< the 8 opening bytes came
+  std::vector<GotFrame> frames;   ///< data frames
+  std::vector<GotFrame> control;  ///< FLOW, LINK, NS, CTRL and REPORT
+  std::uint64_t data_frames = 0;  ///< of this epoch, SKIP included
+  std::uint64_t skipped = 0;
+  std::optional<proto::Welcome> welcome;
+  std::optional<proto::Goodbye> goodbye;
+
+  /// Takes everything that the hub sent (or `most` bytes of it) apart.
+  void read(std::size_t most = MemoryPeer::kAll);
+  [[nodiscard]] std::vector<std::string> texts() const;
+  [[nodiscard]] std::vector<proto::flow::Message> flow() const;
+  template <class Message>
+  [[nodiscard]] std::vector<Message> flow_of() const {
+    std::vector<Message> found;
+    for (const proto::flow::Message& message : flow()) {
+      if (const auto* match = std::get_if<Message>(&message)) found.push_back(*match);
+    }
+    return found;
+  }
+  [[nodiscard]] std::vector<proto::Report> reports() const;
+
+ private:
+  void on_frame(const GotFrame& frame);
+};
+
+/// The sums of the ledger over all shards.
+struct Ledger {
+  std::uint64_t accepted = 0;
+  std::uint64_t copies = 0;
+  std::uint64_t delivered = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t queued = 0;
+  [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped + queued; }
+};
+
+/// The shards of a hub without threads, sockets or a conductor: a test plays all of these, by turns and a fake clock.
+class HubRig {
+ public:
+  explicit HubRig(std::size_t shards = 1, Limits limits = {});
+  ~HubRig();
+  HubRig(const HubRig&) = delete;
+  HubRig& operator=(const HubRig&) = delete;
+
+  /// A new session on that shard. The reference stays good.
+  FakeNode& join(std::size_t shard, const JoinSpec& spec = {});
+  /// Another connection for its session; its counts tell what it took so far.
+  void rejoin(FakeNode& node, const JoinSpec& spec = {});
+  void release(FakeNode& node);
+  void command(std::size_t shard, ShardCommand command);
+  /// Makes `provider` the owner of a group with these members.
+  void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members);
+
+  void write(FakeNode& node, std::span<const std::byte> bytes) { node.pipe.write(bytes); }
+  void send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec = {});
+  void send_flow(FakeNode& from, const proto::flow::Message& message);
+  [[nodiscard]] static std::vector<std::byte> frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,
+                                                    const FrameSpec& spec = {});
+
+  /// What a poller would say of the connections of that shard.
+  [[nodiscard]] std::vector<Ready> ready(std::size_t shard);
+  [[nodiscard]] IoShard& shard(std::size_t shard) { return *shards_[shard]; }
+  /// One turn of one shard, or of each in order. Checks the ledger after all.
+  void turn_shard(std::size_t shard);
+  void turn();
+  /// Turns until nothing moves any more, and each node read what came for it.
+  void settle();
+  void settle_without_reading();
+  /// Starts the threads of all shards and waits for their end: each was told to stop before.
+  void run_threads();
+  /// Fake time passes in ticks, each with a turn.
+  void pass_ms(std::uint64_t ms, bool answer_pings = true);
+
+  [[nodiscard]] Ledger ledger() const;
+  [[nodiscard]] std::uint64_t dropped(proto::DropReason reason) const;
+  [[nodiscard]] std::uint64_t sum(Counter ShardCounters::* counter) const;
+  [[nodiscard]] std::vector<ShardEvent> take_events();
+  [[nodiscard]] std::optional<DetachedEvent> take_detached();
+  [[nodiscard]] ShardState& state(std::size_t shard) { return shards_[shard]->state(); }
+  [[nodiscard]] Connection* connection(const FakeNode& node) { return state(node.shard.value()).find(node.session); }
+  [[nodiscard]] HubId hub() const { return HubId{7}; }
+  [[nodiscard]] NodeTable& nodes() { return nodes_; }
+  [[nodiscard]] static std::uint32_t group(std::uint32_t index) { return make_id<GroupId>(HubId{7}, index).value(); }
+
+  std::uint64_t now_ms = 1'000'000;
+
+ private:
+  void attach(FakeNode& node, const JoinSpec& spec, bool new_session);
+  [[nodiscard]] std::uint64_t activity() const;
+
+  Limits limits_;
+  NodeTable nodes_;
+  GroupTable groups_;
+  Quiescence quiescence_;
+  Budget budget_;
+  ControlInbox inbox_;
+  std::vector<std::unique_ptr<Waker>> wakers_;
+  std::vector<std::unique_ptr<Mailbox>> mailboxes_;
+  std::vector<std::unique_ptr<ShardCounters>> counters_;
+  static constexpr std::size_t kGaugedSlots = 1024;
+  std::vector<std::unique_ptr<QueueGauges>> queues_;
+  std::optional<HubShared> shared_;
+  std::vector<std::unique_ptr<IoShard>> shards_;
+  std::deque<FakeNode> nodes_played_;
+  std::vector<std::unique_ptr<const GroupMembers>> members_;
+  std::uint32_t next_index_ = 1;
+};
+
+}  // namespace gimnet::hub::testing
