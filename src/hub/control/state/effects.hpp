@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/control/state/place.hpp"
+
+// What the state machines want done, to be carried out in this order: tables first or messages first is part of the
+// meaning (docs/protocol.md, section 8).
+
+namespace gimnet::hub {
+
+/// Publish the place of this node, or that there is none any more.
+struct NodeChanged {
+  std::uint32_t index = 0;
+};
+/// Publish the members of this group, or that there is none any more.
+struct GroupChanged {
+  std::uint32_t index = 0;
+};
+/// Tell the shard that the session is over.
+struct SessionEnded {
+  Place place;
+};
+/// Tell a subscriber that a service has another group id. Groups and nodes are named by index here; 0: none.
+struct ServiceMovedDue {
+  std::uint32_t subscriber = 0;
+  std::string full_name;
+  std::uint32_t old_group = 0;
+  std::uint32_t new_group = 0;
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  std::uint8_t delivery = 0;
+};
+/// Tell a provider that somebody came or went.
+struct SubscriberDue {
+  std::uint32_t provider = 0;
+  std::uint32_t group = 0;
+  std::uint32_t subscriber = 0;
+  std::uint32_t subscribers_now = 0;
+  bool joined = false;
+};
+
+using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue>;
+using Effects = std::vector<Effect>;
+
+}  // namespace gimnet::hub

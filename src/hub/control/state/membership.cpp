@@ -1,0 +1,132 @@
+#include "hub/control/state/membership.hpp"
+
+#include <algorithm>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+
+/// Did the hub close the connection for what the node sent?
+bool is_misconduct(const Membership::Ending& ending) {
+  if (ending.said_by_peer) return false;
+  return ending.code == GoodbyeCode::malformed || ending.code == GoodbyeCode::wrong_source ||
+         ending.code == GoodbyeCode::not_allowed || ending.code == GoodbyeCode::too_many_requests;
+}
+
+}  // namespace
+
+Membership::Membership(const Sessions::Options& options, const Limits& limits)
+    : limits_(limits), sessions_(options, limits), services_(options.hub, limits) {}
+
+Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request, milliseconds now, Effects& effects) {
+  if (std::optional<Refusal> refusal = check(request)) return std::move(*refusal);
+  Session* session = sessions_.claim(request.token);
+  if (!request.name.empty()) {
+    if (std::optional<Refusal> refusal = directory_.refusal(request.name, session, sessions_, now)) {
+      return std::move(*refusal);
+    }
+    end_absent_holder(request.name, session, now, effects);
+  }
+  const bool fresh = session == nullptr;
+  if (fresh) {
+    make_room(now, effects);
+    Result<Session*, Refusal> created = sessions_.create(request.secret, request.shard_hint, now);
+    if (!created) return created.error();
+    session = *created;
+  } else {
+    services_.node_returned(session->index);
+  }
+  if (!request.name.empty() && request.name != session->name) take_name(*session, request.name, now, effects);
+  session->role = request.role;
+  session->description = request.description;
+  session->origin = request.origin;
+  sessions_.attach(*session, now);
+  if (!fresh) {
+    redeclaring_.push_back(
+        {now + milliseconds{limits_.grace_ms}, session->index, session->place.generation, session->attachment});
+  }
+  return Joined{session, fresh};
+}
+
+void Membership::connection_ended(Session& session, const Ending& ending, milliseconds now, Effects& effects) {
+  const bool left = ending.said_by_peer && ending.code == GoodbyeCode::done;
+  // Nobody knows a nameless node but by its id, and sessions kept for those who send rubbish would fill the hub.
+  if (left || (session.name.empty() && is_misconduct(ending))) {
+    end(session, now, effects);
+    return;
+  }
+  if (!ending.said_by_peer && ending.code != GoodbyeCode::done) {
+    session.close_code = ending.code;
+    session.close_sentence = ending.sentence;
+  }
+  sessions_.begin_grace(session, now);
+}
+
+void Membership::tick(milliseconds now, Effects& effects) {
+  while (Session* expired = sessions_.next_expired(now)) end(*expired, now, effects);
+  while (!redeclaring_.empty() && redeclaring_.front().until <= now) {
+    const Redeclaring due = redeclaring_.front();
+    redeclaring_.pop_front();
+    const Session* session = sessions_.find(due.index);
+    const bool same = session != nullptr && session->place.generation == due.generation &&
+                      session->attachment == due.attachment && session->connected;
+    if (same) services_.drop_undeclared(due.index, now, effects);
+  }
+}
+
+std::optional<milliseconds> Membership::next_deadline() const {
+  std::optional<milliseconds> deadline = sessions_.next_expiry();
+  if (!redeclaring_.empty() && (!deadline || redeclaring_.front().until < *deadline)) {
+    deadline = redeclaring_.front().until;
+  }
+  return deadline;
+}
+
+std::optional<Refusal> Membership::check(const JoinRequest& request) const {
+  if (request.role == proto::Role::hub) {
+    return Refusal{GoodbyeCode::not_allowed, "this hub takes no links from other hubs; connect as a node"};
+  }
+  if (request.role == proto::Role::admin && !request.may_administer) {
+    return Refusal{GoodbyeCode::not_allowed,
+                   "administrators connect over the hub's Unix socket, as root or as the user that runs the hub"};
+  }
+  if (request.role != proto::Role::node && request.role != proto::Role::admin) {
+    return Refusal{GoodbyeCode::not_allowed,
+                   "there is no role " + std::to_string(static_cast<int>(request.role)) + "; connect as a node (0)"};
+  }
+  return std::nullopt;
+}
+
+void Membership::end_absent_holder(const std::string& name, const Session* claimant, milliseconds now,
+                                   Effects& effects) {
+  const std::optional<std::uint32_t> holder = directory_.find(name);
+  if (!holder || (claimant != nullptr && claimant->index == *holder)) return;
+  end(*sessions_.find(*holder), now, effects);
+}
+
+void Membership::make_room(milliseconds now, Effects& effects) {
+  if (!sessions_.full()) return;
+  if (Session* away = sessions_.longest_away_nameless()) end(*away, now, effects);
+}
+
+void Membership::take_name(Session& session, const std::string& name, milliseconds now, Effects& effects) {
+  if (!session.name.empty()) {
+    services_.node_renamed(session.index, now, effects);
+    directory_.remove(session.name);
+  }
+  session.name = name;
+  directory_.put(name, session.index);
+}
+
+void Membership::end(Session& session, milliseconds now, Effects& effects) {
+  services_.node_left(session.index, now, effects);
+  directory_.remove(session.name);
+  effects.emplace_back(NodeChanged{session.index});
+  effects.emplace_back(SessionEnded{session.place});
+  sessions_.end(session, now);
+}
+
+}  // namespace gimnet::hub

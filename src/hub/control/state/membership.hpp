@@ -1,0 +1,89 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "hub/control/state/directory.hpp"
+#include "hub/control/state/effects.hpp"
+#include "hub/control/state/services.hpp"
+#include "hub/control/state/sessions.hpp"
+
+namespace gimnet::hub {
+
+/// What a HELLO asks for, and who sent it.
+struct JoinRequest {
+  proto::Role role{};
+  std::string name;                  ///< "": none, or the one that the session has
+  std::span<const std::byte> token;  ///< empty: none
+  std::string description;
+  std::optional<std::uint16_t> shard_hint;
+  Origin origin;
+  bool may_administer = false;  ///< the peer is root or the hub's own user, told by the kernel
+  Secret secret{};              ///< fresh randomness, for a new session
+};
+
+/// Who belongs to this hub, under which name, with which services: the state of one hub without its neighbours. Makes
+/// sure that sessions, names and services agree with each other.
+/// Thread safety: none. Time and randomness are arguments; what is to be done comes back as effects.
+class Membership {
+ public:
+  Membership(const Sessions::Options& options, const Limits& limits);
+
+  struct Joined {
+    Session* session = nullptr;
+    bool new_session = false;
+  };
+  /// Admits a connection, for a new session or for the one whose token it shows. The caller attaches it at its shard
+  /// and publishes its place after the effects were carried out. Errors: what GOODBYE says.
+  [[nodiscard]] Result<Joined, Refusal> join(const JoinRequest& request, std::chrono::milliseconds now,
+                                             Effects& effects);
+
+  /// How a connection ended.
+  struct Ending {
+    bool said_by_peer = false;
+    proto::GoodbyeCode code{};
+    std::string sentence;
+  };
+  /// A connection of the session ended: for good if the node said so or has no name and was closed
+  /// for what it sent, else its grace time begins. REQUIRES: connected.
+  void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now, Effects& effects);
+
+  /// Ends what is overdue.
+  void tick(std::chrono::milliseconds now, Effects& effects);
+  /// When tick() has something to do; nothing while nothing runs out.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
+
+  [[nodiscard]] Sessions& sessions() { return sessions_; }
+  [[nodiscard]] const Sessions& sessions() const { return sessions_; }
+  [[nodiscard]] const Directory& directory() const { return directory_; }
+  [[nodiscard]] Services& services() { return services_; }
+  [[nodiscard]] const Services& services() const { return services_; }
+
+ private:
+  struct Redeclaring {
+    std::chrono::milliseconds until;
+    std::uint32_t index;
+    std::uint32_t generation;
+    std::uint32_t attachment;
+  };
+  [[nodiscard]] std::optional<Refusal> check(const JoinRequest& request) const;
+  /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
+  void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
+                         Effects& effects);
+  /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
+  void make_room(std::chrono::milliseconds now, Effects& effects);
+  void take_name(Session& session, const std::string& name, std::chrono::milliseconds now, Effects& effects);
+  void end(Session& session, std::chrono::milliseconds now, Effects& effects);
+
+  const Limits& limits_;
+  Sessions sessions_;
+  Directory directory_;
+  Services services_;
+  std::deque<Redeclaring> redeclaring_;  ///< in the order of `until`
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,262 @@
+#include "hub/control/state/services.hpp"
+
+#include <algorithm>
+
+#include "base/check.hpp"
+#include "base/id_text.hpp"
+#include "proto/control/names.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Status;
+using std::chrono::milliseconds;
+
+milliseconds resting_time(const Limits& limits) {
+  return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
+}
+
+template <class List>
+auto find_topic(List& list, const Topic& topic) {
+  return std::find_if(list.begin(), list.end(), [&topic](const auto& entry) { return entry.topic == &topic; });
+}
+
+ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t old_group, std::uint32_t new_group) {
+  ServiceMovedDue event;
+  event.full_name = std::string{topic.full_name};
+  event.old_group = old_group;
+  event.new_group = new_group;
+  event.message_type = service.terms.message_type;
+  event.instance = service.terms.instance;
+  event.delivery = service.terms.delivery;
+  return event;
+}
+
+void tell_subscribers(const Topic& topic, ServiceMovedDue event, Effects& effects) {
+  for (const std::uint32_t subscriber : topic.subscribers) {
+    event.subscriber = subscriber;
+    effects.emplace_back(event);
+  }
+}
+
+/// Do subscribers that know the one understand the other?
+bool same_stream(const ServiceTerms& a, const ServiceTerms& b) {
+  return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
+         a.delivery == b.delivery;
+}
+
+Failure bad_name(const char* fault) {
+  return Failure{Status::bad_request, std::string{"the full name of a service cannot be that: "} + fault};
+}
+
+Failure limit_reached(std::string_view what, std::uint64_t limit, std::string_view name) {
+  return Failure{Status::limit, "a node may have " + std::to_string(limit) + " " + std::string{what} +
+                                    "; end one first, or start the hub with a larger --limit " + std::string{name}};
+}
+
+}  // namespace
+
+Services::Services(HubId hub, const Limits& limits)
+    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits)) {}
+
+Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider, std::string_view full_name,
+                                                          const ServiceTerms& terms, milliseconds now,
+                                                          Effects& effects) {
+  if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
+  const auto known = topics_.find(full_name);
+  const bool provided = known != topics_.end() && known->second.service.has_value();
+  if (provided && known->second.service->provider != provider) {
+    return Failure{Status::taken, "the service '" + std::string{full_name} + "' is provided by node " +
+                                      to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
+                                      "; choose another name"};
+  }
+  Node& node = nodes_[provider];
+  if (!provided && node.provides.size() >= limits_.services_per_node) {
+    forget_if_idle(provider);
+    return limit_reached("services", limits_.services_per_node, "services_per_node");
+  }
+  Topic& entry = topic(full_name);
+  if (provided) find_topic(node.provides, entry)->life = node.life;
+  if (!provided || !same_stream(entry.service->terms, terms)) {
+    const std::optional<std::uint32_t> group = group_indices_.take(now);
+    if (!group) {
+      forget_if_unused(entry);
+      forget_if_idle(provider);
+      return Failure{Status::limit, "all group ids of this hub are in use or resting; try again in a minute"};
+    }
+    if (!provided) node.provides.push_back({&entry, node.life});
+    std::uint32_t old_group = 0;
+    if (provided) {
+      old_group = entry.service->group;
+      groups_.erase(old_group);
+      group_indices_.give_back(old_group, now);
+    }
+    open_group(entry, Service{*group, provider, terms}, old_group, effects);
+  }
+  entry.service->terms.metadata = terms.metadata;
+  return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
+}
+
+std::optional<Failure> Services::withdraw(std::uint32_t provider, std::uint32_t group, milliseconds now,
+                                          Effects& effects) {
+  const auto found = groups_.find(group);
+  if (found == groups_.end()) {
+    return Failure{Status::not_found, "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
+  }
+  Topic& entry = *found->second;
+  if (entry.service->provider != provider) {
+    return Failure{Status::denied, "the service '" + std::string{entry.full_name} + "' is provided by another node"};
+  }
+  Node& node = nodes_[provider];
+  node.provides.erase(find_topic(node.provides, entry));
+  close_group(entry, now, effects);
+  forget_if_unused(entry);
+  forget_if_idle(provider);
+  return std::nullopt;
+}
+
+Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std::string_view full_name,
+                                                  Effects& effects) {
+  if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
+  Node& node = nodes_[node_index];
+  const auto known = topics_.find(full_name);
+  if (known != topics_.end()) {
+    if (const auto old = find_topic(node.subscribes, known->second); old != node.subscribes.end()) {
+      old->life = node.life;
+      return &known->second;
+    }
+  }
+  if (node.subscribes.size() >= limits_.subscriptions_per_node) {
+    forget_if_idle(node_index);
+    return limit_reached("subscriptions", limits_.subscriptions_per_node, "subscriptions_per_node");
+  }
+  Topic& entry = topic(full_name);
+  node.subscribes.push_back({&entry, node.life});
+  auto& list = entry.subscribers;
+  list.insert(std::lower_bound(list.begin(), list.end(), node_index), node_index);
+  if (entry.service) {
+    effects.emplace_back(GroupChanged{entry.service->group});
+    effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group, node_index,
+                                       static_cast<std::uint32_t>(list.size()), true});
+  }
+  return &entry;
+}
+
+std::optional<Failure> Services::unsubscribe(std::uint32_t node_index, std::string_view full_name, Effects& effects) {
+  const auto known = topics_.find(full_name);
+  const auto node = nodes_.find(node_index);
+  if (known != topics_.end() && node != nodes_.end()) {
+    auto& list = node->second.subscribes;
+    if (const auto declared = find_topic(list, known->second); declared != list.end()) {
+      list.erase(declared);
+      remove_subscriber(known->second, node_index, effects);
+      forget_if_idle(node_index);
+      return std::nullopt;
+    }
+  }
+  return Failure{Status::not_found, "this node is not subscribed to that service"};
+}
+
+std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>& list, std::uint32_t life) {
+  std::vector<Declared> kept;
+  std::vector<Declared> taken;
+  for (const Declared& declared : list) (declared.life == life ? kept : taken).push_back(declared);
+  list = std::move(kept);
+  return taken;
+}
+
+void Services::node_returned(std::uint32_t node) {
+  if (const auto found = nodes_.find(node); found != nodes_.end()) ++found->second.life;
+}
+
+void Services::drop_undeclared(std::uint32_t node_index, milliseconds now, Effects& effects) {
+  const auto found = nodes_.find(node_index);
+  if (found == nodes_.end()) return;
+  Node& node = found->second;
+  const std::vector<Declared> unsubscribed = take_undeclared(node.subscribes, node.life);
+  const std::vector<Declared> closed = take_undeclared(node.provides, node.life);
+  for (const Declared& declared : unsubscribed) remove_subscriber(*declared.topic, node_index, effects);
+  for (const Declared& declared : closed) {
+    close_group(*declared.topic, now, effects);
+    forget_if_unused(*declared.topic);
+  }
+  forget_if_idle(node_index);
+}
+
+void Services::node_renamed(std::uint32_t node_index, milliseconds now, Effects& effects) {
+  const auto found = nodes_.find(node_index);
+  if (found == nodes_.end()) return;
+  const std::vector<Declared> provides = std::move(found->second.provides);
+  found->second.provides.clear();
+  for (const Declared& declared : provides) {
+    close_group(*declared.topic, now, effects);
+    forget_if_unused(*declared.topic);
+  }
+  forget_if_idle(node_index);
+}
+
+void Services::node_left(std::uint32_t node_index, milliseconds now, Effects& effects) {
+  node_returned(node_index);
+  drop_undeclared(node_index, now, effects);
+}
+
+const Topic* Services::find_group(std::uint32_t group) const {
+  const auto found = groups_.find(group);
+  return found == groups_.end() ? nullptr : found->second;
+}
+
+std::size_t Services::services_of(std::uint32_t node) const {
+  const auto found = nodes_.find(node);
+  return found == nodes_.end() ? 0 : found->second.provides.size();
+}
+
+Topic& Services::topic(std::string_view full_name) {
+  if (const auto found = topics_.find(full_name); found != topics_.end()) return found->second;
+  const auto [added, fresh] = topics_.emplace(std::string{full_name}, Topic{});
+  GIMNET_CHECK(fresh);
+  added->second.full_name = added->first;
+  return added->second;
+}
+
+void Services::forget_if_unused(Topic& topic) {
+  if (topic.service || !topic.subscribers.empty()) return;
+  topics_.erase(topics_.find(topic.full_name));
+}
+
+void Services::forget_if_idle(std::uint32_t node) {
+  const auto found = nodes_.find(node);
+  if (found == nodes_.end()) return;
+  if (found->second.provides.empty() && found->second.subscribes.empty()) nodes_.erase(found);
+}
+
+void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects) {
+  topic.service = service;
+  groups_[service.group] = &topic;
+  if (old_group != 0) effects.emplace_back(GroupChanged{old_group});
+  tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
+  effects.emplace_back(GroupChanged{service.group});
+}
+
+void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
+  const Service service = *topic.service;
+  topic.service.reset();
+  groups_.erase(service.group);
+  group_indices_.give_back(service.group, now);
+  effects.emplace_back(GroupChanged{service.group});
+  tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
+}
+
+void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects) {
+  auto& list = topic.subscribers;
+  const auto place = std::lower_bound(list.begin(), list.end(), node);
+  GIMNET_CHECK(place != list.end() && *place == node);
+  list.erase(place);
+  if (topic.service) {
+    effects.emplace_back(GroupChanged{topic.service->group});
+    effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node,
+                                       static_cast<std::uint32_t>(list.size()), false});
+  }
+  forget_if_unused(topic);
+}
+
+}  // namespace gimnet::hub

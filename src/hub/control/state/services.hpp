@@ -1,0 +1,121 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hub/control/state/effects.hpp"
+#include "hub/control/state/index_pool.hpp"
+#include "hub/limits.hpp"
+#include "proto/control/control_message.hpp"
+
+namespace gimnet::hub {
+
+/// Why a request was not granted: what its answer says.
+using Failure = proto::Refusal;
+
+/// What a provider says of its service.
+struct ServiceTerms {
+  std::uint32_t message_type = 0;
+  std::uint32_t instance = 0;
+  std::uint8_t direction = 0;
+  std::uint8_t delivery = 0;
+  std::string metadata;
+};
+
+struct Service {
+  std::uint32_t group = 0;     ///< index
+  std::uint32_t provider = 0;  ///< node index
+  ServiceTerms terms;
+};
+
+/// A full name that somebody provides, or waits for, or both.
+struct Topic {
+  std::string_view full_name;
+  std::optional<Service> service;
+  std::vector<std::uint32_t> subscribers;  ///< node indices, ascending
+};
+
+/// Services and subscriptions by full name; each service owns a group. Nodes are named by index, and what a node
+/// declared stays while its session lives, its grace time included.
+/// Thread safety: none. Limits: services_per_node, subscriptions_per_node.
+class Services {
+ public:
+  Services(HubId hub, const Limits& limits);
+
+  struct Advertised {
+    std::uint32_t group = 0;
+    std::uint32_t subscribers = 0;
+  };
+  /// A provider that advertises again what it provides keeps the group; if more than the metadata differs it gets a
+  /// new one, which its subscribers are told before it is published. Errors: bad_request, taken, limit.
+  [[nodiscard]] Result<Advertised, Failure> advertise(std::uint32_t provider, std::string_view full_name,
+                                                      const ServiceTerms& terms, std::chrono::milliseconds now,
+                                                      Effects& effects);
+  /// Errors: not_found, denied. nullopt: done.
+  [[nodiscard]] std::optional<Failure> withdraw(std::uint32_t provider, std::uint32_t group,
+                                                std::chrono::milliseconds now, Effects& effects);
+  /// The topic, with or without a service yet. Errors: bad_request, limit.
+  [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
+                                                        Effects& effects);
+  /// Errors: not_found. nullopt: done.
+  [[nodiscard]] std::optional<Failure> unsubscribe(std::uint32_t node, std::string_view full_name, Effects& effects);
+
+  /// The node came back on a new connection: it will declare again what it still wants.
+  void node_returned(std::uint32_t node);
+  /// Forgets what the node has not declared since node_returned().
+  void drop_undeclared(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  /// Withdraws what the node provides: it has another name now.
+  void node_renamed(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  /// The node's session is over.
+  void node_left(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+
+  /// nullptr: no such group.
+  [[nodiscard]] const Topic* find_group(std::uint32_t group) const;
+  /// Topics with a service, by ascending group index.
+  [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
+  [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
+  [[nodiscard]] std::size_t topics() const { return topics_.size(); }
+
+ private:
+  struct Hash {
+    using is_transparent = void;
+    std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
+  };
+  struct Declared {
+    Topic* topic = nullptr;
+    std::uint32_t life = 0;
+  };
+  /// What one node declared; `life` counts its connections.
+  struct Node {
+    std::uint32_t life = 0;
+    std::vector<Declared> provides;
+    std::vector<Declared> subscribes;
+  };
+  using Topics = std::unordered_map<std::string, Topic, Hash, std::equal_to<>>;
+
+  /// Takes out of `list` what was not declared in that life.
+  [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list, std::uint32_t life);
+  Topic& topic(std::string_view full_name);
+  void forget_if_unused(Topic& topic);
+  void forget_if_idle(std::uint32_t node);
+  void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
+  void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
+  void remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects);
+
+  const HubId hub_;
+  const Limits& limits_;
+  IndexPool group_indices_;
+  Topics topics_;
+  std::map<std::uint32_t, Topic*> groups_;
+  std::unordered_map<std::uint32_t, Node> nodes_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,286 @@
+#include "hub/control/state/membership.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::GoodbyeCode;
+
+constexpr auto kGrace = 30s;
+
+class MembershipTest : public ::testing::Test {
+ protected:
+  MembershipTest() { limits_.nodes = 4; }
+
+  JoinRequest request(const std::string& name) {
+    JoinRequest result;
+    result.name = name;
+    result.origin = Origin{"tcp", "127.0.0.1:1"};
+    result.secret.fill(static_cast<std::byte>(++secrets_));
+    return result;
+  }
+  Session* join(const std::string& name, std::chrono::milliseconds now = 0ms) {
+    const auto joined = membership_.join(request(name), now, effects_);
+    return joined ? joined->session : nullptr;
+  }
+  GoodbyeCode refused(const JoinRequest& wanted, std::chrono::milliseconds now = 0ms) {
+    const auto joined = membership_.join(wanted, now, effects_);
+    return joined ? GoodbyeCode::done : joined.error().code;
+  }
+  void lose(Session& session, std::chrono::milliseconds now) {
+    membership_.connection_ended(session, {false, GoodbyeCode::done, ""}, now, effects_);
+  }
+  template <class Kind>
+  std::size_t count() const {
+    return static_cast<std::size_t>(std::count_if(
+        effects_.begin(), effects_.end(), [](const Effect& effect) { return std::holds_alternative<Kind>(effect); }));
+  }
+
+  Limits limits_;
+  Membership membership_{Sessions::Options{HubId{7}, 2, Placement::spread}, limits_};
+  Effects effects_;
+  int secrets_ = 0;
+};
+
+TEST_F(MembershipTest, JoiningTakesANameAndAnId) {
+  const Session* robot = join("robot");
+  ASSERT_NE(robot, nullptr);
+  EXPECT_EQ(membership_.directory().find("robot"), robot->index);
+  EXPECT_TRUE(robot->connected);
+  EXPECT_EQ(robot->attachment, 1u);
+  EXPECT_TRUE(effects_.empty());
+}
+
+TEST_F(MembershipTest, NodesMayHaveNoName) {
+  EXPECT_NE(join(""), nullptr);
+  EXPECT_NE(join(""), nullptr);
+  EXPECT_EQ(membership_.directory().size(), 0u);
+}
+
+TEST_F(MembershipTest, ASecondLiveHolderOfANameIsRefused) {
+  join("robot");
+  EXPECT_EQ(refused(request("robot")), GoodbyeCode::name_taken);
+  EXPECT_EQ(membership_.sessions().all().size(), 1u);
+}
+
+TEST_F(MembershipTest, ATokenBringsIdAndNameBackWithinTheGraceTime) {
+  Session* robot = join("robot");
+  const std::uint32_t index = robot->index;
+  lose(*robot, 1s);
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  JoinRequest again = request("");
+  again.token = token;
+  const auto joined = membership_.join(again, 1s + kGrace - 1ms, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_FALSE(joined->new_session);
+  EXPECT_EQ(joined->session->index, index);
+  EXPECT_EQ(joined->session->name, "robot");
+  EXPECT_EQ(joined->session->attachment, 2u);
+}
+
+TEST_F(MembershipTest, AfterTheGraceTimeATokenCountsAsNone) {
+  Session* robot = join("robot");
+  const std::uint32_t index = robot->index;
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  lose(*robot, 1s);
+  EXPECT_EQ(membership_.next_deadline(), 1s + kGrace);
+  membership_.tick(1s + kGrace, effects_);
+  EXPECT_EQ(count<SessionEnded>(), 1u);
+  EXPECT_EQ(count<NodeChanged>(), 1u);
+  EXPECT_EQ(membership_.next_deadline(), std::nullopt);
+  JoinRequest again = request("robot");
+  again.token = token;
+  const auto joined = membership_.join(again, 40s, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_TRUE(joined->new_session);
+  EXPECT_NE(joined->session->index, index);
+}
+
+TEST_F(MembershipTest, ALiveSessionMovesToItsNewerConnection) {
+  Session* robot = join("robot");
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  JoinRequest again = request("robot");
+  again.token = token;
+  const auto joined = membership_.join(again, 1s, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_EQ(joined->session, robot);
+  EXPECT_EQ(robot->attachment, 2u);
+  EXPECT_EQ(membership_.sessions().connected(), 1u);
+}
+
+TEST_F(MembershipTest, ANewcomerTakesTheNameOfSomebodyAway) {
+  Session* robot = join("robot");
+  const std::uint32_t index = robot->index;
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  lose(*robot, 1s);
+  const Session* newcomer = join("robot", 2s);
+  ASSERT_NE(newcomer, nullptr);
+  EXPECT_NE(newcomer->index, index);
+  EXPECT_EQ(count<SessionEnded>(), 1u);
+  JoinRequest late = request("robot");
+  late.token = token;
+  EXPECT_EQ(refused(late, 3s), GoodbyeCode::name_taken);
+}
+
+TEST_F(MembershipTest, ANewcomerTakesThePlaceToo) {
+  limits_.nodes = 1;
+  Membership membership{Sessions::Options{HubId{7}, 1, Placement::spread}, limits_};
+  const auto first = membership.join(request("robot"), 0ms, effects_);
+  ASSERT_TRUE(first);
+  membership.connection_ended(*first->session, {}, 1s, effects_);
+  EXPECT_TRUE(membership.join(request("robot"), 2s, effects_));
+}
+
+TEST_F(MembershipTest, GoodbyeFreesNameAndIdAtOnce) {
+  Session* robot = join("robot");
+  membership_.connection_ended(*robot, {true, GoodbyeCode::done, ""}, 1s, effects_);
+  EXPECT_EQ(count<SessionEnded>(), 1u);
+  EXPECT_EQ(membership_.directory().find("robot"), std::nullopt);
+  EXPECT_TRUE(membership_.sessions().all().empty());
+}
+
+TEST_F(MembershipTest, AGoodbyeWithAReasonKeepsTheGraceTime) {
+  Session* robot = join("robot");
+  membership_.connection_ended(*robot, {true, GoodbyeCode::silent, "lost you"}, 1s, effects_);
+  EXPECT_FALSE(robot->connected);
+  EXPECT_FALSE(robot->close_code);
+  EXPECT_EQ(membership_.sessions().all().size(), 1u);
+}
+
+TEST_F(MembershipTest, HowTheHubClosedIsRemembered) {
+  Session* robot = join("robot");
+  membership_.connection_ended(*robot, {false, GoodbyeCode::slow_consumer, "took too little"}, 1s, effects_);
+  EXPECT_EQ(robot->close_code, GoodbyeCode::slow_consumer);
+  EXPECT_EQ(robot->close_sentence, "took too little");
+}
+
+TEST_F(MembershipTest, AReturningNodeMayTakeAnotherName) {
+  Session* robot = join("robot");
+  ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  JoinRequest again = request("lifter");
+  again.token = token;
+  ASSERT_TRUE(membership_.join(again, 1s, effects_));
+  EXPECT_EQ(membership_.directory().find("robot"), std::nullopt);
+  EXPECT_EQ(membership_.directory().find("lifter"), robot->index);
+  EXPECT_EQ(membership_.services().services_of(robot->index), 0u);
+}
+
+TEST_F(MembershipTest, AReturningNodeCannotTakeALiveNodesName) {
+  join("viewer");
+  Session* robot = join("robot");
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  JoinRequest again = request("viewer");
+  again.token = token;
+  EXPECT_EQ(refused(again), GoodbyeCode::name_taken);
+  EXPECT_EQ(robot->name, "robot");
+  EXPECT_EQ(robot->attachment, 1u);
+}
+
+TEST_F(MembershipTest, ServicesStayThroughTheGraceTimeAndGoWithIt) {
+  Session* robot = join("robot");
+  Session* viewer = join("viewer");
+  ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
+  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", effects_));
+  lose(*robot, 1s);
+  membership_.tick(1s + kGrace - 1ms, effects_);
+  EXPECT_NE(membership_.services().find_group(1), nullptr);
+  effects_.clear();
+  membership_.tick(1s + kGrace, effects_);
+  EXPECT_EQ(membership_.services().find_group(1), nullptr);
+  EXPECT_EQ(count<ServiceMovedDue>(), 1u);
+}
+
+TEST_F(MembershipTest, WhatAReturnedNodeDoesNotDeclareAgainIsDropped) {
+  Session* robot = join("robot");
+  ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
+  ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/scan", {}, 0ms, effects_));
+  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  lose(*robot, 1s);
+  JoinRequest again = request("robot");
+  again.token = token;
+  ASSERT_TRUE(membership_.join(again, 2s, effects_));
+  const auto odom = membership_.services().advertise(robot->index, "robot/odom", {}, 3s, effects_);
+  ASSERT_TRUE(odom);
+  EXPECT_EQ(odom->group, 1u);
+  membership_.tick(2s + kGrace, effects_);
+  EXPECT_NE(membership_.services().find_group(1), nullptr);
+  EXPECT_EQ(membership_.services().find_group(2), nullptr);
+}
+
+TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
+  JoinRequest hub = request("");
+  hub.role = proto::Role::hub;
+  EXPECT_EQ(refused(hub), GoodbyeCode::not_allowed);
+  JoinRequest admin = request("");
+  admin.role = proto::Role::admin;
+  EXPECT_EQ(refused(admin), GoodbyeCode::not_allowed);
+  admin.may_administer = true;
+  EXPECT_EQ(refused(admin), GoodbyeCode::done);
+  JoinRequest unknown = request("");
+  unknown.role = static_cast<proto::Role>(9);
+  EXPECT_EQ(refused(unknown), GoodbyeCode::not_allowed);
+}
+
+TEST_F(MembershipTest, AFullHubSaysSo) {
+  for (int i = 0; i < 4; ++i) ASSERT_NE(join(""), nullptr);
+  EXPECT_EQ(refused(request("")), GoodbyeCode::hub_full);
+}
+
+TEST_F(MembershipTest, ANamelessNodeClosedForWhatItSentIsForgottenAtOnce) {
+  for (const GoodbyeCode code :
+       {GoodbyeCode::malformed, GoodbyeCode::wrong_source, GoodbyeCode::not_allowed, GoodbyeCode::too_many_requests}) {
+    effects_.clear();
+    membership_.connection_ended(*join(""), {false, code, "why"}, 1s, effects_);
+    EXPECT_EQ(count<SessionEnded>(), 1u);
+    EXPECT_EQ(count<NodeChanged>(), 1u);
+    EXPECT_TRUE(membership_.sessions().all().empty());
+  }
+}
+
+TEST_F(MembershipTest, OthersWhoWereClosedKeepTheirGraceTime) {
+  membership_.connection_ended(*join("robot"), {false, GoodbyeCode::malformed, "why"}, 1s, effects_);
+  membership_.connection_ended(*join(""), {false, GoodbyeCode::silent, "why"}, 1s, effects_);
+  membership_.connection_ended(*join(""), {true, GoodbyeCode::malformed, "your frame"}, 1s, effects_);
+  EXPECT_EQ(membership_.sessions().all().size(), 3u);
+}
+
+TEST_F(MembershipTest, AtTheLimitTheNamelessNodeThatIsAwayLongestMakesWay) {
+  Session* named = join("robot");
+  Session* second = join("");
+  Session* first = join("");
+  const std::uint32_t named_index = named->index;
+  const std::uint32_t first_index = first->index;
+  const std::uint32_t second_index = second->index;
+  lose(*named, 1s);
+  lose(*first, 2s);
+  lose(*second, 3s);
+  ASSERT_NE(join("", 4s), nullptr);  // the last free place: nobody has to go
+  EXPECT_EQ(count<SessionEnded>(), 0u);
+  ASSERT_NE(join("", 4s), nullptr);
+  EXPECT_EQ(count<SessionEnded>(), 1u);
+  EXPECT_EQ(membership_.sessions().find(first_index), nullptr);
+  ASSERT_NE(join("", 4s), nullptr);
+  EXPECT_EQ(membership_.sessions().find(second_index), nullptr);
+  EXPECT_EQ(refused(request(""), 4s), GoodbyeCode::hub_full);
+  EXPECT_NE(membership_.sessions().find(named_index), nullptr);
+  EXPECT_EQ(membership_.next_deadline(), 1s + kGrace);
+}
+
+TEST_F(MembershipTest, ANamelessNodeThatCameBackDoesNotMakeWay) {
+  Session* viewer = join("");
+  for (int i = 0; i < 3; ++i) ASSERT_NE(join(""), nullptr);
+  lose(*viewer, 1s);
+  const std::vector<std::byte> token = Sessions::token_of(*viewer);
+  JoinRequest again = request("");
+  again.token = token;
+  ASSERT_TRUE(membership_.join(again, 2s, effects_));
+  EXPECT_EQ(refused(request(""), 3s), GoodbyeCode::hub_full);
+  EXPECT_TRUE(viewer->connected);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,254 @@
+#include "hub/control/state/services.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::Status;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kRobot = 1;
+constexpr std::uint32_t kViewer = 2;
+constexpr std::uint32_t kLogger = 3;
+
+ServiceTerms odometry() {
+  ServiceTerms terms;
+  terms.message_type = 5;
+  terms.instance = 6;
+  terms.delivery = 1;
+  return terms;
+}
+
+/// Effects as short words, in order: "group 1", "moved 2: 0->1", "joined 2 of 1: 1".
+std::vector<std::string> words(const Effects& effects) {
+  std::vector<std::string> result;
+  for (const Effect& effect : effects) {
+    if (const auto* group = std::get_if<GroupChanged>(&effect)) {
+      result.push_back("group " + std::to_string(group->index));
+    } else if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
+      result.push_back("moved " + std::to_string(moved->subscriber) + ": " + std::to_string(moved->old_group) + "->" +
+                       std::to_string(moved->new_group));
+    } else if (const auto* change = std::get_if<SubscriberDue>(&effect)) {
+      result.push_back((change->joined ? "joined " : "left ") + std::to_string(change->subscriber) + " of " +
+                       std::to_string(change->group) + ": " + std::to_string(change->subscribers_now));
+    } else {
+      result.emplace_back("other");
+    }
+  }
+  return result;
+}
+
+class ServicesTest : public ::testing::Test {
+ protected:
+  ServicesTest() {
+    limits_.services_per_node = 2;
+    limits_.subscriptions_per_node = 2;
+  }
+  std::uint32_t advertise(std::uint32_t node, const std::string& name, const ServiceTerms& terms = odometry()) {
+    const auto done = services_.advertise(node, name, terms, now_, effects_);
+    return done ? done->group : 0;
+  }
+  Status advertise_failure(std::uint32_t node, const std::string& name) {
+    const auto done = services_.advertise(node, name, odometry(), now_, effects_);
+    return done ? Status::done : done.error().status;
+  }
+  Status subscribe(std::uint32_t node, const std::string& name) {
+    const auto done = services_.subscribe(node, name, effects_);
+    return done ? Status::done : done.error().status;
+  }
+  std::vector<std::string> take_words() {
+    std::vector<std::string> result = words(effects_);
+    effects_.clear();
+    return result;
+  }
+
+  Limits limits_;
+  Services services_{HubId{7}, limits_};
+  Effects effects_;
+  std::chrono::milliseconds now_{0};
+};
+
+TEST_F(ServicesTest, AdvertisingOpensAGroup) {
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  EXPECT_THAT(take_words(), ElementsAre("group 1"));
+  const Topic* topic = services_.find_group(1);
+  ASSERT_NE(topic, nullptr);
+  EXPECT_EQ(topic->full_name, "robot/odom");
+  EXPECT_EQ(topic->service->provider, kRobot);
+  EXPECT_EQ(services_.services_of(kRobot), 1u);
+}
+
+TEST_F(ServicesTest, AdvertisingAgainKeepsTheGroup) {
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  take_words();
+  ServiceTerms terms = odometry();
+  terms.metadata = "wheel encoders";
+  EXPECT_EQ(advertise(kRobot, "robot/odom", terms), 1u);
+  EXPECT_THAT(take_words(), IsEmpty());
+  EXPECT_EQ(services_.find_group(1)->service->terms.metadata, "wheel encoders");
+}
+
+TEST_F(ServicesTest, OtherTermsMeanAnotherGroupThatSubscribersAreToldFirst) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  ServiceTerms terms = odometry();
+  terms.message_type = 99;
+  EXPECT_EQ(advertise(kRobot, "robot/odom", terms), 2u);
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved 2: 1->2", "group 2"));
+  EXPECT_EQ(services_.find_group(1), nullptr);
+  EXPECT_EQ(services_.services_of(kRobot), 1u);
+}
+
+TEST_F(ServicesTest, AnotherNodeCannotTakeAService) {
+  advertise(kRobot, "robot/odom");
+  EXPECT_EQ(advertise_failure(kViewer, "robot/odom"), Status::taken);
+}
+
+TEST_F(ServicesTest, SubscribingToAServicePublishesItsGroupBeforeItsProviderIsTold) {
+  advertise(kRobot, "robot/odom");
+  take_words();
+  EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "joined 2 of 1: 1"));
+  EXPECT_THAT(services_.find_group(1)->subscribers, ElementsAre(kViewer));
+}
+
+TEST_F(ServicesTest, SubscribingTwiceIsOnce) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
+  EXPECT_THAT(take_words(), IsEmpty());
+  EXPECT_THAT(services_.find_group(1)->subscribers, ElementsAre(kViewer));
+}
+
+TEST_F(ServicesTest, ANameWithoutAServiceIsWaitedFor) {
+  const auto topic = services_.subscribe(kViewer, "robot/odom", effects_);
+  ASSERT_TRUE(topic);
+  EXPECT_FALSE((*topic)->service.has_value());
+  subscribe(kLogger, "robot/odom");
+  EXPECT_THAT(take_words(), IsEmpty());
+  const auto done = services_.advertise(kRobot, "robot/odom", odometry(), now_, effects_);
+  ASSERT_TRUE(done);
+  EXPECT_EQ(done->subscribers, 2u);
+  EXPECT_THAT(take_words(), ElementsAre("moved 2: 0->1", "moved 3: 0->1", "group 1"));
+}
+
+TEST_F(ServicesTest, UnsubscribingTellsTheProvider) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "left 2 of 1: 0"));
+  const auto again = services_.unsubscribe(kViewer, "robot/odom", effects_);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->status, Status::not_found);
+}
+
+TEST_F(ServicesTest, AForgottenNameLeavesNothingBehind) {
+  subscribe(kViewer, "robot/odom");
+  EXPECT_EQ(services_.topics(), 1u);
+  EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
+  EXPECT_EQ(services_.topics(), 0u);
+}
+
+TEST_F(ServicesTest, WithdrawingTellsSubscribersAndKeepsThemWaiting) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kViewer, "robot/odom");
+  take_words();
+  EXPECT_FALSE(services_.withdraw(kRobot, 1, now_, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "moved 2: 1->0"));
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 2u);
+  EXPECT_THAT(take_words(), ElementsAre("moved 2: 0->2", "group 2"));
+}
+
+TEST_F(ServicesTest, OnlyTheProviderWithdraws) {
+  advertise(kRobot, "robot/odom");
+  EXPECT_EQ(services_.withdraw(kViewer, 1, now_, effects_)->status, Status::denied);
+  EXPECT_EQ(services_.withdraw(kRobot, 2, now_, effects_)->status, Status::not_found);
+  EXPECT_NE(services_.find_group(1), nullptr);
+}
+
+TEST_F(ServicesTest, ServicesOfANodeAreLimited) {
+  EXPECT_EQ(advertise_failure(kRobot, "robot/a"), Status::done);
+  EXPECT_EQ(advertise_failure(kRobot, "robot/b"), Status::done);
+  EXPECT_EQ(advertise_failure(kRobot, "robot/c"), Status::limit);
+  EXPECT_EQ(advertise_failure(kRobot, "robot/b"), Status::done);
+  EXPECT_FALSE(services_.withdraw(kRobot, 1, now_, effects_));
+  EXPECT_EQ(advertise_failure(kRobot, "robot/c"), Status::done);
+}
+
+TEST_F(ServicesTest, SubscriptionsOfANodeAreLimited) {
+  EXPECT_EQ(subscribe(kViewer, "x/a"), Status::done);
+  EXPECT_EQ(subscribe(kViewer, "x/b"), Status::done);
+  EXPECT_EQ(subscribe(kViewer, "x/c"), Status::limit);
+  EXPECT_EQ(subscribe(kViewer, "x/b"), Status::done);
+  EXPECT_EQ(services_.topics(), 2u);
+  EXPECT_EQ(subscribe(kLogger, "x/c"), Status::done);
+}
+
+TEST_F(ServicesTest, BadFullNamesAreRefused) {
+  EXPECT_EQ(subscribe(kViewer, ""), Status::bad_request);
+  EXPECT_EQ(subscribe(kViewer, "a//b"), Status::bad_request);
+  EXPECT_EQ(advertise_failure(kRobot, std::string(256, 'a')), Status::bad_request);
+  EXPECT_EQ(services_.topics(), 0u);
+}
+
+TEST_F(ServicesTest, WhoLeavesTakesEverythingAlong) {
+  advertise(kRobot, "robot/odom");
+  advertise(kViewer, "viewer/view");
+  subscribe(kViewer, "robot/odom");
+  subscribe(kRobot, "viewer/view");
+  take_words();
+  services_.node_left(kRobot, now_, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("group 2", "left 1 of 2: 0", "group 1", "moved 2: 1->0"));
+  services_.node_left(kViewer, now_, effects_);
+  EXPECT_EQ(services_.topics(), 0u);
+  EXPECT_TRUE(services_.groups().empty());
+}
+
+TEST_F(ServicesTest, ANodeMaySubscribeToItselfAndLeave) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kRobot, "robot/odom");
+  services_.node_left(kRobot, now_, effects_);
+  EXPECT_EQ(services_.topics(), 0u);
+}
+
+TEST_F(ServicesTest, AReturnedNodeKeepsWhatItDeclaresAgain) {
+  advertise(kRobot, "robot/odom");
+  advertise(kRobot, "robot/scan");
+  subscribe(kRobot, "x/a");
+  subscribe(kRobot, "x/b");
+  take_words();
+  services_.node_returned(kRobot);
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  EXPECT_EQ(subscribe(kRobot, "x/b"), Status::done);
+  EXPECT_THAT(take_words(), IsEmpty());
+  services_.drop_undeclared(kRobot, now_, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("group 2"));
+  EXPECT_NE(services_.find_group(1), nullptr);
+  EXPECT_EQ(services_.services_of(kRobot), 1u);
+  EXPECT_EQ(services_.topics(), 2u);
+}
+
+TEST_F(ServicesTest, ARenamedNodeProvidesNothingUnderItsOldName) {
+  advertise(kRobot, "robot/odom");
+  subscribe(kRobot, "x/a");
+  services_.node_renamed(kRobot, now_, effects_);
+  EXPECT_EQ(services_.services_of(kRobot), 0u);
+  EXPECT_EQ(services_.find_group(1), nullptr);
+  EXPECT_EQ(services_.topics(), 1u);
+}
+
+TEST_F(ServicesTest, AGroupIdRestsBeforeItComesAgain) {
+  advertise(kRobot, "robot/odom");
+  EXPECT_FALSE(services_.withdraw(kRobot, 1, now_, effects_));
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 2u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
