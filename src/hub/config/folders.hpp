@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "base/result.hpp"
+
+namespace gimnet::hub {
+
+/// Creates the folder with mode 0700 where there is none. "" or why it cannot be used: it belongs to another user, or
+/// others may write to it, or it is no folder.
+[[nodiscard]] std::string prepare_private_folder(const std::string& path);
+
+/// The user's folder for sockets of this network, made ready: XDG_RUNTIME_DIR/gimnet, or, where that is not set, a
+/// folder of mode 0700 named after the user id in the system's temporary folder.
+[[nodiscard]] Result<std::string> runtime_folder();
+
+/// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used.
+[[nodiscard]] std::string prepare_state_folder(const std::string& path);
+
+}  // namespace gimnet::hub

@@ -1,0 +1,231 @@
+#include "hub/control/conductor.hpp"
+
+#include "base/check.hpp"
+#include "base/id_text.hpp"
+#include "base/log.hpp"
+#include "hub/control/dispatch.hpp"
+#include "hub/shard/control_frame.hpp"
+#include "proto/control/ns.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Goodbye;
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+namespace ns = proto::ns;
+
+std::string title(NodeId node, const Session& session) {
+  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
+}
+
+SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
+
+}  // namespace
+
+Conductor::Conductor(HubFacts facts, Placement placement, const Limits& limits, Wiring wiring)
+    : facts_(std::move(facts)),
+      limits_(limits),
+      wiring_(std::move(wiring)),
+      membership_(Sessions::Options{facts_.id, facts_.shards, placement}, limits),
+      publisher_(facts_.id, facts_.shards, wiring_.tables) {
+  GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
+}
+
+std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
+  if (draining_) return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
+  JoinRequest request;
+  request.role = hello.role;
+  request.name = hello.name;
+  request.token = hello.token;
+  request.description = hello.description;
+  request.shard_hint = hello.shard;
+  request.origin = Origin{stranger.peer.transport, stranger.peer.address};
+  request.may_administer = stranger.may_administer;
+  request.secret = wiring_.fresh_secret();
+  Effects effects;
+  const auto joined = membership_.join(request, moment.now, effects);
+  carry_out(effects);
+  if (!joined) return joined.error();
+  attach(stranger, hello, *joined, moment);
+  return std::nullopt;
+}
+
+void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment) {
+  Session& session = *joined.session;
+  AttachCommand command;
+  command.session = ref_of(session.place);
+  command.attachment = session.attachment;
+  command.node = node_id(session);
+  command.new_session = joined.new_session;
+  command.transport = std::move(stranger.transport);
+  command.welcome = welcome(session, hello, moment);
+  command.resume_wanted = hello.resume;
+  command.peer_epoch = hello.epoch;
+  command.known_hub_epoch = hello.resume_epoch;
+  command.known_taken = hello.resume_taken;
+  command.peer_resume_bytes = hello.resume_buffer_bytes;
+  command.peer_frame_bytes = hello.frame_length_max;
+  // Before the command, which lets WELCOME out: who has seen that can be reached. The id is nobody's before.
+  publisher_.publish_node(session.index, membership_);
+  wiring_.shards.send(session.place.shard, std::move(command));
+  session.close_code.reset();
+  session.close_sentence.clear();
+  log_info(title(node_id(session), session) + (joined.new_session ? " joined over " : " came back over ") +
+           session.origin.transport + " from " + session.origin.address + ", shard " +
+           std::to_string(session.place.shard.value()));
+}
+
+proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& hello, Moment moment) const {
+  proto::Welcome welcome;
+  welcome.node = node_id(session);
+  welcome.token = Sessions::token_of(session);
+  welcome.hub = facts_.id;
+  welcome.hub_name = facts_.name;
+  welcome.frame_length_max = static_cast<std::uint32_t>(limits_.frame_bytes);
+  welcome.keep_alive_ms = static_cast<std::uint32_t>(limits_.keep_alive_ms);
+  welcome.silent_ms = static_cast<std::uint32_t>(limits_.silent_ms);
+  welcome.hub_time_ns = moment.wall_ns;
+  welcome.resume_buffer_bytes = hello.resume ? static_cast<std::uint32_t>(limits_.resume_bytes) : 0;
+  welcome.grace_ms = static_cast<std::uint32_t>(limits_.grace_ms);
+  welcome.name = session.name;
+  if (session.close_code) {
+    welcome.last_goodbye_code = static_cast<std::uint16_t>(*session.close_code);
+    welcome.last_goodbye_sentence = session.close_sentence.substr(0, proto::kSentenceBytesMax);
+  }
+  return welcome;
+}
+
+void Conductor::on_event(ShardEvent event, milliseconds now) {
+  if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
+    on_frame(*frame, now);
+  } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
+    on_detached(*detached, now);
+  } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
+    --shards_to_drain_;
+  }
+}
+
+void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
+  const Session* session = find(event.session, event.node);
+  if (session == nullptr || event.frame.size() < proto::kHeaderSize) return;
+  const proto::Kind kind = proto::load_header(event.frame.data()).kind;
+  const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
+  const auto view = proto::split_control(payload);
+  if (!view) return close(*session, GoodbyeCode::malformed, "a control frame without operation and request number");
+  if (kind != proto::Kind::ns && kind != proto::Kind::ctrl) {
+    return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
+  }
+  Effects effects;
+  HandlerContext context{facts_, limits_, membership_,    wiring_.counters,
+                         now,    effects, wiring_.queues, wiring_.refusals};
+  const Request request{*session, view->header, payload};
+  const Handler handle = handler_for(session->role, kind, view->header.operation);
+  const proto::Payload answer = handle(context, request);
+  carry_out(effects);
+  SendControlCommand command;
+  command.session = event.session;
+  command.attachment = event.attachment;
+  command.frame = control_frame(kind, node_id(*session), facts_.id, answer);
+  command.answers = 1;
+  wiring_.shards.send(session->place.shard, std::move(command));
+}
+
+void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
+  Session* session = find(event.session, event.node);
+  // The end of a connection that a newer one has replaced says nothing about the session.
+  if (session == nullptr || event.attachment != session->attachment || !session->connected) return;
+  const bool said = event.said_by_peer || event.code != GoodbyeCode::done;
+  std::string line = title(node_id(*session), *session);
+  if (event.said_by_peer && event.code == GoodbyeCode::done) {
+    line += " left";
+  } else if (said) {
+    line += std::string{event.said_by_peer ? " said goodbye: " : " was closed: "} + proto::goodbye_name(event.code) +
+            (event.sentence.empty() ? "" : ": ") + event.sentence;
+  } else {
+    line += " lost its connection";
+  }
+  log_info(line);
+  Effects effects;
+  membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
+  carry_out(effects);
+}
+
+void Conductor::close(const Session& session, GoodbyeCode code, std::string sentence) {
+  wiring_.shards.send(session.place.shard, CloseCommand{ref_of(session.place), code, std::move(sentence)});
+}
+
+void Conductor::tick(milliseconds now) {
+  Effects effects;
+  membership_.tick(now, effects);
+  carry_out(effects);
+  publisher_.collect();
+}
+
+std::optional<milliseconds> Conductor::next_deadline() const { return membership_.next_deadline(); }
+
+void Conductor::drain() {
+  if (draining_) return;
+  draining_ = true;
+  shards_to_drain_ = facts_.shards;
+  for (std::size_t i = 0; i < facts_.shards; ++i) {
+    wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, DrainCommand{limits_.drain_ms});
+  }
+}
+
+Session* Conductor::find(const SessionRef& ref, NodeId node) {
+  Session* session = membership_.sessions().find(index_of(node));
+  if (session == nullptr || session->place.generation != ref.generation) return nullptr;
+  return session;
+}
+
+NodeId Conductor::node_id(const Session& session) const { return membership_.sessions().node_id(session); }
+
+void Conductor::carry_out(const Effects& effects) {
+  for (const Effect& effect : effects) {
+    std::visit([this](const auto& one) { carry_out_one(one); }, effect);
+  }
+}
+
+void Conductor::carry_out_one(const NodeChanged& effect) { publisher_.publish_node(effect.index, membership_); }
+
+void Conductor::carry_out_one(const GroupChanged& effect) { publisher_.publish_group(effect.index, membership_); }
+
+void Conductor::carry_out_one(const SessionEnded& effect) {
+  wiring_.shards.send(effect.place.shard, ReleaseCommand{ref_of(effect.place)});
+}
+
+void Conductor::carry_out_one(const ServiceMovedDue& effect) {
+  const Session* session = membership_.sessions().find(effect.subscriber);
+  if (session == nullptr) return;
+  ns::ServiceMoved event;
+  event.name = effect.full_name;
+  event.old_group = effect.old_group == 0 ? GroupId{} : make_id<GroupId>(facts_.id, effect.old_group);
+  event.new_group = effect.new_group == 0 ? GroupId{} : make_id<GroupId>(facts_.id, effect.new_group);
+  event.message_type = effect.message_type;
+  event.instance = effect.instance;
+  event.delivery = static_cast<ns::Delivery>(effect.delivery);
+  send_event(*session, proto::encode(event));
+}
+
+void Conductor::carry_out_one(const SubscriberDue& effect) {
+  const Session* session = membership_.sessions().find(effect.provider);
+  if (session == nullptr) return;
+  const auto fill = [&](auto event) {
+    event.group = make_id<GroupId>(facts_.id, effect.group);
+    event.node = make_id<NodeId>(facts_.id, effect.subscriber);
+    event.subscribers = effect.subscribers_now;
+    return proto::encode(event);
+  };
+  send_event(*session, effect.joined ? fill(ns::SubscriberJoined{}) : fill(ns::SubscriberLeft{}));
+}
+
+void Conductor::send_event(const Session& session, const proto::Payload& payload) {
+  if (!session.connected) return;  // it declares again when it is back, and learns what is true then
+  SendControlCommand command;
+  command.session = ref_of(session.place);
+  command.frame = control_frame(proto::Kind::ns, node_id(session), facts_.id, payload);
+  wiring_.shards.send(session.place.shard, std::move(command));
+}
+
+}  // namespace gimnet::hub

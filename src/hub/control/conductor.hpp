@@ -1,0 +1,90 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "hub/control/acceptor.hpp"
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/shard_proxy.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/control/table_publisher.hpp"
+#include "hub/limits.hpp"
+#include "hub/observe/counters.hpp"
+#include "hub/observe/queue_gauges.hpp"
+#include "hub/observe/refusal_counters.hpp"
+#include "hub/shard/commands.hpp"
+
+namespace gimnet::hub {
+
+/// The control plane of a hub: admits peers, answers control requests, publishes tables, commands the shards. The event
+/// loop around it is conductor_loop.hpp; here are neither sockets to wait for nor clocks.
+/// Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters outlive it.
+class Conductor {
+ public:
+  struct Wiring {
+    ShardProxy& shards;
+    TablePublisher::Tables tables;
+    std::span<const ShardCounters* const> counters;  ///< one per shard
+    std::function<Secret()> fresh_secret;            ///< 32 unpredictable bytes each time
+    std::span<const QueueGauges* const> queues{};    ///< one per shard, or none
+    const RefusalCounters* refusals = nullptr;       ///< or none
+  };
+  Conductor(HubFacts facts, Placement placement, const Limits& limits, Wiring wiring);
+
+  /// The two clocks at one moment.
+  struct Moment {
+    std::chrono::milliseconds now{};  ///< monotonic
+    std::int64_t wall_ns = 0;         ///< since 1970
+  };
+  /// Judges a HELLO: takes the stranger's transport and hands it to a shard, or says why not.
+  [[nodiscard]] std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello, Moment moment);
+
+  void on_event(ShardEvent event, std::chrono::milliseconds now);
+
+  /// Ends what is overdue and frees what is no longer looked at.
+  void tick(std::chrono::milliseconds now);
+  /// When tick() has something to do; nothing while nothing runs out.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
+  /// Do lists wait to be freed? Then tick() wants to be called from time to time.
+  [[nodiscard]] bool has_garbage() const { return publisher_.garbage() > 0; }
+
+  /// Nobody new is admitted, and the shards say GOODBYE to everybody once what waits is written.
+  void drain();
+  [[nodiscard]] bool drained() const { return draining_ && shards_to_drain_ == 0; }
+
+  [[nodiscard]] const Membership& membership() const { return membership_; }
+
+ private:
+  void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment);
+  [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello, Moment moment) const;
+  void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  void on_detached(const DetachedEvent& event, std::chrono::milliseconds now);
+  void close(const Session& session, proto::GoodbyeCode code, std::string sentence);
+  /// The session that the event is about, if it is still the same one.
+  [[nodiscard]] Session* find(const SessionRef& ref, NodeId node);
+  [[nodiscard]] NodeId node_id(const Session& session) const;
+
+  void carry_out(const Effects& effects);
+  void carry_out_one(const NodeChanged& effect);
+  void carry_out_one(const GroupChanged& effect);
+  void carry_out_one(const SessionEnded& effect);
+  void carry_out_one(const ServiceMovedDue& effect);
+  void carry_out_one(const SubscriberDue& effect);
+  void send_event(const Session& session, const proto::Payload& payload);
+
+  // Immutable after construction
+  const HubFacts facts_;
+  const Limits& limits_;
+  const Wiring wiring_;
+  // The conductor's thread only
+  Membership membership_;
+  TablePublisher publisher_;
+  bool draining_ = false;
+  std::size_t shards_to_drain_ = 0;
+};
+
+}  // namespace gimnet::hub

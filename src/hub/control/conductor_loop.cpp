@@ -1,0 +1,205 @@
+#include "hub/control/conductor_loop.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <csignal>
+
+#include "base/clock.hpp"
+#include "base/log.hpp"
+#include "hub/control/acceptor.hpp"
+#include "hub/control/waiting_room.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+using std::chrono::milliseconds;
+using Descriptor = asio::posix::stream_descriptor;
+
+constexpr std::size_t kEventsABatch = 256;
+constexpr milliseconds kCollectEvery{20};
+/// The shards end by themselves at the deadline of DrainCommand; this is for one that does not.
+constexpr milliseconds kDrainMargin{1'000};
+
+milliseconds now() { return milliseconds{steady_now_ns() / 1'000'000}; }
+
+/// Waits for a descriptor that somebody else owns.
+class Watch {
+ public:
+  Watch(asio::io_context& context, int descriptor) : descriptor_(context, descriptor) {}
+  ~Watch() { descriptor_.release(); }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  template <class Then>
+  void wait(Then then) {
+    descriptor_.async_wait(Descriptor::wait_read, [then](const error_code& error) {
+      if (!error) then();
+    });
+  }
+
+ private:
+  Descriptor descriptor_;
+};
+
+}  // namespace
+
+struct ConductorLoop::Impl {
+  /// A listener, and what wakes it.
+  struct Door {
+    Door(asio::io_context& context, std::unique_ptr<Listener> listener, const Wiring& wiring)
+        : acceptor(std::move(listener), wiring.limits, wiring.refusals),
+          watch(context, acceptor.listener().descriptor()),
+          pause(context) {}
+    Acceptor acceptor;
+    Watch watch;
+    asio::steady_timer pause;
+  };
+
+  Impl(const Wiring& parts, std::vector<std::unique_ptr<Listener>> listeners)
+      : wiring(parts),
+        strangers(
+            parts.limits,
+            [this](Stranger& stranger, const proto::Hello& hello) {
+              return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
+            },
+            parts.refusals),
+        strangers_watch(context, strangers.descriptor()),
+        inbox_watch(context, parts.inbox.waker().descriptor()),
+        timer(context),
+        signals(context, SIGTERM, SIGINT) {
+    for (auto& listener : listeners) {
+      doors.push_back(std::make_unique<Door>(context, std::move(listener), parts));
+    }
+  }
+
+  void watch_door(Door& door) {
+    door.watch.wait([this, &door] { open(door); });
+  }
+
+  void open(Door& door) {
+    if (stopping) return;
+    const milliseconds moment = now();
+    const auto after =
+        door.acceptor.accept_some([this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
+    arm_timer();
+    if (after == Acceptor::After::wait) return watch_door(door);
+    door.pause.expires_after(milliseconds{Acceptor::kPauseMs});
+    door.pause.async_wait([this, &door](const error_code& error) {
+      if (!error) open(door);
+    });
+  }
+
+  void watch_strangers() {
+    strangers_watch.wait([this] {
+      while (strangers.serve(now())) {
+      }
+      arm_timer();
+      watch_strangers();
+    });
+  }
+
+  void take_events() {
+    wiring.inbox.waker().awake();
+    wiring.inbox.drain(kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
+    arm_timer();
+    if (wiring.conductor.drained()) context.stop();
+    if (wiring.inbox.empty()) {
+      wiring.inbox.waker().prepare_to_sleep();
+      if (wiring.inbox.empty()) {
+        inbox_watch.wait([this] {
+          wiring.inbox.waker().clear();
+          take_events();
+        });
+        return;
+      }
+    }
+    // Let strangers and timers have a turn before the next batch.
+    asio::post(context, [this] { take_events(); });
+  }
+
+  void take_event(ShardEvent event) {
+    if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
+      strangers.see_off(std::move(farewell->transport), now());
+    } else {
+      wiring.conductor.on_event(std::move(event), now());
+    }
+  }
+
+  void arm_timer() {
+    std::optional<milliseconds> deadline = wiring.conductor.next_deadline();
+    const auto sooner = [&deadline](std::optional<milliseconds> other) {
+      if (other && (!deadline || *other < *deadline)) deadline = other;
+    };
+    sooner(strangers.next_deadline());
+    if (wiring.conductor.has_garbage()) sooner(now() + kCollectEvery);
+    if (!deadline || (armed && *armed <= *deadline)) return;
+    armed = deadline;
+    timer.expires_after(std::max(*deadline - now(), milliseconds{0}) + milliseconds{1});
+    timer.async_wait([this](const error_code& error) {
+      if (error) return;
+      armed.reset();
+      wiring.conductor.tick(now());
+      strangers.tick(now());
+      arm_timer();
+    });
+  }
+
+  void watch_signals() {
+    signals.async_wait([this](const error_code& error, int number) {
+      if (error) return;
+      if (stopping) {
+        log_warning("second signal: ending without waiting");
+        context.stop();
+        return;
+      }
+      log_info(std::string{"signal "} + (number == SIGTERM ? "TERM" : "INT") + ": draining");
+      begin_drain();
+      watch_signals();
+    });
+  }
+
+  void begin_drain() {
+    stopping = true;
+    doors.clear();
+    strangers.dismiss_all({proto::GoodbyeCode::draining, "the hub is shutting down; connect to another one"}, now());
+    wiring.conductor.drain();
+    drain_deadline.emplace(context, milliseconds{wiring.limits.drain_ms} + kDrainMargin);
+    drain_deadline->async_wait([this](const error_code& error) {
+      if (error) return;
+      log_warning("draining took too long: ending without waiting");
+      context.stop();
+    });
+  }
+
+  const Wiring wiring;
+  asio::io_context context{1};
+  WaitingRoom strangers;
+  Watch strangers_watch;
+  Watch inbox_watch;
+  asio::steady_timer timer;
+  std::optional<milliseconds> armed;  ///< when the timer fires
+  std::optional<asio::steady_timer> drain_deadline;
+  asio::signal_set signals;
+  std::vector<std::unique_ptr<Door>> doors;
+  bool stopping = false;
+};
+
+ConductorLoop::ConductorLoop(const Wiring& wiring, std::vector<std::unique_ptr<Listener>> listeners)
+    : impl_(std::make_unique<Impl>(wiring, std::move(listeners))) {}
+
+ConductorLoop::~ConductorLoop() = default;
+
+void ConductorLoop::run() {
+  for (auto& door : impl_->doors) impl_->watch_door(*door);
+  impl_->watch_strangers();
+  impl_->watch_signals();
+  impl_->take_events();
+  impl_->context.run();
+}
+
+}  // namespace gimnet::hub

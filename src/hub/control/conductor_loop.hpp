@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "hub/control/conductor.hpp"
+#include "hub/control/listener.hpp"
+#include "hub/limits.hpp"
+#include "hub/observe/refusal_counters.hpp"
+#include "hub/shard/control_inbox.hpp"
+
+namespace gimnet::hub {
+
+/// The conductor's thread: waits for strangers, for what shards hand over, for deadlines and for signals, and drives a
+/// Conductor with them. SIGTERM or SIGINT drains the hub; a second one ends it at once.
+/// Thread safety: constructed, run and destroyed by one thread. Lifetime: what it is wired to outlives
+/// it.
+class ConductorLoop {
+ public:
+  struct Wiring {
+    Conductor& conductor;
+    ControlInbox& inbox;
+    const Limits& limits;
+    RefusalCounters& refusals;
+  };
+  ConductorLoop(const Wiring& wiring, std::vector<std::unique_ptr<Listener>> listeners);
+  ~ConductorLoop();
+  ConductorLoop(const ConductorLoop&) = delete;
+  ConductorLoop& operator=(const ConductorLoop&) = delete;
+
+  /// Returns when the hub has drained or a second signal came.
+  void run();
+
+ private:
+  struct Impl;
+  const std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,79 @@
+#include "hub/control/counter_names.hpp"
+
+#include <array>
+#include <string_view>
+
+namespace gimnet::hub {
+namespace {
+
+struct Named {
+  std::string_view name;
+  Counter ShardCounters::* field;
+};
+
+#define GIMNET_COUNTER(field) \
+  Named { #field, &ShardCounters::field }
+constexpr std::array kCounters{
+    GIMNET_COUNTER(accepted),
+    GIMNET_COUNTER(copies),
+    GIMNET_COUNTER(delivered),
+    GIMNET_COUNTER(queued),
+    GIMNET_COUNTER(received_bytes),
+    GIMNET_COUNTER(sent_bytes),
+    GIMNET_COUNTER(receive_calls),
+    GIMNET_COUNTER(send_calls),
+    GIMNET_COUNTER(turns),
+    GIMNET_COUNTER(copied_bytes),
+    GIMNET_COUNTER(moved_tail_bytes),
+    GIMNET_COUNTER(mailbox_entries),
+    GIMNET_COUNTER(mailbox_frames),
+    GIMNET_COUNTER(mailbox_wakeups),
+    GIMNET_COUNTER(connections),
+    GIMNET_COUNTER(sessions),
+    GIMNET_COUNTER(malformed),
+    GIMNET_COUNTER(wrong_source),
+    GIMNET_COUNTER(silent),
+    GIMNET_COUNTER(slow_consumers),
+    GIMNET_COUNTER(stalled_frames),
+    GIMNET_COUNTER(pauses),
+    GIMNET_COUNTER(resumes),
+    GIMNET_COUNTER(reports),
+    GIMNET_COUNTER(held_reads),
+    GIMNET_COUNTER(gap_frames),
+    GIMNET_COUNTER(resumed),
+    GIMNET_COUNTER(lane0_demoted),
+    GIMNET_COUNTER(pinned_bytes),
+    GIMNET_COUNTER(pinned_bytes_max),
+    GIMNET_COUNTER(too_many_requests),
+    GIMNET_COUNTER(no_memory),
+};
+#undef GIMNET_COUNTER
+
+// Every field of ShardCounters is a Counter, but for the padding at its end: one that is added there and forgotten here
+// shows.
+constexpr std::size_t kListed = kCounters.size() + proto::kDropReasonCount;
+static_assert(sizeof(ShardCounters) >= kListed * sizeof(Counter) &&
+              sizeof(ShardCounters) - kListed * sizeof(Counter) < alignof(ShardCounters));
+
+}  // namespace
+
+void for_each_counter(const ShardCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
+  for (const Named& named : kCounters) take(std::string{named.name}, (counters.*named.field).value());
+  for (std::size_t reason = 1; reason < proto::kDropReasonCount; ++reason) {
+    const auto* name = proto::drop_reason_name(static_cast<proto::DropReason>(reason));
+    take(std::string{"dropped."} + name, counters.dropped[reason].value());
+  }
+}
+
+void for_each_counter(const RefusalCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
+  for (std::size_t code = 0; code < counters.by_code.size(); ++code) {
+    const auto* name = proto::goodbye_name(static_cast<proto::GoodbyeCode>(code));
+    take(std::string{"refused."} + name, counters.by_code[code].value());
+  }
+  take("refused.garbage", counters.garbage.value());
+  take("refused.no_descriptor", counters.no_descriptor.value());
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "hub/observe/counters.hpp"
+#include "hub/observe/refusal_counters.hpp"
+
+namespace gimnet::hub {
+
+/// Calls `take` with the name and value of every counter, as STATISTICS lists them: the field's name, and
+/// "dropped.queue_full" and so on for the reasons. Thread safety: any thread.
+void for_each_counter(const ShardCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take);
+/// The same for the peers that were not admitted: "refused.hub_full" and so on, "refused.garbage",
+/// "refused.no_descriptor".
+void for_each_counter(const RefusalCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take);
+
+}  // namespace gimnet::hub

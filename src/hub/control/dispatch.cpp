@@ -1,0 +1,59 @@
+#include "hub/control/dispatch.hpp"
+
+#include <array>
+
+#include "hub/control/handle/admin.hpp"
+#include "hub/control/handle/names.hpp"
+#include "hub/control/handle/services.hpp"
+#include "proto/control/ctrl.hpp"
+#include "proto/control/ns.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Kind;
+using proto::Role;
+namespace ns = proto::ns;
+namespace ctrl = proto::ctrl;
+
+enum Roles : std::uint8_t { nodes = 1, admins = 2, everybody = nodes | admins };
+
+struct Entry {
+  Kind kind;
+  std::uint16_t operation;
+  Roles roles;
+  Handler handler;
+};
+
+constexpr std::array kTable{
+    Entry{Kind::ns, ns::Resolve::kOperation, everybody, handle_resolve},
+    Entry{Kind::ns, ns::Reverse::kOperation, everybody, handle_reverse},
+    Entry{Kind::ns, ns::List::kOperation, everybody, handle_list},
+    Entry{Kind::ns, ns::Advertise::kOperation, everybody, handle_advertise},
+    Entry{Kind::ns, ns::Withdraw::kOperation, everybody, handle_withdraw},
+    Entry{Kind::ns, ns::Services::kOperation, everybody, handle_services},
+    Entry{Kind::ns, ns::Subscribe::kOperation, everybody, handle_subscribe},
+    Entry{Kind::ns, ns::Unsubscribe::kOperation, everybody, handle_unsubscribe},
+    Entry{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
+    Entry{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
+    Entry{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
+};
+
+Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
+
+proto::Payload handle_unknown(HandlerContext&, const Request& request) {
+  return proto::encode_refusal(request.header,
+                               {proto::Status::not_supported,
+                                "this hub has no operation " + std::to_string(request.header.operation) + " for you"});
+}
+
+}  // namespace
+
+Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
+  for (const Entry& entry : kTable) {
+    if (entry.kind == kind && entry.operation == operation && (entry.roles & mask_of(role)) != 0) return entry.handler;
+  }
+  return handle_unknown;
+}
+
+}  // namespace gimnet::hub

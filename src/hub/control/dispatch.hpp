@@ -1,0 +1,12 @@
+#pragma once
+
+#include "hub/control/handle/request.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::hub {
+
+/// The handler for an operation of that kind by somebody of that role. Never null: what is not in the table is answered
+/// `not_supported`. Thread safety: any thread.
+[[nodiscard]] Handler handler_for(proto::Role role, proto::Kind kind, std::uint16_t operation);
+
+}  // namespace gimnet::hub

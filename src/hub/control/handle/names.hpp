@@ -1,0 +1,13 @@
+#pragma once
+
+#include "hub/control/handle/request.hpp"
+
+// Requests about names of nodes: docs/protocol.md, section 8.
+
+namespace gimnet::hub {
+
+[[nodiscard]] proto::Payload handle_resolve(HandlerContext& context, const Request& request);
+[[nodiscard]] proto::Payload handle_reverse(HandlerContext& context, const Request& request);
+[[nodiscard]] proto::Payload handle_list(HandlerContext& context, const Request& request);
+
+}  // namespace gimnet::hub

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <chrono>
+#include <span>
+#include <utility>
+
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/limits.hpp"
+#include "hub/observe/counters.hpp"
+#include "hub/observe/queue_gauges.hpp"
+#include "hub/observe/refusal_counters.hpp"
+#include "proto/control/control_message.hpp"
+
+namespace gimnet::hub {
+
+/// What handlers work on. Valid until: the handler returns.
+struct HandlerContext {
+  const HubFacts& facts;
+  const Limits& limits;
+  Membership& membership;
+  std::span<const ShardCounters* const> counters;  ///< one per shard
+  std::chrono::milliseconds now;
+  Effects& effects;                              ///< carried out before the answer leaves
+  std::span<const QueueGauges* const> queues{};  ///< one per shard, or none
+  const RefusalCounters* refusals = nullptr;     ///< or none
+};
+
+/// A request of kind NS or CTRL. Valid until: the handler returns.
+struct Request {
+  const Session& session;
+  proto::ControlHeader header;
+  std::span<const std::byte> payload;
+};
+
+/// The payload of the answer.
+using Handler = proto::Payload (*)(HandlerContext&, const Request&);
+
+/// Reads a request of type Message, lets `grant` answer it, and writes the answer. `grant` takes the message and
+/// returns a Result<its answer, proto::Refusal>.
+template <class Message, class Grant>
+[[nodiscard]] proto::Payload answer_to(const Request& request, Grant&& grant) {
+  const Result<Message> message = proto::decode<Message>(request.payload);
+  if (!message) {
+    return proto::encode_refusal(request.header, {proto::Status::bad_request, message.error().sentence});
+  }
+  const auto answer = std::forward<Grant>(grant)(*message);
+  if (!answer) return proto::encode_refusal(request.header, answer.error());
+  return proto::encode_answer(*answer, request.header.request);
+}
+
+/// How much fits in one page of records.
+class PageBudget {
+ public:
+  PageBudget(const Limits& limits, std::uint32_t records_wanted);
+  /// Is there room for one more record of that size? Counts it if so.
+  [[nodiscard]] bool take(std::size_t bytes);
+
+ private:
+  std::size_t records_;
+  std::size_t bytes_;
+};
+
+/// The index of a node or group of this hub; nothing for those of another hub.
+template <class Id>
+[[nodiscard]] std::optional<std::uint32_t> own_index(const HubFacts& facts, Id id) {
+  const HubId hub = hub_of(id);
+  if (hub != kOwnHub && hub != facts.id) return std::nullopt;
+  return index_of(id);
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,128 @@
+#include "hub/control/handle/services.hpp"
+
+#include "base/log.hpp"
+#include "proto/control/names.hpp"
+#include "proto/control/ns.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Status;
+namespace ns = proto::ns;
+
+constexpr std::size_t kQuotedMax = 60;
+
+GroupId group_id(const HandlerContext& context, std::uint32_t index) {
+  return make_id<GroupId>(context.facts.id, index);
+}
+
+Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, const Session& session,
+                                                      const ns::Advertise& offer) {
+  if (session.name.empty()) {
+    return proto::Refusal{Status::bad_request,
+                          "a node without a name cannot advertise: services are named after their node"};
+  }
+  if (!proto::valid_service_name(offer.service)) {
+    return proto::Refusal{Status::bad_request, "'" + escaped(offer.service, kQuotedMax) +
+                                                   "' is no name of a service: one part of A-Z a-z 0-9 . _ -"};
+  }
+  ServiceTerms terms;
+  terms.message_type = offer.message_type;
+  terms.instance = offer.instance;
+  terms.direction = static_cast<std::uint8_t>(offer.direction);
+  terms.delivery = static_cast<std::uint8_t>(offer.delivery);
+  terms.metadata = offer.metadata;
+  const std::string full_name = proto::join_service_name(session.name, offer.service);
+  const auto done =
+      context.membership.services().advertise(session.index, full_name, terms, context.now, context.effects);
+  if (!done) return done.error();
+  return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
+}
+
+ns::ServiceRecord record_of(const HandlerContext& context, const Topic& topic) {
+  const Service& service = *topic.service;
+  ns::ServiceRecord record;
+  record.group = group_id(context, service.group);
+  record.name = std::string{topic.full_name};
+  record.node = make_id<NodeId>(context.facts.id, service.provider);
+  record.message_type = service.terms.message_type;
+  record.instance = service.terms.instance;
+  record.direction = static_cast<ns::Direction>(service.terms.direction);
+  record.delivery = static_cast<ns::Delivery>(service.terms.delivery);
+  record.metadata = service.terms.metadata;
+  record.subscribers = static_cast<std::uint32_t>(topic.subscribers.size());
+  record.hub_name = context.facts.name;
+  return record;
+}
+
+Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {
+  if (!wanted.pattern.empty() && !proto::valid_pattern(wanted.pattern)) {
+    return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
+                                                   "' is no pattern: write a full name in which a part may be * or **"};
+  }
+  ns::ServicesAnswer answer;
+  PageBudget budget(context.limits, wanted.records_max);
+  const auto& groups = context.membership.services().groups();
+  for (auto entry = groups.upper_bound(index_of(wanted.after)); entry != groups.end(); ++entry) {
+    const Topic& topic = *entry->second;
+    if (!wanted.pattern.empty() && !proto::matches(wanted.pattern, topic.full_name)) continue;
+    ns::ServiceRecord record = record_of(context, topic);
+    if (!budget.take(ns::page_bytes_max(record))) {
+      answer.more = true;
+      break;
+    }
+    answer.services.push_back(std::move(record));
+  }
+  return answer;
+}
+
+}  // namespace
+
+proto::Payload handle_advertise(HandlerContext& context, const Request& request) {
+  return answer_to<ns::Advertise>(
+      request, [&](const ns::Advertise& offer) { return advertise(context, request.session, offer); });
+}
+
+proto::Payload handle_withdraw(HandlerContext& context, const Request& request) {
+  return answer_to<ns::Withdraw>(
+      request, [&](const ns::Withdraw& wanted) -> Result<ns::WithdrawAnswer, proto::Refusal> {
+        const std::optional<std::uint32_t> group = own_index(context.facts, wanted.group);
+        if (!group) return proto::Refusal{Status::not_found, "that group belongs to another hub"};
+        const std::optional<proto::Refusal> failed =
+            context.membership.services().withdraw(request.session.index, *group, context.now, context.effects);
+        if (failed) return *failed;
+        return ns::WithdrawAnswer{};
+      });
+}
+
+proto::Payload handle_services(HandlerContext& context, const Request& request) {
+  return answer_to<ns::Services>(request, [&](const ns::Services& wanted) { return services(context, wanted); });
+}
+
+proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
+  return answer_to<ns::Subscribe>(
+      request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
+        const auto topic = context.membership.services().subscribe(request.session.index, wanted.name, context.effects);
+        if (!topic) return topic.error();
+        ns::SubscribeAnswer answer;
+        if (const std::optional<Service>& service = (*topic)->service) {
+          answer.group = group_id(context, service->group);
+          answer.message_type = service->terms.message_type;
+          answer.instance = service->terms.instance;
+          answer.delivery = static_cast<ns::Delivery>(service->terms.delivery);
+        }
+        return answer;
+      });
+}
+
+proto::Payload handle_unsubscribe(HandlerContext& context, const Request& request) {
+  return answer_to<ns::Unsubscribe>(
+      request, [&](const ns::Unsubscribe& wanted) -> Result<ns::UnsubscribeAnswer, proto::Refusal> {
+        const std::optional<proto::Refusal> failed =
+            context.membership.services().unsubscribe(request.session.index, wanted.name, context.effects);
+        if (failed) return *failed;
+        return ns::UnsubscribeAnswer{};
+      });
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,170 @@
+#include "hub/control/listener.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "hub/control/port_owner.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+constexpr int kBacklog = 4'096;
+
+Error refuse(const ListenUrl& url, const std::string& why) {
+  return Error{"cannot listen on " + url.text() + ": " + why};
+}
+
+std::string system_text(int error) { return std::generic_category().message(error); }
+
+/// Closes on the way out unless it was released.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return value_; }
+  int release() { return std::exchange(value_, -1); }
+
+ private:
+  int value_;
+};
+
+struct TcpAddress {
+  sockaddr_storage storage{};
+  socklen_t size = 0;
+};
+
+TcpAddress tcp_address(const ListenUrl& url) {
+  TcpAddress address;
+  auto* v4 = reinterpret_cast<sockaddr_in*>(&address.storage);
+  if (::inet_pton(AF_INET, url.host.c_str(), &v4->sin_addr) == 1) {
+    v4->sin_family = AF_INET;
+    v4->sin_port = htons(url.port);
+    address.size = sizeof(sockaddr_in);
+    return address;
+  }
+  auto* v6 = reinterpret_cast<sockaddr_in6*>(&address.storage);
+  if (::inet_pton(AF_INET6, url.host.c_str(), &v6->sin6_addr) == 1) {
+    v6->sin6_family = AF_INET6;
+    v6->sin6_port = htons(url.port);
+    address.size = sizeof(sockaddr_in6);
+  }
+  return address;
+}
+
+std::uint16_t bound_port(int descriptor) {
+  sockaddr_storage storage{};
+  socklen_t size = sizeof storage;
+  if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&storage), &size) != 0) return 0;
+  // The port stands at the same place in both families.
+  return ntohs(reinterpret_cast<const sockaddr_in*>(&storage)->sin_port);
+}
+
+std::string tcp_reason(const ListenUrl& url, int error) {
+  if (error == EADDRINUSE) {
+    const std::string owner = port_owner(url.port);
+    return "the port is in use by " + (owner.empty() ? "another process" : owner) +
+           "; end that, or choose another port (0: any free one)";
+  }
+  if (error == EACCES) return "ports below 1024 need rights that this user does not have; choose a higher one";
+  if (error == EADDRNOTAVAIL) return "this machine has no such address; `ip address` shows those it has";
+  return system_text(error);
+}
+
+sockaddr_un unix_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.data(), std::min(path.size(), sizeof address.sun_path - 1));
+  return address;
+}
+
+/// Who answers on the socket file: a process, "" for nobody.
+std::string unix_owner(const sockaddr_un& address) {
+  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const int failed = ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  if (failed != 0 && errno != EAGAIN) return {};  // EAGAIN: it listens, and its queue is full
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (failed != 0 || ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return "another process";
+  return process_text(peer.pid);
+}
+
+/// "" when nothing stands at the path any more, or why it has to stay.
+std::string clear_path(const std::string& path, const sockaddr_un& address) {
+  struct stat info{};
+  if (::lstat(path.c_str(), &info) != 0) return {};
+  if (!S_ISSOCK(info.st_mode)) return "there is a file of that name that is no socket; choose another path";
+  const std::string owner = unix_owner(address);
+  if (!owner.empty()) return "the socket is in use by " + owner + "; end that, or choose another path";
+  if (::unlink(path.c_str()) != 0) return "a socket is left over there and cannot be removed: " + system_text(errno);
+  return {};
+}
+
+std::string unix_reason(const ListenUrl& url, int error) {
+  if (error == ENOENT) {
+    const std::string folder = url.path.substr(0, url.path.rfind('/'));
+    return "the folder " + (folder.empty() ? "/" : folder) + " does not exist; create it, or choose another path";
+  }
+  return system_text(error);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Listener>> Listener::open(const ListenUrl& url) {
+  return url.scheme == ListenUrl::Scheme::tcp ? open_tcp(url) : open_unix(url);
+}
+
+Result<std::unique_ptr<Listener>> Listener::open_tcp(const ListenUrl& url) {
+  const TcpAddress address = tcp_address(url);
+  Descriptor socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (socket.get() < 0) return refuse(url, system_text(errno));
+  const int on = 1;
+  // Connections of a killed process may linger on the port; with this it can be bound all the same.
+  static_cast<void>(::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on));
+  if (address.storage.ss_family == AF_INET6) {
+    static_cast<void>(::setsockopt(socket.get(), IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on));
+  }
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address.storage), address.size) != 0 ||
+      ::listen(socket.get(), kBacklog) != 0) {
+    return refuse(url, tcp_reason(url, errno));
+  }
+  ListenUrl bound = url;
+  bound.port = bound_port(socket.get());
+  return std::unique_ptr<Listener>(new Listener(socket.release(), bound));
+}
+
+Result<std::unique_ptr<Listener>> Listener::open_unix(const ListenUrl& url) {
+  const sockaddr_un address = unix_address(url.path);
+  if (const std::string why = clear_path(url.path, address); !why.empty()) return refuse(url, why);
+  Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (socket.get() < 0) return refuse(url, system_text(errno));
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(socket.get(), kBacklog) != 0) {
+    return refuse(url, unix_reason(url, errno));
+  }
+  std::unique_ptr<Listener> listener(new Listener(socket.release(), url));
+  struct stat info{};
+  if (::stat(url.path.c_str(), &info) == 0) listener->file_ = info.st_ino;
+  return listener;
+}
+
+Listener::~Listener() {
+  ::close(descriptor_);
+  struct stat info{};
+  const bool still_ours =
+      url_.scheme == ListenUrl::Scheme::unix_socket && ::lstat(url_.path.c_str(), &info) == 0 && info.st_ino == file_;
+  if (still_ours) ::unlink(url_.path.c_str());
+}
+
+}  // namespace gimnet::hub

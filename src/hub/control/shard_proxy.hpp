@@ -1,0 +1,17 @@
+#pragma once
+
+#include "base/ids.hpp"
+#include "hub/shard/commands.hpp"
+
+namespace gimnet::hub {
+
+/// The conductor's door to the shards. Thread safety: the conductor's thread only.
+class ShardProxy {
+ public:
+  virtual ~ShardProxy() = default;
+  /// Hands a command over; each shard carries its commands out in the order in which they were sent.
+  virtual void send(ShardIndex shard, ShardCommand command) = 0;
+  [[nodiscard]] virtual std::size_t shards() const = 0;
+};
+
+}  // namespace gimnet::hub

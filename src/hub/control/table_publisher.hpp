@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <unordered_map>
+
+#include "hub/concurrent/quiescence.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/data/route/group_table.hpp"
+#include "hub/data/route/node_table.hpp"
+
+namespace gimnet::hub {
+
+/// Writes the tables that shards read. Lists of members that were replaced are freed when no shard can still look at
+/// them. Thread safety: the conductor's thread only. Ownership: of all published lists; shards must have ended, or left
+/// their turns for good, before it is destroyed.
+class TablePublisher {
+ public:
+  struct Tables {
+    NodeTable& nodes;
+    GroupTable& groups;
+    Quiescence& quiescence;
+  };
+  TablePublisher(HubId hub, std::size_t shards, const Tables& tables);
+  ~TablePublisher();
+  TablePublisher(const TablePublisher&) = delete;
+  TablePublisher& operator=(const TablePublisher&) = delete;
+
+  /// Publishes what `membership` says of the node now.
+  void publish_node(std::uint32_t index, const Membership& membership);
+  /// Publishes what `membership` says of the group now.
+  void publish_group(std::uint32_t index, const Membership& membership);
+
+  /// Frees what nobody looks at any more. True: something is left to free.
+  bool collect();
+  [[nodiscard]] std::size_t garbage() const { return garbage_.size(); }
+
+ private:
+  struct Garbage {
+    std::uint64_t ticket;
+    std::unique_ptr<const GroupMembers> members;
+  };
+  const HubId hub_;
+  const std::size_t shards_;
+  const Tables tables_;
+  std::unordered_map<std::uint32_t, std::unique_ptr<const GroupMembers>> published_;
+  std::deque<Garbage> garbage_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,175 @@
+#include "hub/control/waiting_room.hpp"
+
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include "base/check.hpp"
+#include "base/log.hpp"
+#include "hub/control/goodbye.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Goodbye;
+using proto::GoodbyeCode;
+using std::chrono::milliseconds;
+
+constexpr int kBatch = 64;
+/// Closing at once would reset the connection where the peer sent more than was read, and the reset could overtake
+/// GOODBYE. So the peer has this long to read it and close, and may send this much that nobody looks at.
+constexpr milliseconds kLeavingTime{1'000};
+constexpr std::size_t kDiscardedMax = 64 * 1'024;
+
+}  // namespace
+
+WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& refusals)
+    : limits_(limits), judge_(std::move(judge)), refusals_(refusals), poll_(::epoll_create1(EPOLL_CLOEXEC)) {
+  if (poll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
+}
+
+WaitingRoom::~WaitingRoom() { ::close(poll_); }
+
+void WaitingRoom::enter(Stranger stranger, milliseconds now) {
+  if (waiting_.size() >= limits_.handshakes) {
+    turn_away(waiting_.front(), {GoodbyeCode::hello_timeout, "too many connections wait for their HELLO; try again"},
+              now);
+  }
+  Peer& peer = waiting_.emplace_back();
+  peer.self = std::prev(waiting_.end());
+  peer.stranger = std::move(stranger);
+  peer.handshake = std::make_unique<Handshake>(limits_);
+  peer.deadline = now + milliseconds{limits_.handshake_ms};
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = &peer;
+  const int descriptor = peer.stranger.transport->descriptor();
+  GIMNET_CHECK(descriptor >= 0);
+  if (::epoll_ctl(poll_, EPOLL_CTL_ADD, descriptor, &event) != 0) {
+    turn_away(peer, {GoodbyeCode::no_memory, "the hub is out of memory; try again later"}, now);
+  }
+  keep_leaving_few();
+}
+
+bool WaitingRoom::serve(milliseconds now) {
+  std::array<epoll_event, kBatch> events{};
+  const int count = ::epoll_wait(poll_, events.data(), kBatch, 0);
+  for (int i = 0; i < count; ++i) {
+    // Each event removes its own peer only, so none of the batch is stale.
+    Peer& peer = *static_cast<Peer*>(events[static_cast<std::size_t>(i)].data.ptr);
+    if (peer.handshake != nullptr) {
+      read(peer, now);
+    } else {
+      discard(peer);
+    }
+  }
+  keep_leaving_few();
+  return count == kBatch;
+}
+
+void WaitingRoom::tick(milliseconds now) {
+  while (!waiting_.empty() && waiting_.front().deadline <= now) {
+    turn_away(waiting_.front(),
+              {GoodbyeCode::hello_timeout, "no HELLO within " + std::to_string(limits_.handshake_ms) + " ms"}, now);
+  }
+  while (!leaving_.empty() && leaving_.front().deadline <= now) remove(leaving_.front());
+  keep_leaving_few();
+}
+
+void WaitingRoom::dismiss_all(const Goodbye& goodbye, milliseconds now) {
+  while (!waiting_.empty()) turn_away(waiting_.front(), goodbye, now);
+  keep_leaving_few();
+}
+
+std::optional<milliseconds> WaitingRoom::next_deadline() const {
+  std::optional<milliseconds> deadline;
+  if (!waiting_.empty()) deadline = waiting_.front().deadline;
+  if (!leaving_.empty() && (!deadline || leaving_.front().deadline < *deadline)) deadline = leaving_.front().deadline;
+  return deadline;
+}
+
+void WaitingRoom::read(Peer& peer, milliseconds now) {
+  const IoResult result = peer.stranger.transport->receive(peer.handshake->room());
+  if (result.status == IoStatus::would_block) return;
+  if (result.status != IoStatus::ok) return remove(peer);
+  switch (peer.handshake->took(result.bytes)) {
+    case Handshake::Verdict::more:
+      return;
+    case Handshake::Verdict::hello:
+      return judge(peer, now);
+    case Handshake::Verdict::refused: {
+      const Goodbye goodbye = peer.handshake->refusal();
+      return turn_away(peer, goodbye, now);
+    }
+    case Handshake::Verdict::garbage:
+      refusals_.garbage.add(1);
+      log_debug("closed " + peer.stranger.peer.address + ": what it sent is not this protocol");
+      return remove(peer);
+  }
+}
+
+void WaitingRoom::judge(Peer& peer, milliseconds now) {
+  // The shard will wait for the descriptor from here on.
+  ::epoll_ctl(poll_, EPOLL_CTL_DEL, peer.stranger.transport->descriptor(), nullptr);
+  const std::optional<Goodbye> refusal = judge_(peer.stranger, peer.handshake->hello());
+  if (!refusal) {
+    waiting_.erase(peer.self);
+    return;
+  }
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = &peer;
+  ::epoll_ctl(poll_, EPOLL_CTL_ADD, peer.stranger.transport->descriptor(), &event);
+  turn_away(peer, *refusal, now);
+}
+
+void WaitingRoom::discard(Peer& peer) {
+  std::array<std::byte, 4'096> nobody_looks{};
+  const IoResult result = peer.stranger.transport->receive(nobody_looks);
+  if (result.status == IoStatus::would_block) return;
+  peer.discarded += result.bytes;
+  if (result.status != IoStatus::ok || peer.discarded > kDiscardedMax) remove(peer);
+}
+
+void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
+  log_info("refused " + peer.stranger.peer.transport + " " + peer.stranger.peer.address + ": " + goodbye.sentence +
+           " (" + proto::goodbye_name(goodbye.code) + ")");
+  refusals_.count(goodbye.code);
+  if (!send_goodbye(*peer.stranger.transport, goodbye.code, goodbye.sentence)) return remove(peer);
+  peer.handshake.reset();
+  leaving_.splice(leaving_.end(), waiting_, peer.self);
+  begin_leaving(peer, now);
+}
+
+void WaitingRoom::keep_leaving_few() {
+  while (leaving_.size() > limits_.handshakes) remove(leaving_.front());
+}
+
+void WaitingRoom::see_off(std::unique_ptr<Transport> transport, milliseconds now) {
+  Peer& peer = leaving_.emplace_back();
+  peer.self = std::prev(leaving_.end());
+  peer.stranger.transport = std::move(transport);
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = &peer;
+  // Without a place in the poll set it is closed at its deadline all the same.
+  ::epoll_ctl(poll_, EPOLL_CTL_ADD, peer.stranger.transport->descriptor(), &event);
+  begin_leaving(peer, now);
+  keep_leaving_few();
+}
+
+void WaitingRoom::begin_leaving(Peer& peer, milliseconds now) {
+  ::shutdown(peer.stranger.transport->descriptor(), SHUT_WR);
+  peer.deadline = now + kLeavingTime;
+}
+
+void WaitingRoom::remove(Peer& peer) {
+  Peers& list = peer.handshake != nullptr ? waiting_ : leaving_;
+  list.erase(peer.self);  // closing the descriptor takes it out of the poll set
+}
+
+}  // namespace gimnet::hub

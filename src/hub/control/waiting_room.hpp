@@ -1,0 +1,80 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <memory>
+#include <optional>
+
+#include "hub/control/acceptor.hpp"
+#include "hub/control/handshake.hpp"
+#include "hub/limits.hpp"
+#include "hub/observe/refusal_counters.hpp"
+
+namespace gimnet::hub {
+
+/// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else. Those who say HELLO are
+/// judged; those who are refused are told why, and given a moment to read it.
+/// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes; one more
+/// ends the oldest. Time is an argument.
+class WaitingRoom {
+ public:
+  /// Takes the stranger's transport and returns nothing, or leaves it and says why not.
+  using Judge = std::function<std::optional<proto::Goodbye>(Stranger&, const proto::Hello&)>;
+
+  /// REQUIRES: limits and refusals outlive it.
+  WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& refusals);
+  ~WaitingRoom();
+  WaitingRoom(const WaitingRoom&) = delete;
+  WaitingRoom& operator=(const WaitingRoom&) = delete;
+
+  /// REQUIRES: a transport with a descriptor.
+  void enter(Stranger stranger, std::chrono::milliseconds now);
+  /// A peer to which GOODBYE was written elsewhere: it gets the same moment. REQUIRES: a transport with a descriptor.
+  void see_off(std::unique_ptr<Transport> transport, std::chrono::milliseconds now);
+  /// Reads what strangers said, one batch. True: there may be more.
+  bool serve(std::chrono::milliseconds now);
+  /// Ends those whose time is over.
+  void tick(std::chrono::milliseconds now);
+  /// Refuses everybody, as at the end of the hub.
+  void dismiss_all(const proto::Goodbye& goodbye, std::chrono::milliseconds now);
+
+  /// Readable when serve() has something to do.
+  [[nodiscard]] int descriptor() const { return poll_; }
+  /// When tick() has something to do; nothing while nobody waits.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_deadline() const;
+  /// Those who have not said HELLO.
+  [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
+  /// Those who were refused and may still be reading why.
+  [[nodiscard]] std::size_t leaving() const { return leaving_.size(); }
+
+ private:
+  struct Peer;
+  using Peers = std::list<Peer>;
+  struct Peer {
+    Stranger stranger;
+    std::unique_ptr<Handshake> handshake;  ///< null: leaving
+    std::chrono::milliseconds deadline{};
+    std::size_t discarded = 0;
+    Peers::iterator self;
+  };
+
+  void read(Peer& peer, std::chrono::milliseconds now);
+  void discard(Peer& peer);
+  void begin_leaving(Peer& peer, std::chrono::milliseconds now);
+  void judge(Peer& peer, std::chrono::milliseconds now);
+  void turn_away(Peer& peer, const proto::Goodbye& goodbye, std::chrono::milliseconds now);
+  /// Not while a batch of events is served: one of them may be for a peer that this removes.
+  void keep_leaving_few();
+  void remove(Peer& peer);
+
+  const Limits& limits_;
+  const Judge judge_;
+  RefusalCounters& refusals_;
+  int poll_;
+  Peers waiting_;  ///< both in the order of their deadlines
+  Peers leaving_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,190 @@
+#include "hub/hub.hpp"
+
+#include <sys/random.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "base/check.hpp"
+#include "base/clock.hpp"
+#include "hub/config/folders.hpp"
+#include "hub/control/conductor.hpp"
+#include "hub/control/conductor_loop.hpp"
+#include "hub/shard/io_shard.hpp"
+#include "hub/version.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+constexpr std::uint16_t kDefaultPort = 7450;
+
+Result<std::vector<ListenUrl>> addresses_for(const HubOptions& options) {
+  if (!options.listen.empty()) return options.listen;
+  const Result<std::string> folder = runtime_folder();
+  if (!folder) return folder.error();
+  ListenUrl tcp;
+  tcp.host = "127.0.0.1";
+  tcp.port = kDefaultPort;
+  const Result<ListenUrl> local = parse_listen_url("unix:" + *folder + "/tcphub.sock");
+  if (!local) return local.error();
+  return std::vector{tcp, *local};
+}
+
+Secret fresh_secret() {
+  Secret secret{};
+  GIMNET_CHECK(::getrandom(secret.data(), secret.size(), 0) == static_cast<ssize_t>(secret.size()));
+  return secret;
+}
+
+/// The conductor's door to the real shards.
+class Shards final : public ShardProxy {
+ public:
+  explicit Shards(const HubShared& shared) {
+    for (std::size_t i = 0; i < shared.mailboxes.size(); ++i) {
+      shards_.push_back(
+          std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, shared, IoShard::Options{}));
+    }
+  }
+  ~Shards() override { stop(); }
+  Shards(const Shards&) = delete;
+  Shards& operator=(const Shards&) = delete;
+
+  void start() {
+    for (const auto& shard : shards_) shard->start();
+    running_ = true;
+  }
+  void stop() {
+    if (!running_) return;
+    running_ = false;
+    for (const auto& shard : shards_) shard->send(StopCommand{});
+    for (const auto& shard : shards_) shard->join();
+    for (const auto& shard : shards_) shard->let_go();
+  }
+  void send(ShardIndex shard, ShardCommand command) override { shards_[shard.value()]->send(std::move(command)); }
+  [[nodiscard]] std::size_t shards() const override { return shards_.size(); }
+
+ private:
+  std::vector<std::unique_ptr<IoShard>> shards_;
+  bool running_ = false;
+};
+
+/// What the shards share, and what keeps it.
+struct Ground {
+  explicit Ground(const HubOptions& options)
+      : quiescence(options.shards), budget(options.limits.budget_bytes), inbox(options.shards) {
+    for (std::size_t i = 0; i < options.shards; ++i) {
+      wakers.push_back(std::make_unique<Waker>());
+      mailboxes.push_back(std::make_unique<Mailbox>(
+          options.shards, Mailbox::Bounds{options.limits.mailbox_entries, options.limits.mailbox_bytes},
+          *wakers.back()));
+      counters.push_back(std::make_unique<ShardCounters>());
+      readable.push_back(counters.back().get());
+      queues.push_back(std::make_unique<QueueGauges>(options.limits.nodes));
+      readable_queues.push_back(queues.back().get());
+    }
+  }
+
+  [[nodiscard]] HubShared shared(const HubOptions& options) {
+    HubShared result{.hub = options.id,
+                     .limits = options.limits,
+                     .nodes = nodes,
+                     .groups = groups,
+                     .quiescence = quiescence,
+                     .budget = budget,
+                     .inbox = inbox,
+                     .mailboxes = {},
+                     .wakers = {},
+                     .counters = {},
+                     .queues = {}};
+    for (const auto& mailbox : mailboxes) result.mailboxes.push_back(mailbox.get());
+    for (const auto& waker : wakers) result.wakers.push_back(waker.get());
+    for (const auto& counter : counters) result.counters.push_back(counter.get());
+    for (const auto& gauges : queues) result.queues.push_back(gauges.get());
+    return result;
+  }
+
+  NodeTable nodes;
+  GroupTable groups;
+  Quiescence quiescence;
+  Budget budget;
+  ControlInbox inbox;
+  std::vector<std::unique_ptr<Waker>> wakers;
+  std::vector<std::unique_ptr<Mailbox>> mailboxes;
+  std::vector<std::unique_ptr<ShardCounters>> counters;
+  std::vector<std::unique_ptr<QueueGauges>> queues;
+  std::vector<const ShardCounters*> readable;
+  RefusalCounters refusals;
+  std::vector<const QueueGauges*> readable_queues;
+};
+
+HubFacts facts_of(const HubOptions& options) {
+  HubFacts facts;
+  facts.id = options.id;
+  facts.name = options.name;
+  facts.version = kVersion;
+  facts.shards = options.shards;
+  facts.started = std::chrono::milliseconds{steady_now_ns() / 1'000'000};
+  return facts;
+}
+
+}  // namespace
+
+/// In the order in which they need each other: shards end before the conductor frees what they look at.
+struct Hub::Parts {
+  Parts(const HubOptions& given, std::vector<std::unique_ptr<Listener>> listeners)
+      : options(given),
+        ground(options),
+        shared(ground.shared(options)),
+        shards(shared),
+        conductor(facts_of(options), options.placement, options.limits,
+                  Conductor::Wiring{shards,
+                                    {ground.nodes, ground.groups, ground.quiescence},
+                                    ground.readable,
+                                    fresh_secret,
+                                    ground.readable_queues,
+                                    &ground.refusals}) {
+    for (const auto& listener : listeners) {
+      addresses += (addresses.empty() ? "" : " ") + listener->url().text();
+    }
+    loop = std::make_unique<ConductorLoop>(
+        ConductorLoop::Wiring{conductor, ground.inbox, options.limits, ground.refusals}, std::move(listeners));
+  }
+
+  const HubOptions options;
+  Ground ground;
+  const HubShared shared;
+  Shards shards;
+  Conductor conductor;
+  std::string addresses;
+  std::unique_ptr<ConductorLoop> loop;
+};
+
+Hub::Hub(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Hub::~Hub() { parts_->shards.stop(); }
+
+Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options) {
+  if (!options.state_dir.empty()) {
+    if (const std::string error = prepare_state_folder(options.state_dir); !error.empty()) return Error{error};
+  }
+  const Result<std::vector<ListenUrl>> urls = addresses_for(options);
+  if (!urls) return urls.error();
+  std::vector<std::unique_ptr<Listener>> listeners;
+  for (const ListenUrl& url : *urls) {
+    Result<std::unique_ptr<Listener>> listener = Listener::open(url);
+    if (!listener) return listener.error();
+    listeners.push_back(std::move(*listener));
+  }
+  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, std::move(listeners))));
+  hub->parts_->shards.start();
+  return hub;
+}
+
+std::string Hub::addresses() const { return parts_->addresses; }
+
+void Hub::run() {
+  parts_->loop->run();
+  parts_->shards.stop();
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.hpp"
+#include "hub/config/options.hpp"
+
+namespace gimnet::hub {
+
+/// A whole hub in this process: shards, conductor, listeners, and what they share.
+/// Thread safety: made, run and destroyed by one thread, which is the conductor's while it runs.
+class Hub {
+ public:
+  /// Listens, and starts the shards. Errors: a sentence that says what could not be had.
+  [[nodiscard]] static Result<std::unique_ptr<Hub>> start(const HubOptions& options);
+  ~Hub();
+  Hub(const Hub&) = delete;
+  Hub& operator=(const Hub&) = delete;
+
+  /// The addresses that it listens on, as the command line writes them, separated by spaces.
+  [[nodiscard]] std::string addresses() const;
+  /// Serves until SIGTERM or SIGINT, and then until it has drained or a second signal comes.
+  void run();
+
+ private:
+  struct Parts;
+  explicit Hub(std::unique_ptr<Parts> parts);
+  const std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,54 @@
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <variant>
+
+#include "hub/config/options.hpp"
+#include "hub/hub.hpp"
+
+namespace {
+
+using namespace gimnet;
+
+/// Every connection is a descriptor: as many as this user may have.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
+}
+
+int run(const hub::HubOptions& options) {
+  set_log_level(options.log_level);
+  raise_descriptor_limit();
+  std::signal(SIGPIPE, SIG_IGN);
+  const auto hub = hub::Hub::start(options);
+  if (!hub) {
+    std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
+    return 1;
+  }
+  std::printf("ready %s\n", (*hub)->addresses().c_str());
+  std::fflush(stdout);
+  (*hub)->run();
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const auto parsed = hub::parse_command_line(argc, argv);
+    if (const auto* ending = std::get_if<hub::CommandLineEnding>(&parsed)) {
+      std::fputs(ending->text.c_str(), ending->exit_code == 0 ? stdout : stderr);
+      return ending->exit_code;
+    }
+    return run(std::get<hub::HubOptions>(parsed));
+  } catch (const std::exception& error) {
+    // Start-up only: out of memory or descriptors before anything was served.
+    std::fprintf(stderr, "tcphub: cannot run: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,79 @@
+#include "hub/config/folders.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "tests/hub/control/support/folder.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::HasSubstr;
+
+mode_t mode_of(const std::string& path) {
+  struct stat info{};
+  EXPECT_EQ(::stat(path.c_str(), &info), 0);
+  return info.st_mode & 0777;
+}
+
+TEST(Folders, APrivateFolderIsCreatedForOneUser) {
+  const TestFolder folder;
+  EXPECT_EQ(prepare_private_folder(folder.path("run")), "");
+  EXPECT_EQ(mode_of(folder.path("run")), 0700u);
+  EXPECT_EQ(prepare_private_folder(folder.path("run")), "");
+}
+
+TEST(Folders, AFolderThatOthersCanEnterIsRefused) {
+  const TestFolder folder;
+  ASSERT_EQ(::mkdir(folder.path("run").c_str(), 0700), 0);
+  ASSERT_EQ(::chmod(folder.path("run").c_str(), 0770), 0);
+  EXPECT_THAT(prepare_private_folder(folder.path("run")), HasSubstr("chmod 700"));
+}
+
+TEST(Folders, AnotherUsersFolderIsRefused) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder away";
+  const TestFolder folder;
+  ASSERT_EQ(::mkdir(folder.path("run").c_str(), 0700), 0);
+  ASSERT_EQ(::chown(folder.path("run").c_str(), 12'345, 12'345), 0);
+  EXPECT_THAT(prepare_private_folder(folder.path("run")), HasSubstr("another user"));
+}
+
+TEST(Folders, ALinkIsNoPrivateFolder) {
+  const TestFolder folder;
+  ASSERT_EQ(::mkdir(folder.path("target").c_str(), 0700), 0);
+  ASSERT_EQ(::symlink(folder.path("target").c_str(), folder.path("run").c_str()), 0);
+  EXPECT_THAT(prepare_private_folder(folder.path("run")), HasSubstr("not a folder"));
+}
+
+TEST(Folders, TheRuntimeFolderFollowsTheEnvironment) {
+  const TestFolder folder;
+  ::setenv("XDG_RUNTIME_DIR", folder.path("").c_str(), 1);
+  const auto given = runtime_folder();
+  ASSERT_TRUE(given);
+  EXPECT_EQ(mode_of(*given), 0700u);
+  ::unsetenv("XDG_RUNTIME_DIR");
+  ::setenv("TMPDIR", folder.path("").c_str(), 1);
+  const auto fallback = runtime_folder();
+  ASSERT_TRUE(fallback);
+  EXPECT_THAT(*fallback, ::testing::EndsWith("/gimnet-" + std::to_string(::geteuid())));
+  EXPECT_EQ(mode_of(*fallback), 0700u);
+  ::unsetenv("TMPDIR");
+}
+
+TEST(Folders, AStateFolderIsCreatedOrUsed) {
+  const TestFolder folder;
+  EXPECT_EQ(prepare_state_folder(folder.path("state")), "");
+  EXPECT_EQ(mode_of(folder.path("state")), 0700u);
+  EXPECT_EQ(prepare_state_folder(folder.path("state")), "");
+  std::ofstream(folder.path("file")) << "x";
+  EXPECT_THAT(prepare_state_folder(folder.path("file")), HasSubstr("not a folder"));
+  EXPECT_THAT(prepare_state_folder(folder.path("none/state")), HasSubstr("cannot create"));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,122 @@
+#include "hub/config/options.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::variant<HubOptions, CommandLineEnding> parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "tcphub");
+  return parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+}
+
+HubOptions options(const std::vector<const char*>& arguments) {
+  const auto parsed = parse(arguments);
+  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  EXPECT_EQ(ending, nullptr) << ending->text;
+  return ending == nullptr ? std::get<HubOptions>(parsed) : HubOptions{};
+}
+
+CommandLineEnding ending(const std::vector<const char*>& arguments) {
+  const auto parsed = parse(arguments);
+  const auto* found = std::get_if<CommandLineEnding>(&parsed);
+  EXPECT_NE(found, nullptr);
+  return found == nullptr ? CommandLineEnding{} : *found;
+}
+
+std::string error(const std::vector<const char*>& arguments) {
+  const CommandLineEnding found = ending(arguments);
+  EXPECT_EQ(found.exit_code, 2);
+  EXPECT_THAT(found.text, ::testing::StartsWith("tcphub: "));
+  return found.text;
+}
+
+TEST(Options, DefaultsAreUseful) {
+  const HubOptions defaults = options({});
+  EXPECT_TRUE(defaults.listen.empty());
+  EXPECT_EQ(defaults.shards, default_shards());
+  EXPECT_EQ(defaults.id, HubId{1});
+  EXPECT_EQ(defaults.name, "hub-1");
+  EXPECT_EQ(defaults.placement, Placement::spread);
+  EXPECT_FALSE(defaults.insecure);
+}
+
+TEST(Options, ReadsEverything) {
+  const HubOptions read = options({"--listen",    "tcp://127.0.0.1:0",
+                                   "--listen",    "unix:/some/path",
+                                   "--shards",    "2",
+                                   "--hub-id",    "7",
+                                   "--hub-name",  "hall",
+                                   "--state-dir", "/some/dir",
+                                   "--limit",     "nodes=10",
+                                   "--limit",     "control_bytes=1M",
+                                   "--placement", "hint",
+                                   "--log-level", "debug"});
+  ASSERT_EQ(read.listen.size(), 2u);
+  EXPECT_EQ(read.listen[0].text(), "tcp://127.0.0.1:0");
+  EXPECT_EQ(read.listen[1].text(), "unix:/some/path");
+  EXPECT_EQ(read.shards, 2u);
+  EXPECT_EQ(read.id, HubId{7});
+  EXPECT_EQ(read.name, "hall");
+  EXPECT_EQ(read.state_dir, "/some/dir");
+  EXPECT_EQ(read.limits.nodes, 10u);
+  EXPECT_EQ(read.limits.control_bytes, 1ull << 20);
+  EXPECT_EQ(read.placement, Placement::hint);
+  EXPECT_EQ(read.log_level, LogLevel::debug);
+}
+
+TEST(Options, UnderstandsEqualsSigns) { EXPECT_EQ(options({"--hub-id=9", "--limit=nodes=5"}).limits.nodes, 5u); }
+
+TEST(Options, AnOpenAddressNeedsTheWord) {
+  EXPECT_EQ(error({"--listen", "tcp://0.0.0.0:7450"}),
+            "tcphub: cannot listen on tcp://0.0.0.0:7450: an open address needs TLS, or --insecure\n");
+  EXPECT_EQ(options({"--listen", "tcp://0.0.0.0:7450", "--insecure"}).listen.size(), 1u);
+  EXPECT_EQ(options({"--insecure", "--listen", "tcp://[::]:7450"}).listen.size(), 1u);
+}
+
+TEST(Options, RangesAreKept) {
+  EXPECT_EQ(options({"--shards", "16"}).shards, 16u);
+  EXPECT_THAT(error({"--shards", "17"}), AllOf(HasSubstr("--shards"), HasSubstr("1 to 16")));
+  EXPECT_THAT(error({"--shards", "0"}), HasSubstr("1 to 16"));
+  EXPECT_EQ(options({"--hub-id", "4094"}).id, HubId{4094});
+  EXPECT_THAT(error({"--hub-id", "4095"}), HasSubstr("1 to 4094"));
+  EXPECT_THAT(error({"--hub-id", "0"}), HasSubstr("1 to 4094"));
+  EXPECT_THAT(error({"--hub-id", "7x"}), HasSubstr("'7x'"));
+}
+
+TEST(Options, ErrorsSayWhatWasMeant) {
+  EXPECT_THAT(error({"--lisen", "tcp://127.0.0.1:1"}), AllOf(HasSubstr("'--lisen'"), HasSubstr("--listen?")));
+  EXPECT_THAT(error({"--limit", "nods=1"}), HasSubstr("did you mean nodes?"));
+  EXPECT_THAT(error({"--placement", "hnt"}), HasSubstr("did you mean hint?"));
+  EXPECT_THAT(error({"--log-level", "inof"}), HasSubstr("did you mean info?"));
+  EXPECT_THAT(error({"robot"}), HasSubstr("'robot'"));
+  EXPECT_THAT(error({"--shards"}), HasSubstr("--shards"));
+  EXPECT_THAT(error({"--hub-name", "my hub"}), HasSubstr("--hub-name"));
+  EXPECT_THAT(error({"--listen", "tcp://127.0.0.1:1", "--listen", "tcp://127.0.0.1:1"}), HasSubstr("twice"));
+}
+
+TEST(Options, LimitsMustFitEachOther) {
+  EXPECT_THAT(error({"--limit", "silent_ms=1000"}), HasSubstr("keep_alive_ms"));
+  EXPECT_EQ(options({"--limit", "silent_ms=1001"}).limits.silent_ms, 1'001u);
+}
+
+TEST(Options, HelpAndVersionEndWell) {
+  EXPECT_EQ(ending({"--help"}).exit_code, 0);
+  EXPECT_THAT(ending({"--help"}).text, HasSubstr("--listen"));
+  EXPECT_THAT(ending({"--version"}).text, HasSubstr("tcphub "));
+  const CommandLineEnding limits = ending({"--help-limits"});
+  EXPECT_EQ(limits.exit_code, 0);
+  for (const LimitInfo& limit : limit_table()) EXPECT_THAT(limits.text, HasSubstr(std::string{limit.name}));
+}
+
+TEST(Options, DefaultShardsAreBounded) {
+  EXPECT_GE(default_shards(), 1u);
+  EXPECT_LE(default_shards(), 8u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,52 @@
+#include "hub/control/counter_names.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+namespace gimnet::hub {
+namespace {
+
+template <class Counters>
+std::map<std::string, std::uint64_t> read(const Counters& counters) {
+  std::map<std::string, std::uint64_t> all;
+  for_each_counter(counters, [&all](const std::string& name, std::uint64_t value) {
+    EXPECT_TRUE(all.emplace(name, value).second) << name;
+  });
+  return all;
+}
+
+TEST(CounterNames, AreThoseOfTheFields) {
+  ShardCounters counters;
+  counters.accepted.add(3);
+  counters.pinned_bytes_max.raise_to(9);
+  const auto all = read(counters);
+  EXPECT_EQ(all.at("accepted"), 3u);
+  EXPECT_EQ(all.at("pinned_bytes_max"), 9u);
+  EXPECT_EQ(all.at("delivered"), 0u);
+}
+
+TEST(CounterNames, DropsAreListedByReason) {
+  ShardCounters counters;
+  counters.dropped[static_cast<std::size_t>(proto::DropReason::queue_full)].add(4);
+  const auto all = read(counters);
+  EXPECT_EQ(all.at("dropped.queue_full"), 4u);
+  EXPECT_EQ(all.at("dropped.wrong_source"), 0u);
+  EXPECT_FALSE(all.contains("dropped.none"));
+}
+
+TEST(CounterNames, RefusalsAreListedByCode) {
+  RefusalCounters counters;
+  counters.count(proto::GoodbyeCode::no_memory);
+  counters.count(static_cast<proto::GoodbyeCode>(proto::kGoodbyeCount));
+  counters.garbage.add(2);
+  const auto all = read(counters);
+  EXPECT_EQ(all.size(), proto::kGoodbyeCount + 2);
+  EXPECT_EQ(all.at("refused.no_memory"), 1u);
+  EXPECT_EQ(all.at("refused.garbage"), 2u);
+  EXPECT_EQ(all.at("refused.no_descriptor"), 0u);
+  EXPECT_FALSE(all.contains("refused.unknown"));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

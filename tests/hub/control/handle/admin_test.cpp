@@ -1,0 +1,93 @@
+#include "hub/control/handle/admin.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "base/log.hpp"
+#include "hub/config/options.hpp"
+#include "proto/control/ctrl.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/hub/control/support/test_conductor.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+namespace ctrl = proto::ctrl;
+
+class AdminTest : public ::testing::Test, protected TestConductor {
+ protected:
+  AdminTest() { set_log_level(LogLevel::off); }
+  ~AdminTest() override { set_log_level(LogLevel::info); }
+  template <class Answer, class Message>
+  Answer ask_hub(const Node& node, const Message& message) {
+    const auto answer = ask<Answer>(node, message, proto::Kind::ctrl);
+    EXPECT_TRUE(answer);
+    return *answer;
+  }
+};
+
+TEST_F(AdminTest, TellsWhoTheHubIs) {
+  const Node robot = join("robot");
+  now += 60s;
+  const auto info = ask_hub<ctrl::HubInfoAnswer>(robot, ctrl::HubInfo{});
+  EXPECT_EQ(info.hub, kHub);
+  EXPECT_EQ(info.hub_name, "hub-7");
+  EXPECT_EQ(info.version, "1.2.3");
+  EXPECT_EQ(info.shards, 2u);
+  EXPECT_EQ(info.uptime_ms, 61'000u);
+  EXPECT_EQ(info.nodes, 1u);
+  EXPECT_EQ(info.services, 0u);
+}
+
+TEST_F(AdminTest, TellsTheCountersOfEveryShard) {
+  const Node robot = join("robot");
+  counters[1].delivered.add(42);
+  const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
+  ASSERT_EQ(statistics.shards.size(), 2u);
+  EXPECT_EQ(statistics.shards[1].shard, 1u);
+  const auto& list = statistics.shards[1].counters;
+  EXPECT_NE(std::find(list.begin(), list.end(), ctrl::Counter{"delivered", 42}), list.end());
+}
+
+TEST_F(AdminTest, TellsWhoWasRefusedInARecordOfItsOwn) {
+  const Node robot = join("robot");
+  refusals.count(proto::GoodbyeCode::hub_full);
+  refusals.garbage.add(3);
+  const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
+  ASSERT_EQ(statistics.shards.size(), 3u);
+  EXPECT_EQ(statistics.shards[2],
+            (ctrl::ShardRecord{ctrl::kConductorRecord, {{"refused.hub_full", 1}, {"refused.garbage", 3}}}));
+}
+
+TEST_F(AdminTest, StatisticsOfTheMostShardsFitInAFrame) {
+  const Node robot = join("robot");
+  counters[0].delivered.add(~std::uint64_t{0});
+  ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
+  const std::size_t two_shards = std::get<SendControlCommand>(shards.sent.back().command).frame.size();
+  EXPECT_LE(two_shards / 2 * kShardCountMax, proto::kFrameLengthDefault);
+}
+
+TEST_F(AdminTest, TellsWhereConnectionsAre) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  detach(viewer);
+  const auto answer = ask_hub<ctrl::ConnectionsAnswer>(robot, ctrl::Connections{});
+  ASSERT_EQ(answer.connections.size(), 2u);
+  EXPECT_EQ(answer.connections[0].node, robot.id);
+  EXPECT_EQ(answer.connections[0].name, "robot");
+  EXPECT_EQ(answer.connections[0].shard, robot.shard.value());
+  EXPECT_EQ(answer.connections[0].transport, "tcp");
+  EXPECT_EQ(answer.connections[0].peer, "127.0.0.1:5000");
+  EXPECT_TRUE(answer.connections[0].connected);
+  EXPECT_EQ(answer.connections[1].shard, viewer.shard.value());
+  EXPECT_FALSE(answer.connections[1].connected);
+  const auto rest = ask_hub<ctrl::ConnectionsAnswer>(robot, ctrl::Connections{.after = robot.id, .records_max = 1});
+  ASSERT_EQ(rest.connections.size(), 1u);
+  EXPECT_EQ(rest.connections[0].node, viewer.id);
+  EXPECT_FALSE(rest.more);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

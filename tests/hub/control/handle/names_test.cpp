@@ -1,0 +1,134 @@
+#include "hub/control/handle/names.hpp"
+
+#include <gtest/gtest.h>
+
+#include "base/log.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/hub/control/support/test_conductor.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::Status;
+namespace ns = proto::ns;
+
+class NamesTest : public ::testing::Test, protected TestConductor {
+ protected:
+  NamesTest() { set_log_level(LogLevel::off); }
+  ~NamesTest() override { set_log_level(LogLevel::info); }
+  std::vector<std::string> list(const Node& node, const ns::List& wanted) {
+    std::vector<std::string> names;
+    const auto answer = ask<ns::ListAnswer>(node, wanted);
+    EXPECT_TRUE(answer);
+    for (const ns::NodeRecord& record : answer->nodes) names.push_back(record.name);
+    return names;
+  }
+};
+
+TEST_F(NamesTest, ResolvesNamesToIds) {
+  const Node robot = join("robot");
+  EXPECT_EQ(ask<ns::ResolveAnswer>(robot, ns::Resolve{"robot"})->node, robot.id);
+  EXPECT_EQ(ask<ns::ResolveAnswer>(robot, ns::Resolve{"nobody"}).error().status, Status::not_found);
+}
+
+TEST_F(NamesTest, ResolvesWhoIsAway) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  detach(robot);
+  EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"robot"})->node, robot.id);
+}
+
+TEST_F(NamesTest, ReversesIdsToNames) {
+  const Node robot = join("robot");
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{robot.id})->name, "robot");
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, kHubIndex)})->name, "hub-7");
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, 99)}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(HubId{8}, 1)}).error().status, Status::not_found);
+}
+
+TEST_F(NamesTest, ListsNodesWithAllThatIsKnown) {
+  proto::Hello hello;
+  hello.name = "robot";
+  hello.description = "forklift";
+  const Node robot = join(hello);
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"}));
+  now += 5s;
+  const auto answer = ask<ns::ListAnswer>(robot, ns::List{});
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->nodes.size(), 1u);
+  ns::NodeRecord expected;
+  expected.node = robot.id;
+  expected.name = "robot";
+  expected.hub = kHub;
+  expected.hub_name = "hub-7";
+  expected.connected = true;
+  expected.description = "forklift";
+  expected.place = "127.0.0.1:5000";
+  expected.joined_ms = 5'000;
+  expected.services = 1;
+  EXPECT_EQ(answer->nodes[0], expected);
+  EXPECT_FALSE(answer->more);
+}
+
+TEST_F(NamesTest, ListsByPattern) {
+  const Node robot = join("hall/robot-1");
+  join("hall/robot-2");
+  join("yard/robot-1");
+  join("");
+  EXPECT_EQ(list(robot, ns::List{.pattern = "hall/*"}).size(), 2u);
+  EXPECT_EQ(list(robot, ns::List{.pattern = "**/robot-1"}).size(), 2u);
+  EXPECT_EQ(list(robot, ns::List{}).size(), 4u);
+  EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "a//b"}).error().status, Status::bad_request);
+}
+
+TEST_F(NamesTest, ListsInPages) {
+  const Node first = join("node-0");
+  for (int i = 1; i < 600; ++i) join("node-" + std::to_string(i));
+  std::size_t seen = 0;
+  NodeId after{};
+  for (int page = 0; page < 10; ++page) {
+    const auto answer = ask<ns::ListAnswer>(first, ns::List{.after = after});
+    ASSERT_TRUE(answer);
+    ASSERT_LE(answer->nodes.size(), limits.page_records);
+    for (const ns::NodeRecord& record : answer->nodes) EXPECT_GT(record.node, std::exchange(after, record.node));
+    seen += answer->nodes.size();
+    if (!answer->more) break;
+  }
+  EXPECT_EQ(seen, 600u);
+}
+
+TEST_F(NamesTest, PagesOfLongRecordsFitInAFrame) {
+  proto::Hello hello;
+  hello.description = std::string(256, 'd');
+  for (int i = 0; i < 250; ++i) {
+    hello.name = std::string(250, 'n') + std::to_string(1'000 + i);
+    join(hello);
+  }
+  const Node asker = join("asker");
+  std::size_t seen = 0;
+  NodeId after{};
+  for (int page = 0; page < 20; ++page) {
+    const auto answer = ask<ns::ListAnswer>(asker, ns::List{.after = after});
+    ASSERT_TRUE(answer);
+    EXPECT_LE(std::get<SendControlCommand>(shards.sent.back().command).frame.size(),
+              proto::kHeaderSize + limits.frame_bytes);
+    seen += answer->nodes.size();
+    if (!answer->more) break;
+    after = answer->nodes.back().node;
+  }
+  EXPECT_EQ(seen, 251u);
+}
+
+TEST_F(NamesTest, AnUnreadableRequestIsABadOne) {
+  const Node robot = join("robot");
+  proto::Payload payload = proto::encode(ns::Resolve{"robot"}, 5);
+  payload.back() = std::byte{0xff};  // no UTF-8 any more
+  send_frame(robot, proto::Kind::ns, payload);
+  const auto& answer = std::get<SendControlCommand>(shards.sent.back().command);
+  EXPECT_EQ(proto::decode_answer<ns::ResolveAnswer>(payload_of(answer)).error().status, Status::bad_request);
+  EXPECT_TRUE(shards.all<CloseCommand>().empty());
+}
+
+}  // namespace
+}  // namespace gimnet::hub

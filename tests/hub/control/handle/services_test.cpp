@@ -1,0 +1,125 @@
+#include "hub/control/handle/services.hpp"
+
+#include <gtest/gtest.h>
+
+#include "base/log.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/hub/control/support/test_conductor.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Status;
+namespace ns = proto::ns;
+
+class ServiceRequestsTest : public ::testing::Test, protected TestConductor {
+ protected:
+  ServiceRequestsTest() { set_log_level(LogLevel::off); }
+  ~ServiceRequestsTest() override { set_log_level(LogLevel::info); }
+};
+
+TEST_F(ServiceRequestsTest, AServiceIsNamedAfterItsNode) {
+  const Node robot = join("hall/robot");
+  const auto advertised = ask<ns::AdvertiseAnswer>(
+      robot, ns::Advertise{.service = "odom", .message_type = 5, .instance = 6, .delivery = ns::Delivery::latest});
+  ASSERT_TRUE(advertised);
+  EXPECT_EQ(hub_of(advertised->group), kHub);
+  const auto answer = ask<ns::ServicesAnswer>(robot, ns::Services{});
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->services.size(), 1u);
+  ns::ServiceRecord expected;
+  expected.group = advertised->group;
+  expected.name = "hall/robot/odom";
+  expected.node = robot.id;
+  expected.message_type = 5;
+  expected.instance = 6;
+  expected.delivery = ns::Delivery::latest;
+  expected.hub_name = "hub-7";
+  EXPECT_EQ(answer->services[0], expected);
+}
+
+TEST_F(ServiceRequestsTest, ANodeWithoutANameCannotAdvertise) {
+  const Node nobody = join("");
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(nobody, ns::Advertise{.service = "odom"}).error().status, Status::bad_request);
+}
+
+TEST_F(ServiceRequestsTest, BadTermsAreRefused) {
+  const Node robot = join("robot");
+  for (const char* name : {"a/b", "", "a b", "*"}) {
+    const auto answer = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = name});
+    ASSERT_FALSE(answer) << name;
+    EXPECT_EQ(answer.error().status, Status::bad_request);
+  }
+  const auto direction = static_cast<ns::Direction>(2);
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .direction = direction}).error().status,
+            Status::bad_request);
+  const auto delivery = static_cast<ns::Delivery>(2);
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .delivery = delivery}).error().status,
+            Status::bad_request);
+}
+
+TEST_F(ServiceRequestsTest, AReturningNodeGetsItsFormerGroup) {
+  const Node robot = join("robot");
+  const auto before = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"});
+  detach(robot);
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  const Node back = join(hello);
+  const auto after = ask<ns::AdvertiseAnswer>(back, ns::Advertise{.service = "odom", .former_group = before->group});
+  EXPECT_EQ(after->group, before->group);
+}
+
+TEST_F(ServiceRequestsTest, SubscribingTellsTheTerms) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  const auto early = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"});
+  ASSERT_TRUE(early);
+  EXPECT_EQ(early->group, GroupId{});
+  const auto group = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom", .message_type = 5});
+  const auto later = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"});
+  ASSERT_TRUE(later);
+  EXPECT_EQ(later->group, group->group);
+  EXPECT_EQ(later->message_type, 5u);
+}
+
+TEST_F(ServiceRequestsTest, WithdrawingAndUnsubscribing) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  const auto group = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"});
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"}));
+  EXPECT_EQ(ask<ns::WithdrawAnswer>(viewer, ns::Withdraw{group->group}).error().status, Status::denied);
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}));
+  EXPECT_EQ(events<ns::SubscriberLeft>().size(), 1u);
+  EXPECT_EQ(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}).error().status, Status::not_found);
+  ASSERT_TRUE(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}));
+  EXPECT_EQ(groups.find(index_of(group->group)), nullptr);
+  EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(HubId{9}, 1)}).error().status,
+            Status::not_found);
+}
+
+TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
+  const Node robot = join("robot");
+  const std::string metadata(proto::kMetadataBytesMax, 'm');
+  for (int i = 0; i < 40; ++i) {
+    const std::string name = "s" + std::to_string(i);
+    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = name, .metadata = metadata}));
+  }
+  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/s7"})->services.size(), 1u);
+  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "**/"}).error().status, Status::bad_request);
+  std::size_t seen = 0;
+  GroupId after{};
+  for (int page = 0; page < 10; ++page) {
+    const auto answer = ask<ns::ServicesAnswer>(robot, ns::Services{.after = after});
+    ASSERT_TRUE(answer);
+    EXPECT_LE(std::get<SendControlCommand>(shards.sent.back().command).frame.size(),
+              proto::kHeaderSize + limits.frame_bytes);
+    seen += answer->services.size();
+    if (!answer->more) break;
+    after = answer->services.back().group;
+  }
+  EXPECT_EQ(seen, 40u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

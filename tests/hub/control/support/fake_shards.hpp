@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "hub/control/shard_proxy.hpp"
+
+namespace gimnet::hub {
+
+/// Shards that only write down what they are told.
+class FakeShards final : public ShardProxy {
+ public:
+  explicit FakeShards(std::size_t count) : count_(count) {}
+
+  struct Sent {
+    ShardIndex shard;
+    ShardCommand command;
+  };
+  void send(ShardIndex shard, ShardCommand command) override {
+    if (on_send) on_send(command);
+    sent.push_back({shard, std::move(command)});
+  }
+  [[nodiscard]] std::size_t shards() const override { return count_; }
+
+  /// All commands of one kind, in order.
+  template <class Command>
+  [[nodiscard]] std::vector<const Command*> all() const {
+    std::vector<const Command*> found;
+    for (const Sent& each : sent) {
+      if (const auto* command = std::get_if<Command>(&each.command)) found.push_back(command);
+    }
+    return found;
+  }
+
+  std::vector<Sent> sent;
+  std::function<void(const ShardCommand&)> on_send;
+
+ private:
+  const std::size_t count_;
+};
+
+}  // namespace gimnet::hub

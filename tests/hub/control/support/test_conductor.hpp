@@ -1,0 +1,137 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hub/control/conductor.hpp"
+#include "hub/shard/control_frame.hpp"
+#include "proto/control/control_message.hpp"
+#include "tests/hub/control/support/fake_shards.hpp"
+
+// Tests name the members that matter and leave the others at their defaults, on purpose.
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
+namespace gimnet::hub {
+
+/// A transport that leads nowhere.
+class NoTransport final : public Transport {
+ public:
+  IoResult receive(std::span<std::byte>) override { return {}; }
+  IoResult send(std::span<const iovec>) override { return {}; }
+  [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
+  void limit_unsent(std::uint32_t) override {}
+  [[nodiscard]] int descriptor() const override { return -1; }
+};
+
+/// A conductor with two shards that only write down what they are told, and no clock but `now`.
+class TestConductor {
+ public:
+  static constexpr HubId kHub{7};
+
+  /// A node as its shard knows it.
+  struct Node {
+    NodeId id;
+    ShardIndex shard;
+    SessionRef session;
+    std::uint32_t attachment = 0;
+    proto::Welcome welcome;
+  };
+
+  explicit TestConductor(Placement placement = Placement::spread)
+      : conductor(facts(), placement, limits,
+                  Conductor::Wiring{shards,
+                                    {nodes, groups, quiescence},
+                                    readable,
+                                    [this] {
+                                      Secret secret{};
+                                      secret.fill(static_cast<std::byte>(++secrets));
+                                      return secret;
+                                    },
+                                    {},
+                                    &refusals}) {}
+
+  std::optional<proto::Goodbye> try_join(const proto::Hello& hello) {
+    Stranger stranger;
+    stranger.transport = std::make_unique<NoTransport>();
+    stranger.peer = PeerInfo{"tcp", "127.0.0.1:5000"};
+    return conductor.admit(stranger, hello, {now, 1'000'000'000});
+  }
+  Node join(const proto::Hello& hello) {
+    const auto refusal = try_join(hello);
+    EXPECT_FALSE(refusal) << refusal->sentence;
+    const FakeShards::Sent& last = shards.sent.back();
+    const auto* attach = std::get_if<AttachCommand>(&last.command);
+    EXPECT_NE(attach, nullptr);
+    return Node{attach->node, last.shard, attach->session, attach->attachment, attach->welcome};
+  }
+  Node join(const std::string& name) {
+    proto::Hello hello;
+    hello.name = name;
+    return join(hello);
+  }
+  void detach(const Node& node, bool said_by_peer = false, proto::GoodbyeCode code = {}, std::string sentence = {}) {
+    conductor.on_event(
+        {node.shard, DetachedEvent{node.session, node.attachment, node.id, said_by_peer, code, std::move(sentence)}},
+        now);
+  }
+  void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload) {
+    conductor.on_event({node.shard, ControlFrameEvent{node.session, node.attachment, node.id,
+                                                      control_frame(kind, NodeId{0}, kHub, payload)}},
+                       now);
+  }
+
+  /// Asks for something and returns the answer, which is the last thing that the node's shard is told.
+  template <class Answer, class Message>
+  Result<Answer, proto::Refusal> ask(const Node& node, const Message& message, proto::Kind kind = proto::Kind::ns) {
+    send_frame(node, kind, proto::encode(message, ++requests));
+    const auto* answer = std::get_if<SendControlCommand>(&shards.sent.back().command);
+    EXPECT_NE(answer, nullptr);
+    EXPECT_EQ(answer->answers, 1u);
+    EXPECT_EQ(answer->attachment, node.attachment);
+    EXPECT_EQ(answer->session.slot, node.session.slot);
+    EXPECT_EQ(proto::split_control(payload_of(*answer))->header.request, requests);
+    return proto::decode_answer<Answer>(payload_of(*answer));
+  }
+  static std::span<const std::byte> payload_of(const SendControlCommand& command) {
+    return std::span{command.frame}.subspan(proto::kHeaderSize);
+  }
+  /// All events of one kind that shards were told to send.
+  template <class Event>
+  std::vector<Event> events() const {
+    std::vector<Event> found;
+    for (const auto* command : shards.all<SendControlCommand>()) {
+      if (proto::split_control(payload_of(*command))->header.operation != Event::kOperation) continue;
+      EXPECT_EQ(command->answers, 0u);
+      found.push_back(*proto::decode<Event>(payload_of(*command)));
+    }
+    return found;
+  }
+
+  static HubFacts facts() {
+    HubFacts result;
+    result.id = kHub;
+    result.name = "hub-7";
+    result.version = "1.2.3";
+    result.shards = 2;
+    return result;
+  }
+
+  Limits limits;
+  NodeTable nodes;
+  GroupTable groups;
+  Quiescence quiescence{2};
+  ShardCounters counters[2];
+  const ShardCounters* readable[2] = {&counters[0], &counters[1]};
+  RefusalCounters refusals;
+  FakeShards shards{2};
+  int secrets = 0;
+  std::uint16_t requests = 0;
+  std::chrono::milliseconds now{1'000};
+  Conductor conductor;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,235 @@
+#include "hub/control/waiting_room.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/control/support/peer.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::Goodbye;
+using proto::GoodbyeCode;
+using ::testing::IsEmpty;
+
+class WaitingRoomTest : public ::testing::Test {
+ protected:
+  WaitingRoomTest()
+      : room_(
+            limits_, [this](Stranger& stranger, const proto::Hello& hello) { return judge(stranger, hello); },
+            refusals_) {}
+
+  std::optional<Goodbye> judge(Stranger& stranger, const proto::Hello& hello) {
+    hellos_.push_back(hello);
+    if (hello.name == "unwelcome") return Goodbye{GoodbyeCode::name_taken, "taken"};
+    admitted_.push_back(std::move(stranger.transport));
+    return std::nullopt;
+  }
+  Peer& enter(std::chrono::milliseconds now = 0ms) {
+    peers_.push_back(std::make_unique<Peer>(limits_));
+    room_.enter(peers_.back()->take_stranger(), now);
+    return *peers_.back();
+  }
+  void serve(std::chrono::milliseconds now = 0ms) {
+    while (room_.serve(now)) {
+    }
+  }
+  static proto::Hello hello(const std::string& name) {
+    proto::Hello result;
+    result.name = name;
+    return result;
+  }
+
+  Limits limits_;
+  RefusalCounters refusals_;
+  std::vector<proto::Hello> hellos_;
+  std::vector<std::unique_ptr<Transport>> admitted_;
+  std::vector<std::unique_ptr<Peer>> peers_;
+  WaitingRoom room_;
+};
+
+TEST_F(WaitingRoomTest, WhoSaysHelloIsJudgedAndLeavesWithItsTransport) {
+  Peer& peer = enter();
+  peer.send(opening_and(hello("robot")));
+  serve();
+  ASSERT_EQ(admitted_.size(), 1u);
+  EXPECT_EQ(hellos_[0].name, "robot");
+  EXPECT_EQ(room_.waiting(), 0u);
+  EXPECT_EQ(room_.next_deadline(), std::nullopt);
+  EXPECT_THAT(peer.receive(), IsEmpty());
+  EXPECT_FALSE(peer.closed());
+}
+
+TEST_F(WaitingRoomTest, WhoIsRefusedIsToldWhy) {
+  Peer& peer = enter();
+  peer.send(opening_and(hello("unwelcome")));
+  serve();
+  EXPECT_EQ(peer.receive_goodbye(), (Goodbye{GoodbyeCode::name_taken, "taken"}));
+  EXPECT_TRUE(peer.closed());
+  EXPECT_EQ(refusals_.of(GoodbyeCode::name_taken), 1u);
+  EXPECT_EQ(room_.leaving(), 1u);
+  peer.close();
+  serve();
+  EXPECT_EQ(room_.leaving(), 0u);
+}
+
+// A refusal makes room among those who leave: never by removing one whose own event is in the same batch.
+TEST_F(WaitingRoomTest, WhoLeavesAndTalksInTheBatchOfARefusalIsServedOnce) {
+  limits_.handshakes = 1;
+  Peer& first = enter();
+  first.send(opening_and(hello("unwelcome")));
+  serve();
+  Peer& second = enter();
+  second.send(opening_and(hello("unwelcome")));
+  first.send(std::vector<std::byte>(100));
+  serve();
+  EXPECT_EQ(room_.leaving(), 1u);
+  EXPECT_EQ(second.receive_goodbye(), (Goodbye{GoodbyeCode::name_taken, "taken"}));
+}
+
+TEST_F(WaitingRoomTest, WhoDoesNotCloseAfterGoodbyeIsClosed) {
+  Peer& peer = enter();
+  peer.send(opening_and(hello("unwelcome")));
+  serve();
+  room_.tick(999ms);
+  EXPECT_EQ(room_.leaving(), 1u);
+  EXPECT_EQ(room_.next_deadline(), 1s);
+  room_.tick(1s);
+  EXPECT_EQ(room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, WhoGoesOnTalkingAfterGoodbyeIsClosedBeforeItsTime) {
+  Peer& peer = enter();
+  peer.send(opening_and(hello("unwelcome")));
+  serve();
+  const std::vector<std::byte> noise(4'096);
+  for (int i = 0; i < 17; ++i) {
+    peer.send(noise);
+    serve();
+    if (room_.leaving() == 0) break;
+  }
+  EXPECT_EQ(room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, GarbageIsClosedWithoutAnAnswer) {
+  Peer& peer = enter();
+  peer.send("GET / HTTP/1.1\r\nHost: x\r\n\r\n");
+  serve();
+  EXPECT_THAT(peer.receive(), IsEmpty());
+  EXPECT_TRUE(peer.closed());
+  EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
+  EXPECT_EQ(refusals_.garbage.value(), 1u);
+}
+
+TEST_F(WaitingRoomTest, WhoIsAdmittedOrLeavesByItselfIsNoRefusal) {
+  enter().send(opening_and(hello("robot")));
+  enter().close();
+  serve();
+  EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
+  for (const Counter& counter : refusals_.by_code) EXPECT_EQ(counter.value(), 0u);
+  EXPECT_EQ(refusals_.garbage.value(), 0u);
+}
+
+TEST_F(WaitingRoomTest, CountsWhoDoesNotSayHelloInTime) {
+  enter();
+  room_.tick(std::chrono::milliseconds{limits_.handshake_ms} - 1ms);
+  EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 0u);
+  room_.tick(std::chrono::milliseconds{limits_.handshake_ms});
+  EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 1u);
+}
+
+TEST_F(WaitingRoomTest, HalfAHelloWaitsUntilItsDeadlineExactly) {
+  Peer& peer = enter(1s);
+  const std::vector<std::byte> bytes = opening_and(hello("robot"));
+  peer.send(std::span{bytes}.first(bytes.size() / 2));
+  serve(1s);
+  EXPECT_EQ(room_.next_deadline(), 6s);
+  room_.tick(6s - 1ms);
+  EXPECT_EQ(room_.waiting(), 1u);
+  room_.tick(6s);
+  EXPECT_EQ(room_.waiting(), 0u);
+  const auto goodbye = peer.receive_goodbye();
+  ASSERT_TRUE(goodbye);
+  EXPECT_EQ(goodbye->code, GoodbyeCode::hello_timeout);
+}
+
+TEST_F(WaitingRoomTest, AHelloThatDripsDoesNotMoveItsDeadline) {
+  Peer& peer = enter();
+  const std::vector<std::byte> bytes = opening_and(hello("robot"));
+  for (std::size_t i = 0; i < 10; ++i) {
+    peer.send(std::span{bytes}.subspan(i, 1));
+    serve(std::chrono::milliseconds{400 * i});
+  }
+  room_.tick(5s);
+  EXPECT_EQ(room_.waiting(), 0u);
+}
+
+TEST_F(WaitingRoomTest, WhoHangsUpIsForgotten) {
+  Peer& peer = enter();
+  peer.close();
+  serve();
+  EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, AtTheLimitTheOldestGoes) {
+  limits_.handshakes = 3;
+  Peer& oldest = enter(0ms);
+  for (int i = 1; i < 3; ++i) enter(1ms);
+  EXPECT_EQ(room_.waiting(), 3u);
+  EXPECT_FALSE(oldest.receive_goodbye());
+  enter(2ms);
+  EXPECT_EQ(room_.waiting(), 3u);
+  const auto goodbye = oldest.receive_goodbye();
+  ASSERT_TRUE(goodbye);
+  EXPECT_EQ(goodbye->code, GoodbyeCode::hello_timeout);
+}
+
+TEST_F(WaitingRoomTest, TenThousandSilentConnectionsKeepToTheLimit) {
+  limits_.handshakes = 100;
+  for (int i = 0; i < 10'000; ++i) {
+    enter(std::chrono::milliseconds{i / 10});
+    ASSERT_LE(room_.waiting(), 100u);
+    ASSERT_LE(room_.leaving(), 100u);
+    if (peers_.size() > 300) peers_.erase(peers_.begin());
+    serve(std::chrono::milliseconds{i / 10});
+  }
+  Peer& late = enter(1s);
+  late.send(opening_and(hello("robot")));
+  serve(1s);
+  EXPECT_EQ(admitted_.size(), 1u);
+  room_.tick(1h);
+  EXPECT_EQ(room_.waiting(), 0u);
+  room_.tick(2h);
+  EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, WhoIsSeenOffIsReadUntilItLeavesOrItsTimeIsOver) {
+  peers_.push_back(std::make_unique<Peer>(limits_));
+  Peer& patient = *peers_.back();
+  peers_.push_back(std::make_unique<Peer>(limits_));
+  Peer& hasty = *peers_.back();
+  room_.see_off(patient.take_stranger().transport, 0ms);
+  room_.see_off(hasty.take_stranger().transport, 0ms);
+  EXPECT_EQ(room_.leaving(), 2u);
+  patient.send("what was under way when the hub said GOODBYE");
+  hasty.close();
+  serve();
+  EXPECT_EQ(room_.leaving(), 1u) << "who closes is gone at once";
+  EXPECT_THAT(patient.receive(), IsEmpty());
+  EXPECT_TRUE(patient.closed()) << "the hub's side is shut from the beginning";
+  room_.tick(1h);
+  EXPECT_EQ(room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, AtTheEndEverybodyIsDismissed) {
+  Peer& a = enter();
+  Peer& b = enter();
+  room_.dismiss_all({GoodbyeCode::draining, "bye"}, 0ms);
+  EXPECT_EQ(room_.waiting(), 0u);
+  EXPECT_EQ(a.receive_goodbye()->code, GoodbyeCode::draining);
+  EXPECT_EQ(b.receive_goodbye()->code, GoodbyeCode::draining);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
