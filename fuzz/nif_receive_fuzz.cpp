@@ -1,0 +1,166 @@
+// The receiving side of NIF against a hub that sends anything: the same bytes give the same messages however they are
+// split, nothing that is another node's or larger than allowed comes out, and nothing breaks. Input: a byte that
+// chooses handshake or connection and the size of the pieces, then the hub's bytes.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "client/nif/handshake.hpp"
+#include "client/nif/hub_clock.hpp"
+#include "client/nif/inbound.hpp"
+#include "client/nif/outbound.hpp"
+#include "client/nif/request_table.hpp"
+#include "fuzz/support/fuzz_input.hpp"
+
+namespace {
+
+using namespace gimnet;
+using namespace gimnet::nif;
+
+constexpr std::uint32_t kOwnId = (7u << 20) | 17;
+constexpr proto::ReassemblyLimits kLimits{.message_bytes_max = 4096, .waiting_bytes_max = 8192, .streams_max = 4};
+
+/// Everything that the receiving half asks for, written down; what a node would do with it is done, too.
+class Witness final : public InboundHost {
+ public:
+  Witness() : outbound_({}, wake_), requests_(outbound_) {}
+
+  [[nodiscard]] bool on_flow(const proto::flow::Message& message) override {
+    note("flow " + std::to_string(message.index()));
+    if (const auto* pong = std::get_if<proto::flow::Pong>(&message)) {
+      const auto ping = clock_.ping(1, 2);
+      clock_.on_pong({ping.sequence, pong->sent_ns, pong->now_ns}, 3);
+    }
+    if (const auto* pause = std::get_if<proto::flow::Pause>(&message)) outbound_.on_pause(pause->target);
+    if (const auto* resume = std::get_if<proto::flow::Resume>(&message)) outbound_.on_resume(resume->target);
+    const auto* confirm = std::get_if<proto::flow::Confirm>(&message);
+    return confirm == nullptr || outbound_.on_confirm(confirm->count);
+  }
+  void on_answer(proto::Kind kind, const proto::ControlView& answer) override {
+    note("answer " + std::to_string(answer.header.request));
+    FUZZ_MUST(!requests_.on_answer(kind, answer));
+  }
+  void on_service_moved(const proto::ns::ServiceMoved& event) override { note("moved " + event.name); }
+  void on_taken(std::uint32_t from, const proto::Taken& taken) override {
+    note("taken " + std::to_string(taken.message));
+    outbound_.on_taken(from, taken);
+  }
+  bool on_report(const proto::Report& report) override { return outbound_.on_report(report.header, report.reason); }
+  void send_taken(std::uint32_t to, const proto::Taken& taken) override {
+    note("tell " + std::to_string(to) + " " + std::to_string(taken.message) + " " + std::to_string(taken.taken) + " " +
+         std::to_string(taken.allowed));
+  }
+  void deliver(std::span<const Item> items) override {
+    for (const Item& item : items) {
+      nif_incoming in = incoming_of(item);
+      witness(in);
+      nif_release(&in);
+    }
+  }
+
+  [[nodiscard]] const std::vector<std::string>& delivered() const { return delivered_; }
+  [[nodiscard]] const std::vector<std::string>& asked() const { return asked_; }
+
+ private:
+  void note(std::string what) { asked_.push_back(std::move(what)); }
+
+  void witness(const nif_incoming& in) {
+    FUZZ_MUST(in.text != nullptr && in.storage != nullptr);
+    FUZZ_MUST(in.type != NIF_MESSAGE || in.kind != NIF_UNICAST || in.to == kOwnId);
+    FUZZ_MUST(in.type != NIF_MESSAGE || in.size <= proto::kFrameLengthDefault);
+    std::string written = std::to_string(in.type) + "/" + std::to_string(in.from) + "/" + std::to_string(in.to) + "/" +
+                          std::to_string(in.kind) + "/" + std::to_string(in.flags) + "/" + std::to_string(in.key) +
+                          "/" + std::to_string(in.count) + "/" + std::to_string(in.reason) + "/" + in.text + "/";
+    if (in.size > 0) written.append(static_cast<const char*>(in.payload), in.size);
+    if (in.extensions_size > 0) written.append(static_cast<const char*>(in.extensions), in.extensions_size);
+    delivered_.push_back(std::move(written));
+  }
+
+  WakeSignal wake_;
+  Outbound outbound_;
+  RequestTable requests_;
+  HubClock clock_;
+  std::vector<std::string> delivered_;
+  std::vector<std::string> asked_;
+};
+
+Inbound::Verdict feed(Inbound& inbound, std::span<const std::byte> bytes, std::size_t step) {
+  auto verdict = Inbound::Verdict::going;
+  while (verdict == Inbound::Verdict::going && !bytes.empty()) {
+    const auto space = inbound.space();
+    FUZZ_MUST(space.size() >= proto::kFrameLengthDefault / 2);
+    const std::size_t size = std::min({step, space.size(), bytes.size()});
+    std::memcpy(space.data(), bytes.data(), size);
+    bytes = bytes.subspan(size);
+    verdict = inbound.take(size, 1);
+  }
+  return verdict;
+}
+
+void check_connection(std::span<const std::byte> bytes, std::size_t step) {
+  Session session;
+  session.id = kOwnId;
+  session.resume = true;
+  session.hub_resume_bytes = 1024;
+  Witness whole_witness;
+  Witness split_witness;
+  Inbound whole(kLimits, whole_witness);
+  Inbound split(kLimits, split_witness);
+  whole.begin(session);
+  split.begin(session);
+  const auto verdict = feed(whole, bytes, SIZE_MAX);
+  FUZZ_MUST(feed(split, bytes, step) == verdict);
+  FUZZ_MUST(whole.taken() == split.taken());
+  FUZZ_MUST(whole_witness.delivered() == split_witness.delivered());
+  FUZZ_MUST(whole_witness.asked() == split_witness.asked());
+  FUZZ_MUST(verdict != Inbound::Verdict::malformed || !whole.fault().empty());
+  // The next connection begins clean, with or without resume.
+  session.resumed = (step & 1) != 0;
+  whole.begin(session);
+  FUZZ_MUST(session.resumed || whole.taken() == 0);
+  static_cast<void>(feed(whole, bytes, step));
+}
+
+Handshake::State shake(Handshake& handshake, std::span<const std::byte> bytes, std::size_t step) {
+  auto state = Handshake::State::need_more;
+  while (state == Handshake::State::need_more && !bytes.empty()) {
+    const std::size_t size = std::min(step, bytes.size());
+    const fuzz::ExactCopy piece(bytes.first(size));
+    state = handshake.take(piece.span());
+    bytes = bytes.subspan(size);
+  }
+  return state;
+}
+
+void check_handshake(std::span<const std::byte> bytes, std::size_t step) {
+  Handshake whole(true, 0x1234);
+  Handshake split(true, 0x1234);
+  const auto state = shake(whole, bytes, SIZE_MAX);
+  FUZZ_MUST(shake(split, bytes, step) == state);
+  FUZZ_MUST(state != Handshake::State::failed || !whole.failure().sentence.empty());
+  if (state != Handshake::State::welcome) return;
+  const Session& session = whole.session();
+  FUZZ_MUST(session.id == split.session().id && session.token == split.session().token);
+  FUZZ_MUST(hub_of(NodeId{session.id}).value() == session.hub_id && !session.token.empty());
+  FUZZ_MUST(session.keep_alive_ns > 0 && session.silent_after_ns >= 2 * session.keep_alive_ns);
+  FUZZ_MUST(session.frame_bytes_max <= proto::kFrameLengthDefault);
+  FUZZ_MUST(!session.resumed || session.hub_epoch == 0x1234);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const auto bytes = fuzz::input(data + 1, size - 1);
+  const std::size_t step = 1u + (data[0] >> 1);
+  if ((data[0] & 1) != 0) {
+    check_handshake(bytes, step);
+  } else {
+    check_connection(bytes, step);
+  }
+  return 0;
+}

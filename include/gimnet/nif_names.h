@@ -1,0 +1,137 @@
+#ifndef GIMNET_NIF_NAMES_H
+#define GIMNET_NIF_NAMES_H
+
+/* Names, services and other questions to the hub. Included by gimnet/nif.h. */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "gimnet/nif_status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** One connection to a hub, one node. Opaque; not a pointer to anything. */
+typedef struct nif_node nif_node;
+
+/** Finds a node by its name. An answer is remembered for a second, and forgotten earlier where a REPORT says
+ * no_such_node or renumbered, and at every break. NIF_NOT_FOUND, NIF_BAD_NAME, NIF_TIMEOUT, NIF_NOT_CONNECTED. */
+nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t timeout_ms);
+
+/** Finds the name of a node, "" for one without a name. `name` must have room for NIF_NAME_BYTES_MAX + 1 bytes. */
+nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms);
+
+/** One node of a list. Text: NUL-terminated, never NULL. */
+typedef struct nif_node_record {
+  uint32_t id;
+  uint32_t hub_id;
+  uint32_t services;  /**< Services it provides or accepts. */
+  uint32_t connected; /**< 0: within its grace time. */
+  uint64_t joined_ms; /**< Milliseconds since it joined. */
+  const char* name;
+  const char* hub_name;
+  const char* description;
+  const char* place; /**< Address of the peer as its hub sees it. */
+} nif_node_record;
+
+typedef struct nif_node_list {
+  size_t count;
+  const nif_node_record* records; /**< Ascending node ids. */
+} nif_node_list;
+
+/** Lists the nodes whose name matches the pattern (`*` one part, `**` any number; NULL: all nodes, also those without a
+ *  name) into *list, which nif_free_nodes() frees. */
+nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list, int32_t timeout_ms);
+void nif_free_nodes(nif_node_list* list);
+
+typedef enum nif_direction { NIF_PROVIDES = 0, NIF_ACCEPTS = 1 } nif_direction;
+typedef enum nif_delivery { NIF_STREAM_DELIVERY = 0, NIF_LATEST_DELIVERY = 1 } nif_delivery;
+
+/** A service to advertise. Its full name is `node name/name`. */
+typedef struct nif_service {
+  size_t struct_size; /**< sizeof(nif_service). */
+  const char* name;   /**< One part, without '/'. */
+  uint32_t message_type;
+  uint32_t instance;
+  uint8_t direction;    /**< nif_direction. */
+  uint8_t delivery;     /**< nif_delivery. */
+  const char* metadata; /**< For people and tools; may be NULL. */
+} nif_service;
+
+/** Declares a service; stores its group id in *group and, if subscribers is not NULL, how many subscribers wait for it
+ *  already. The library declares it again after every reconnect, under the former group id where the hub can.
+ *  NIF_BAD_NAME, NIF_TAKEN (this node has such a service), NIF_LIMIT, NIF_DENIED (a node without a name). */
+nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
+                         int32_t timeout_ms);
+
+/** Ends an own service. NIF_NOT_FOUND. */
+nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
+
+/** One service of a list. Text: NUL-terminated, never NULL. */
+typedef struct nif_service_record {
+  uint32_t group;
+  uint32_t node_id;
+  uint32_t message_type;
+  uint32_t instance;
+  uint32_t subscribers;
+  uint8_t direction;
+  uint8_t delivery;
+  const char* name; /**< Full name. */
+  const char* metadata;
+  const char* hub_name;
+} nif_service_record;
+
+typedef struct nif_service_list {
+  size_t count;
+  const nif_service_record* records; /**< Ascending group ids. */
+} nif_service_list;
+
+/** Lists services by a pattern of full names, as nif_list_nodes(). */
+nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list, int32_t timeout_ms);
+void nif_free_services(nif_service_list* list);
+
+/** What a subscription stands for at the moment. */
+typedef struct nif_subscription {
+  uint32_t group; /**< 0: there is no such service yet; NIF_SERVICE_MOVED comes when there is. */
+  uint32_t message_type;
+  uint32_t instance;
+  uint32_t delivery; /**< nif_delivery. */
+} nif_subscription;
+
+/** Subscribes to a service by its full name; it need not exist yet. The library subscribes again after every reconnect.
+ *  subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
+nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms);
+
+/** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. */
+nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
+
+/* ---------------------------------------------------------------- asking the hub */
+
+/** Kinds for nif_request(); the operations are in docs/protocol.md, sections 8 and 9. */
+enum { NIF_NS = 17, NIF_CTRL = 18 };
+enum { NIF_CTRL_HUB_INFO = 1, NIF_CTRL_STATISTICS = 2, NIF_CTRL_CONNECTIONS = 3 };
+
+/** An answer of the hub as it came. Belongs to the caller until nif_free_reply(). */
+typedef struct nif_reply {
+  uint16_t status;     /**< Of the wire: 0 done. */
+  const void* content; /**< Bitestream of the answer, keys 1 and 2 included. */
+  size_t size;
+  const char* sentence; /**< Of the hub, if status is not 0; never NULL. */
+} nif_reply;
+
+/** Sends a request (kind NIF_NS or NIF_CTRL, an operation below 0x8000, and its Bitestream) to the own hub and waits
+ * for the answer. NIF_OK: *reply holds it, whatever its status. */
+nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content, size_t size,
+                       nif_reply** reply, int32_t timeout_ms);
+void nif_free_reply(nif_reply* reply);
+
+/** Measures the way to the hub with one FLOW PING: round trip and hub's clock minus this one, in ns; either may be
+ *  NULL. The clock offset is good to half of the round trip. */
+nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns, int32_t timeout_ms);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* GIMNET_NIF_NAMES_H */

@@ -1,0 +1,153 @@
+#include "client/nif/declarations.hpp"
+
+#include <utility>
+
+#include "client/nif/answer_status.hpp"
+#include "client/nif/inbound.hpp"
+
+namespace gimnet::nif {
+
+Declarations::~Declarations() {
+  for (const Item& item : events_) item.storage->release();
+}
+
+void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
+  const MutexLock lock(mutex_);
+  services_.insert_or_assign(service.service, Service{service, group});
+}
+
+void Declarations::remove_service(GroupId group) {
+  const MutexLock lock(mutex_);
+  std::erase_if(services_, [group](const auto& entry) { return entry.second.group == group; });
+}
+
+void Declarations::add_subscription(const std::string& full_name, GroupId group) {
+  const MutexLock lock(mutex_);
+  subscriptions_.insert_or_assign(full_name, group);
+}
+
+void Declarations::remove_subscription(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  subscriptions_.erase(full_name);
+}
+
+void Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
+  const MutexLock lock(mutex_);
+  const auto found = subscriptions_.find(event.name);
+  if (found != subscriptions_.end()) found->second = event.new_group;
+}
+
+void Declarations::declare_again() {
+  services_due_.clear();
+  subscriptions_due_.clear();
+  under_way_ = 0;
+  ++round_;
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& [name, service] : services_) services_due_.push_back(name);
+    for (const auto& [name, group] : subscriptions_) subscriptions_due_.push_back(name);
+  }
+  declaring_ = !services_due_.empty();
+  outbound_.set_declaring(declaring_);
+  go_on();
+}
+
+void Declarations::go_on() {
+  while (under_way_ < kAtOnce && !services_due_.empty()) {
+    if (!declare_service(services_due_.front())) return;
+    services_due_.pop_front();
+  }
+  while (under_way_ < kAtOnce && !subscriptions_due_.empty()) {
+    if (!declare_subscription(subscriptions_due_.front())) return;
+    subscriptions_due_.pop_front();
+  }
+  if (declaring_ && under_way_ == 0) {
+    declaring_ = false;
+    outbound_.set_declaring(false);
+  }
+}
+
+void Declarations::answered() {
+  if (under_way_ > 0) --under_way_;
+  go_on();
+}
+
+bool Declarations::declare_service(const std::string& service) {
+  proto::ns::Advertise request;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = services_.find(service);
+    if (found == services_.end()) return true;  // withdrawn meanwhile
+    request = found->second.request;
+    request.former_group = found->second.group;
+  }
+  const auto handler = [this, service, round = round_](const proto::Payload& payload) {
+    if (round == round_) on_advertised(service, payload);
+  };
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(request), handler)) return false;
+  ++under_way_;
+  return true;
+}
+
+bool Declarations::declare_subscription(const std::string& full_name) {
+  const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
+    if (round == round_) on_subscribed(full_name, payload);
+  };
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Subscribe{full_name}), handler)) return false;
+  ++under_way_;
+  return true;
+}
+
+void Declarations::on_advertised(const std::string& service, const proto::Payload& payload) {
+  const auto answer = proto::decode_answer<proto::ns::AdvertiseAnswer>(payload);
+  const GroupId group = answer ? answer->group : GroupId{};
+  GroupId former;
+  bool changed = false;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = services_.find(service);
+    if (found != services_.end()) {
+      former = std::exchange(found->second.group, group);
+      changed = former != group;
+    }
+  }
+  if (changed) {
+    Record* record = make_event(NIF_OWN_SERVICE_MOVED, service);
+    record->incoming.former_group = former.value();
+    record->incoming.group = group.value();
+    record->incoming.reason = static_cast<std::uint32_t>(answer ? NIF_OK : status_of(answer.error().status));
+    events_.push_back(item_of(record, service.size()));
+  }
+  answered();
+}
+
+void Declarations::on_subscribed(const std::string& full_name, const proto::Payload& payload) {
+  const auto answer = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
+  const GroupId group = answer ? answer->group : GroupId{};
+  GroupId former;
+  bool changed = false;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = subscriptions_.find(full_name);
+    if (found != subscriptions_.end()) {
+      former = std::exchange(found->second, group);
+      changed = former != group;
+    }
+  }
+  if (changed) {
+    Record* record = make_event(NIF_SERVICE_MOVED, full_name);
+    record->incoming.former_group = former.value();
+    record->incoming.group = group.value();
+    if (answer) {
+      record->incoming.message_type = answer->message_type;
+      record->incoming.instance = answer->instance;
+      record->incoming.delivery = static_cast<std::uint32_t>(answer->delivery);
+    }
+    events_.push_back(item_of(record, full_name.size()));
+  }
+  answered();
+}
+
+std::vector<Item> Declarations::take_events() { return std::exchange(events_, {}); }
+
+}  // namespace gimnet::nif

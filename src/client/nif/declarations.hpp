@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "client/nif/outbound.hpp"
+#include "client/nif/request_table.hpp"
+#include "client/nif/storage.hpp"
+#include "proto/control/ns.hpp"
+
+namespace gimnet::nif {
+
+/// The own services and subscriptions, so that they can be declared again after a reconnect.
+/// Thread safety: add, remove and find from any thread; the rest from the library's.
+class Declarations {
+ public:
+  Declarations(RequestTable& requests, Outbound& outbound) : requests_(requests), outbound_(outbound) {}
+
+  void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
+  void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
+  void add_subscription(const std::string& full_name, GroupId group) GIMNET_EXCLUDES(mutex_);
+  void remove_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+
+  /// A new connection: declares everything again, a few requests at a time. Changes are put into `events` by later
+  /// calls of take_events(). GROUP messages wait until the services are through.
+  void declare_again() GIMNET_EXCLUDES(mutex_);
+  /// Goes on declaring where numbers for requests were short.
+  void go_on() GIMNET_EXCLUDES(mutex_);
+  void on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
+  /// What the answers brought that the program should know. Takes the references along.
+  [[nodiscard]] std::vector<Item> take_events();
+  ~Declarations();
+
+ private:
+  /// Requests under way at a time, so that the program's own find free numbers.
+  static constexpr std::size_t kAtOnce = 32;
+
+  struct Service {
+    proto::ns::Advertise request;
+    GroupId group;
+  };
+  void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
+  void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  void answered();
+
+  RequestTable& requests_;
+  Outbound& outbound_;
+
+  Mutex mutex_;
+  std::map<std::string, Service> services_ GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node
+  std::map<std::string, GroupId> subscriptions_ GIMNET_GUARDED_BY(mutex_);
+
+  // The library's thread.
+  std::deque<std::string> services_due_;
+  std::deque<std::string> subscriptions_due_;
+  std::size_t under_way_ = 0;
+  bool declaring_ = false;
+  std::uint64_t round_ = 0;  ///< answers of an earlier connection do not count
+  std::vector<Item> events_;
+};
+
+}  // namespace gimnet::nif

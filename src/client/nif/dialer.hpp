@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/result.hpp"
+#include "client/nif/endpoint.hpp"
+#include "client/nif/error.hpp"
+#include "client/nif/platform.hpp"
+#include "client/nif/session.hpp"
+#include "proto/control/link.hpp"
+
+namespace gimnet::nif {
+
+/// An admitted connection.
+struct Admitted {
+  Socket socket;
+  Session session;
+  std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
+};
+
+/// What nif_connect() and the library's thread do to get one: dials each address in turn and shakes hands, until one
+/// hub admits the node, one refuses it, or the time is up. Where several fail, the last hub-less failure is told.
+/// Errors: those of dial() and of the hub's GOODBYE; NIF_CLOSED when `cancel` was raised.
+[[nodiscard]] Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
+                                              const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel);
+
+/// How long to wait before dialing again: full jitter, a random time below 50 ms, 100 ms, 200 ms ... 1 s.
+class Backoff {
+ public:
+  /// `random`: any 64 random bits.
+  [[nodiscard]] std::int64_t next_ns(std::uint64_t random);
+  void reset() { limit_ns_ = kFirstNs; }
+
+ private:
+  static constexpr std::int64_t kFirstNs = 50'000'000;
+  static constexpr std::int64_t kLastNs = 1'000'000'000;
+  std::int64_t limit_ns_ = kFirstNs;
+};
+
+}  // namespace gimnet::nif

@@ -1,0 +1,73 @@
+#include "client/nif/endpoint.hpp"
+
+#include <charconv>
+
+#include "client/nif/platform.hpp"
+
+namespace gimnet::nif {
+namespace {
+
+constexpr std::string_view kTcp = "tcp://";
+constexpr std::string_view kUnix = "unix:";
+
+Failure not_understood(std::string_view url, std::string_view why) {
+  return {NIF_BAD_ARGUMENT, "cannot use the hub URL '" + std::string(url) + "': " + std::string(why) +
+                                "; give tcp://host:port or unix:/path"};
+}
+
+}  // namespace
+
+std::string Endpoint::url() const {
+  if (transport == Transport::unix_socket) return std::string(kUnix) + path;
+  const bool numeric_v6 = host.find(':') != std::string::npos;
+  return std::string(kTcp) + (numeric_v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
+Result<Endpoint, Failure> parse_endpoint(std::string_view url) {
+  Endpoint endpoint;
+  if (url.starts_with(kUnix)) {
+    endpoint.transport = Endpoint::Transport::unix_socket;
+    endpoint.path = url.substr(kUnix.size());
+    if (endpoint.path.empty()) return not_understood(url, "the path is missing");
+    if (endpoint.path.size() > unix_path_max()) return not_understood(url, "the path is too long for a Unix socket");
+    return endpoint;
+  }
+  if (!url.starts_with(kTcp)) return not_understood(url, "the scheme is unknown");
+  const std::string_view rest = url.substr(kTcp.size());
+  const std::size_t colon = rest.rfind(':');
+  if (colon == std::string_view::npos) return not_understood(url, "the port is missing");
+  std::string_view host = rest.substr(0, colon);
+  if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  if (host.empty()) return not_understood(url, "the host is missing");
+  const std::string_view port = rest.substr(colon + 1);
+  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), endpoint.port);
+  if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size() || endpoint.port == 0) {
+    return not_understood(url, "the port is not a number from 1 to 65535");
+  }
+  endpoint.host = host;
+  return endpoint;
+}
+
+Result<std::vector<Endpoint>, Failure> endpoints_for(std::string_view url) {
+  const std::string chosen = url.empty() ? environment("GIMNET_HUB") : std::string(url);
+  std::vector<Endpoint> endpoints;
+  if (!chosen.empty()) {
+    auto parsed = parse_endpoint(chosen);
+    if (!parsed) return parsed.error();
+    endpoints.push_back(std::move(*parsed));
+    return endpoints;
+  }
+  if (const std::string folder = runtime_folder(); !folder.empty()) {
+    Endpoint local;
+    local.transport = Endpoint::Transport::unix_socket;
+    local.path = folder + "/tcphub.sock";
+    if (local.path.size() <= unix_path_max()) endpoints.push_back(std::move(local));
+  }
+  Endpoint loopback;
+  loopback.host = "127.0.0.1";
+  loopback.port = kDefaultPort;
+  endpoints.push_back(std::move(loopback));
+  return endpoints;
+}
+
+}  // namespace gimnet::nif

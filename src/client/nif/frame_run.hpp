@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "base/endian.hpp"
+#include "client/nif/chunk_pool.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::nif {
+
+/// Neighbouring whole frames in one chunk. A value type; keeps its chunk.
+struct FrameRun {
+  enum class Sort : std::uint8_t {
+    data,    ///< counted, kept for resume
+    latest,  ///< one data frame that a newer one of its stream may replace
+    resent,  ///< data frames that were counted before the break
+    control  ///< FLOW and kinds from 16 on: for this connection only
+  };
+  std::shared_ptr<Chunk> chunk;
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  std::uint32_t frames = 0;
+  std::uint8_t lane = 0;
+  Sort sort = Sort::data;
+
+  [[nodiscard]] std::size_t size() const { return end - begin; }
+  [[nodiscard]] const std::byte* bytes() const { return chunk->memory.get() + begin; }
+  [[nodiscard]] std::byte* bytes() { return chunk->memory.get() + begin; }
+  [[nodiscard]] bool counted() const { return sort != Sort::control; }
+  [[nodiscard]] proto::FrameHeader first_header() const { return proto::load_header(bytes()); }
+  [[nodiscard]] std::size_t first_size() const { return first_header().frame_size(); }
+
+  /// Takes `count` frames of `size` bytes together from the front into a run of their own.
+  /// REQUIRES: they are there.
+  FrameRun split(std::size_t size, std::uint32_t count) {
+    FrameRun front = *this;
+    front.end = begin + size;
+    front.frames = count;
+    begin += size;
+    frames -= count;
+    return front;
+  }
+
+  /// Takes as many frames as fit into `bytes_max`, at least one.
+  FrameRun split_at_most(std::size_t bytes_max) {
+    if (size() <= bytes_max) return split(size(), frames);
+    std::size_t taken = first_size();
+    std::uint32_t count = 1;
+    while (count < frames) {
+      const std::size_t next = proto::load_header(bytes() + taken).frame_size();
+      if (taken + next > bytes_max) break;
+      taken += next;
+      ++count;
+    }
+    return split(taken, count);
+  }
+
+  /// Takes the frames that end at or before `offset`; maybe none.
+  FrameRun split_whole_before(std::size_t offset) {
+    if (first_size() > offset) return split(0, 0);
+    return split_at_most(offset);
+  }
+};
+
+}  // namespace gimnet::nif

@@ -1,0 +1,58 @@
+#include "client/nif/hub_clock.hpp"
+
+#include <algorithm>
+
+namespace gimnet::nif {
+
+proto::flow::Ping HubClock::ping(std::int64_t steady_ns, std::int64_t wall_ns) {
+  const MutexLock lock(mutex_);
+  if (under_way_.size() >= kUnderWayMax) under_way_.erase(under_way_.begin());
+  ++sequence_;
+  under_way_.insert_or_assign(sequence_, UnderWay{steady_ns, wall_ns, std::nullopt});
+  return {sequence_, wall_ns};
+}
+
+void HubClock::on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) {
+  const MutexLock lock(mutex_);
+  const auto found = under_way_.find(pong.sequence);
+  if (found == under_way_.end() || found->second.answer) return;
+  UnderWay& ping = found->second;
+  Measurement measured;
+  measured.round_trip_ns = steady_ns - ping.steady_ns;
+  // The hub's time may be anything: unsigned arithmetic wraps where signed would be undefined.
+  const auto middle = static_cast<std::uint64_t>(ping.wall_ns + measured.round_trip_ns / 2);
+  measured.offset_ns = static_cast<std::int64_t>(static_cast<std::uint64_t>(pong.now_ns) - middle);
+  ping.answer = measured;
+  kept_[measured_ % kKept] = measured;
+  ++measured_;
+  changed_.notify_all();
+}
+
+void HubClock::clear() {
+  const MutexLock lock(mutex_);
+  under_way_.clear();
+  measured_ = 0;
+  changed_.notify_all();
+}
+
+std::optional<HubClock::Measurement> HubClock::wait_for(std::uint32_t sequence, Deadline deadline) {
+  const MutexLock lock(mutex_);
+  for (;;) {
+    const auto found = under_way_.find(sequence);
+    if (found == under_way_.end()) return std::nullopt;
+    if (found->second.answer) return found->second.answer;
+    if (deadline != kNever && steady_now_ns() >= deadline) return std::nullopt;
+    static_cast<void>(changed_.wait_until(mutex_, deadline));
+  }
+}
+
+std::optional<HubClock::Measurement> HubClock::best() {
+  const MutexLock lock(mutex_);
+  if (measured_ == 0) return std::nullopt;
+  const auto end = kept_.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(measured_, kKept));
+  const auto shortest = std::min_element(
+      kept_.begin(), end, [](const auto& a, const auto& b) { return a.round_trip_ns < b.round_trip_ns; });
+  return Measurement{kept_[(measured_ - 1) % kKept].round_trip_ns, shortest->offset_ns};
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,302 @@
+#include "client/nif/inbound.hpp"
+
+#include <cstring>
+#include <memory>
+#include <utility>
+
+namespace gimnet::nif {
+namespace {
+
+/// The largest frame that this end takes, with its header: what space() always has room for.
+constexpr std::size_t kFrameSizeMax = proto::kHeaderSize + proto::kFrameLengthDefault;
+
+}  // namespace
+
+Record* make_event(nif_incoming_type type, std::string text) {
+  auto record = std::make_unique<Record>();
+  record->incoming.type = type;
+  record->text = std::move(text);
+  record->finish();
+  return record.release();
+}
+
+Item item_of(Record* record, std::size_t bytes) { return {record, nullptr, 0, bytes + sizeof(Record)}; }
+
+Inbound::~Inbound() {
+  for (const Item& item : batch_) item.storage->release();
+  if (slab_ != nullptr) slab_->release();
+}
+
+Inbound::Verdict Inbound::malformed(std::string why) {
+  fault_ = std::move(why);
+  return Verdict::malformed;
+}
+
+void Inbound::begin(const Session& session) {
+  filled_ = parsed_ = 0;
+  if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
+  id_ = session.id;
+  confirm_bytes_ = session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
+  unconfirmed_bytes_ = 0;
+  if (session.resumed) return;
+  taken_ = 0;
+  const MessageAssembler::Lost lost = assembler_.clear();
+  counts_.messages_lost += lost.messages;
+  if (lost.messages > 0) add_gap(0, lost.messages, proto::DropReason::link_lost);
+  for (const auto& notice : lost.notices) host_.send_taken(notice.to, notice.taken);
+  deliver();
+}
+
+std::span<std::byte> Inbound::space() {
+  if (slab_ != nullptr && parsed_ == filled_ && slab_->is_only_reference()) filled_ = parsed_ = 0;
+  if (slab_ == nullptr || Slab::kBytes - parsed_ < kFrameSizeMax || filled_ == Slab::kBytes) {
+    Slab* fresh = Slab::make();
+    if (fresh == nullptr) return {};
+    const std::size_t rest = filled_ - parsed_;
+    if (slab_ != nullptr) {
+      std::memcpy(fresh->bytes(), slab_->bytes() + parsed_, rest);
+      slab_->release();
+    }
+    slab_ = fresh;
+    parsed_ = 0;
+    filled_ = rest;
+  }
+  return {slab_->bytes() + filled_, Slab::kBytes - filled_};
+}
+
+Inbound::Verdict Inbound::take(std::size_t bytes, std::int64_t arrival_ns) {
+  filled_ += bytes;
+  arrival_ns_ = arrival_ns;
+  Verdict verdict = Verdict::going;
+  while (verdict == Verdict::going) {
+    const auto next = proto::next_run(slab_->bytes() + parsed_, slab_->bytes() + filled_, proto::kFrameLengthDefault);
+    if (next.found == proto::Found::need_more) break;
+    if (next.found == proto::Found::too_long) {
+      verdict = malformed(proto::frame_error_text(proto::FrameError::too_long));
+      break;
+    }
+    parsed_ += next.run.size;
+    verdict = take_run(next.run);
+  }
+  deliver();
+  return verdict;
+}
+
+void Inbound::deliver() {
+  host_.deliver(batch_);
+  batch_.clear();
+}
+
+Inbound::Verdict Inbound::take_run(const proto::RunView& run) {
+  const std::byte* at = run.bytes;
+  for (std::uint32_t i = 0; i < run.frames; ++i) {
+    const std::size_t left = run.size - static_cast<std::size_t>(at - run.bytes);
+    const auto view = proto::parse_frame({at, left}, proto::Origin::hub);
+    if (!view) return malformed(proto::frame_error_text(view.error()));
+    if (const Verdict verdict = take_frame(*view, at); verdict != Verdict::going) return verdict;
+    at += view->header.frame_size();
+  }
+  return Verdict::going;
+}
+
+Inbound::Verdict Inbound::take_frame(const proto::FrameView& view, const std::byte* frame) {
+  switch (view.header.kind) {
+    case proto::Kind::flow:
+      return take_flow(view);
+    case proto::Kind::link:
+      return take_link(view);
+    case proto::Kind::ns:
+    case proto::Kind::ctrl:
+      return take_names(view);
+    case proto::Kind::route:
+      return malformed("ROUTE is for hubs only");
+    default:
+      return take_data(view, frame);
+  }
+}
+
+Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byte* frame) {
+  ++counts_.frames;
+  if (view.header.kind == proto::Kind::report) return take_report(view);  // the hub's own, not counted for resume
+  ++taken_;
+  unconfirmed_bytes_ += view.header.frame_size();
+  switch (view.header.kind) {
+    case proto::Kind::unicast:
+#if !defined(GIMNET_BUG_NIF_TAKES_ALL_UNICAST)
+      // Never to another node than the one addressed, whatever the hub thinks.
+      if (view.header.dst != id_) break;
+#endif
+      return take_message(view, frame);
+    case proto::Kind::group:
+    case proto::Kind::list:
+    case proto::Kind::broadcast:
+    case proto::Kind::service:
+      return take_message(view, frame);
+    case proto::Kind::taken: {
+      const auto taken = proto::decode_taken(view.payload);
+      if (!taken) return malformed("TAKEN is too short");
+      if (view.header.dst != id_) break;
+      host_.on_taken(view.header.src, *taken);
+      return Verdict::going;
+    }
+    default:
+      break;
+  }
+  ++counts_.ignored;
+  return Verdict::going;
+}
+
+Inbound::Verdict Inbound::take_message(const proto::FrameView& view, const std::byte* frame) {
+  if (view.fragment) return take_fragment(view, frame);
+  if (const std::uint32_t lost = assembler_.interrupt(view.header); lost > 0) {
+    counts_.messages_lost += lost;
+    add_gap(view.header.src, lost, proto::DropReason::cut_message);
+  }
+  add_frame(view, frame);
+  return Verdict::going;
+}
+
+Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std::byte* frame) {
+  MessageAssembler::Step step = assembler_.take(view);
+  proto::Reassembled& reassembled = step.reassembled;
+  if (step.notice) host_.send_taken(step.notice->to, step.notice->taken);
+  if (reassembled.lost_messages > 0) {
+    counts_.messages_lost += reassembled.lost_messages;
+    const bool too_large = reassembled.state == proto::Reassembled::State::too_large;
+    add_gap(view.header.src, reassembled.lost_messages,
+            too_large ? proto::DropReason::too_large : proto::DropReason::cut_message);
+  }
+  if (reassembled.state != proto::Reassembled::State::whole) return Verdict::going;
+  if (reassembled.storage.empty()) {
+    add_frame(view, frame);  // it came in one piece
+    return Verdict::going;
+  }
+  auto record = std::make_unique<Record>();
+  record->incoming = incoming_of({nullptr, frame, arrival_ns_, 0});
+  record->payload = std::move(reassembled.storage);
+  record->extensions.assign(view.extensions.begin(), view.extensions.end());
+  record->finish();
+  ++counts_.messages;
+  const std::size_t bytes = record->payload.size();
+  add_record(record.release(), bytes);
+  return Verdict::going;
+}
+
+void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
+  batch_.push_back({slab_, frame, arrival_ns_, view.header.frame_size()});
+  slab_->add_reference();
+  ++counts_.messages;
+}
+
+void Inbound::add_record(Record* record, std::size_t bytes) {
+  record->incoming.arrival_ns = arrival_ns_;
+  batch_.push_back(item_of(record, bytes));
+}
+
+void Inbound::add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason) {
+  ++counts_.gaps;
+  Record* record = make_event(NIF_GAP, proto::drop_reason_name(reason));
+  record->incoming.from = from;
+  record->incoming.count = count;
+  record->incoming.reason = static_cast<std::uint32_t>(reason);
+  add_record(record, 0);
+}
+
+Inbound::Verdict Inbound::take_flow(const proto::FrameView& view) {
+  const auto message = proto::flow::decode(view.payload);
+  if (!message) return malformed("FLOW is too short or has an unknown operation");
+  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) {
+    const bool unknown = skip->count == proto::flow::kSkipUnknown;
+    if (!unknown && skip->count > UINT64_MAX - 1 - taken_) return malformed("SKIP has an impossible count");
+    if (!unknown) taken_ += skip->count;
+    add_gap(0, unknown ? NIF_COUNT_UNKNOWN : skip->count, skip->reason);
+    return Verdict::going;
+  }
+  return host_.on_flow(*message) ? Verdict::going : malformed("CONFIRM names more frames than were sent");
+}
+
+Inbound::Verdict Inbound::take_link(const proto::FrameView& view) {
+  auto goodbye = proto::decode<proto::Goodbye>(view.payload);
+  if (!goodbye) return malformed("LINK after WELCOME is not GOODBYE: " + goodbye.error().sentence);
+  goodbye_ = std::move(*goodbye);
+  return Verdict::goodbye;
+}
+
+Inbound::Verdict Inbound::take_names(const proto::FrameView& view) {
+  const auto control = proto::split_control(view.payload);
+  if (!control) return malformed("NS or CTRL without an operation");
+  if (control->header.is_answer()) {
+    host_.on_answer(view.header.kind, *control);
+    return Verdict::going;
+  }
+  if (view.header.kind == proto::Kind::ns) return take_event(*control, view.payload);
+  ++counts_.ignored;
+  return Verdict::going;
+}
+
+void Inbound::add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change) {
+  Record* record = make_event(type, "");
+  record->incoming.group = change.group.value();
+  record->incoming.from = change.node.value();
+  record->incoming.count = change.subscribers;
+  add_record(record, 0);
+}
+
+Inbound::Verdict Inbound::take_event(const proto::ControlView& event, std::span<const std::byte> payload) {
+  switch (static_cast<proto::ns::Operation>(event.header.operation)) {
+    case proto::ns::Operation::service_moved: {
+      const auto moved = proto::decode<proto::ns::ServiceMoved>(payload);
+      if (!moved) return malformed(moved.error().sentence);
+      host_.on_service_moved(*moved);
+      Record* record = make_event(NIF_SERVICE_MOVED, moved->name);
+      record->incoming.former_group = moved->old_group.value();
+      record->incoming.group = moved->new_group.value();
+      record->incoming.message_type = moved->message_type;
+      record->incoming.instance = moved->instance;
+      record->incoming.delivery = static_cast<std::uint32_t>(moved->delivery);
+      add_record(record, moved->name.size());
+      return Verdict::going;
+    }
+    case proto::ns::Operation::subscriber_joined: {
+      const auto joined = proto::decode<proto::ns::SubscriberJoined>(payload);
+      if (!joined) return malformed(joined.error().sentence);
+      add_subscriber(NIF_SUBSCRIBER_JOINED, *joined);
+      return Verdict::going;
+    }
+    case proto::ns::Operation::subscriber_left: {
+      const auto left = proto::decode<proto::ns::SubscriberLeft>(payload);
+      if (!left) return malformed(left.error().sentence);
+      add_subscriber(NIF_SUBSCRIBER_LEFT, *left);
+      return Verdict::going;
+    }
+    default:
+      ++counts_.ignored;
+      return Verdict::going;
+  }
+}
+
+Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
+  const auto report = proto::decode_report(view.payload);
+  if (!report) return malformed("REPORT is too short");
+  if (host_.on_report(*report)) return Verdict::going;
+  Record* record = make_event(NIF_REPORT, proto::drop_reason_name(report->reason));
+  nif_incoming& in = record->incoming;
+  in.from = view.header.src;
+  in.reason = static_cast<std::uint32_t>(report->reason);
+  in.count = report->count;
+  in.to = report->header.dst;
+  in.kind = static_cast<std::uint8_t>(report->header.kind);
+  in.lane = report->header.lane & proto::kLaneMask;
+  in.policy = static_cast<std::uint8_t>(report->header.policy());
+  const bool plain = !report->header.has(proto::kFlagExt | proto::kFlagFragment);
+  if (plain && report->header.has(proto::kFlagKeyed) && report->following.size() >= sizeof(std::uint64_t)) {
+    in.key = load_le<std::uint64_t>(report->following.data());
+    in.flags = NIF_FLAG_KEYED;
+  }
+  const std::size_t size = std::min(view.payload.size(), proto::kReportSizeMax);
+  if (record->payload.append(view.payload.subspan(8).first(size - 8))) record->finish();
+  add_record(record, size);
+  return Verdict::going;
+}
+
+}  // namespace gimnet::nif

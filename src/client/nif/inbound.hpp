@@ -1,0 +1,121 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/nif/message_assembler.hpp"
+#include "client/nif/session.hpp"
+#include "client/nif/storage.hpp"
+#include "proto/control/control_message.hpp"
+#include "proto/control/link.hpp"
+#include "proto/control/ns.hpp"
+#include "proto/frame/flow.hpp"
+#include "proto/frame/frame_parser.hpp"
+#include "proto/frame/report.hpp"
+#include "proto/frame/taken.hpp"
+
+namespace gimnet::nif {
+
+/// What the receiving half asks of the rest of the node. Called on the library's thread, with no lock held.
+class InboundHost {
+ public:
+  /// PING, PONG, PAUSE, RESUME, CONFIRM. False: it contradicts what was sent, the hub is wrong.
+  [[nodiscard]] virtual bool on_flow(const proto::flow::Message& message) = 0;
+  virtual void on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
+  virtual void on_service_moved(const proto::ns::ServiceMoved& event) = 0;
+  virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
+  /// True: the program did not ask for this report.
+  virtual bool on_report(const proto::Report& report) = 0;
+  virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
+  /// What was received, in order; takes over the references.
+  virtual void deliver(std::span<const Item> items) = 0;
+
+ protected:
+  ~InboundHost() = default;
+};
+
+/// The receiving half of a node: bytes of the hub in, messages and events out. The hub is not trusted: whatever it
+/// sends either is taken or ends the connection with a sentence. Thread safety: the library's thread; no sockets, no
+/// clocks. Memory: the read buffer, and unfinished messages within the reassembly limits.
+class Inbound {
+ public:
+  enum class Verdict : std::uint8_t {
+    going,
+    goodbye,    ///< the hub said GOODBYE: goodbye()
+    malformed,  ///< fault() says what
+  };
+
+  Inbound(const proto::ReassemblyLimits& limits, InboundHost& host) : host_(host), assembler_(limits) {}
+  ~Inbound();
+  Inbound(const Inbound&) = delete;
+  Inbound& operator=(const Inbound&) = delete;
+
+  /// A new connection; what its handshake left over is to be given to take() next.
+  void begin(const Session& session);
+
+  /// Where the next bytes go, at least one frame's worth. Empty: no memory. Valid until: take().
+  [[nodiscard]] std::span<std::byte> space();
+  /// `bytes` were written to space().
+  [[nodiscard]] Verdict take(std::size_t bytes, std::int64_t arrival_ns);
+
+  /// Data frames of this epoch taken so far.
+  [[nodiscard]] std::uint64_t taken() const { return taken_; }
+  /// A quarter of the hub's resume buffer was taken since confirmed().
+  [[nodiscard]] bool confirm_due() const { return unconfirmed_bytes_ >= confirm_bytes_; }
+  void confirmed() { unconfirmed_bytes_ = 0; }
+
+  [[nodiscard]] const proto::Goodbye& goodbye() const { return goodbye_; }
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+
+  struct Counts {
+    std::uint64_t frames = 0;
+    std::uint64_t messages = 0;
+    std::uint64_t messages_lost = 0;
+    std::uint64_t gaps = 0;
+    std::uint64_t ignored = 0;
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+
+ private:
+  [[nodiscard]] Verdict malformed(std::string why);
+  [[nodiscard]] Verdict take_run(const proto::RunView& run);
+  [[nodiscard]] Verdict take_frame(const proto::FrameView& view, const std::byte* frame);
+  [[nodiscard]] Verdict take_data(const proto::FrameView& view, const std::byte* frame);
+  [[nodiscard]] Verdict take_message(const proto::FrameView& view, const std::byte* frame);
+  [[nodiscard]] Verdict take_fragment(const proto::FrameView& view, const std::byte* frame);
+  [[nodiscard]] Verdict take_flow(const proto::FrameView& view);
+  [[nodiscard]] Verdict take_link(const proto::FrameView& view);
+  [[nodiscard]] Verdict take_names(const proto::FrameView& view);
+  [[nodiscard]] Verdict take_event(const proto::ControlView& event, std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_report(const proto::FrameView& view);
+  void add_frame(const proto::FrameView& view, const std::byte* frame);
+  void add_record(Record* record, std::size_t bytes);
+  void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
+  void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
+  void deliver();
+
+  InboundHost& host_;
+  MessageAssembler assembler_;
+  Slab* slab_ = nullptr;
+  std::size_t filled_ = 0;
+  std::size_t parsed_ = 0;
+  std::uint32_t id_ = 0;
+  std::uint64_t taken_ = 0;
+  std::uint64_t unconfirmed_bytes_ = 0;
+  std::uint64_t confirm_bytes_ = UINT64_MAX;
+  std::int64_t arrival_ns_ = 0;
+  std::vector<Item> batch_;
+  proto::Goodbye goodbye_;
+  std::string fault_;
+  Counts counts_;
+};
+
+/// A record that only says something happened. `text` is copied.
+[[nodiscard]] Record* make_event(nif_incoming_type type, std::string text);
+[[nodiscard]] Item item_of(Record* record, std::size_t bytes);
+
+}  // namespace gimnet::nif

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "proto/frame/frame_parser.hpp"
+#include "proto/frame/reassembler.hpp"
+#include "proto/frame/taken.hpp"
+#include "proto/frame/window.hpp"
+
+namespace gimnet::nif {
+
+/// Fragments in, whole messages and TAKENs out: proto's Reassembler with a receive window for each large UNICAST
+/// message. Thread safety: one thread. Memory: within the limits, whatever a peer claims.
+class MessageAssembler {
+ public:
+  explicit MessageAssembler(const proto::ReassemblyLimits& limits) : limits_(limits), reassembler_(limits) {}
+
+  /// What the sender of a message is to be told.
+  struct Notice {
+    std::uint32_t to = 0;
+    proto::Taken taken;
+  };
+  struct Step {
+    proto::Reassembled reassembled;
+    std::optional<Notice> notice;
+  };
+  /// REQUIRES: view.fragment.
+  [[nodiscard]] Step take(const proto::FrameView& view);
+
+  /// A frame without fragment header came in that stream. Returns messages lost by it.
+  [[nodiscard]] std::uint32_t interrupt(const proto::FrameHeader& header) {
+    if (reassembler_.open_messages() == 0) return 0;
+    return reassembler_.interrupt(proto::FragmentStream::of(header));
+  }
+
+  /// Everything unfinished is lost: how many messages, and whom to tell that it is in vain to go on.
+  struct Lost {
+    std::uint32_t messages = 0;
+    std::vector<Notice> notices;
+  };
+  [[nodiscard]] Lost clear();
+
+ private:
+  struct OpenMessage {
+    std::uint32_t window = proto::kWindowDefault;
+    proto::ReceiveWindow progress;
+  };
+  [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view, std::uint32_t taken);
+
+  const proto::ReassemblyLimits limits_;
+  proto::Reassembler reassembler_;
+  std::unordered_map<std::uint64_t, OpenMessage> windows_;  ///< by sender and message number
+};
+
+}  // namespace gimnet::nif

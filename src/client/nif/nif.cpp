@@ -1,0 +1,143 @@
+#include "gimnet/nif.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "client/nif/api.hpp"
+#include "client/nif/outgoing.hpp"
+
+// The C API but for names and services.
+
+using gimnet::nif::Deadline;
+using gimnet::nif::deadline_after;
+using gimnet::nif::fail;
+using gimnet::nif::find_node;
+using gimnet::nif::guarded;
+using gimnet::nif::Node;
+using gimnet::nif::NodeRef;
+using gimnet::nif::with_node;
+using gimnet::nif::with_waiting_node;
+
+extern "C" {
+
+nif_status nif_connect(const nif_options* options, nif_node** node) {
+  return guarded([&]() -> nif_status {
+    if (node == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot connect: node is NULL");
+    *node = nullptr;
+    auto checked = gimnet::nif::read_options(options);
+    if (!checked) return fail(checked.error());
+    auto connected = Node::connect(std::move(*checked));
+    if (!connected) return fail(connected.error());
+    *node = gimnet::nif::add_node(*connected);
+    if (*node != nullptr) return NIF_OK;
+    (*connected)->begin_close();
+    (*connected)->close();
+    return fail(NIF_LIMIT, "cannot connect: this process has 4,096 open handles");
+  });
+}
+
+nif_status nif_close(nif_node* node) {
+  return guarded([&] { return gimnet::nif::close_node(node); });
+}
+
+nif_status nif_get_info(nif_node* node, nif_info* info) {
+  return with_node(node, [&](Node& found) -> nif_status {
+    if (info == nullptr || info->struct_size < sizeof(std::size_t)) return fail(NIF_BAD_ARGUMENT, "info has no size");
+    found.fill_info(*info);
+    return NIF_OK;
+  });
+}
+
+uint32_t nif_id(nif_node* node) {
+  const NodeRef found = find_node(node);
+  return found ? found->id() : 0;
+}
+
+size_t nif_last_error(nif_node* node, char* buffer, size_t size) {
+  size_t length = 0;
+  if (buffer != nullptr && size > 0) *buffer = '\0';
+  const nif_status status = with_node(node, [&](Node& found) -> nif_status {
+    const std::string sentence = found.last_error();
+    length = sentence.size();
+    if (buffer == nullptr || size == 0) return NIF_OK;
+    const std::size_t copied = std::min(length, size - 1);
+    std::memcpy(buffer, sentence.data(), copied);
+    buffer[copied] = '\0';
+    return NIF_OK;
+  });
+  return status == NIF_OK ? length : 0;
+}
+
+nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms) {
+  return with_node(node, [&](Node& found) -> nif_status {
+    if (message == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot send: message is NULL");
+    gimnet::nif::Outgoing outgoing;
+    if (const auto failure = outgoing.read(*message)) return fail(*failure);
+    const bool may_wait = timeout_ms != 0 && !found.in_callback();
+    return found.outbound().send(outgoing, may_wait ? deadline_after(timeout_ms) : 0);
+  });
+}
+
+nif_status nif_send_to(nif_node* node, uint32_t to, const void* data, size_t size) {
+  const nif_bytes part = {data, size};
+  nif_outgoing message = NIF_OUTGOING_INIT;
+  message.to = to;
+  message.parts = &part;
+  message.part_count = 1;
+  return nif_send(node, &message, NIF_FOREVER);
+}
+
+nif_status nif_flush(nif_node* node) {
+  return with_node(node, [](Node& found) { return found.outbound().flush(); });
+}
+
+nif_status nif_drain(nif_node* node, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) { return found.outbound().drain(deadline_after(timeout_ms)); });
+}
+
+nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms) {
+  size_t count = 0;
+  return nif_receive_many(node, in, 1, &count, timeout_ms);
+}
+
+nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, size_t* count, int32_t timeout_ms) {
+  return with_node(node, [&](Node& found) -> nif_status {
+    if (in == nullptr || count == nullptr || capacity == 0) {
+      return fail(NIF_BAD_ARGUMENT, "cannot receive: no place to receive into");
+    }
+    *count = 0;
+    if (found.options().callback != nullptr) {
+      return fail(NIF_BAD_ARGUMENT, "cannot receive: everything is given to the callback");
+    }
+    return found.received().pop({in, capacity}, *count, deadline_after(timeout_ms));
+  });
+}
+
+int nif_event_fd(nif_node* node) {
+  int descriptor = -1;
+  static_cast<void>(with_node(node, [&](Node& found) -> nif_status {
+    descriptor = found.received().event_descriptor();
+    return NIF_OK;
+  }));
+  return descriptor;
+}
+
+nif_status nif_deliver(nif_node* node) {
+  return with_node(node, [](Node& found) -> nif_status {
+    found.deliver_again();
+    return NIF_OK;
+  });
+}
+
+nif_status nif_get_counters(nif_node* node, nif_counters* counters) {
+  return with_node(node, [&](Node& found) -> nif_status {
+    if (counters == nullptr || counters->struct_size < sizeof(std::size_t)) {
+      return fail(NIF_BAD_ARGUMENT, "counters has no size");
+    }
+    found.fill_counters(*counters);
+    return NIF_OK;
+  });
+}
+
+}  // extern "C"

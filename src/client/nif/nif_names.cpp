@@ -1,0 +1,269 @@
+#include "gimnet/nif_names.h"
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/id_text.hpp"
+#include "client/nif/answer_status.hpp"
+#include "client/nif/api.hpp"
+#include "client/nif/record_list.hpp"
+#include "proto/control/names.hpp"
+#include "proto/control/ns.hpp"
+
+// Names, services and raw requests of the C API.
+
+namespace ns = gimnet::proto::ns;
+namespace proto = gimnet::proto;
+using gimnet::GroupId;
+using gimnet::NodeId;
+using gimnet::steady_now_ns;
+using gimnet::nif::Deadline;
+using gimnet::nif::deadline_after;
+using gimnet::nif::fail;
+using gimnet::nif::Failure;
+using gimnet::nif::Node;
+using gimnet::nif::with_waiting_node;
+
+namespace {
+
+nif_status refused(const char* what, const std::string& about, const proto::Refusal& refusal) {
+  const std::string why = refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
+  return fail(gimnet::nif::status_of(refusal.status), std::string("cannot ") + what + " '" + about + "': " + why);
+}
+
+/// Asks, and reads the answer. `what` and `about` are for the sentence.
+template <class Answer, class Request>
+nif_status ask(Node& node, const Request& request, Answer& answer, const char* what, const std::string& about,
+               Deadline deadline) {
+  proto::Payload payload;
+  const nif_status status = node.requests().ask(proto::Kind::ns, proto::encode(request), payload, deadline);
+  if (status != NIF_OK) return status;
+  auto decoded = proto::decode_answer<Answer>(payload);
+  if (!decoded) return refused(what, about, decoded.error());
+  answer = std::move(*decoded);
+  return NIF_OK;
+}
+
+nif_status check_name(const char* name, const char* what) {
+  if (name == nullptr) return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
+  const char* fault = proto::name_fault(name);
+  if (fault == nullptr) return NIF_OK;
+  return fail(NIF_BAD_NAME, std::string("cannot ") + what + " '" + name + "': " + fault);
+}
+
+nif_status check_pattern(const char* pattern) {
+  if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
+  return fail(NIF_BAD_NAME, std::string("cannot list '") + pattern + "': it is not a pattern");
+}
+
+nif_status impossible_answer() { return fail(NIF_PROTOCOL, "the hub's answer is not in ascending order"); }
+
+/// All pages of a listing. `id_of` reads a record's id.
+template <class Request, class Answer, class Record, class IdOf>
+nif_status list_pages(Node& node, Request request, std::vector<Record> Answer::* page, IdOf id_of,
+                      std::vector<Record>& records, Deadline deadline) {
+  for (;;) {
+    Answer answer;
+    const nif_status status = ask(node, request, answer, "list", request.pattern, deadline);
+    if (status != NIF_OK) return status;
+    for (Record& record : answer.*page) {
+      // Ascending, or a hub could page for ever.
+      if (!(request.after < id_of(record))) return impossible_answer();
+      request.after = id_of(record);
+      records.push_back(std::move(record));
+    }
+    if (!answer.more) return NIF_OK;
+    if ((answer.*page).empty()) return impossible_answer();
+  }
+}
+
+struct OwnedReply : nif_reply {
+  proto::Payload payload;
+  std::string text;
+};
+
+}  // namespace
+
+extern "C" {
+
+nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (id == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot resolve: id is NULL");
+    if (const nif_status status = check_name(name, "resolve"); status != NIF_OK) return status;
+    if (const auto known = found.names().id_of(name, steady_now_ns())) {
+      *id = *known;
+      return NIF_OK;
+    }
+    ns::ResolveAnswer answer;
+    const nif_status status = ask(found, ns::Resolve{name}, answer, "resolve", name, deadline_after(timeout_ms));
+    if (status != NIF_OK) return status;
+    *id = answer.node.value();
+    found.names().remember(name, *id, steady_now_ns());
+    return NIF_OK;
+  });
+}
+
+nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (name == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot look a node up: name is NULL");
+    auto known = found.names().name_of(id, steady_now_ns());
+    if (!known) {
+      ns::ReverseAnswer answer;
+      const nif_status status = ask(found, ns::Reverse{NodeId{id}}, answer, "look up the node",
+                                    gimnet::to_string(NodeId{id}), deadline_after(timeout_ms));
+      if (status != NIF_OK) return status;
+      if (answer.name.size() > NIF_NAME_BYTES_MAX) return fail(NIF_PROTOCOL, "the hub's answer has too long a name");
+      found.names().remember(answer.name, id, steady_now_ns());
+      known = std::move(answer.name);
+    }
+    std::memcpy(name, known->c_str(), known->size() + 1);
+    return NIF_OK;
+  });
+}
+
+nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
+    *list = nullptr;
+    if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
+    std::vector<ns::NodeRecord> records;
+    ns::List request;
+    request.pattern = pattern != nullptr ? pattern : "";
+    const nif_status status = list_pages(
+        found, request, &ns::ListAnswer::nodes, [](const ns::NodeRecord& record) { return record.node; }, records,
+        deadline_after(timeout_ms));
+    if (status == NIF_OK) *list = gimnet::nif::make_node_list(std::move(records));
+    return status;
+  });
+}
+
+nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
+    *list = nullptr;
+    if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
+    std::vector<ns::ServiceRecord> records;
+    ns::Services request;
+    request.pattern = pattern != nullptr ? pattern : "";
+    const nif_status status = list_pages(
+        found, request, &ns::ServicesAnswer::services, [](const ns::ServiceRecord& record) { return record.group; },
+        records, deadline_after(timeout_ms));
+    if (status == NIF_OK) *list = gimnet::nif::make_service_list(std::move(records));
+    return status;
+  });
+}
+
+nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
+                         int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (service == nullptr || service->struct_size < sizeof(nif_service) || group == nullptr) {
+      return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is missing, or struct_size is wrong");
+    }
+    if (service->direction > NIF_ACCEPTS || service->delivery > NIF_LATEST_DELIVERY) {
+      return fail(NIF_BAD_ARGUMENT, "cannot advertise: direction or delivery is not one of its enumeration");
+    }
+    if (const nif_status status = check_name(service->name, "advertise"); status != NIF_OK) return status;
+    ns::Advertise request;
+    request.service = service->name;
+    request.message_type = service->message_type;
+    request.instance = service->instance;
+    request.direction = static_cast<ns::Direction>(service->direction);
+    request.delivery = static_cast<ns::Delivery>(service->delivery);
+    request.metadata = service->metadata != nullptr ? service->metadata : "";
+    if (!proto::valid_service_name(request.service)) {
+      return fail(NIF_BAD_NAME, "cannot advertise '" + request.service + "': a service's name has one part");
+    }
+    ns::AdvertiseAnswer answer;
+    const nif_status status = ask(found, request, answer, "advertise", request.service, deadline_after(timeout_ms));
+    if (status != NIF_OK) return status;
+    found.declarations().add_service(request, answer.group);
+    *group = answer.group.value();
+    if (subscribers != nullptr) *subscribers = answer.subscribers;
+    return NIF_OK;
+  });
+}
+
+nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    ns::WithdrawAnswer answer;
+    const nif_status status = ask(found, ns::Withdraw{GroupId{group}}, answer, "withdraw the service",
+                                  gimnet::to_string(GroupId{group}), deadline_after(timeout_ms));
+    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_service(GroupId{group});
+    return status;
+  });
+}
+
+nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK) return status;
+    ns::SubscribeAnswer answer;
+    const nif_status status =
+        ask(found, ns::Subscribe{full_name}, answer, "subscribe", full_name, deadline_after(timeout_ms));
+    if (status != NIF_OK) return status;
+    found.declarations().add_subscription(full_name, answer.group);
+    if (subscription != nullptr) {
+      *subscription = {answer.group.value(), answer.message_type, answer.instance,
+                       static_cast<std::uint32_t>(answer.delivery)};
+    }
+    return NIF_OK;
+  });
+}
+
+nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (const nif_status status = check_name(full_name, "unsubscribe"); status != NIF_OK) return status;
+    ns::UnsubscribeAnswer answer;
+    const nif_status status =
+        ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline_after(timeout_ms));
+    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_subscription(full_name);
+    return status;
+  });
+}
+
+nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content, size_t size,
+                       nif_reply** reply, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (reply == nullptr || (content == nullptr && size > 0)) {
+      return fail(NIF_BAD_ARGUMENT, "cannot ask: reply or content is NULL");
+    }
+    *reply = nullptr;
+    constexpr std::size_t kContentMax = 16 * 1024;
+    if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit || size > kContentMax) {
+      return fail(NIF_BAD_ARGUMENT, "cannot ask: kind, operation or size is out of range");
+    }
+    proto::Payload request(proto::kControlHeaderSize + size);
+    gimnet::store_le(request.data(), operation);
+    if (size > 0) std::memcpy(request.data() + proto::kControlHeaderSize, content, size);
+    auto owned = std::make_unique<OwnedReply>();
+    const nif_status status =
+        found.requests().ask(static_cast<proto::Kind>(kind), request, owned->payload, deadline_after(timeout_ms));
+    if (status != NIF_OK) return status;
+    const auto body = std::span<const std::byte>(owned->payload).subspan(proto::kControlHeaderSize);
+    const proto::Refusal refusal = proto::read_status(body);
+    owned->status = static_cast<std::uint16_t>(refusal.status);
+    owned->text = refusal.sentence;
+    owned->sentence = owned->text.c_str();
+    owned->content = body.data();
+    owned->size = body.size();
+    *reply = owned.release();
+    return NIF_OK;
+  });
+}
+
+void nif_free_reply(nif_reply* reply) { delete static_cast<OwnedReply*>(reply); }
+
+nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    gimnet::nif::HubClock::Measurement measured;
+    const nif_status status = found.ping_hub(measured, deadline_after(timeout_ms));
+    if (status != NIF_OK) return status;
+    if (round_trip_ns != nullptr) *round_trip_ns = measured.round_trip_ns;
+    if (clock_offset_ns != nullptr) *clock_offset_ns = measured.offset_ns;
+    return NIF_OK;
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,261 @@
+#include "client/nif/node.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "client/nif/handshake.hpp"
+#include "proto/frame/frame_builder.hpp"
+
+// A node as the program's threads see it, and what the receiving half asks of it; its thread is in node_thread.cpp.
+
+namespace gimnet::nif {
+namespace {
+
+/// Between two tries of nif_connect() with wait_for_hub.
+Deadline try_again_at(Backoff& backoff, Deadline deadline) {
+  return std::min(deadline, steady_now_ns() + backoff.next_ns(random_bits()));
+}
+
+void copy_text(char* to, std::size_t size, const std::string& text) {
+  const std::size_t length = std::min(text.size(), size - 1);
+  std::memcpy(to, text.data(), length);
+  to[length] = '\0';
+}
+
+/// Worth another try while the hub may still be starting.
+bool may_come(nif_status status) { return status == NIF_NO_HUB || status == NIF_HUB_FULL || status == NIF_REFUSED; }
+
+}  // namespace
+
+Node::Node(Options options)
+    : options_(std::move(options)),
+      outbound_(options_.send, wake_),
+      received_(options_.receive_queue_bytes, wake_),
+      requests_(outbound_),
+      declarations_(requests_, outbound_),
+      inbound_(options_.reassembly, *this),
+      epoch_(random_bits() | 1) {}
+
+Node::~Node() = default;
+
+proto::Hello Node::hello() const {
+  proto::Hello hello;
+  hello.name = options_.name;
+  hello.description = options_.description;
+  hello.token = session_.token;
+  hello.epoch = epoch_;
+  hello.resume = options_.resume;
+  hello.resume_epoch = session_.resume ? session_.hub_epoch : 0;
+  hello.resume_taken = session_.resume ? inbound_.taken() : 0;
+  hello.shard = options_.shard;
+  hello.resume_buffer_bytes =
+      static_cast<std::uint32_t>(std::min<std::size_t>(options_.send.retained_bytes, UINT32_MAX));
+  return hello;
+}
+
+Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
+  std::unique_ptr<Node> node(new Node(std::move(options)));
+  if (!node->wake_.valid() || !node->stop_.valid()) {
+    return Failure{NIF_NO_MEMORY, "cannot connect: this process has no descriptors left"};
+  }
+  const Deadline deadline = deadline_after(node->options_.connect_timeout_ms);
+  Backoff backoff;
+  for (;;) {
+    auto admitted = admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline, node->stop_);
+    if (admitted) {
+      if (!node->take_over(std::move(*admitted), true)) {
+        return Failure{NIF_PROTOCOL, "the hub resumes a connection that never was"};
+      }
+      break;
+    }
+    const bool again = node->options_.wait_for_hub && may_come(admitted.error().status);
+    if (!again || steady_now_ns() >= deadline) return admitted.error();
+    static_cast<void>(wait_for(Socket(), false, false, node->stop_, try_again_at(backoff, deadline)));
+  }
+  try {
+    const SignalsBlocked blocked;
+    node->thread_ = std::thread([raw = node.get()] { raw->run(); });
+  } catch (const std::system_error&) {
+    return Failure{NIF_NO_MEMORY, "cannot connect: the system has no thread left"};
+  }
+  return node;
+}
+
+bool Node::take_over(Admitted admitted, bool first) {
+  socket_ = std::move(admitted.socket);
+  const bool same_id = admitted.session.id == session_.id;
+  session_ = std::move(admitted.session);
+  if (!first) outbound_.set_declaring(true);  // until declare_again() below knows better
+  const auto let_go = outbound_.attach(socket_, session_);
+  if (!let_go) return false;
+  id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
+  last_heard_ns_ = last_tick_ns_ = steady_now_ns();
+  {
+    const MutexLock lock(mutex_);
+    info_.id = session_.id;
+    info_.hub_id = session_.hub_id;
+    info_.connected = 1;
+    info_.resume = session_.resume ? 1 : 0;
+    info_.reconnects += first ? 0 : 1;
+    info_.frame_bytes_max = session_.frame_bytes_max;
+    copy_text(info_.name, sizeof info_.name, session_.name);
+    copy_text(info_.hub_name, sizeof info_.hub_name, session_.hub_name);
+    if (!session_.earlier_goodbye.empty()) last_error_ = session_.earlier_goodbye;
+  }
+  if (!first) {
+    Record* event = make_event(NIF_CONNECTED, session_.earlier_goodbye);
+    event->incoming.from = session_.id;
+    event->incoming.flags = static_cast<std::uint8_t>((session_.resumed ? NIF_CONNECTED_RESUMED : 0) |
+                                                      (same_id ? NIF_CONNECTED_SAME_ID : 0));
+    push_event(event);
+  }
+  if (*let_go > 0) {
+    Record* gap = make_event(NIF_GAP, proto::drop_reason_name(proto::DropReason::link_lost));
+    gap->incoming.from = session_.id;
+    gap->incoming.count = *let_go;
+    gap->incoming.reason = static_cast<std::uint32_t>(proto::DropReason::link_lost);
+    push_event(gap);
+  }
+  inbound_.begin(session_);
+  confirmed_ = inbound_.taken();
+  const auto space = inbound_.space();
+  if (space.size() < admitted.rest.size()) return false;
+  std::copy(admitted.rest.begin(), admitted.rest.end(), space.begin());
+  if (!first) declarations_.declare_again();
+  const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), wall_now_ns());
+  return verdict == Inbound::Verdict::going;
+}
+
+void Node::push_event(Record* record) {
+  record->incoming.arrival_ns = wall_now_ns();
+  const Item item = item_of(record, record->text.size());
+  received_.push(std::span(&item, 1));
+}
+
+void Node::deliver(std::span<const Item> items) { received_.push(items); }
+
+bool Node::on_flow(const proto::flow::Message& message) {
+  if (const auto* ping = std::get_if<proto::flow::Ping>(&message)) {
+    outbound_.post(proto::flow::Pong{ping->sequence, ping->sent_ns, wall_now_ns()});
+    confirm();
+  } else if (const auto* pong = std::get_if<proto::flow::Pong>(&message)) {
+    clock_.on_pong(*pong, steady_now_ns());
+  } else if (const auto* pause = std::get_if<proto::flow::Pause>(&message)) {
+    outbound_.on_pause(pause->target);
+  } else if (const auto* resume = std::get_if<proto::flow::Resume>(&message)) {
+    outbound_.on_resume(resume->target);
+  } else if (const auto* confirmed = std::get_if<proto::flow::Confirm>(&message)) {
+    return outbound_.on_confirm(confirmed->count);
+  }
+  return true;
+}
+
+void Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
+  static_cast<void>(requests_.on_answer(kind, answer));
+}
+
+void Node::on_service_moved(const proto::ns::ServiceMoved& event) { declarations_.on_service_moved(event); }
+
+void Node::on_taken(std::uint32_t from, const proto::Taken& taken) { outbound_.on_taken(from, taken); }
+
+bool Node::on_report(const proto::Report& report) {
+  if (report.reason == proto::DropReason::no_such_node || report.reason == proto::DropReason::renumbered) {
+    names_.forget(report.header.dst);
+  }
+  return outbound_.on_report(report.header, report.reason);
+}
+
+void Node::send_taken(std::uint32_t to, const proto::Taken& taken) {
+  std::array<std::byte, proto::kTakenSize> payload;
+  proto::encode_taken(taken, payload);
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::taken;
+  parts.header.dst = to;
+  parts.header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
+  std::array<std::byte, proto::kHeaderSize + proto::kTakenSize> frame;
+  static_cast<void>(proto::write_frame(parts, payload, frame));
+  outbound_.post_data(frame, parts.header.lane);
+}
+
+void Node::set_last_error(std::string sentence) {
+  const MutexLock lock(mutex_);
+  last_error_ = std::move(sentence);
+}
+
+std::string Node::last_error() {
+  const MutexLock lock(mutex_);
+  return last_error_;
+}
+
+void Node::fill_info(nif_info& info) {
+  const auto best = clock_.best();
+  const MutexLock lock(mutex_);
+  const std::size_t size = info.struct_size;
+  nif_info whole = info_;
+  whole.struct_size = size;
+  whole.keep_alive_seen = best ? 1 : 0;
+  whole.round_trip_ns = best ? best->round_trip_ns : 0;
+  whole.clock_offset_ns = best ? best->offset_ns : 0;
+  std::memcpy(&info, &whole, std::min(size, sizeof whole));
+}
+
+void Node::fill_counters(nif_counters& counters) {
+  const std::size_t size = counters.struct_size;
+  nif_counters whole{};
+  whole.struct_size = size;
+  outbound_.add_counters(whole);
+  whole.receive_queue_bytes = received_.bytes();
+  whole.read_stops = received_.stops();
+  {
+    const MutexLock lock(mutex_);
+    whole.frames_received = inbound_counts_.frames;
+    whole.messages_received = inbound_counts_.messages;
+    whole.messages_lost = inbound_counts_.messages_lost;
+    whole.gaps = inbound_counts_.gaps;
+    whole.frames_ignored = inbound_counts_.ignored;
+    whole.bytes_received = bytes_received_;
+    whole.read_calls = read_calls_;
+  }
+  std::memcpy(&counters, &whole, std::min(size, sizeof whole));
+}
+
+nif_status Node::ping_hub(HubClock::Measurement& measured, Deadline deadline) {
+  const nif_status status = outbound_.wait_connected(deadline);
+  if (status != NIF_OK) return status;
+  const proto::flow::Ping ping = clock_.ping(steady_now_ns(), wall_now_ns());
+  if (!outbound_.post(ping)) return fail(NIF_NOT_CONNECTED, "the connection broke while the hub was pinged");
+  const auto answer = clock_.wait_for(ping.sequence, deadline);
+  if (answer) {
+    measured = *answer;
+    return NIF_OK;
+  }
+  if (closing_.load()) return fail(NIF_CLOSED, "the handle was closed");
+  if (deadline != kNever && steady_now_ns() >= deadline) return fail(NIF_TIMEOUT, "the hub did not answer in time");
+  return fail(NIF_NOT_CONNECTED, "the connection broke while the hub was pinged");
+}
+
+void Node::deliver_again() {
+  deliver_calls_.fetch_add(1);
+  wake_.raise();
+}
+
+void Node::begin_close() {
+  closing_.store(true);
+  outbound_.end(NIF_CLOSED);
+  received_.close();
+  requests_.close();
+  clock_.clear();
+}
+
+void Node::close() {
+  stop_.raise();
+  wake_.raise();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Node::abandon() { socket_.close(); }
+
+}  // namespace gimnet::nif

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "base/mutex.hpp"
+#include "client/nif/declarations.hpp"
+#include "client/nif/dialer.hpp"
+#include "client/nif/hub_clock.hpp"
+#include "client/nif/inbound.hpp"
+#include "client/nif/name_cache.hpp"
+#include "client/nif/options.hpp"
+#include "client/nif/outbound.hpp"
+#include "client/nif/receive_queue.hpp"
+#include "client/nif/request_table.hpp"
+
+namespace gimnet::nif {
+
+/// One node: a connection to a hub, made again when it breaks, with its library thread.
+/// Thread safety: public functions from any thread. Ownership: of the socket and the thread.
+class Node final : private InboundHost {
+ public:
+  /// Dials, shakes hands, starts the thread. Errors: as nif_connect().
+  [[nodiscard]] static Result<std::unique_ptr<Node>, Failure> connect(Options options);
+  /// REQUIRES: close() was called, and no other thread is inside.
+  ~Node();
+
+  [[nodiscard]] Outbound& outbound() { return outbound_; }
+  [[nodiscard]] ReceiveQueue& received() { return received_; }
+  [[nodiscard]] RequestTable& requests() { return requests_; }
+  [[nodiscard]] Declarations& declarations() { return declarations_; }
+  [[nodiscard]] NameCache& names() { return names_; }
+  [[nodiscard]] const Options& options() const { return options_; }
+
+  [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
+  void fill_info(nif_info& info) GIMNET_EXCLUDES(mutex_);
+  void fill_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::string last_error() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] nif_status ping_hub(HubClock::Measurement& measured, Deadline deadline);
+  /// The callback has room again.
+  void deliver_again();
+  /// The calling thread is this node's library thread.
+  [[nodiscard]] bool in_callback() const;
+
+  /// Makes every waiting call leave with NIF_CLOSED, now and from now on.
+  void begin_close();
+  /// Writes what waits, says GOODBYE, ends the thread. REQUIRES: begin_close() was called.
+  void close();
+  /// In a child after fork(), where the thread is not: closes the descriptor. The rest has to be left alone, since any
+  /// lock may be held by a thread that does not exist.
+  void abandon();
+
+ private:
+  explicit Node(Options options);
+
+  // InboundHost, on the library's thread.
+  [[nodiscard]] bool on_flow(const proto::flow::Message& message) override;
+  void on_answer(proto::Kind kind, const proto::ControlView& answer) override;
+  void on_service_moved(const proto::ns::ServiceMoved& event) override;
+  void on_taken(std::uint32_t from, const proto::Taken& taken) override;
+  bool on_report(const proto::Report& report) override;
+  void send_taken(std::uint32_t to, const proto::Taken& taken) override;
+  void deliver(std::span<const Item> items) override;
+
+  // The library's thread, node_thread.cpp.
+  void run();
+  void turn();
+  void read_some(std::int64_t now);
+  void on_timers(std::int64_t now, bool reading);
+  [[nodiscard]] Deadline next_timer(bool reading, std::int64_t last_write_ns) const;
+  void call_back();
+  void confirm();
+  void redial();
+  void disconnect(std::string why, proto::GoodbyeCode code);
+  void on_goodbye(const proto::Goodbye& goodbye);
+  void end(nif_status status);
+  void leave();
+
+  [[nodiscard]] proto::Hello hello() const;
+  /// False: the hub's counts are impossible.
+  [[nodiscard]] bool take_over(Admitted admitted, bool first);
+  void set_last_error(std::string sentence) GIMNET_EXCLUDES(mutex_);
+  void push_event(Record* record);
+
+  const Options options_;
+  WakeSignal wake_;
+  WakeSignal stop_;
+  Outbound outbound_;
+  ReceiveQueue received_;
+  RequestTable requests_;
+  Declarations declarations_;
+  NameCache names_;
+  HubClock clock_;
+  std::thread thread_;
+
+  std::atomic<std::uint32_t> id_{0};
+  std::atomic<bool> closing_{false};
+  std::atomic<std::uint32_t> deliver_calls_{0};
+
+  Mutex mutex_;
+  nif_info info_ GIMNET_GUARDED_BY(mutex_){};
+  std::string last_error_ GIMNET_GUARDED_BY(mutex_);
+  Inbound::Counts inbound_counts_ GIMNET_GUARDED_BY(mutex_);
+  std::uint64_t bytes_received_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t read_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
+
+  // The library's thread (before it starts: the connecting one).
+  Inbound inbound_;
+  Socket socket_;
+  Session session_;
+  Backoff backoff_;
+  std::uint64_t epoch_ = 0;
+  std::uint64_t confirmed_ = 0;
+  std::int64_t last_heard_ns_ = 0;
+  std::int64_t last_tick_ns_ = 0;
+  bool was_reading_ = true;
+  bool ended_ = false;
+  bool held_ = false;          ///< the callback said NIF_NOT_NOW ...
+  std::uint32_t held_at_ = 0;  ///< ... after so many deliver_again()
+};
+
+}  // namespace gimnet::nif

@@ -1,0 +1,247 @@
+#include <algorithm>
+#include <new>
+#include <span>
+#include <utility>
+
+#include "client/nif/handshake.hpp"
+#include "client/nif/node.hpp"
+
+// The library's thread: reads, keeps alive, writes what senders left to it, calls back, dials again.
+
+namespace gimnet::nif {
+namespace {
+
+/// How long nif_close() goes on writing what waits.
+constexpr std::int64_t kLeaveNs = 1'000'000'000;
+/// How long one try of a reconnect may take.
+constexpr std::int64_t kRedialNs = 5'000'000'000;
+
+thread_local constinit const Node* t_node = nullptr;
+
+}  // namespace
+
+bool Node::in_callback() const { return t_node == this; }
+
+void Node::run() {
+  t_node = this;
+  while (!closing_.load()) {
+    try {
+      if (ended_) {
+        call_back();
+        const Ready ready = wait_for(Socket(), false, false, wake_, kNever);
+        if (ready.woken) wake_.clear();
+      } else if (socket_.open()) {
+        turn();
+      } else {
+        redial();
+      }
+    } catch (const std::bad_alloc&) {
+      // Half a step may be done: only a new epoch is sure to be right.
+      epoch_ = random_bits() | 1;
+      session_.hub_epoch = 0;
+      disconnect("the library ran out of memory", proto::GoodbyeCode::no_memory);
+    }
+  }
+  leave();
+}
+
+Deadline Node::next_timer(bool reading, std::int64_t last_write_ns) const {
+  Deadline next = std::min(last_tick_ns_, last_write_ns) + session_.keep_alive_ns;
+  next = std::max(next, last_tick_ns_ + session_.keep_alive_ns / 4);
+  if (reading) next = std::min(next, last_heard_ns_ + session_.silent_after_ns);
+  return next;
+}
+
+void Node::turn() {
+  const bool reading = received_.has_room();
+  // Nothing was heard because nobody listened: the hub gets its whole time again.
+  if (reading && !was_reading_) last_heard_ns_ = steady_now_ns();
+  was_reading_ = reading;
+  const Outbound::Wants wants = outbound_.wants();
+  if (wants.broken) {
+    disconnect("the connection to the hub broke while writing", proto::GoodbyeCode::done);
+    return;
+  }
+  const Ready ready = wait_for(socket_, reading, wants.writable, wake_, next_timer(reading, wants.last_write_ns));
+  if (ready.woken) wake_.clear();
+  if (ready.woken || ready.writable) outbound_.write_pending(ready.writable);
+  const std::int64_t now = steady_now_ns();
+  if (ready.readable) read_some(now);
+  if (!socket_.open()) return;
+  if (!ready.readable) on_timers(now, reading);
+  if (socket_.open()) {
+    declarations_.go_on();
+    const auto events = declarations_.take_events();
+    received_.push(events);
+  }
+  call_back();
+}
+
+void Node::read_some(std::int64_t now) {
+  const auto space = inbound_.space();
+  if (space.empty()) throw std::bad_alloc();
+  const IoResult result = socket_.read(space);
+  if (result.state == IoResult::State::would_block) return;
+  if (result.state != IoResult::State::done) {
+    disconnect("the hub closed the connection", proto::GoodbyeCode::done);
+    return;
+  }
+  last_heard_ns_ = now;
+  const Inbound::Verdict verdict = inbound_.take(result.bytes, wall_now_ns());
+  {
+    const MutexLock lock(mutex_);
+    bytes_received_ += result.bytes;
+    ++read_calls_;
+    inbound_counts_ = inbound_.counts();
+  }
+  switch (verdict) {
+    case Inbound::Verdict::going:
+      if (inbound_.confirm_due()) confirm();
+      break;
+    case Inbound::Verdict::goodbye:
+      on_goodbye(inbound_.goodbye());
+      break;
+    case Inbound::Verdict::malformed: {
+      const auto goodbye = encode_goodbye(proto::GoodbyeCode::malformed, inbound_.fault());
+      static_cast<void>(outbound_.post(goodbye));
+      disconnect("the hub broke the protocol: " + inbound_.fault(), proto::GoodbyeCode::malformed);
+      break;
+    }
+  }
+  if (socket_.open() && now - last_tick_ns_ >= session_.keep_alive_ns) on_timers(now, true);
+}
+
+void Node::confirm() {
+  if (!session_.resume || inbound_.taken() == confirmed_) return;
+  if (!outbound_.post(proto::flow::Confirm{inbound_.taken()})) return;
+  confirmed_ = inbound_.taken();
+  inbound_.confirmed();
+}
+
+void Node::on_timers(std::int64_t now, bool reading) {
+  if (reading && now - last_heard_ns_ >= session_.silent_after_ns) {
+    disconnect("the hub was silent for too long", proto::GoodbyeCode::silent);
+    return;
+  }
+  if (now - last_tick_ns_ < session_.keep_alive_ns / 4) return;
+  const Outbound::Wants wants = outbound_.wants();
+  const bool due = now - wants.last_write_ns >= session_.keep_alive_ns;
+  if (!due && now - last_tick_ns_ < session_.keep_alive_ns) return;
+  last_tick_ns_ = now;
+  backoff_.reset();  // only now: a hub that admits and closes at once must not be dialed in a tight loop
+  confirm();
+  // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not pile up.
+  if (due && !wants.writable) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
+  static_cast<void>(outbound_.flush());
+}
+
+/// Gives the program what waits, as long as it takes it.
+void Node::call_back() {
+  if (options_.callback == nullptr) return;
+  std::uint32_t calls = deliver_calls_.load();
+  if (held_ && calls == held_at_) return;
+  held_ = false;
+  nif_incoming in;
+  bool busy = false;
+  while (!closing_.load() && received_.peek(in)) {
+    if (!busy) outbound_.set_library_busy(busy = true);
+    calls = deliver_calls_.load();
+    const nif_verdict verdict = options_.callback(options_.user, &in);
+    if (verdict == NIF_NOT_NOW) {
+      if (deliver_calls_.load() != calls) continue;  // room came while it was asked
+      held_ = true;
+      held_at_ = calls;
+      break;
+    }
+    received_.remove_first();
+    if (verdict == NIF_DONE) nif_release(&in);
+  }
+  if (busy) outbound_.set_library_busy(false);
+}
+
+void Node::redial() {
+  const Deadline wait_until = steady_now_ns() + backoff_.next_ns(random_bits());
+  while (!closing_.load() && steady_now_ns() < wait_until) {
+    const Ready ready = wait_for(Socket(), false, false, wake_, wait_until);
+    if (ready.woken) wake_.clear();
+    call_back();
+  }
+  if (closing_.load()) return;
+  auto admitted = admit(options_.endpoints, options_.socket, hello(), steady_now_ns() + kRedialNs, stop_);
+  if (!admitted) {
+    if (admitted.error().status == NIF_CLOSED) return;
+    set_last_error(admitted.error().sentence);
+    if (admitted.error().status == NIF_REPLACED) end(NIF_REPLACED);
+    return;
+  }
+  if (!take_over(std::move(*admitted), false)) {
+    epoch_ = random_bits() | 1;
+    session_.hub_epoch = 0;
+    disconnect("the hub's counts or first frames are impossible", proto::GoodbyeCode::malformed);
+    return;
+  }
+  outbound_.write_pending(true);
+}
+
+void Node::on_goodbye(const proto::Goodbye& goodbye) {
+  std::string why = std::string("the hub said goodbye: ") + proto::goodbye_name(goodbye.code);
+  if (!goodbye.sentence.empty()) why += ": " + goodbye.sentence;
+  disconnect(std::move(why), goodbye.code);
+  if (goodbye.code == proto::GoodbyeCode::replaced) end(NIF_REPLACED);
+}
+
+void Node::disconnect(std::string why, proto::GoodbyeCode code) {
+  const bool replaced = code == proto::GoodbyeCode::replaced;
+  const bool again = options_.reconnect && !replaced;
+  outbound_.detach(again);
+  socket_.close();
+  requests_.fail_all();
+  names_.clear();
+  clock_.clear();
+  {
+    const MutexLock lock(mutex_);
+    info_.connected = 0;
+    last_error_ = why;
+  }
+  Record* event = make_event(replaced ? NIF_SESSION_REPLACED : NIF_DISCONNECTED, std::move(why));
+  event->incoming.reason = static_cast<std::uint32_t>(code);
+  push_event(event);
+  if (!again && !replaced) end(NIF_NOT_CONNECTED);
+  call_back();
+}
+
+void Node::end(nif_status status) {
+  ended_ = true;
+  {
+    const MutexLock lock(mutex_);
+    info_.replaced = status == NIF_REPLACED ? 1 : 0;
+  }
+  outbound_.end(status);
+  received_.end(status);
+}
+
+/// The last words: what waits, then GOODBYE, and then nothing is sent, but what the hub still says is read, so that
+/// closing does not throw away what is on its way to it.
+void Node::leave() {
+  if (!socket_.open()) return;
+  const Deadline deadline = steady_now_ns() + kLeaveNs;
+  const auto goodbye = encode_goodbye(proto::GoodbyeCode::done, "");
+  outbound_.begin_leaving(session_.resume ? inbound_.taken() : 0, goodbye);
+  while (outbound_.write_last() && steady_now_ns() < deadline) {
+    static_cast<void>(wait_for(socket_, false, true, wake_, deadline));
+    wake_.clear();
+  }
+  socket_.shutdown_write();
+  std::byte memory[4096];
+  for (;;) {
+    const IoResult result = socket_.read(memory);
+    if (result.state == IoResult::State::done) continue;
+    if (result.state != IoResult::State::would_block || steady_now_ns() >= deadline) break;
+    static_cast<void>(wait_for(socket_, true, false, wake_, deadline));
+    wake_.clear();
+  }
+  outbound_.detach(false);
+  socket_.close();
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,86 @@
+#include "client/nif/options.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "proto/control/names.hpp"
+
+namespace gimnet::nif {
+namespace {
+
+constexpr std::size_t kStructSizeMax = 4096;
+constexpr std::size_t kDescriptionBytesMax = 256;
+
+Failure bad(const std::string& why) { return {NIF_BAD_ARGUMENT, "cannot connect: " + why}; }
+
+/// A program compiled with an older header gives a shorter struct: what it does not have is zero, the default.
+std::optional<Failure> read_struct(const nif_options* options, nif_options& whole) {
+  whole = {};
+  if (options == nullptr) return std::nullopt;
+  if (options->struct_size < sizeof(std::size_t) || options->struct_size > kStructSizeMax) {
+    return bad("nif_options.struct_size is not sizeof(nif_options)");
+  }
+  const auto* bytes = reinterpret_cast<const unsigned char*>(options);
+  std::memcpy(&whole, bytes, std::min(options->struct_size, sizeof whole));
+  const bool newer = options->struct_size > sizeof whole &&
+                     std::any_of(bytes + sizeof whole, bytes + options->struct_size, [](auto b) { return b != 0; });
+  if (newer) return bad("nif_options asks for something that this version of the library does not have");
+  return std::nullopt;
+}
+
+std::optional<Failure> read_identity(const nif_options& given, Options& options) {
+  if (given.name != nullptr) options.name = given.name;
+  if (given.description != nullptr) options.description = given.description;
+  if (options.description.size() > kDescriptionBytesMax) return bad("the description is over 256 bytes");
+  const char* fault = options.name.empty() ? nullptr : proto::name_fault(options.name);
+  if (fault != nullptr) {
+    return Failure{NIF_BAD_NAME, "cannot connect as '" + options.name + "': " + std::string(fault)};
+  }
+  if (given.resume > NIF_RESUME_ON) return bad("resume is not a nif_resume");
+  options.resume = given.resume == NIF_RESUME_ON || (given.resume == NIF_RESUME_DEFAULT && !options.name.empty());
+  if (given.shard_plus_one > 0) options.shard = static_cast<std::uint16_t>(given.shard_plus_one - 1);
+  return std::nullopt;
+}
+
+std::optional<Failure> read_limits(const nif_options& given, Options& options) {
+  if (given.send_queue_bytes != 0) options.send.queue_bytes = given.send_queue_bytes;
+  if (given.resume_bytes != 0) options.send.retained_bytes = given.resume_bytes;
+  if (given.receive_queue_bytes != 0) options.receive_queue_bytes = given.receive_queue_bytes;
+  if (given.message_bytes_max > NIF_MESSAGE_BYTES_MAX) return bad("message_bytes_max is over 1 GiB");
+  if (given.message_bytes_max != 0) {
+    options.reassembly.message_bytes_max = static_cast<std::uint32_t>(given.message_bytes_max);
+  }
+  options.reassembly.waiting_bytes_max =
+      std::max<std::uint64_t>(options.reassembly.waiting_bytes_max, options.reassembly.message_bytes_max);
+  if (given.reassembly_bytes != 0) options.reassembly.waiting_bytes_max = given.reassembly_bytes;
+  if (options.reassembly.waiting_bytes_max < options.reassembly.message_bytes_max) {
+    return bad("reassembly_bytes is smaller than message_bytes_max");
+  }
+  if (given.socket_receive_bytes > INT32_MAX || given.socket_send_bytes > INT32_MAX) {
+    return bad("a socket buffer is over 2 GiB");
+  }
+  options.socket.receive_bytes = given.socket_receive_bytes;
+  if (given.socket_send_bytes != 0) options.socket.send_bytes = given.socket_send_bytes;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<Options, Failure> read_options(const nif_options* options) {
+  nif_options given;
+  if (auto failure = read_struct(options, given)) return std::move(*failure);
+  Options checked;
+  if (auto failure = read_identity(given, checked)) return std::move(*failure);
+  if (auto failure = read_limits(given, checked)) return std::move(*failure);
+  if (given.connect_timeout_ms != 0) checked.connect_timeout_ms = given.connect_timeout_ms;
+  checked.wait_for_hub = given.wait_for_hub != 0;
+  checked.reconnect = given.no_reconnect == 0;
+  checked.callback = given.callback;
+  checked.user = given.user;
+  auto endpoints = endpoints_for(given.url != nullptr ? given.url : "");
+  if (!endpoints) return endpoints.error();
+  checked.endpoints = std::move(*endpoints);
+  return checked;
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "client/nif/endpoint.hpp"
+#include "client/nif/error.hpp"
+#include "client/nif/platform.hpp"
+#include "client/nif/send_queue.hpp"
+#include "gimnet/nif.h"
+#include "proto/frame/reassembler.hpp"
+
+namespace gimnet::nif {
+
+/// nif_options, checked and with the defaults filled in. A value type.
+struct Options {
+  std::vector<Endpoint> endpoints;
+  std::string name;
+  std::string description;
+  std::int32_t connect_timeout_ms = 5'000;
+  bool wait_for_hub = false;
+  bool reconnect = true;
+  bool resume = false;
+  std::optional<std::uint16_t> shard;
+  SendQueue::Limits send;
+  std::size_t receive_queue_bytes = 16 * 1024 * 1024;
+  proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20};
+  SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
+  nif_callback callback = nullptr;
+  void* user = nullptr;
+};
+
+/// `options` may be null. Errors: NIF_BAD_ARGUMENT, NIF_BAD_NAME.
+[[nodiscard]] Result<Options, Failure> read_options(const nif_options* options);
+
+}  // namespace gimnet::nif

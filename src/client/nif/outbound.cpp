@@ -1,0 +1,252 @@
+#include "client/nif/outbound.hpp"
+
+#include <array>
+#include <cstring>
+
+namespace gimnet::nif {
+namespace {
+
+/// After so many writes in a row a sender leaves the rest to the library's thread: its own message went long ago.
+constexpr int kWriteRoundsMax = 8;
+
+}  // namespace
+
+bool Outbound::wait(Deadline deadline) {
+  ++waiting_;
+  const bool in_time = changed_.wait_until(mutex_, deadline);
+  --waiting_;
+  return in_time;
+}
+
+void Outbound::notify_waiting() {
+  if (waiting_ > 0) changed_.notify_all();
+}
+
+void Outbound::wake_library() {
+  if (wake_raised_) return;
+  wake_raised_ = true;
+  wake_.raise();
+}
+
+/// One gathered write. False: nothing waits, or the kernel takes no more.
+bool Outbound::write_once() {
+  const auto pieces = queue_.gather();
+  if (pieces.empty()) return false;
+  std::size_t offered = 0;
+  for (const auto& piece : pieces) offered += piece.size();
+  Socket* const socket = socket_;
+  mutex_.unlock();
+  const IoResult result = socket->write(pieces);
+  mutex_.lock();
+  ++write_calls_;
+  bytes_sent_ += result.bytes;
+  queue_.commit(result.bytes);
+  if (result.bytes > 0) notify_waiting();
+  if (result.bytes == offered) return true;
+  broken_ = result.state == IoResult::State::failed;
+  full_ = !broken_;
+  return false;
+}
+
+void Outbound::write_rounds(bool by_library) {
+  writing_ = true;
+  int rounds = 0;
+  while (rounds < kWriteRoundsMax && state_ == State::connected && write_once()) ++rounds;
+  writing_ = false;
+  last_write_ns_ = steady_now_ns();
+  const bool more = rounds == kWriteRoundsMax && !queue_.all_written();
+  // The library's thread sees for itself that the kernel is full: waking it would only make it try again at once.
+  if (more || (!by_library && (full_ || broken_))) wake_library();
+  if (state_ != State::connected) changed_.notify_all();  // detach() waits for the writer
+}
+
+void Outbound::write_pending(bool writable) {
+  const MutexLock lock(mutex_);
+  wake_raised_ = false;
+  if (state_ != State::connected || writing_ || broken_ || (full_ && !writable)) return;
+  full_ = false;
+  write_rounds(true);
+}
+
+Outbound::Wants Outbound::wants() {
+  const MutexLock lock(mutex_);
+  return {full_ && !writing_, broken_, last_write_ns_};
+}
+
+/// Copies a frame into the queue under the id that the node has now.
+bool Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) {
+  if (memory.empty()) return false;
+  proto::FrameHeader header = proto::load_header(frame.data());
+  header.src = id_;
+  std::memcpy(memory.data(), frame.data(), frame.size());
+  proto::store_header(memory.data(), header);
+  return true;
+}
+
+bool Outbound::post(std::span<const std::byte> frame) {
+  const MutexLock lock(mutex_);
+  if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame)) return false;
+  write_or_leave(false);
+  return true;
+}
+
+bool Outbound::post(const proto::flow::Message& message) {
+  std::array<std::byte, proto::flow::kFrameSizeMax> frame;
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{0}, frame);
+  return post(std::span<const std::byte>(frame).first(size));
+}
+
+bool Outbound::post_data(std::span<const std::byte> frame, std::uint8_t lane) {
+  const MutexLock lock(mutex_);
+  if (state_ != State::connected || !put_frame(queue_.append(lane, frame.size()), frame)) return false;
+  write_or_leave(false);
+  return true;
+}
+
+std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& session) {
+  const MutexLock lock(mutex_);
+  std::uint64_t missing = 0;
+  if (session.resumed) {
+    const auto skipped = queue_.resume_from(session.hub_taken);
+    if (!skipped) return std::nullopt;
+    missing = *skipped;
+  } else {
+    queue_.restart(session.id);
+    ++epochs_;
+  }
+  queue_.set_resume(session.resume);
+  id_ = session.id;
+  frame_bytes_max_ = session.frame_bytes_max;
+  pauses_.clear();
+  socket_ = &socket;
+  full_ = false;
+  broken_ = false;
+  last_write_ns_ = steady_now_ns();
+  if (missing > 0) {
+    std::array<std::byte, proto::flow::kFrameSizeMax> frame;
+    const proto::flow::Skip skip{proto::DropReason::link_lost, missing};
+    const std::size_t size = proto::flow::encode_frame(skip, NodeId{0}, frame);
+    if (!put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size))) return std::nullopt;
+  }
+  state_ = State::connected;
+  changed_.notify_all();
+  return missing;
+}
+
+void Outbound::detach(bool again) {
+  const MutexLock lock(mutex_);
+  if (state_ == State::connected) state_ = State::away;
+  while (writing_) static_cast<void>(wait(kNever));
+  socket_ = nullptr;
+  full_ = false;
+  queue_.disconnect();
+  pauses_.clear();
+  if (!again || !queue_.resume()) static_cast<void>(queue_.drop_all());
+  changed_.notify_all();
+}
+
+void Outbound::end(nif_status status) {
+  const MutexLock lock(mutex_);
+  if (state_ == State::ended && status != NIF_CLOSED) return;
+  state_ = State::ended;
+  end_status_ = status;
+  changed_.notify_all();
+}
+
+void Outbound::set_library_busy(bool busy) {
+  const MutexLock lock(mutex_);
+  library_busy_ = busy;
+}
+
+void Outbound::set_declaring(bool declaring) {
+  const MutexLock lock(mutex_);
+  declaring_ = declaring;
+  if (!declaring) notify_waiting();
+}
+
+void Outbound::on_pause(const proto::flow::Target& target) {
+  const MutexLock lock(mutex_);
+  ++pause_count_;
+  pauses_.pause(target);
+}
+
+void Outbound::on_resume(const proto::flow::Target& target) {
+  const MutexLock lock(mutex_);
+  pauses_.resume(target);
+  notify_waiting();
+}
+
+void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
+  const MutexLock lock(mutex_);
+  if (taken != 0) {
+    std::array<std::byte, proto::flow::kFrameSizeMax> confirm;
+    const std::size_t size = proto::flow::encode_frame(proto::flow::Confirm{taken}, NodeId{0}, confirm);
+    static_cast<void>(put_frame(queue_.append_control(size), std::span<const std::byte>(confirm).first(size)));
+  }
+  goodbye_.assign(goodbye.begin(), goodbye.end());
+}
+
+bool Outbound::write_last() {
+  const MutexLock lock(mutex_);
+  while (writing_) static_cast<void>(wait(kNever));
+  if (socket_ == nullptr || broken_) return false;
+  writing_ = true;
+  do {
+    if (queue_.all_written() && !goodbye_.empty()) {
+      static_cast<void>(put_frame(queue_.append_control(goodbye_.size()), goodbye_));
+      goodbye_.clear();
+    }
+  } while (write_once());
+  writing_ = false;
+  return !broken_ && !queue_.all_written();
+}
+
+bool Outbound::on_confirm(std::uint64_t count) {
+  const MutexLock lock(mutex_);
+  const bool possible = queue_.confirm(count);
+  notify_waiting();
+  return possible;
+}
+
+void Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
+  const MutexLock lock(mutex_);
+  for (auto& [stream, progress] : in_progress_) {
+    if (progress->number != taken.message || progress->dst != from || !progress->windowed) continue;
+    static_cast<void>(progress->window.on_taken(taken));
+    progress->refused |= taken.refuses();
+    notify_waiting();
+  }
+}
+
+bool Outbound::on_report(const proto::FrameHeader& header, proto::DropReason reason) {
+  const MutexLock lock(mutex_);
+  if (header.kind == proto::Kind::taken) {
+    // Our own TAKENs ask for no reports, so this answers probe().
+    for (auto& [stream, progress] : in_progress_) {
+      if (progress->windowed && progress->dst == header.dst) progress->undelivered = reason;
+    }
+    notify_waiting();
+    return true;
+  }
+  const auto found = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
+  if (found == in_progress_.end() || !found->second->windowed || !header.has(proto::kFlagFragment)) return false;
+  found->second->undelivered = reason;
+  notify_waiting();
+  return !found->second->reported;
+}
+
+void Outbound::add_counters(nif_counters& counters) {
+  const MutexLock lock(mutex_);
+  counters.messages_sent = messages_sent_;
+  counters.frames_sent = queue_.frames_written();
+  counters.frames_resent = queue_.frames_resent();
+  counters.frames_let_go = queue_.frames_let_go();
+  counters.frames_replaced = queue_.frames_replaced();
+  counters.bytes_sent = bytes_sent_;
+  counters.write_calls = write_calls_;
+  counters.pauses = pause_count_;
+  counters.send_queue_bytes = queue_.unsent_bytes();
+  counters.retained_bytes = queue_.retained_bytes();
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,154 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "client/nif/error.hpp"
+#include "client/nif/outgoing.hpp"
+#include "client/nif/pause_table.hpp"
+#include "client/nif/platform.hpp"
+#include "client/nif/send_queue.hpp"
+#include "client/nif/session.hpp"
+#include "gimnet/nif.h"
+#include "proto/frame/flow.hpp"
+#include "proto/frame/taken.hpp"
+#include "proto/frame/window.hpp"
+
+namespace gimnet::nif {
+
+/// The sending half of a node: any thread puts messages in, whoever finds the socket idle writes what is there.
+///
+/// A message is copied into the send queue; then its thread becomes the writer, unless another one is (which takes the
+/// message along), the kernel is full, or messages come so fast one after another that writing is left to the library's
+/// thread, which gathers them. One small message on an idle connection is one system call in the caller's thread.
+///
+/// Thread safety: send, flush, drain, post and the counters from any thread; the rest from the library's thread.
+class Outbound {
+ public:
+  /// `wake` rouses the library's thread, which then calls write_pending().
+  Outbound(const SendQueue::Limits& limits, WakeSignal& wake) : wake_(wake), queue_(limits) {}
+
+  // Any thread.
+  [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] nif_status flush() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] nif_status drain(Deadline deadline) GIMNET_EXCLUDES(mutex_);
+  /// A frame of the connection itself (FLOW, LINK, NS, CTRL), before all messages. The source is filled in here, where
+  /// it cannot change on the way. False: not connected, or no memory.
+  bool post(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
+  bool post(const proto::flow::Message& message) GIMNET_EXCLUDES(mutex_);
+  /// A frame of a data kind that the library sends by itself; it does not wait for room.
+  bool post_data(std::span<const std::byte> frame, std::uint8_t lane) GIMNET_EXCLUDES(mutex_);
+  /// Waits until connected. NIF_OK, or why it will not be.
+  [[nodiscard]] nif_status wait_connected(Deadline deadline) GIMNET_EXCLUDES(mutex_);
+  void add_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);
+
+  // The library's thread.
+  /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is impossible, and it is not
+  /// attached.
+  [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session) GIMNET_EXCLUDES(mutex_);
+  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket any more.
+  void detach(bool again) GIMNET_EXCLUDES(mutex_);
+  /// No connection will come any more: what waits answers `status`.
+  void end(nif_status status) GIMNET_EXCLUDES(mutex_);
+  /// Writes what waits, as far as the kernel takes it. `writable`: it has room again after it was full.
+  void write_pending(bool writable) GIMNET_EXCLUDES(mutex_);
+  /// The handle closes: what waits, a CONFIRM of the frames `taken` so far (0: none), and then this frame, are the last
+  /// that go out; write_last() sends them on. True: more is left. Without the CONFIRM the hub would count as lost what
+  /// was taken last.
+  void begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool write_last() GIMNET_EXCLUDES(mutex_);
+  /// What to wait for.
+  struct Wants {
+    bool writable = false;  ///< the kernel was full
+    bool broken = false;    ///< a write failed
+    std::int64_t last_write_ns = 0;
+  };
+  [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
+  /// While a callback of the program runs, senders do not leave writing to the library's thread.
+  void set_library_busy(bool busy) GIMNET_EXCLUDES(mutex_);
+  /// GROUP messages wait until the services are declared again.
+  void set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
+
+  void on_pause(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
+  void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
+  void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
+  /// A REPORT about a frame with this header. True: it belongs to a message that is being sent and did not ask for
+  /// reports.
+  bool on_report(const proto::FrameHeader& header, proto::DropReason reason) GIMNET_EXCLUDES(mutex_);
+
+ private:
+  enum class State : std::uint8_t { away, connected, ended };
+  /// A fragmented message whose sender is in send().
+  struct InProgress {
+    std::uint32_t number = 0;  ///< 0: not begun
+    std::uint64_t epoch = 0;
+    std::uint32_t dst = 0;
+    bool windowed = false;
+    bool reported = false;  ///< the program wants the reports
+    bool refused = false;
+    proto::DropReason undelivered = proto::DropReason::none;
+    proto::SendWindow window;
+  };
+
+  [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status send_pieces(Outgoing& message, InProgress& progress, Deadline deadline)
+      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status wait_for_turn(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+                                         Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
+  void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own)
+      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
+                               std::uint32_t size, bool report) GIMNET_REQUIRES(mutex_);
+  void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
+  void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
+  void wake_library() GIMNET_REQUIRES(mutex_);
+  void notify_waiting() GIMNET_REQUIRES(mutex_);
+
+  WakeSignal& wake_;
+
+  Mutex mutex_;
+  Condition changed_;
+  State state_ GIMNET_GUARDED_BY(mutex_) = State::away;
+  nif_status end_status_ GIMNET_GUARDED_BY(mutex_) = NIF_NOT_CONNECTED;
+  std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
+  Socket* socket_ GIMNET_GUARDED_BY(mutex_) = nullptr;
+  SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
+  std::vector<std::byte> goodbye_ GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
+  PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
+  std::unordered_map<std::uint64_t, InProgress*> in_progress_ GIMNET_GUARDED_BY(mutex_);  ///< by stream
+  std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
+  std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
+
+  bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
+  bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
+  bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool library_busy_ GIMNET_GUARDED_BY(mutex_) = false;
+  std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint32_t quick_sends_ GIMNET_GUARDED_BY(mutex_) = 0;
+
+  std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t bytes_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t write_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t pause_count_ GIMNET_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace gimnet::nif

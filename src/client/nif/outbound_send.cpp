@@ -1,0 +1,245 @@
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "client/nif/outbound.hpp"
+#include "proto/frame/fragmenter.hpp"
+
+// The calls that wait: sending, flushing, draining.
+
+namespace gimnet::nif {
+namespace {
+
+/// With NIF_FLAG_MORE this much is written anyway.
+constexpr std::size_t kHeldBytesMax = 64 * 1024;
+/// A send that follows the last write within this time is part of a burst ...
+constexpr std::int64_t kQuickNs = 3'000;
+/// ... and after so many of them in a row gathering them pays for the wake-up of the library's thread.
+constexpr std::uint32_t kQuickSends = 4;
+/// How long the receiver of a message may leave its window closed before it is asked whether it is still there.
+constexpr std::int64_t kProbeNs = 1'000'000'000;
+
+/// Room for a frame with this payload before its prefix is written.
+std::size_t frame_size(const Outgoing& message, bool fragment, std::uint32_t payload) {
+  return proto::prefix_size(message.parts()) + (fragment ? proto::kFragmentHeaderSize : 0) + payload;
+}
+
+}  // namespace
+
+bool Outbound::in_burst() {
+  const bool quick = steady_now_ns() - last_write_ns_ < kQuickNs;
+  quick_sends_ = quick ? std::min(quick_sends_ + 1, kQuickSends) : 0;
+  return quick_sends_ == kQuickSends;
+}
+
+void Outbound::write_or_leave(bool more) {
+  if (state_ != State::connected || writing_ || broken_) return;
+  if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
+  if (!library_busy_) {
+    if (full_) return;  // the library's thread waits for the kernel
+    if (in_burst()) {
+      wake_library();
+      return;
+    }
+  }
+  write_rounds(false);
+}
+
+/// Writes in this thread if there is something to write and nobody else does. True: it did.
+bool Outbound::write_here() {
+  if (state_ != State::connected || writing_ || full_ || broken_ || queue_.all_written()) return false;
+  write_rounds(false);
+  return true;
+}
+
+nif_status Outbound::not_connected() const {
+  if (state_ == State::ended) {
+    switch (end_status_) {
+      case NIF_CLOSED:
+        return fail(NIF_CLOSED, "the handle was closed");
+      case NIF_REPLACED:
+        return fail(NIF_REPLACED, "another connection took this session over");
+      default:
+        return fail(end_status_, "the connection broke, and nif_options.no_reconnect is set");
+    }
+  }
+  return fail(NIF_NOT_CONNECTED, "the connection is broken; the library is dialing again");
+}
+
+bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own) {
+  if (state_ != State::connected || pauses_.is_paused(message.stream())) return false;
+  if (own != nullptr) {
+    if (own->windowed && own->window.room() == 0) return false;
+  } else if (!in_progress_.empty() && in_progress_.contains(message.stream())) {
+    return false;
+  }
+  if (declaring_ && message.parts().header.kind == proto::Kind::group) return false;
+  if (message.replaceable() && queue_.would_replace(latest_stream_of(message.parts().header, message.parts().key))) {
+    return true;
+  }
+  return queue_.has_room(frame_size);
+}
+
+/// Why a message that has begun cannot be finished; NIF_OK: it can.
+nif_status Outbound::check_progress(const InProgress& own) const {
+  if (own.undelivered != proto::DropReason::none) {
+    return fail(NIF_NOT_DELIVERED, std::string("the hub reported ") + proto::drop_reason_name(own.undelivered) +
+                                       " while the message was being sent");
+  }
+  if (own.refused && own.window.taken() == 0) {
+    return fail(NIF_TOO_LARGE, "the receiver refused the message: it is larger than it takes");
+  }
+  if (own.refused) return fail(NIF_NOT_DELIVERED, "the receiver lost a part of the message and gave it up");
+  if (own.number != 0 && own.epoch != epochs_) {
+    return fail(NIF_NOT_CONNECTED, "the connection broke in the middle of the message; its receiver lost it");
+  }
+  return NIF_OK;
+}
+
+/// A receiver that crashed says nothing more; a TAKEN of no message, which its hub reports if there is nobody to take
+/// it, tells that from one that is slow.
+void Outbound::probe(const InProgress& own) {
+  proto::FrameHeader header;
+  header.length = proto::kTakenSize;
+  header.dst = own.dst;
+  header.src = id_;
+  header.kind = proto::Kind::taken;
+  header.flags = proto::kFlagReport;
+  header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
+  const auto memory = queue_.append(header.lane, header.frame_size());
+  if (memory.empty()) return;
+  proto::store_header(memory.data(), header);
+  proto::encode_taken({}, memory.subspan<proto::kHeaderSize, proto::kTakenSize>());
+  write_or_leave(false);
+}
+
+/// Waits until a frame of the message may enter the queue. `own`: the message is under way already.
+nif_status Outbound::wait_for_turn(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+                                   Deadline deadline) {
+  std::int64_t probe_at = 0;
+  for (;;) {
+    if (state_ == State::ended || (state_ == State::away && !queue_.resume())) return not_connected();
+    if (own != nullptr) {
+      if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
+    }
+    if (may_go(message, frame_size, own)) return NIF_OK;
+    // What NIF_FLAG_MORE held back, or was left to the library's thread, goes before anybody waits for room.
+    if (write_here()) continue;
+    const std::int64_t now = steady_now_ns();
+    if (now >= deadline) {
+      return fail(NIF_TIMEOUT, own != nullptr && own->number != 0
+                                   ? "no room within the time given; the message had begun, so its receiver lost it"
+                                   : "no room within the time given");
+    }
+    const bool stalled = own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
+    if (stalled && probe_at == 0) probe_at = now + kProbeNs;
+    if (stalled && now >= probe_at) {
+      probe(*own);
+      probe_at = now + kProbeNs;
+    }
+    static_cast<void>(wait(stalled ? std::min(deadline, probe_at) : deadline));
+  }
+}
+
+nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
+                         std::uint32_t size, bool report) {
+  const std::size_t bytes = frame_size(message, fragment.has_value(), size);
+  const proto::FrameHeader& header = message.parts().header;
+  const auto memory = message.replaceable()
+                          ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
+                          : queue_.append(header.lane, bytes);
+  if (memory.empty()) return fail(NIF_NO_MEMORY, "no memory for the message");
+  message.write_frame(memory, id_, fragment, offset, size, report);
+  return NIF_OK;
+}
+
+nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
+  const bool with_header = proto::needs_fragment_header(message.size());
+  const nif_status turn = wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
+  if (turn != NIF_OK) return turn;
+  std::optional<proto::FragmentHeader> fragment;
+  if (with_header) fragment = proto::FragmentHeader{next_message_++, 0, message.size()};
+  return put(message, fragment, 0, message.size(), false);
+}
+
+nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadline deadline) {
+  const std::size_t prefix = frame_size(message, true, 0) - proto::kHeaderSize;
+  const auto piece_max =
+      static_cast<std::uint32_t>(std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
+  proto::Fragmenter fragmenter(message.size(), piece_max);
+  while (!fragmenter.done()) {
+    const nif_status turn = wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
+    if (turn != NIF_OK) return turn;
+    if (progress.number == 0) {
+      progress.number = next_message_++;
+      progress.epoch = epochs_;
+      progress.window = proto::SendWindow(progress.number, message.size());
+    }
+    const proto::Piece piece = fragmenter.next(progress.windowed ? progress.window.room() : UINT32_MAX);
+    const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
+    const nif_status put_status = put(message, fragment, piece.offset, piece.size, progress.windowed);
+    if (put_status != NIF_OK) return put_status;
+    if (progress.windowed) progress.window.on_sent(piece.size);
+    write_or_leave(!fragmenter.done() || message.more());
+  }
+  return NIF_OK;
+}
+
+nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
+  const nif_status turn = wait_for_turn(message, frame_size(message, true, proto::kFragmentPayload), nullptr, deadline);
+  if (turn != NIF_OK) return turn;
+  InProgress progress{
+      .number = 0,
+      .dst = message.parts().header.dst,
+      .windowed = message.parts().header.kind == proto::Kind::unicast && message.size() > proto::kWindowDefault,
+      .reported = message.reported(),
+      .window = proto::SendWindow(0, message.size())};
+  in_progress_.emplace(message.stream(), &progress);
+  const nif_status status = send_pieces(message, progress, deadline);
+  in_progress_.erase(message.stream());
+  notify_waiting();
+  return status;
+}
+
+nif_status Outbound::send(Outgoing& message, Deadline deadline) {
+  const MutexLock lock(mutex_);
+  const bool whole = message.size() <= proto::kUncutMessageMax;
+  const nif_status status = whole ? send_whole(message, deadline) : send_fragments(message, deadline);
+  if (status != NIF_OK) return status;
+  ++messages_sent_;
+  if (whole) write_or_leave(message.more());
+  return NIF_OK;
+}
+
+nif_status Outbound::flush() {
+  const MutexLock lock(mutex_);
+  if (state_ != State::connected) return not_connected();
+  static_cast<void>(write_here());
+  return NIF_OK;
+}
+
+nif_status Outbound::drain(Deadline deadline) {
+  const MutexLock lock(mutex_);
+  for (;;) {
+    if (state_ == State::ended) return not_connected();
+    if (state_ == State::away && !queue_.resume()) return not_connected();
+    if (queue_.all_written() && !writing_ && queue_.retained_bytes() == 0) return NIF_OK;
+    if (write_here()) continue;
+    if (deadline != kNever && steady_now_ns() >= deadline) {
+      return fail(NIF_TIMEOUT, "not everything was written and confirmed within the time given");
+    }
+    static_cast<void>(wait(deadline));
+  }
+}
+
+nif_status Outbound::wait_connected(Deadline deadline) {
+  const MutexLock lock(mutex_);
+  for (;;) {
+    if (state_ == State::connected) return NIF_OK;
+    if (state_ == State::ended) return not_connected();
+    if (deadline != kNever && steady_now_ns() >= deadline) return not_connected();
+    static_cast<void>(wait(deadline));
+  }
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "client/nif/error.hpp"
+#include "gimnet/nif.h"
+#include "proto/frame/extensions.hpp"
+#include "proto/frame/frame_builder.hpp"
+
+namespace gimnet::nif {
+
+/// A nif_outgoing that was checked, in the form in which frames are made of it. Refers to the caller's payload.
+/// Thread safety: one thread.
+class Outgoing {
+ public:
+  /// Errors: NIF_BAD_ARGUMENT, NIF_TOO_LARGE. REQUIRES: `message` and what it points to outlive this.
+  [[nodiscard]] std::optional<Failure> read(const nif_outgoing& message);
+
+  [[nodiscard]] std::uint32_t size() const { return size_; }
+  /// Frame parts without fragment and payload size. Valid until: this goes.
+  [[nodiscard]] const proto::FrameParts& parts() const { return parts_; }
+  /// Kind, lane and destination; 0 for LIST, as its recipients see it.
+  [[nodiscard]] std::uint64_t stream() const { return stream_; }
+  /// LATEST, and small enough to be replaced whole in the send queue.
+  [[nodiscard]] bool replaceable() const;
+  [[nodiscard]] bool more() const { return more_; }
+  [[nodiscard]] bool reported() const { return parts_.header.has(proto::kFlagReport); }
+
+  /// Writes one frame with the payload bytes from `offset` on; `frame` has exactly its size.
+  void write_frame(std::span<std::byte> frame, std::uint32_t src, std::optional<proto::FragmentHeader> fragment,
+                   std::uint32_t offset, std::uint32_t piece_size, bool report);
+
+ private:
+  [[nodiscard]] std::optional<Failure> read_address(const nif_outgoing& message);
+  [[nodiscard]] std::optional<Failure> read_payload(const nif_outgoing& message);
+  void read_extensions(const nif_outgoing& message);
+  void copy_payload(std::byte* to, std::uint32_t offset, std::uint32_t bytes);
+
+  proto::FrameParts parts_;
+  std::vector<NodeId> recipients_;
+  std::array<std::byte, 256> extensions_;
+  std::span<const nif_bytes> payload_;
+  std::uint32_t size_ = 0;
+  std::uint64_t stream_ = 0;
+  bool more_ = false;
+  std::size_t part_ = 0;         ///< where the last copy ended
+  std::size_t part_offset_ = 0;  ///< payload bytes before that part
+};
+
+}  // namespace gimnet::nif

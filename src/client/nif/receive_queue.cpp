@@ -1,0 +1,136 @@
+#include "client/nif/receive_queue.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace gimnet::nif {
+namespace {
+
+/// Items taken under one lock; frames are taken apart outside it.
+constexpr std::size_t kItemsAtOnce = 64;
+
+std::size_t cost(const Item& item) { return item.bytes + sizeof(Item); }
+
+nif_status end_answer(nif_status status) {
+  switch (status) {
+    case NIF_REPLACED:
+      return fail(NIF_REPLACED, "another connection took this session over");
+    case NIF_CLOSED:
+      return fail(NIF_CLOSED, "the handle was closed");
+    default:
+      return fail(status, "the connection broke, and nif_options.no_reconnect is set");
+  }
+}
+
+}  // namespace
+
+ReceiveQueue::~ReceiveQueue() {
+  for (const Item& item : items_) item.storage->release();
+}
+
+void ReceiveQueue::push(std::span<const Item> items) {
+  if (items.empty()) return;
+  const MutexLock lock(mutex_);
+  const bool was_empty = items_.empty();
+  items_.insert(items_.end(), items.begin(), items.end());
+  for (const Item& item : items) bytes_ += cost(item);
+  if (was_empty && event_) event_->raise();
+  if (items.size() > 1) {
+    filled_.notify_all();
+  } else {
+    filled_.notify_one();
+  }
+}
+
+bool ReceiveQueue::has_room() {
+  const MutexLock lock(mutex_);
+  const bool room = items_.empty() || bytes_ < (stopped_ ? bytes_max_ / 2 : bytes_max_);
+  if (!room && !stopped_) ++stops_;
+  stopped_ = !room;
+  return room;
+}
+
+Item ReceiveQueue::take_first() {
+  const Item item = items_.front();
+  items_.pop_front();
+  bytes_ -= cost(item);
+  return item;
+}
+
+void ReceiveQueue::after_removal() {
+  if (items_.empty() && event_ && end_status_ == NIF_OK) event_->clear();
+  if (stopped_ && (items_.empty() || bytes_ < bytes_max_ / 2)) {
+    stopped_ = false;
+    room_.raise();
+  }
+}
+
+nif_status ReceiveQueue::pop(std::span<nif_incoming> in, std::size_t& count, Deadline deadline) {
+  std::array<Item, kItemsAtOnce> taken;
+  std::size_t size = 0;
+  count = 0;
+  {
+    const MutexLock lock(mutex_);
+    while (items_.empty() || closed_) {
+      if (closed_) return end_answer(NIF_CLOSED);
+      if (end_status_ != NIF_OK) return end_answer(end_status_);
+      if (deadline != kNever && steady_now_ns() >= deadline) return NIF_TIMEOUT;
+      static_cast<void>(filled_.wait_until(mutex_, deadline));
+    }
+    while (size < std::min(in.size(), taken.size()) && !items_.empty()) taken[size++] = take_first();
+    after_removal();
+  }
+  for (; count < size; ++count) in[count] = incoming_of(taken[count]);
+  return NIF_OK;
+}
+
+bool ReceiveQueue::peek(nif_incoming& in) {
+  Item first;
+  {
+    const MutexLock lock(mutex_);
+    if (items_.empty()) return false;
+    first = items_.front();
+  }
+  in = incoming_of(first);
+  return true;
+}
+
+void ReceiveQueue::remove_first() {
+  const MutexLock lock(mutex_);
+  static_cast<void>(take_first());
+  after_removal();
+}
+
+void ReceiveQueue::end(nif_status status) {
+  const MutexLock lock(mutex_);
+  end_status_ = status;
+  if (event_) event_->raise();
+  filled_.notify_all();
+}
+
+void ReceiveQueue::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  filled_.notify_all();
+}
+
+Descriptor ReceiveQueue::event_descriptor() {
+  const MutexLock lock(mutex_);
+  if (!event_) {
+    event_ = std::make_unique<WakeSignal>();
+    if (!items_.empty() || end_status_ != NIF_OK) event_->raise();
+  }
+  return event_->descriptor();
+}
+
+std::size_t ReceiveQueue::bytes() {
+  const MutexLock lock(mutex_);
+  return bytes_;
+}
+
+std::uint64_t ReceiveQueue::stops() {
+  const MutexLock lock(mutex_);
+  return stops_;
+}
+
+}  // namespace gimnet::nif

@@ -1,0 +1,276 @@
+#include "client/nif/send_queue.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "base/check.hpp"
+
+namespace gimnet::nif {
+namespace {
+
+/// What one lane gets before the others are looked at again.
+constexpr std::size_t kTurnBytes = 16 * 1024;
+/// A lane that waited while this much went is next: 1/16 of the bytes.
+constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
+
+}  // namespace
+
+LatestStream latest_stream_of(const proto::FrameHeader& header, std::optional<std::uint64_t> key) {
+  const std::uint64_t rest =
+      (std::uint64_t{key.has_value()} << 16) | (static_cast<std::uint64_t>(header.kind) << 8) | header.lane;
+  return {(rest << 32) | header.dst, key.value_or(0)};
+}
+
+void SendQueue::set_resume(bool on) { resume_ = on; }
+
+bool SendQueue::has_room(std::size_t frame_size) {
+  const bool queue_has_room = unsent_bytes_ == 0 || unsent_bytes_ + frame_size <= limits_.queue_bytes;
+  if (!queue_has_room || !resume_) return queue_has_room;
+  // What waits will be kept, too, once it is written.
+  return retained_.make_room(unsent_bytes_ + frame_size) || (retained_.bytes() == 0 && unsent_bytes_ == 0);
+}
+
+SendQueue::Place SendQueue::allocate(std::size_t size) {
+  if (!open_chunk_ || open_chunk_->capacity - open_chunk_->used < size) {
+    auto fresh = pool_.take(size);
+    if (!fresh) return {};
+    open_chunk_ = std::move(fresh);
+  }
+  const std::size_t begin = open_chunk_->used;
+  open_chunk_->used += size;
+  return {open_chunk_, begin};
+}
+
+std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) {
+  GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
+  Place place = allocate(size);
+  if (!place.chunk) return {};
+  Runs& runs = lanes_[lane];
+  std::byte* memory = place.chunk->memory.get() + place.begin;
+  unsent_bytes_ += size;
+  const bool extends = !runs.empty() && runs.back().chunk == place.chunk && runs.back().end == place.begin &&
+                       runs.back().sort == FrameRun::Sort::data;
+  if (extends) {
+    runs.back().end += size;
+    ++runs.back().frames;
+  } else {
+    runs.push_back({std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::data});
+  }
+  return {memory, size};
+}
+
+std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t size, const LatestStream& stream) {
+  GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
+  Place place = allocate(size);
+  if (!place.chunk) return {};
+  const std::span<std::byte> memory{place.chunk->memory.get() + place.begin, size};
+  unsent_bytes_ += size;
+  if (const auto older = latest_.find(stream); older != latest_.end()) {
+    FrameRun& run = *older->second;
+    unsent_bytes_ -= run.size();
+    run.chunk = std::move(place.chunk);
+    run.begin = place.begin;
+    run.end = place.begin + size;
+    ++frames_replaced_;
+    return memory;
+  }
+  lanes_[lane].push_back({std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::latest});
+  latest_.emplace(stream, &lanes_[lane].back());
+  return memory;
+}
+
+std::span<std::byte> SendQueue::append_control(std::size_t size) {
+  Place place = allocate(size);
+  if (!place.chunk) return {};
+  std::byte* memory = place.chunk->memory.get() + place.begin;
+  unsent_bytes_ += size;
+  control_.push_back({std::move(place.chunk), place.begin, place.begin + size, 1, 0, FrameRun::Sort::control});
+  return {memory, size};
+}
+
+/// Moves frames from the front of a list into the write.
+void SendQueue::stage(Runs& from, std::size_t bytes_max) {
+  FrameRun& front = from.front();
+  if (front.sort == FrameRun::Sort::latest) {
+    std::erase_if(latest_, [&front](const auto& entry) { return entry.second == &front; });
+    front.sort = FrameRun::Sort::data;
+  }
+  FrameRun run = front.split_at_most(bytes_max);
+  if (front.frames == 0) from.pop_front();
+  staged_bytes_ += run.size();
+  staged_.push_back(std::move(run));
+}
+
+std::optional<std::uint8_t> SendQueue::pick_lane() const {
+  std::optional<std::uint8_t> first;
+  for (std::uint8_t lane = 0; lane < lanes_.size(); ++lane) {
+    if (lanes_[lane].empty()) continue;
+    if (passed_over_[lane] >= kPassedOverMax) return lane;
+    if (!first) first = lane;
+  }
+  return first;
+}
+
+void SendQueue::stage_lanes() {
+  while (staged_.size() < kGatherPiecesMax && staged_bytes_ < kGatherBytesMax) {
+    const auto lane = pick_lane();
+    if (!lane) return;
+    const bool others = std::any_of(lanes_.begin(), lanes_.end(),
+                                    [&](const Runs& runs) { return &runs != &lanes_[*lane] && !runs.empty(); });
+    const std::size_t before = staged_bytes_;
+    stage(lanes_[*lane], others ? kTurnBytes : kGatherBytesMax - staged_bytes_);
+    passed_over_[*lane] = 0;
+    for (std::size_t other = 0; other < lanes_.size(); ++other) {
+      if (other != *lane && !lanes_[other].empty()) passed_over_[other] += staged_bytes_ - before;
+    }
+  }
+}
+
+void SendQueue::stage_first(Runs& from) {
+  while (!from.empty() && staged_.size() < kGatherPiecesMax && staged_bytes_ < kGatherBytesMax) {
+    stage(from, kGatherBytesMax - staged_bytes_);
+  }
+}
+
+std::span<const std::span<const std::byte>> SendQueue::gather() {
+  stage_first(control_);
+  stage_first(resend_);
+  // Frames of the lanes are counted after all that is sent again.
+  if (resend_.empty()) stage_lanes();
+  std::size_t count = 0;
+  std::size_t skip = first_written_;
+  for (const FrameRun& run : staged_) {
+    pieces_[count++] = {run.bytes() + skip, run.size() - skip};
+    skip = 0;
+  }
+  return {pieces_.data(), count};
+}
+
+/// The run was written whole.
+void SendQueue::finish(FrameRun run) {
+  if (!run.counted()) return;
+  frames_written_ += run.sort == FrameRun::Sort::resent ? 0 : run.frames;
+  frames_resent_ += run.sort == FrameRun::Sort::resent ? run.frames : 0;
+  retained_.written(std::move(run), resume_);
+}
+
+void SendQueue::commit(std::size_t bytes) {
+  unsent_bytes_ -= bytes;
+  std::size_t position = first_written_ + bytes;
+  first_written_ = 0;
+  while (!staged_.empty() && position > 0) {
+    FrameRun& run = staged_.front();
+    if (run.size() <= position) {
+      position -= run.size();
+      finish(std::move(run));
+      staged_.pop_front();
+      continue;
+    }
+    FrameRun whole = run.split_whole_before(position);
+    position -= whole.size();
+    if (whole.frames > 0) finish(std::move(whole));
+    first_written_ = position;
+    break;
+  }
+  return_staged();
+}
+
+/// What was not begun goes back where it came from, so that more urgent frames can still overtake it.
+void SendQueue::return_staged() {
+  std::optional<FrameRun> begun;
+  if (first_written_ > 0) {
+    begun = staged_.front().split(staged_.front().first_size(), 1);
+    if (staged_.front().frames == 0) staged_.pop_front();
+  }
+  while (!staged_.empty()) {
+    FrameRun run = std::move(staged_.back());
+    staged_.pop_back();
+    Runs& home = run.sort == FrameRun::Sort::control  ? control_
+                 : run.sort == FrameRun::Sort::resent ? resend_
+                                                      : lanes_[run.lane];
+    home.push_front(std::move(run));
+  }
+  staged_bytes_ = 0;
+  if (begun) {
+    staged_bytes_ = begun->size() - first_written_;
+    staged_.push_back(std::move(*begun));
+  }
+}
+
+bool SendQueue::confirm(std::uint64_t count) {
+  std::uint64_t upcoming = 0;
+  for (const FrameRun& run : staged_) upcoming += run.counted() ? run.frames : 0;
+  return retained_.confirm(count, upcoming);
+}
+
+void SendQueue::disconnect() {
+  if (!staged_.empty()) {
+    FrameRun begun = std::move(staged_.front());
+    staged_.clear();
+    unsent_bytes_ += first_written_;
+    if (begun.counted()) {
+      resend_.push_front(std::move(begun));
+    } else {
+      unsent_bytes_ -= begun.size();
+    }
+  }
+  first_written_ = 0;
+  staged_bytes_ = 0;
+  for (const FrameRun& run : control_) unsent_bytes_ -= run.size();
+  control_.clear();
+}
+
+std::optional<std::uint64_t> SendQueue::resume_from(std::uint64_t peer_taken) {
+  const auto missing = retained_.take_after(peer_taken, resend_);
+  if (!missing) return std::nullopt;
+  std::size_t again = 0;
+  for (const FrameRun& run : resend_) again += run.size();
+  unsent_bytes_ = again;
+  for (const Runs& runs : lanes_) {
+    for (const FrameRun& run : runs) unsent_bytes_ += run.size();
+  }
+  return missing;
+}
+
+void SendQueue::set_source(std::uint32_t src) {
+  const auto change = [src](FrameRun& run) {
+    for (std::size_t at = 0; at < run.size();) {
+      proto::FrameHeader header = proto::load_header(run.bytes() + at);
+      header.src = src;
+      proto::store_header(run.bytes() + at, header);
+      at += header.frame_size();
+    }
+  };
+  std::for_each(resend_.begin(), resend_.end(), change);
+  for (Runs& runs : lanes_) std::for_each(runs.begin(), runs.end(), change);
+}
+
+void SendQueue::restart(std::uint32_t src) {
+  retained_.restart();
+  for (FrameRun& run : resend_) run.sort = FrameRun::Sort::data;
+  // What was begun on the old connection leads its lane again.
+  while (!resend_.empty()) {
+    FrameRun run = std::move(resend_.back());
+    resend_.pop_back();
+    lanes_[run.lane].push_front(std::move(run));
+  }
+  set_source(src);
+}
+
+std::uint64_t SendQueue::drop_all() {
+  disconnect();
+  std::uint64_t frames = 0;
+  for (const FrameRun& run : resend_) frames += run.frames;
+  resend_.clear();
+  for (Runs& runs : lanes_) {
+    for (const FrameRun& run : runs) frames += run.frames;
+    runs.clear();
+  }
+  latest_.clear();
+  retained_.restart();
+  unsent_bytes_ = 0;
+  return frames;
+}
+
+}  // namespace gimnet::nif

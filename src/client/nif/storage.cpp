@@ -1,0 +1,46 @@
+#include "client/nif/storage.hpp"
+
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::nif {
+
+nif_incoming incoming_of(const Item& item) {
+  if (item.frame == nullptr) return static_cast<Record*>(item.storage)->incoming;
+  // The frame was checked when it was taken, so its own length bounds it and it parses again.
+  const proto::FrameHeader header = proto::load_header(item.frame);
+  const auto parsed = proto::parse_frame({item.frame, header.frame_size()}, proto::Origin::hub);
+  nif_incoming in{};
+  in.type = NIF_MESSAGE;
+  in.from = header.src;
+  in.to = header.kind == proto::Kind::list ? 0 : header.dst;
+  in.kind = static_cast<std::uint8_t>(header.kind);
+  in.lane = header.lane;
+  in.policy = static_cast<std::uint8_t>(header.policy());
+  in.flags = header.has(proto::kFlagReport) ? NIF_FLAG_REPORT : 0;
+  in.arrival_ns = item.arrival_ns;
+  in.text = "";
+  in.storage = item.storage;
+  if (!parsed) return in;
+  in.payload = parsed->payload.data();
+  in.size = parsed->payload.size();
+  if (parsed->key) {
+    in.key = *parsed->key;
+    in.flags |= NIF_FLAG_KEYED;
+  }
+  if (!parsed->extensions.empty()) {
+    in.extensions = parsed->extensions.data();
+    in.extensions_size = parsed->extensions.size();
+  }
+  return in;
+}
+
+}  // namespace gimnet::nif
+
+extern "C" void nif_release(nif_incoming* in) {
+  if (in == nullptr || in->storage == nullptr) return;
+  static_cast<gimnet::nif::Storage*>(in->storage)->release();
+  in->storage = nullptr;
+  in->payload = nullptr;
+  in->extensions = nullptr;
+  in->text = "";
+}

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "base/byte_buffer.hpp"
+#include "gimnet/nif.h"
+
+namespace gimnet::nif {
+
+/// Memory that received things lie in; freed with its last reference, by whichever thread gives that back.
+/// Thread safety: references from any thread; the contents are written before the first other thread gets one.
+class Storage {
+ public:
+  Storage(const Storage&) = delete;
+  Storage& operator=(const Storage&) = delete;
+  void add_reference() {
+    // No partner: whoever adds one holds one, so there is nothing to order.
+    references_.fetch_add(1, std::memory_order_relaxed);
+  }
+  void release() {
+    // Partner: the other releases; whoever is last sees everything that the others did with the contents.
+    if (references_.fetch_sub(1, std::memory_order_acq_rel) == 1) delete this;
+  }
+  /// Nobody but the caller has a reference.
+  [[nodiscard]] bool is_only_reference() const {
+    return references_.load(std::memory_order_acquire) == 1;  // partner: the fetch_sub of the others' release()
+  }
+
+ protected:
+  Storage() = default;
+  virtual ~Storage() = default;
+
+ private:
+  std::atomic<std::uint32_t> references_{1};
+};
+
+/// What the socket is read into: many frames behind each other.
+class Slab final : public Storage {
+ public:
+  static constexpr std::size_t kBytes = 256 * 1024;
+  /// Null: no memory.
+  [[nodiscard]] static Slab* make() {
+    auto* memory = new (std::nothrow) std::byte[kBytes];
+    if (memory == nullptr) return nullptr;
+    auto* slab = new (std::nothrow) Slab(memory);
+    if (slab == nullptr) delete[] memory;
+    return slab;
+  }
+  [[nodiscard]] std::byte* bytes() { return bytes_; }
+
+ private:
+  explicit Slab(std::byte* memory) : bytes_(memory) {}
+  ~Slab() override { delete[] bytes_; }
+  std::byte* const bytes_;
+};
+
+/// One thing that is not a frame in a slab: an event, or a message put together from fragments.
+class Record final : public Storage {
+ public:
+  nif_incoming incoming{};
+  std::string text;
+  ByteBuffer payload;
+  std::vector<std::byte> extensions;
+
+  /// Points the members of `incoming` at what is stored here.
+  void finish() {
+    incoming.text = text.c_str();
+    if (!payload.empty()) {
+      incoming.payload = payload.data();
+      incoming.size = payload.size();
+    }
+    if (!extensions.empty()) {
+      incoming.extensions = extensions.data();
+      incoming.extensions_size = extensions.size();
+    }
+    incoming.storage = static_cast<Storage*>(this);
+  }
+};
+
+/// A place in the receive queue: a frame in a slab, or (frame null) a record. Holds one reference to its storage.
+struct Item {
+  Storage* storage = nullptr;
+  const std::byte* frame = nullptr;
+  std::int64_t arrival_ns = 0;
+  std::size_t bytes = 0;  ///< of payload and header, for the queue's limit
+};
+
+/// What nif_receive() gives out for it; the reference goes with it.
+[[nodiscard]] nif_incoming incoming_of(const Item& item);
+
+}  // namespace gimnet::nif

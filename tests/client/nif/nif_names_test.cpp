@@ -1,0 +1,198 @@
+#include "gimnet/nif_names.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "proto/control/ctrl.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+
+namespace gimnet::nif::test {
+namespace {
+
+namespace ns = proto::ns;
+
+/// Runs `ask` in a thread of its own while `answer` plays the hub.
+template <class Ask, class Answer>
+void converse(Ask ask, Answer answer) {
+  std::thread asking(ask);
+  answer();
+  asking.join();
+}
+
+TEST(NifNames, ResolvesOnceAndRemembers) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse(
+      [node] {
+        std::uint32_t id = 0;
+        EXPECT_EQ(nif_resolve(node, "robot/base", &id, NIF_FOREVER), NIF_OK);
+        EXPECT_EQ(id, kPeerId);
+        char name[NIF_NAME_BYTES_MAX + 1];
+        EXPECT_EQ(nif_resolve(node, "robot/base", &id, 0), NIF_OK) << "remembered";
+        EXPECT_EQ(nif_reverse(node, kPeerId, name, 0), NIF_OK) << "this way, too";
+        EXPECT_STREQ(name, "robot/base");
+      },
+      [&] {
+        std::uint16_t number = 0;
+        const auto request = connected.hub.next_request<ns::Resolve>(number);
+        ASSERT_TRUE(request);
+        EXPECT_EQ(request->name, "robot/base");
+        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
+      });
+}
+
+TEST(NifNames, TellsWhatTheHubSays) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse(
+      [node] {
+        std::uint32_t id = 0;
+        EXPECT_EQ(nif_resolve(node, "nobody", &id, NIF_FOREVER), NIF_NOT_FOUND);
+        EXPECT_NE(std::string(nif_error_text()).find("no node has that name"), std::string::npos);
+      },
+      [&] {
+        const auto request = connected.hub.next_message();
+        ASSERT_TRUE(request);
+        const auto header = proto::split_control(request->view().payload)->header;
+        connected.hub.send_control(proto::Kind::ns,
+                                   proto::encode_refusal(header, {proto::Status::not_found, "no node has that name"}));
+      });
+}
+
+TEST(NifNames, ChecksNamesBeforeItAsks) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  std::uint32_t id = 0;
+  EXPECT_EQ(nif_resolve(node, "a b", &id, 0), NIF_BAD_NAME);
+  EXPECT_EQ(nif_resolve(node, nullptr, &id, 0), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(nif_resolve(node, "a", nullptr, 0), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(nif_subscribe(node, "", nullptr, 0), NIF_BAD_NAME);
+  nif_service service{};
+  service.struct_size = sizeof service;
+  service.name = "two/parts";
+  EXPECT_EQ(nif_advertise(node, &service, &id, nullptr, 0), NIF_BAD_NAME);
+  service.name = "one";
+  service.direction = 2;
+  EXPECT_EQ(nif_advertise(node, &service, &id, nullptr, 0), NIF_BAD_ARGUMENT);
+  nif_node_list* list = nullptr;
+  EXPECT_EQ(nif_list_nodes(node, "a//b", &list, 0), NIF_BAD_NAME);
+}
+
+TEST(NifNames, ListsAllPages) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse(
+      [node] {
+        nif_node_list* list = nullptr;
+        ASSERT_EQ(nif_list_nodes(node, "robot/**", &list, NIF_FOREVER), NIF_OK);
+        ASSERT_EQ(list->count, 3u);
+        EXPECT_EQ(list->records[2].id, 3u);
+        EXPECT_STREQ(list->records[0].name, "robot/1");
+        EXPECT_STREQ(list->records[0].place, "");
+        nif_free_nodes(list);
+      },
+      [&] {
+        std::uint16_t number = 0;
+        std::uint32_t id = 0;
+        for (const bool more : {true, true, false}) {
+          const auto request = connected.hub.next_request<ns::List>(number);
+          ASSERT_TRUE(request);
+          EXPECT_EQ(request->pattern, "robot/**");
+          EXPECT_EQ(request->after.value(), id);
+          ns::ListAnswer answer;
+          answer.more = more;
+          answer.nodes.resize(1);
+          answer.nodes[0].node = NodeId{++id};
+          answer.nodes[0].name = "robot/" + std::to_string(id);
+          connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+        }
+      });
+}
+
+TEST(NifNames, DoesNotFollowAHubThatPagesForEver) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse(
+      [node] {
+        nif_service_list* list = nullptr;
+        EXPECT_EQ(nif_list_services(node, nullptr, &list, NIF_FOREVER), NIF_PROTOCOL);
+        EXPECT_EQ(list, nullptr);
+      },
+      [&] {
+        std::uint16_t number = 0;
+        for (int i = 0; i < 2; ++i) {
+          ASSERT_TRUE(connected.hub.next_request<ns::Services>(number));
+          ns::ServicesAnswer answer;
+          answer.more = true;
+          answer.services.resize(1);
+          answer.services[0].group = GroupId{5};
+          connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+        }
+      });
+}
+
+TEST(NifNames, GivesRawAnswersOut) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse(
+      [node] {
+        nif_reply* reply = nullptr;
+        EXPECT_EQ(nif_request(node, NIF_CTRL, 0x8001, nullptr, 0, &reply, 0), NIF_BAD_ARGUMENT);
+        EXPECT_EQ(nif_request(node, 16, 1, nullptr, 0, &reply, 0), NIF_BAD_ARGUMENT);
+        ASSERT_EQ(nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, NIF_FOREVER), NIF_OK);
+        EXPECT_EQ(reply->status, 0);
+        EXPECT_GT(reply->size, 0u);
+        nif_free_reply(reply);
+        nif_free_reply(nullptr);
+      },
+      [&] {
+        std::uint16_t number = 0;
+        ASSERT_TRUE(connected.hub.next_request<proto::ctrl::HubInfo>(number));
+        connected.hub.send_control(proto::Kind::ctrl, proto::encode_answer(proto::ctrl::HubInfoAnswer{}, number));
+      });
+}
+
+TEST(NifNames, AsksAgainAfterABreak) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  converse([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); },
+           [&] {
+             std::uint16_t number = 0;
+             ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
+             connected.hub.close();
+             connected.hub = hub.admit(make_welcome());
+             ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
+             connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
+           });
+}
+
+TEST(NifNames, IgnoresAnswersToNothing) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, 55));
+  std::uint32_t id = 0;
+  EXPECT_EQ(nif_resolve(connected.node.get(), "late", &id, 1), NIF_TIMEOUT);
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<ns::Resolve>(number));
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WithdrawAnswer{}, number));
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, number));
+  connected.hub.send_unicast(kPeerId, kOwnId, "still there");
+  nif_incoming in;
+  ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);
+  EXPECT_EQ(payload_of(in), "still there");
+  nif_release(&in);
+}
+
+}  // namespace
+}  // namespace gimnet::nif::test

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <thread>
+
+#include "client/nif/node.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+#include "tests/client/nif/support/recording_host.hpp"
+
+// What the library's thread does by itself: keep-alive, silence, a full receive queue, a hub that misbehaves.
+
+namespace gimnet::nif::test {
+namespace {
+
+TEST(NodeThread, PingsWhenItHasSentNothingAndAnswersPings) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(connected.hub.next_flow<proto::flow::Ping>());
+  connected.hub.send(proto::flow::Ping{5, 6});
+  const auto pong = connected.hub.next_flow<proto::flow::Pong>();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->sequence, 5u);
+  EXPECT_EQ(pong->sent_ns, 6);
+}
+
+TEST(NodeThread, ConfirmsWithEveryKeepAliveAndEachQuarter) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome(1000);
+  Connected connected = connect_to(hub, default_options("robot"), welcome);
+  connected.hub.send_unicast(kPeerId, kOwnId, "a");
+  auto confirm = connected.hub.next_flow<proto::flow::Confirm>();
+  ASSERT_TRUE(confirm);
+  EXPECT_EQ(confirm->count, 1u);
+  connected.hub.send_unicast(kPeerId, kOwnId, std::string(300, 'x'));
+  confirm = connected.hub.next_flow<proto::flow::Confirm>();
+  ASSERT_TRUE(confirm);
+  EXPECT_EQ(confirm->count, 2u);
+}
+
+TEST(NodeThread, LeavesAHubThatIsSilent) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome();
+  welcome.silent_ms = 100;
+  Connected connected = connect_to(hub, default_options(), welcome);
+  EXPECT_TRUE(connected.hub.wait_closed());
+  nif_incoming in;
+  ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);
+  EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_DISCONNECTED));
+  EXPECT_EQ(in.reason, static_cast<std::uint32_t>(proto::GoodbyeCode::silent));
+  nif_release(&in);
+}
+
+TEST(NodeThread, StopsReadingWhenTheProgramDoesNotTakeAndKeepsAlive) {
+  FakeHub hub;
+  nif_options options = default_options();
+  options.receive_queue_bytes = 100'000;
+  options.socket_receive_bytes = 4096;
+  proto::Welcome welcome = make_welcome();
+  welcome.silent_ms = 200;
+  Connected connected = connect_to(hub, options, welcome);
+  constexpr int kMessages = 1000;
+  std::thread sending([&] {
+    for (int i = 0; i < kMessages; ++i) connected.hub.send_unicast(kPeerId, kOwnId, std::string(4000, 'x'));
+  });
+  while (counters_of(connected.node.get()).read_stops == 0) std::this_thread::yield();
+  const std::size_t slack = 256 * 1024;  // what one read may bring
+  EXPECT_LE(counters_of(connected.node.get()).receive_queue_bytes, 100'000 + slack);
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(connected.hub.next_flow<proto::flow::Ping>()) << "it goes on after the silent time";
+  }
+  EXPECT_EQ(info_of(connected.node.get()).connected, 1);
+  for (int i = 0; i < kMessages; ++i) {
+    nif_incoming in;
+    ASSERT_EQ(nif_receive(connected.node.get(), &in, 20'000), NIF_OK);
+    ASSERT_EQ(in.type, static_cast<std::uint32_t>(NIF_MESSAGE)) << in.text;
+    nif_release(&in);
+  }
+  sending.join();
+}
+
+TEST(NodeThread, EndsAConnectionOnWhichTheHubBreaksTheProtocol) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  for (int i = 0; i < 3; ++i) {
+    connected.hub.send_unicast(kPeerId, kOwnId, "before");
+    std::vector<std::byte> garbage(64, std::byte{0xFF});
+    connected.hub.send(garbage);
+    EXPECT_TRUE(connected.hub.wait_closed());
+    connected.hub = hub.admit(make_welcome());
+    nif_incoming in;
+    for (const auto type : {NIF_MESSAGE, NIF_DISCONNECTED, NIF_CONNECTED}) {
+      ASSERT_EQ(nif_receive(connected.node.get(), &in, 20'000), NIF_OK);
+      EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));
+      nif_release(&in);
+    }
+  }
+}
+
+TEST(NodeThread, ConfirmationOfWhatWasNeverSentEndsTheConnection) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(1000));
+  connected.hub.send(proto::flow::Confirm{1});
+  EXPECT_TRUE(connected.hub.wait_closed());
+}
+
+TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
+  FakeHub hub;
+  nif_options options = default_options();
+  const std::string url = hub.url();
+  options.url = url.c_str();
+  nif_node* node = nullptr;
+  std::thread dialing([&] { EXPECT_EQ(nif_connect(&options, &node), NIF_OK); });
+  FakeConnection connection = hub.accept();
+  ASSERT_TRUE(connection.read_hello());
+  std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
+  add_control(bytes, proto::Kind::link, proto::encode(make_welcome()));
+  proto::FrameParts parts;
+  parts.header.dst = kOwnId;
+  parts.header.src = kPeerId;
+  add_frame(bytes, parts, "at once");
+  connection.send(bytes);
+  dialing.join();
+  nif_incoming in;
+  ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+  EXPECT_EQ(payload_of(in), "at once");
+  nif_release(&in);
+  connection.close();
+  EXPECT_EQ(nif_close(node), NIF_OK);
+}
+
+}  // namespace
+}  // namespace gimnet::nif::test
