@@ -1,0 +1,235 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/options.hpp"
+#include "gimnet/gimi/outcome.hpp"
+#include "gimnet/gimi/records.hpp"
+
+// GIMI: how programs use GIMnet. Only the standard library is needed. docs/gimi.md explains it with examples.
+//
+//     gimnet::Node node("robot");                             // joins by the hub of this machine, or of GIMNET_HUB
+//     auto odometry = node.advertise("odom").or_throw();      // robot/odom
+//     odometry.publish("x 1.0 y 2.0");
+//
+//     gimnet::Node node("viewer");
+//     auto odometry = node.subscribe("robot/odom").or_throw();  // need not exist yet
+//     while (auto message = odometry.receive()) show(message->text());
+//
+// Errors: calls answer with an Outcome; those that throw instead are marked, and `.or_throw()` turns any into throwing.
+// Thread safety: every function of every class may be called from any thread at any time, on one object from many.
+// Lifetime: Senders, Publishers, Subscriptions and Queues are handles that can be copied and may outlive their Node;
+// when it is closed they answer Status::closed.
+// Callbacks: there are none. Received messages wait in queues, which the program empties when it has time.
+
+namespace gimnet {
+
+namespace gimi {
+class Core;
+class MessageQueue;
+class SendStream;
+class PublishedService;
+class SubscribedService;
+}  // namespace gimi
+
+/// Messages that were received and wait: a ring buffer for one (type, instance), or for one subscription.
+class Queue {
+ public:
+  /// Takes the oldest. Waits if there is none. Errors: timeout, closed.
+  Outcome<Message> receive(Timeout timeout = kForever) const;
+  /// Takes the oldest; nothing if there is none.
+  [[nodiscard]] std::optional<Message> try_receive() const;
+  /// Takes the newest and throws the others away, uncounted.
+  [[nodiscard]] std::optional<Message> take_newest() const;
+
+  /// Changes the size while it runs; the oldest that no longer fit go and are counted. 1..kQueueMessagesMax.
+  void resize(std::size_t messages) const;
+  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] std::uint64_t received() const;     ///< all that ever came
+  [[nodiscard]] std::uint64_t overwritten() const;  ///< went because it was full
+
+ private:
+  friend class Node;
+  friend class Subscription;
+  explicit Queue(std::shared_ptr<gimi::MessageQueue> queue) : queue_(std::move(queue)) {}
+  std::shared_ptr<gimi::MessageQueue> queue_;
+};
+
+/// What became of the messages of one stream.
+struct SendCounts {
+  std::uint64_t sent = 0;
+  std::uint64_t acknowledged = 0;
+  std::uint64_t lost = 0;  ///< known not to have arrived, or their connection or route ended before they were told of
+  std::uint64_t skipped = 0;  ///< not sent: AtFullWindow::skip, or replaced by a newer one under hold_latest
+  std::size_t waiting = 0;    ///< sent and not acknowledged yet, and one that is held
+  std::string loss;           ///< why the last one was lost, in words; "" if none was
+};
+
+/// A stream of messages to one node with one key. Several Senders of one (peer, key) of a node are one stream: they
+/// share sequence, window and counts; the options of the first hold.
+class Sender {
+ public:
+  /// Sends. Ok: it is on its way; of a synchronized stream, settle() and counts() tell what became of it. Waits while
+  /// the window is full (AtFullWindow::wait) or the hub has paused the destination.
+  /// Errors: timeout (nothing was sent), window_full, not_connected, not_delivered, too_large, closed.
+  Outcome<void> send(BytesView data, Timeout timeout = kForever, More more = More::no) const;
+  /// Waits until nothing is unacknowledged. Ok: all that was sent so far was acknowledged.
+  /// Errors: not_delivered (the sentence says how many were lost and why), timeout, closed.
+  Outcome<void> settle(Timeout timeout = kForever) const;
+
+  [[nodiscard]] SendCounts counts() const;
+  [[nodiscard]] Peer peer() const;
+
+ private:
+  friend class Node;
+  explicit Sender(std::shared_ptr<gimi::SendStream> stream) : stream_(std::move(stream)) {}
+  std::shared_ptr<gimi::SendStream> stream_;
+};
+
+/// An own service that provides data. Copies are the same service; with the last one it ends.
+class Publisher {
+ public:
+  /// Sends to all subscribers; not waited for by slow ones. Without subscribers nothing leaves the process.
+  Outcome<void> publish(BytesView data, More more = More::no) const;
+  [[nodiscard]] std::size_t subscribers() const;
+  /// Waits until there are that many. Errors: timeout, closed.
+  Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
+  [[nodiscard]] const std::string& name() const;  ///< in full
+  [[nodiscard]] std::uint64_t published() const;  ///< messages given to publish() that answered ok
+
+ private:
+  friend class Node;
+  explicit Publisher(std::shared_ptr<gimi::PublishedService> service) : service_(std::move(service)) {}
+  std::shared_ptr<gimi::PublishedService> service_;
+};
+
+/// A subscription to somebody's service. It survives that the provider ends and comes back. Copies are the same
+/// subscription; with the last one it ends.
+class Subscription {
+ public:
+  /// As Queue::receive().
+  Outcome<Message> receive(Timeout timeout = kForever) const;
+  [[nodiscard]] std::optional<Message> try_receive() const;
+  [[nodiscard]] Queue queue() const;
+  /// Is there a provider at the moment?
+  [[nodiscard]] bool exists() const;
+  /// Waits until there is. Errors: timeout, closed.
+  Outcome<void> wait_until_exists(Timeout timeout = kForever) const;
+  [[nodiscard]] const std::string& name() const;  ///< in full
+  /// Messages of the provider that did not come, by their sequence.
+  [[nodiscard]] std::uint64_t missed() const;
+
+ private:
+  friend class Node;
+  explicit Subscription(std::shared_ptr<gimi::SubscribedService> service) : service_(std::move(service)) {}
+  std::shared_ptr<gimi::SubscribedService> service_;
+};
+
+/// How the connection is at one moment.
+struct NodeState {
+  Peer peer;  ///< changes only if a session could not be taken up again after a break
+  std::string name;
+  std::string hub_name;
+  std::uint32_t hub_id = 0;
+  bool connected = false;
+  std::uint32_t reconnects = 0;
+  std::int64_t hub_round_trip_ns = 0;    ///< 0: not measured yet
+  std::int64_t hub_clock_offset_ns = 0;  ///< hub's clock minus this one
+  std::string trouble;                   ///< why the connection broke last; "" if it never did
+};
+
+/// A member of the network. Leaves for good when it is destroyed.
+class Node {
+ public:
+  /// Joins; `name` and `hub` as in NodeOptions. Throws GimnetError.
+  explicit Node(std::string_view name = {}, std::string_view hub = {});
+  /// Joins. Errors: no_hub, timeout, bad_version, name_taken, bad_name, refused, bad_argument, protocol, system.
+  static Outcome<Node> join(const NodeOptions& options);
+
+  Node(Node&&) noexcept;
+  Node& operator=(Node&&) noexcept;
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  ~Node();
+
+  /// Leaves: writes what still waits (at most a second), gives id and name back. All waiting calls answer closed.
+  void close();
+
+  [[nodiscard]] Peer peer() const;
+  [[nodiscard]] NodeState state() const;
+
+  // ---- sending
+
+  /// A stream to a node. Errors: bad_argument, limit.
+  Outcome<Sender> sender(Peer to, const SendOptions& options = {}) const;
+  /// To a name or an id as text (`7.17`). Errors: as find().
+  Outcome<Sender> sender(std::string_view to, const SendOptions& options = {}, Timeout timeout = Timeout{5000}) const;
+  /// To who accepts the service of that full name, with its key. Errors: not_found, timeout, not_connected.
+  Outcome<Sender> sender_to_service(std::string_view full_name, SendOptions options = {},
+                                    Timeout timeout = Timeout{5000}) const;
+  /// Sends one message; sender() and Sender::send() in one.
+  Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {}, Timeout timeout = kForever) const;
+  Outcome<void> send(std::string_view to, BytesView data, const SendOptions& options = {},
+                     Timeout timeout = kForever) const;
+  /// Writes what More::yes held back.
+  void flush() const;
+  /// Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub.
+  Outcome<void> drain(Timeout timeout = kForever) const;
+
+  // ---- receiving
+
+  /// The queue of a key, made or changed as told. Messages of keys for which nobody asked wait too, in queues of
+  /// NodeOptions::queue_messages; of at most 1,024 keys, others are dropped and counted.
+  Queue queue(MessageKey key, const QueueOptions& options = {}) const;
+  /// Takes the next message of that key. Errors: timeout, closed.
+  Outcome<Message> receive(MessageKey key, Timeout timeout = kForever) const;
+  /// Takes the message that has waited longest, of any key or subscription. Errors: timeout, closed.
+  Outcome<Message> receive(Timeout timeout = kForever) const;
+  /// Messages dropped because of too many keys, or because they were no GIMI messages.
+  [[nodiscard]] std::uint64_t dropped() const;
+
+  // ---- services
+
+  /// Provides the service `own name/name`; `name` has one part. Errors: bad_name, taken, denied (a node without a
+  /// name), limit.
+  Outcome<Publisher> advertise(std::string_view name, const PublishOptions& options = {},
+                               Timeout timeout = Timeout{5000}) const;
+  /// Lists the service `own name/name`, to which others send, until the node is closed. Errors: as advertise().
+  Outcome<Queue> accept(std::string_view name, const AcceptOptions& options = {},
+                        Timeout timeout = Timeout{5000}) const;
+  /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name is the same one.
+  /// Errors: bad_name, limit, denied, timeout, not_connected.
+  Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
+                                  Timeout timeout = Timeout{5000}) const;
+
+  // ---- asking
+
+  /// A node by its name, or by its id as text. Errors: not_found, bad_name, timeout, not_connected.
+  Outcome<Peer> find(std::string_view name, Timeout timeout = Timeout{5000}) const;
+  Outcome<std::string> name_of(Peer peer, Timeout timeout = Timeout{5000}) const;
+  /// Nodes whose name matches (`*` one part, `**` any number; "": all, those without a name too), ascending ids.
+  Outcome<std::vector<NodeRecord>> nodes(std::string_view pattern = {}, Timeout timeout = Timeout{5000}) const;
+  /// Services whose full name matches.
+  Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {}, Timeout timeout = Timeout{5000}) const;
+  Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}) const;
+  Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000}) const;
+  Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000}) const;
+
+  /// Sends a small message to the library of another node, which answers by itself. The round trip in ns.
+  /// Errors: timeout (lost, or late), not_delivered (no such node, no way to it), closed.
+  Outcome<std::int64_t> ping(Peer to, Timeout timeout = Timeout{1000}, Lane lane = Lane::normal,
+                             BytesView echo = {}) const;
+
+ private:
+  explicit Node(std::shared_ptr<gimi::Core> core) : core_(std::move(core)) {}
+  std::shared_ptr<gimi::Core> core_;
+};
+
+}  // namespace gimnet

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/outcome.hpp"
+#include "gimnet/gimi/records.hpp"
+
+namespace gimnet {
+
+/// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
+inline constexpr std::size_t kWindowMax = 64;
+/// Messages that a queue keeps if nobody says otherwise.
+inline constexpr std::size_t kQueueMessagesDefault = 64;
+/// Most messages that a queue can be told to keep.
+inline constexpr std::size_t kQueueMessagesMax = std::size_t{1} << 24;
+
+/// How to join. Everything has a default that works on one machine.
+struct NodeOptions {
+  std::string name;  ///< "": a node without a name, found by its id only
+  /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this machine.
+  std::string hub;
+  std::string description;  ///< for people, at most 256 bytes
+  Timeout timeout{5000};    ///< for joining
+  bool wait_for_hub = false;
+  bool reconnect = true;
+  /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed. Default: nodes with a
+  /// name.
+  std::optional<bool> resume;
+  /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
+  std::optional<std::uint8_t> shard;
+  std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, up to 1 GiB
+  std::size_t receive_bytes = std::size_t{16} << 20;      ///< may wait unread when a queue holds the reading back
+  std::size_t queue_messages = kQueueMessagesDefault;     ///< size of queues that nobody asked for
+  std::uint32_t socket_receive_bytes = 0;                 ///< SO_RCVBUF; 0: the system's
+};
+
+/// What a queue does when a message comes and it is full.
+enum class AtFullQueue : std::uint8_t {
+  overwrite_oldest,  ///< a ring buffer: the oldest goes and is counted; of size 1 it holds the newest
+  /// Nothing goes: the node stops reading from the hub, for all its queues, until there is room. Keep-alive goes on.
+  stop_reading,
+};
+
+struct QueueOptions {
+  std::size_t messages = kQueueMessagesDefault;  ///< 1..kQueueMessagesMax
+  AtFullQueue at_full = AtFullQueue::overwrite_oldest;
+};
+
+/// What a sender does when as many messages as its window allows are not acknowledged.
+enum class AtFullWindow : std::uint8_t {
+  wait,         ///< until there is room, at most the time given to send()
+  skip,         ///< send nothing and answer Status::window_full
+  hold_latest,  ///< keep this one, in place of one that is kept already, and send it when there is room
+};
+
+struct SendOptions {
+  MessageKey key;
+  Lane lane = Lane::normal;
+  /// 1..kWindowMax: synchronized, at most that many are not acknowledged; data do not pile up on the way, and each
+  /// receiver sets its own pace. 0: unsynchronized, as fast as the network takes it; nothing is acknowledged.
+  std::size_t window = 0;
+  AtFullWindow at_full = AtFullWindow::wait;
+  bool timestamp = false;        ///< tell the receiver when it was sent
+  std::uint32_t age_max_ms = 0;  ///< not 0: dropped on the way when older
+};
+
+struct PublishOptions {
+  Delivery delivery = Delivery::stream;
+  MessageKey key;
+  Lane lane = Lane::normal;
+  bool timestamp = true;
+  std::string metadata;  ///< for people and tools
+};
+
+/// A service that takes data, such as commands.
+struct AcceptOptions {
+  MessageKey key;
+  QueueOptions queue;
+  std::string metadata;
+};
+
+/// Whether more messages follow at once: those marked so are written together with the next one that is not. A program
+/// that stops there calls Node::flush().
+enum class More : std::uint8_t { no, yes };
+
+}  // namespace gimnet

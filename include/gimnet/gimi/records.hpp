@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gimnet/gimi/message.hpp"
+
+// What a hub tells about itself, its nodes and its services. Value types.
+
+namespace gimnet {
+
+/// How a service's messages wait for a slow subscriber: `stream` all of them in order, the oldest going when the queue
+/// is full; `latest` only the newest.
+enum class Delivery : std::uint8_t { stream = 0, latest = 1 };
+
+/// A service gives data to its subscribers, or takes data that others send to it.
+enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
+
+struct NodeRecord {
+  Peer node;
+  std::string name;  ///< "" for a node without a name
+  std::uint32_t hub_id = 0;
+  std::string hub_name;
+  bool connected = false;  ///< false: within its grace time
+  std::string description;
+  std::string place;            ///< its address as its hub sees it
+  std::uint64_t joined_ms = 0;  ///< milliseconds since it joined
+  std::uint32_t services = 0;   ///< how many it provides or accepts
+};
+
+struct ServiceRecord {
+  std::string name;  ///< in full: node name/service name
+  Peer node;         ///< of the provider
+  MessageKey key;
+  Direction direction = Direction::provides;
+  Delivery delivery = Delivery::stream;
+  std::uint32_t group_id = 0;
+  std::uint32_t subscribers = 0;
+  std::string metadata;
+  std::string hub_name;
+};
+
+struct HubRecord {
+  std::uint32_t hub_id = 0;
+  std::string name;
+  std::string version;
+  std::uint32_t shards = 0;
+  std::uint64_t uptime_ms = 0;
+  std::uint32_t nodes = 0;
+  std::uint32_t services = 0;
+};
+
+/// The counters of one of the hub's io threads, by the names of docs/operations.md, in the hub's order.
+struct ShardCounts {
+  /// The number of the record that is no io thread's: what the hub counted of peers that it did not admit. It is there
+  /// once there is something to count.
+  static constexpr std::uint32_t kConductor = 65'535;
+
+  std::uint32_t shard = 0;  ///< or kConductor
+  std::vector<std::pair<std::string, std::uint64_t>> counters;
+};
+
+struct ConnectionRecord {
+  Peer node;
+  std::string name;
+  std::uint32_t shard = 0;
+  std::string transport;  ///< "tcp" or "unix"
+  std::string peer;       ///< its address
+  bool connected = false;
+  std::uint64_t queued_bytes = 0;  ///< waiting for it at the hub
+};
+
+}  // namespace gimnet

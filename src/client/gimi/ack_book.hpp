@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <unordered_map>
+
+#include "gimnet/gimi/message.hpp"
+#include "proto/gimi/message_header.hpp"
+
+namespace gimnet::gimi {
+
+/// One stream as a table names it: the other node, and the key.
+struct StreamName {
+  Peer peer;
+  MessageKey key;
+  friend bool operator==(const StreamName&, const StreamName&) = default;
+};
+struct StreamNameHash {
+  std::size_t operator()(const StreamName& name) const noexcept {
+    const std::uint64_t key = name.key.type | (static_cast<std::uint64_t>(name.key.instance) << 32);
+    // Fibonacci hashing: ids and keys are small numbers that differ in their low bits.
+    return static_cast<std::size_t>((key ^ (static_cast<std::uint64_t>(name.peer.id) << 17)) * 0x9E3779B97F4A7C15u);
+  }
+};
+
+/// Which DATA of each sender were taken: the highest sequence and the 64 before it, which is what an ACK says.
+/// Thread safety: one thread at a time. Limits: `kStreamsMax` streams; beyond them one that is known is forgotten, and
+/// its next ACK speaks only of what came after.
+class AckBook {
+ public:
+  static constexpr std::size_t kStreamsMax = 65536;
+
+  /// A DATA that asked for an ACK was taken. True: the sender is due for an ACK, and was not before.
+  bool take(const StreamName& sender, std::uint32_t sequence);
+
+  struct Entry {
+    std::uint32_t sequence = 0;
+    std::uint64_t bitmap = 0;
+    bool due = false;
+  };
+  /// What is to be acknowledged, now: it is no longer due. Zeros if nothing came from there.
+  Entry acknowledge(const StreamName& sender);
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+
+ private:
+  std::unordered_map<StreamName, Entry, StreamNameHash> entries_;
+};
+
+}  // namespace gimnet::gimi

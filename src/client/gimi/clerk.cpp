@@ -1,0 +1,115 @@
+#include "client/gimi/clerk.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "base/clock.hpp"
+#include "client/gimi/stream_table.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+/// How often streams are looked after: a quarter of the shortest patience.
+constexpr std::int64_t kTickNs = 50'000'000;
+/// When to try again where the hub had paused the way of an ACK.
+constexpr std::int64_t kRetryNs = 5'000'000;
+/// How long a node that leaves tries to get its last ACKs away.
+constexpr std::int64_t kLastAcksNs = 500'000'000;
+
+}  // namespace
+
+void Clerk::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void Clerk::stop() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+  }
+  work_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Clerk::take(const StreamName& sender, Lane lane, std::uint32_t sequence) {
+  {
+    const MutexLock lock(mutex_);
+    if (!book_.take(sender, sequence)) return;
+    due_.push_back({sender, lane});
+    if (due_.size() != 1) return;
+  }
+  work_.notify_one();
+}
+
+nif_status Clerk::acknowledge(const StreamName& sender, Lane lane, std::uint32_t pong) {
+  AckBook::Entry entry;
+  {
+    const MutexLock lock(mutex_);
+    entry = book_.acknowledge(sender);
+  }
+  std::array<std::byte, proto::gimi::kAckSize> data;
+  proto::gimi::encode_ack({entry.bitmap, pong}, data);
+  const Envelope envelope{sender.peer.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, sender.key, 0, 0};
+  return uplink_.transmit(envelope, {entry.sequence, proto::gimi::Operation::ack, 0, 0}, false, data, 0);
+}
+
+void Clerk::attend(bool at_once) {
+  {
+    const MutexLock lock(mutex_);
+    if (ticking_ && !at_once) return;
+    ticking_ = true;
+    hurry_ = hurry_ || at_once;
+  }
+  work_.notify_one();
+}
+
+void Clerk::wait_for_work(std::int64_t& tick_at) {
+  while (due_.empty() && !stopping_) {
+    if (!ticking_) {
+      tick_at = INT64_MAX;
+    } else if (tick_at == INT64_MAX) {
+      tick_at = steady_now_ns() + kTickNs;
+    }
+    if (std::exchange(hurry_, false)) tick_at = 0;
+    if (steady_now_ns() >= tick_at) return;
+    static_cast<void>(work_.wait_until(mutex_, tick_at));
+  }
+}
+
+void Clerk::run() {
+  std::vector<Due> due;
+  std::vector<Due> paused;
+  std::int64_t tick_at = INT64_MAX;
+  std::int64_t give_up_at = INT64_MAX;
+  for (;;) {
+    {
+      const MutexLock lock(mutex_);
+      if (paused.empty()) {
+        wait_for_work(tick_at);
+      } else {
+        static_cast<void>(work_.wait_until(mutex_, steady_now_ns() + kRetryNs));
+      }
+      if (stopping_ && give_up_at == INT64_MAX) give_up_at = steady_now_ns() + kLastAcksNs;
+      if (stopping_ && due_.empty() && (paused.empty() || steady_now_ns() >= give_up_at)) return;
+      due.swap(due_);
+    }
+    due.insert(due.end(), paused.begin(), paused.end());
+    paused.clear();
+    send_due(due);
+    paused.swap(due);
+    const std::int64_t now = steady_now_ns();
+    if (now < tick_at) continue;
+    tick_at = now + kTickNs;
+    const bool more = streams_.tick(now);
+    const MutexLock lock(mutex_);
+    if (!more && !hurry_) ticking_ = false;
+  }
+}
+
+void Clerk::send_due(std::vector<Due>& due) {
+  std::erase_if(due, [this](const Due& ack) { return acknowledge(ack.sender, ack.lane, 0) != NIF_TIMEOUT; });
+}
+
+}  // namespace gimnet::gimi

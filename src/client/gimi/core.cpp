@@ -1,0 +1,283 @@
+#include "client/gimi/core.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "base/endian.hpp"
+#include "client/gimi/deadline.hpp"
+#include "client/gimi/message_access.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+/// What the GIMI header and its extension may add to the application's bytes.
+constexpr std::size_t kHeaderRoom = 1024;
+
+StreamName stream_of(const nif_incoming& in, std::uint32_t peer) {
+  const auto key = proto::gimi::StreamKey::of(in.key);
+  return {Peer{peer}, {key.type, key.instance}};
+}
+
+std::span<const std::byte> payload_of(const nif_incoming& in) {
+  return {static_cast<const std::byte*>(in.payload), in.size};
+}
+
+nif_verdict verdict_of(ServiceTable::Place place) {
+  return place == ServiceTable::Place::not_yet ? NIF_NOT_NOW : NIF_DONE;
+}
+
+/// The ACK of a message becomes due before the program can take the message and leave.
+class AckReceipt final : public Receipt {
+ public:
+  AckReceipt(Clerk& clerk, const StreamName& sender, Lane lane, std::uint32_t sequence)
+      : clerk_(clerk), sender_(sender), lane_(lane), sequence_(sequence) {}
+  void on_kept() override { clerk_.take(sender_, lane_, sequence_); }
+
+ private:
+  Clerk& clerk_;
+  const StreamName& sender_;
+  const Lane lane_;
+  const std::uint32_t sequence_;
+};
+
+/// The GIMI header in the 16 bytes that a report repeats: behind the key, where no extension or fragment header stands
+/// before it.
+std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
+  constexpr std::size_t kKeySize = 8;
+  const auto bytes = payload_of(in);
+  if (bytes.size() < proto::kHeaderSize + kKeySize + proto::gimi::kMessageHeaderSize) return std::nullopt;
+  const proto::FrameHeader header = proto::load_header(bytes.data());
+  if (!header.has(proto::kFlagKeyed) || header.has(proto::kFlagFragment) || header.has(proto::kFlagExt)) {
+    return std::nullopt;
+  }
+  return proto::gimi::load_message_header(bytes.data() + proto::kHeaderSize + kKeySize);
+}
+
+}  // namespace
+
+Core::Core(const NodeOptions& options)
+    : inbox_(options.queue_messages, options.receive_bytes, [this] { static_cast<void>(nif_deliver(node())); }),
+      streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
+      services_(uplink_, inbox_),
+      clerk_(uplink_, streams_),
+      reconnects_(options.reconnect) {}
+
+Core::~Core() { close(); }
+
+Outcome<std::shared_ptr<Core>> Core::join(const NodeOptions& options) {
+  std::shared_ptr<Core> core(new Core(options));
+  const nif_status status = core->connect(options);
+  if (status == NIF_OK) return core;
+  core->closed_ = true;
+  const char* words = nif_error_text();
+  if (*words != '\0') return Failure{status_of(status), words};
+  return failure_of(status, "join " + (options.hub.empty() ? "the hub of this machine" : options.hub));
+}
+
+nif_status Core::connect(const NodeOptions& options) {
+  nif_options how{};
+  how.struct_size = sizeof how;
+  how.url = options.hub.c_str();
+  how.name = options.name.c_str();
+  how.description = options.description.empty() ? nullptr : options.description.c_str();
+  how.connect_timeout_ms = nif_timeout(options.timeout);
+  how.wait_for_hub = options.wait_for_hub ? 1 : 0;
+  how.no_reconnect = options.reconnect ? 0 : 1;
+  if (options.resume) how.resume = *options.resume ? NIF_RESUME_ON : NIF_RESUME_OFF;
+  if (options.shard) how.shard_plus_one = static_cast<std::uint8_t>(*options.shard + 1);
+  how.receive_queue_bytes = options.receive_bytes;
+  how.message_bytes_max = std::min(options.message_bytes_max + kHeaderRoom, NIF_MESSAGE_BYTES_MAX);
+  how.socket_receive_bytes = options.socket_receive_bytes;
+  how.callback = &Core::on_incoming;
+  how.user = this;
+  nif_node* node = nullptr;
+  const nif_status status = nif_connect(&how, &node);
+  if (status != NIF_OK) return status;
+  uplink_.open(node);
+  clerk_.start();
+  ready_ = true;
+  static_cast<void>(nif_deliver(node));
+  return NIF_OK;
+}
+
+void Core::close() {
+  if (closed_.exchange(true)) return;
+  clerk_.stop();
+  inbox_.close();
+  streams_.close();
+  services_.close();
+  pings_.close();
+  static_cast<void>(nif_close(node()));
+}
+
+NodeState Core::state() const {
+  NodeState state;
+  nif_info info{};
+  info.struct_size = sizeof info;
+  if (nif_get_info(node(), &info) != NIF_OK) return state;
+  state.peer = Peer{info.id};
+  state.name = info.name;
+  state.hub_name = info.hub_name;
+  state.hub_id = info.hub_id;
+  state.connected = info.connected != 0;
+  state.reconnects = info.reconnects;
+  if (info.keep_alive_seen != 0) {
+    state.hub_round_trip_ns = info.round_trip_ns;
+    state.hub_clock_offset_ns = info.clock_offset_ns;
+  }
+  std::array<char, 512> trouble{};
+  static_cast<void>(nif_last_error(node(), trouble.data(), trouble.size()));
+  state.trouble = trouble.data();
+  return state;
+}
+
+Outcome<std::int64_t> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::vector<std::byte> data(proto::gimi::kPingTimeSize + echo.size());
+  store_le(data.data(), wall_now_ns());
+  std::ranges::copy(echo.span(), data.begin() + proto::gimi::kPingTimeSize);
+  const std::uint32_t number = uplink_.next_ping();
+  pings_.expect(number, to);
+  const Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
+  const nif_status status =
+      uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0}, false, data, nif_timeout(timeout));
+  if (status == NIF_OK) return pings_.wait(number, deadline, timeout);
+  pings_.forget(number);
+  return failure_of(status, "ping " + to.text());
+}
+
+nif_verdict Core::on_incoming(void* user, const nif_incoming* in) {
+  auto* core = static_cast<Core*>(user);
+  // The first messages may come before connect() knows its handle.
+  return core->ready_ ? core->dispatch(*in) : NIF_NOT_NOW;
+}
+
+nif_verdict Core::dispatch(const nif_incoming& in) {
+  switch (in.type) {
+    case NIF_MESSAGE:
+      return on_message(in);
+    case NIF_REPORT:
+      on_report(in);
+      return NIF_DONE;
+    case NIF_CONNECTED:
+      on_connected(in);
+      return NIF_DONE;
+    case NIF_DISCONNECTED:
+    case NIF_SESSION_REPLACED:
+      on_disconnected(in);
+      return NIF_DONE;
+    case NIF_SUBSCRIBER_JOINED:
+    case NIF_SUBSCRIBER_LEFT:
+      return verdict_of(services_.on_subscribers(in.group, in.count));
+    case NIF_SERVICE_MOVED:
+      return verdict_of(services_.on_service_moved(in.text, in.group));
+    case NIF_OWN_SERVICE_MOVED:
+      services_.on_own_service_moved(in.text, in.group);
+      return NIF_DONE;
+    default:
+      return NIF_DONE;
+  }
+}
+
+nif_verdict Core::on_message(const nif_incoming& in) {
+  using proto::gimi::Operation;
+  const auto view = (in.flags & NIF_FLAG_KEYED) != 0 ? proto::gimi::parse_message(payload_of(in)) : std::nullopt;
+  if (!view) {
+    inbox_.count_dropped();
+    return NIF_DONE;
+  }
+  switch (view->header.operation) {
+    case Operation::data:
+      return on_data(in, *view);
+    case Operation::ack:
+      on_ack(in, *view);
+      return NIF_DONE;
+    case Operation::ping:
+      on_ping(in, *view);
+      return NIF_DONE;
+    case Operation::pong:
+      pings_.on_pong(view->header.sequence, Peer{in.from});
+      return NIF_DONE;
+    default:
+      inbox_.count_dropped();
+      return NIF_DONE;
+  }
+}
+
+nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (in.kind == NIF_GROUP) return on_group_data(in, view);
+  const StreamName name = stream_of(in, in.from);
+  Message message = MessageAccess::make(in, view, nullptr);
+  AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header.sequence);
+  const bool wanted = in.kind == NIF_UNICAST && view.header.has(proto::gimi::kFlagAckWanted);
+  if (inbox_.put(name.key, message, wanted ? &receipt : nullptr)) return NIF_KEEP;
+  MessageAccess::disown(message);
+  return NIF_NOT_NOW;
+}
+
+nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+  if (service == nullptr) return verdict_of(place);
+  Message message = MessageAccess::make(in, view, service->shared_name());
+  if (!inbox_.put(service->queue(), message, nullptr)) {
+    MessageAccess::disown(message);
+    return NIF_NOT_NOW;
+  }
+  service->on_message(in.from, view.header.sequence);
+  return NIF_KEEP;
+}
+
+void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto ack = proto::gimi::decode_ack(view.data);
+  if (ack) streams_.on_ack(stream_of(in, in.from), view.header.sequence, *ack);
+}
+
+void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (in.kind != NIF_UNICAST || in.from == 0) return;
+  const StreamName name = stream_of(in, in.from);
+  const auto lane = static_cast<Lane>(in.lane);
+  // Both fit or neither arrives: whoever misses them asks again.
+  if (view.header.has(proto::gimi::kFlagAckWanted) && clerk_.acknowledge(name, lane, view.header.sequence) != NIF_OK) {
+    return;
+  }
+  const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
+  static_cast<void>(
+      uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0}, false, view.data, 0));
+}
+
+void Core::on_report(const nif_incoming& in) {
+  if (in.kind != NIF_UNICAST) return;
+  const auto header = reported_header(in);
+  StreamTable::Report report{stream_of(in, in.to), in.reason, in.count, 0, in.text};
+  if (header && header->operation == proto::gimi::Operation::data) report.sequence = header->sequence;
+  if (header && header->operation == proto::gimi::Operation::ping) {
+    pings_.on_lost(header->sequence, "the hub reports " + report.text);
+  }
+  streams_.on_report(report);
+}
+
+void Core::on_connected(const nif_incoming& in) {
+  streams_.on_interrupted(0);
+  if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
+  services_.on_reconnected();
+  streams_.on_broken("the connection to the hub broke, and what was on its way is lost");
+}
+
+void Core::on_disconnected(const nif_incoming& in) {
+  nif_info info{};
+  info.struct_size = sizeof info;
+  const bool kept =
+      in.type == NIF_DISCONNECTED && reconnects_ && nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
+  if (kept) {
+    streams_.on_interrupted(steady_now_ns());
+  } else {
+    streams_.on_broken(std::string("the connection to the hub broke: ") + in.text);
+  }
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/mutex.hpp"
+#include "client/gimi/clerk.hpp"
+#include "client/gimi/inbox.hpp"
+#include "client/gimi/ping_table.hpp"
+#include "client/gimi/service_table.hpp"
+#include "client/gimi/stream_table.hpp"
+#include "client/gimi/uplink.hpp"
+
+namespace gimnet::gimi {
+
+/// A node: NIF's handle, and who takes what it delivers. Everything received comes on the library's thread to
+/// on_incoming(), which sorts it and never waits. Thread safety: any thread.
+class Core {
+ public:
+  static Outcome<std::shared_ptr<Core>> join(const NodeOptions& options);
+  ~Core();
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+
+  void close();
+
+  [[nodiscard]] nif_node* node() const { return uplink_.node(); }
+  [[nodiscard]] NodeState state() const;
+  [[nodiscard]] Inbox& inbox() { return inbox_; }
+  [[nodiscard]] StreamTable& streams() { return streams_; }
+  [[nodiscard]] ServiceTable& services() { return services_; }
+  [[nodiscard]] Outcome<std::int64_t> ping(Peer to, Timeout timeout, Lane lane, BytesView echo);
+
+ private:
+  explicit Core(const NodeOptions& options);
+  [[nodiscard]] nif_status connect(const NodeOptions& options);
+
+  static nif_verdict on_incoming(void* user, const nif_incoming* in);
+  [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
+  [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
+  [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_report(const nif_incoming& in);
+  void on_connected(const nif_incoming& in);
+  void on_disconnected(const nif_incoming& in);
+
+  Uplink uplink_;
+  Inbox inbox_;
+  StreamTable streams_;
+  ServiceTable services_;
+  PingTable pings_;
+  Clerk clerk_;
+  const bool reconnects_;
+  std::atomic<bool> ready_{false};
+  std::atomic<bool> closed_{false};
+};
+
+}  // namespace gimnet::gimi

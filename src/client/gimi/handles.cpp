@@ -1,0 +1,45 @@
+#include "client/gimi/core.hpp"
+#include "gimnet/gimi.hpp"
+
+// The handles of gimnet/gimi.hpp: each leads to its part of a Core, which it keeps alive.
+
+namespace gimnet {
+
+Outcome<Message> Queue::receive(Timeout timeout) const { return queue_->inbox().receive(*queue_, timeout); }
+std::optional<Message> Queue::try_receive() const { return queue_->inbox().try_receive(*queue_); }
+std::optional<Message> Queue::take_newest() const { return queue_->inbox().take_newest(*queue_); }
+void Queue::resize(std::size_t messages) const { queue_->inbox().resize(*queue_, messages); }
+std::size_t Queue::size() const { return queue_->inbox().counts(*queue_).size; }
+std::uint64_t Queue::received() const { return queue_->inbox().counts(*queue_).received; }
+std::uint64_t Queue::overwritten() const { return queue_->inbox().counts(*queue_).overwritten; }
+
+Outcome<void> Sender::send(BytesView data, Timeout timeout, More more) const {
+  return stream_->send(data, timeout, more);
+}
+Outcome<void> Sender::settle(Timeout timeout) const { return stream_->settle(timeout); }
+SendCounts Sender::counts() const { return stream_->counts(); }
+Peer Sender::peer() const { return stream_->to(); }
+
+Outcome<void> Publisher::publish(BytesView data, More more) const { return service_->publish(data, more); }
+std::size_t Publisher::subscribers() const { return service_->subscribers(); }
+Outcome<void> Publisher::wait_for_subscribers(std::size_t count, Timeout timeout) const {
+  return service_->wait_for_subscribers(count, timeout);
+}
+const std::string& Publisher::name() const { return service_->full_name(); }
+std::uint64_t Publisher::published() const { return service_->published(); }
+
+Outcome<Message> Subscription::receive(Timeout timeout) const {
+  gimi::MessageQueue& queue = service_->queue();
+  return queue.inbox().receive(queue, timeout);
+}
+std::optional<Message> Subscription::try_receive() const {
+  gimi::MessageQueue& queue = service_->queue();
+  return queue.inbox().try_receive(queue);
+}
+Queue Subscription::queue() const { return Queue({service_, &service_->queue()}); }
+bool Subscription::exists() const { return service_->exists(); }
+Outcome<void> Subscription::wait_until_exists(Timeout timeout) const { return service_->wait_until_exists(timeout); }
+const std::string& Subscription::name() const { return service_->name(); }
+std::uint64_t Subscription::missed() const { return service_->missed(); }
+
+}  // namespace gimnet

@@ -1,0 +1,113 @@
+#include "client/gimi/hub_records.hpp"
+
+#include <memory>
+#include <span>
+#include <utility>
+
+#include "client/gimi/deadline.hpp"
+#include "client/gimi/uplink.hpp"
+#include "proto/control/ctrl.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+template <class Request>
+proto::bitestream::Writer body_of(const Request& request) {
+  proto::bitestream::Writer body;
+  request.write(body);
+  return body;
+}
+
+/// Asks the hub and reads its answer.
+template <class Answer, class Request>
+Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing, Timeout timeout) {
+  const auto body = body_of(request);
+  nif_reply* reply = nullptr;
+  const nif_status status =
+      nif_request(node, NIF_CTRL, Request::kOperation, body.bytes().data(), body.size(), &reply, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, doing);
+  const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
+  if (reply->status != 0) {
+    const bool denied = reply->status == static_cast<std::uint16_t>(proto::Status::denied);
+    return Failure{denied ? Status::denied : Status::refused, "cannot " + doing + ": " + reply->sentence};
+  }
+  proto::Fields fields({static_cast<const std::byte*>(reply->content), reply->size}, Answer::kName);
+  Answer answer = Answer::read(fields);
+  if (fields.failed()) return Failure{Status::protocol, "cannot " + doing + ": " + fields.error().sentence};
+  return answer;
+}
+
+}  // namespace
+
+Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern, Timeout timeout) {
+  nif_node_list* list = nullptr;
+  const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
+  const nif_status status = nif_list_nodes(node, wanted, &list, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "list the nodes");
+  const std::unique_ptr<nif_node_list, void (*)(nif_node_list*)> owner(list, &nif_free_nodes);
+  std::vector<NodeRecord> records;
+  for (const nif_node_record& found : std::span(list->records, list->count)) {
+    records.push_back({Peer{found.id}, found.name, found.hub_id, found.hub_name, found.connected != 0,
+                       found.description, found.place, found.joined_ms, found.services});
+  }
+  return records;
+}
+
+Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern, Timeout timeout) {
+  nif_service_list* list = nullptr;
+  const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
+  const nif_status status = nif_list_services(node, wanted, &list, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "list the services");
+  const std::unique_ptr<nif_service_list, void (*)(nif_service_list*)> owner(list, &nif_free_services);
+  std::vector<ServiceRecord> records;
+  for (const nif_service_record& found : std::span(list->records, list->count)) {
+    records.push_back({found.name,
+                       Peer{found.node_id},
+                       {found.message_type, found.instance},
+                       found.direction == NIF_ACCEPTS ? Direction::accepts : Direction::provides,
+                       found.delivery == NIF_LATEST_DELIVERY ? Delivery::latest : Delivery::stream,
+                       found.group,
+                       found.subscribers,
+                       found.metadata,
+                       found.hub_name});
+  }
+  return records;
+}
+
+Outcome<HubRecord> ask_hub(nif_node* node, Timeout timeout) {
+  const auto answer = ask<proto::ctrl::HubInfoAnswer>(node, proto::ctrl::HubInfo{}, "ask the hub who it is", timeout);
+  if (!answer) return answer.failure();
+  return HubRecord{answer->hub.value(), answer->hub_name, answer->version, answer->shards,
+                   answer->uptime_ms,   answer->nodes,    answer->services};
+}
+
+Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout) {
+  auto answer =
+      ask<proto::ctrl::StatisticsAnswer>(node, proto::ctrl::Statistics{}, "ask the hub for its counters", timeout);
+  if (!answer) return answer.failure();
+  std::vector<ShardCounts> shards;
+  for (const auto& shard : answer->shards) {
+    ShardCounts& counts = shards.emplace_back();
+    counts.shard = shard.shard;
+    for (const auto& counter : shard.counters) counts.counters.emplace_back(counter.name, counter.value);
+  }
+  return shards;
+}
+
+Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout timeout) {
+  std::vector<ConnectionRecord> records;
+  proto::ctrl::Connections request;
+  for (;;) {
+    const auto page = ask<proto::ctrl::ConnectionsAnswer>(node, request, "ask the hub for its connections", timeout);
+    if (!page) return page.failure();
+    for (const auto& found : page->connections) {
+      if (found.node <= request.after) return records;  // a hub that goes round in circles is not followed
+      request.after = found.node;
+      records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport, found.peer,
+                         found.connected, found.queued_bytes});
+    }
+    if (!page->more || page->connections.empty()) return records;
+  }
+}
+
+}  // namespace gimnet::gimi

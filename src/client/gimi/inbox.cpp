@@ -1,0 +1,193 @@
+#include "client/gimi/inbox.hpp"
+
+#include <utility>
+
+#include "client/gimi/deadline.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+Failure ended() { return {Status::closed, "cannot receive: the node was closed"}; }
+Failure none(Timeout timeout) {
+  return {Status::timeout, "nothing was received within " + std::to_string(timeout.count()) + " ms"};
+}
+
+}  // namespace
+
+MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
+  MessageQueue* found = nullptr;
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    const auto place = by_key_.find(key);
+    if (place != by_key_.end()) {
+      found = place->second;
+      if (options != nullptr) found->set(*options);
+      room = is_room_wanted(*found);
+    } else {
+      const QueueOptions unasked{unasked_messages_, AtFullQueue::overwrite_oldest};
+      found = &queues_.emplace_back(*this, options != nullptr ? *options : unasked, bytes_max_);
+      by_key_.emplace(key, found);
+    }
+  }
+  tell_room(room);
+  return *found;
+}
+
+MessageQueue& Inbox::add_queue(const QueueOptions& options) {
+  const MutexLock lock(mutex_);
+  return queues_.emplace_back(*this, options, bytes_max_);
+}
+
+bool Inbox::push(MessageQueue& queue, Message& message, Receipt* receipt) {
+  if (queue.refuses()) {
+    refusing_ = &queue;
+    return false;
+  }
+  queue.push(std::move(message), ++arrivals_);
+  if (receipt != nullptr) receipt->on_kept();
+  queue.filled().notify_one();
+  if (any_waiters_ != 0) any_.notify_one();
+  return true;
+}
+
+bool Inbox::put(MessageQueue& queue, Message& message, Receipt* receipt) {
+  const MutexLock lock(mutex_);
+  return push(queue, message, receipt);
+}
+
+bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
+  const MutexLock lock(mutex_);
+  const auto place = by_key_.find(key);
+  if (place != by_key_.end()) return push(*place->second, message, receipt);
+  if (unasked_keys_ == kUnaskedKeysMax) {
+    ++dropped_;
+    return true;
+  }
+  ++unasked_keys_;
+  MessageQueue& queue =
+      queues_.emplace_back(*this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
+  by_key_.emplace(key, &queue);
+  return push(queue, message, receipt);
+}
+
+void Inbox::count_dropped() {
+  const MutexLock lock(mutex_);
+  ++dropped_;
+}
+
+std::uint64_t Inbox::dropped() {
+  const MutexLock lock(mutex_);
+  return dropped_;
+}
+
+bool Inbox::is_room_wanted(const MessageQueue& queue) {
+  if (refusing_ != &queue || queue.refuses() || !queue.wants_more()) return false;
+  refusing_ = nullptr;
+  return true;
+}
+
+Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::optional<Message> message;
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    while (queue.empty()) {
+      if (closed_) return ended();
+      if (is_over(deadline)) return none(timeout);
+      static_cast<void>(queue.filled().wait_until(mutex_, deadline));
+    }
+    message = queue.pop();
+    room = is_room_wanted(queue);
+  }
+  tell_room(room);
+  return std::move(*message);
+}
+
+MessageQueue* Inbox::first_waiting() {
+  MessageQueue* first = nullptr;
+  for (MessageQueue& queue : queues_) {
+    if (!queue.empty() && (first == nullptr || queue.first_arrival() < first->first_arrival())) first = &queue;
+  }
+  return first;
+}
+
+Outcome<Message> Inbox::receive_any(Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  std::optional<Message> message;
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    MessageQueue* queue = nullptr;
+    while ((queue = first_waiting()) == nullptr) {
+      if (closed_) return ended();
+      if (is_over(deadline)) return none(timeout);
+      ++any_waiters_;
+      static_cast<void>(any_.wait_until(mutex_, deadline));
+      --any_waiters_;
+    }
+    message = queue->pop();
+    room = is_room_wanted(*queue);
+  }
+  tell_room(room);
+  return std::move(*message);
+}
+
+std::optional<Message> Inbox::try_receive(MessageQueue& queue) {
+  std::optional<Message> message;
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    message = queue.pop();
+    room = is_room_wanted(queue);
+  }
+  tell_room(room);
+  return message;
+}
+
+std::optional<Message> Inbox::take_newest(MessageQueue& queue) {
+  std::optional<Message> message;
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    message = queue.pop_newest();
+    room = is_room_wanted(queue);
+  }
+  tell_room(room);
+  return message;
+}
+
+void Inbox::set(MessageQueue& queue, const QueueOptions& options) {
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    queue.set(options);
+    room = is_room_wanted(queue);
+  }
+  tell_room(room);
+}
+
+void Inbox::resize(MessageQueue& queue, std::size_t messages) {
+  bool room = false;
+  {
+    const MutexLock lock(mutex_);
+    queue.resize(messages);
+    room = is_room_wanted(queue);
+  }
+  tell_room(room);
+}
+
+Inbox::Counts Inbox::counts(MessageQueue& queue) {
+  const MutexLock lock(mutex_);
+  return {queue.size(), queue.received(), queue.overwritten()};
+}
+
+void Inbox::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  any_.notify_all();
+  for (MessageQueue& queue : queues_) queue.filled().notify_all();
+}
+
+}  // namespace gimnet::gimi

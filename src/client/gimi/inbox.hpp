@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <optional>
+
+#include "base/mutex.hpp"
+#include "client/gimi/message_queue.hpp"
+#include "gimnet/gimi/outcome.hpp"
+
+namespace gimnet::gimi {
+
+/// Told that a message found its place, before anybody can take it out again. Called with the inbox locked.
+class Receipt {
+ public:
+  virtual void on_kept() = 0;
+
+ protected:
+  ~Receipt() = default;
+};
+
+/// All queues of a node. Thread safety: any thread. Queues live as long as the inbox.
+class Inbox {
+ public:
+  /// Keys for which nobody asked that get a queue.
+  static constexpr std::size_t kUnaskedKeysMax = 1024;
+
+  /// `on_room` is called without a lock when a queue that refused has room again.
+  Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room)
+      : unasked_messages_(unasked_messages), bytes_max_(bytes_max), on_room_(std::move(on_room)) {}
+
+  /// The queue of a key, made if there is none; with `options` changed to them.
+  MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
+  /// A queue for a subscription.
+  MessageQueue& add_queue(const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
+
+  /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
+  [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_EXCLUDES(mutex_);
+  /// As put() to the queue of the key; of too many keys it is dropped, and true.
+  [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt) GIMNET_EXCLUDES(mutex_);
+  void count_dropped() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
+
+  [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<Message> receive_any(Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::optional<Message> try_receive(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+  void set(MessageQueue& queue, const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
+  void resize(MessageQueue& queue, std::size_t messages) GIMNET_EXCLUDES(mutex_);
+
+  struct Counts {
+    std::size_t size = 0;
+    std::uint64_t received = 0;
+    std::uint64_t overwritten = 0;
+  };
+  [[nodiscard]] Counts counts(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+
+  /// Nothing more comes: when they are empty, queues answer closed.
+  void close() GIMNET_EXCLUDES(mutex_);
+
+ private:
+  [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
+  void tell_room(bool wanted) const {
+    if (wanted) on_room_();
+  }
+
+  const std::size_t unasked_messages_;
+  const std::size_t bytes_max_;
+  const std::function<void()> on_room_;
+
+  Mutex mutex_;
+  Condition any_;
+  std::list<MessageQueue> queues_ GIMNET_GUARDED_BY(mutex_);
+  std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
+  std::size_t unasked_keys_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
+  MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) = nullptr;  ///< at most one: nothing comes while one refuses
+  std::uint64_t arrivals_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t dropped_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,53 @@
+#include "client/gimi/message_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/check.hpp"
+
+namespace gimnet::gimi {
+
+void MessageQueue::set(const QueueOptions& options) {
+  options_ = options;
+  options_.messages = std::clamp<std::size_t>(options.messages, 1, kQueueMessagesMax);
+  make_room(options_.messages);
+}
+
+bool MessageQueue::refuses() const {
+  if (options_.at_full != AtFullQueue::stop_reading || entries_.empty()) return false;
+  return entries_.size() >= options_.messages || bytes_ >= bytes_max_;
+}
+
+void MessageQueue::push(Message message, std::uint64_t arrival) {
+  GIMNET_ASSERT(!refuses());
+  make_room(options_.messages - 1);
+  bytes_ += message.size();
+  ++received_;
+  entries_.push_back({std::move(message), arrival});
+}
+
+std::optional<Message> MessageQueue::pop() {
+  if (entries_.empty()) return std::nullopt;
+  std::optional<Message> message(std::move(entries_.front().message));
+  bytes_ -= message->size();
+  entries_.pop_front();
+  return message;
+}
+
+std::optional<Message> MessageQueue::pop_newest() {
+  if (entries_.empty()) return std::nullopt;
+  std::optional<Message> message(std::move(entries_.back().message));
+  entries_.clear();
+  bytes_ = 0;
+  return message;
+}
+
+void MessageQueue::make_room(std::size_t messages) {
+  while (entries_.size() > messages) {
+    bytes_ -= entries_.front().message.size();
+    entries_.pop_front();
+    ++overwritten_;
+  }
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "base/mutex.hpp"
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/options.hpp"
+
+namespace gimnet::gimi {
+
+class Inbox;
+
+/// Received messages of one key or subscription: a ring buffer, or one that refuses when it is full.
+/// Thread safety: guarded by the mutex of its Inbox, through which programs come to it.
+class MessageQueue {
+ public:
+  MessageQueue(Inbox& inbox, const QueueOptions& options, std::size_t bytes_max)
+      : inbox_(inbox), bytes_max_(bytes_max) {
+    set(options);
+  }
+
+  void set(const QueueOptions& options);
+  void resize(std::size_t messages) { set({messages, options_.at_full}); }
+
+  /// It would refuse. A message fits into an empty queue, whatever its size.
+  [[nodiscard]] bool refuses() const;
+  /// REQUIRES: !refuses(). `arrival` counts the messages of all queues of an Inbox.
+  void push(Message message, std::uint64_t arrival);
+  [[nodiscard]] std::optional<Message> pop();
+  [[nodiscard]] std::optional<Message> pop_newest();
+
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  /// REQUIRES: !empty().
+  [[nodiscard]] std::uint64_t first_arrival() const { return entries_.front().arrival; }
+  [[nodiscard]] std::uint64_t received() const { return received_; }
+  [[nodiscard]] std::uint64_t overwritten() const { return overwritten_; }
+  /// Half empty: time to take in again what was refused.
+  [[nodiscard]] bool wants_more() const { return entries_.size() <= options_.messages / 2; }
+
+  [[nodiscard]] Inbox& inbox() const { return inbox_; }
+  [[nodiscard]] Condition& filled() { return filled_; }
+
+ private:
+  void make_room(std::size_t messages);
+
+  struct Entry {
+    Message message;
+    std::uint64_t arrival;
+  };
+
+  Inbox& inbox_;
+  const std::size_t bytes_max_;
+  QueueOptions options_;
+  std::deque<Entry> entries_;
+  std::size_t bytes_ = 0;
+  std::uint64_t received_ = 0;
+  std::uint64_t overwritten_ = 0;
+  Condition filled_;
+};
+
+}  // namespace gimnet::gimi

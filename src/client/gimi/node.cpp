@@ -1,0 +1,155 @@
+#include <utility>
+
+#include "client/gimi/core.hpp"
+#include "client/gimi/deadline.hpp"
+#include "client/gimi/hub_records.hpp"
+#include "gimnet/gimi.hpp"
+
+namespace gimnet {
+namespace {
+
+using gimi::failure_of;
+using gimi::nif_timeout;
+
+NodeOptions options_of(std::string_view name, std::string_view hub) {
+  NodeOptions options;
+  options.name = name;
+  options.hub = hub;
+  return options;
+}
+
+}  // namespace
+
+Node::Node(std::string_view name, std::string_view hub) : core_(gimi::Core::join(options_of(name, hub)).or_throw()) {}
+
+Outcome<Node> Node::join(const NodeOptions& options) {
+  auto core = gimi::Core::join(options);
+  if (!core) return core.failure();
+  return Node(std::move(*core));
+}
+
+Node::Node(Node&&) noexcept = default;
+Node& Node::operator=(Node&& other) noexcept {
+  if (core_ && core_ != other.core_) core_->close();
+  core_ = std::move(other.core_);
+  return *this;
+}
+Node::~Node() { close(); }
+
+void Node::close() {
+  if (core_) core_->close();
+}
+
+Peer Node::peer() const { return Peer{nif_id(core_->node())}; }
+NodeState Node::state() const { return core_->state(); }
+
+Outcome<Sender> Node::sender(Peer to, const SendOptions& options) const {
+  auto stream = core_->streams().stream(to, options);
+  if (!stream) return stream.failure();
+  return Sender({core_, *stream});
+}
+
+Outcome<Sender> Node::sender(std::string_view to, const SendOptions& options, Timeout timeout) const {
+  const auto peer = find(to, timeout);
+  if (!peer) return peer.failure();
+  return sender(*peer, options);
+}
+
+Outcome<Sender> Node::sender_to_service(std::string_view full_name, SendOptions options, Timeout timeout) const {
+  const auto found = services(full_name, timeout);
+  if (!found) return found.failure();
+  for (const ServiceRecord& service : *found) {
+    if (service.direction != Direction::accepts) continue;
+    options.key = service.key;
+    return sender(service.node, options);
+  }
+  return Failure{Status::not_found, "nobody accepts '" + std::string(full_name) + "'"};
+}
+
+Outcome<void> Node::send(Peer to, BytesView data, const SendOptions& options, Timeout timeout) const {
+  const auto stream = sender(to, options);
+  if (!stream) return stream.failure();
+  return stream->send(data, timeout);
+}
+
+Outcome<void> Node::send(std::string_view to, BytesView data, const SendOptions& options, Timeout timeout) const {
+  const auto stream = sender(to, options, timeout);
+  if (!stream) return stream.failure();
+  return stream->send(data, timeout);
+}
+
+void Node::flush() const { static_cast<void>(nif_flush(core_->node())); }
+
+Outcome<void> Node::drain(Timeout timeout) const {
+  const nif_status status = nif_drain(core_->node(), nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "write what waits");
+  return {};
+}
+
+Queue Node::queue(MessageKey key, const QueueOptions& options) const {
+  return Queue({core_, &core_->inbox().queue(key, &options)});
+}
+
+Outcome<Message> Node::receive(MessageKey key, Timeout timeout) const {
+  return core_->inbox().receive(core_->inbox().queue(key, nullptr), timeout);
+}
+
+Outcome<Message> Node::receive(Timeout timeout) const { return core_->inbox().receive_any(timeout); }
+std::uint64_t Node::dropped() const { return core_->inbox().dropped(); }
+
+Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options, Timeout timeout) const {
+  auto service = core_->services().advertise(core_->state().name, std::string(name), options, timeout);
+  if (!service) return service.failure();
+  return Publisher({*service, [core = core_](gimi::PublishedService* done) { core->services().withdraw(*done); }});
+}
+
+Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options, Timeout timeout) const {
+  Queue made = queue(options.key, options.queue);
+  auto accepted = core_->services().accept(core_->state().name, std::string(name), options, timeout);
+  if (!accepted) return accepted.failure();
+  return made;
+}
+
+Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options, Timeout timeout) const {
+  auto service = core_->services().subscribe(std::string(full_name), options, timeout);
+  if (!service) return service.failure();
+  return Subscription(
+      {*service, [core = core_](gimi::SubscribedService* done) { core->services().unsubscribe(*done); }});
+}
+
+Outcome<Peer> Node::find(std::string_view name, Timeout timeout) const {
+  if (const auto id = Peer::parse(name)) return *id;
+  Peer peer;
+  const std::string text(name);
+  const nif_status status = nif_resolve(core_->node(), text.c_str(), &peer.id, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "find the node '" + text + "'");
+  return peer;
+}
+
+Outcome<std::string> Node::name_of(Peer peer, Timeout timeout) const {
+  std::string name(NIF_NAME_BYTES_MAX + 1, '\0');
+  const nif_status status = nif_reverse(core_->node(), peer.id, name.data(), nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "find the name of " + peer.text());
+  name.resize(name.find('\0'));
+  return name;
+}
+
+Outcome<std::vector<NodeRecord>> Node::nodes(std::string_view pattern, Timeout timeout) const {
+  return gimi::list_nodes(core_->node(), std::string(pattern), timeout);
+}
+Outcome<std::vector<ServiceRecord>> Node::services(std::string_view pattern, Timeout timeout) const {
+  return gimi::list_services(core_->node(), std::string(pattern), timeout);
+}
+Outcome<HubRecord> Node::hub(Timeout timeout) const { return gimi::ask_hub(core_->node(), timeout); }
+Outcome<std::vector<ShardCounts>> Node::hub_counters(Timeout timeout) const {
+  return gimi::ask_counters(core_->node(), timeout);
+}
+Outcome<std::vector<ConnectionRecord>> Node::hub_connections(Timeout timeout) const {
+  return gimi::ask_connections(core_->node(), timeout);
+}
+
+Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) const {
+  return core_->ping(to, timeout, lane, echo);
+}
+
+}  // namespace gimnet

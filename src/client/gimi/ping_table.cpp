@@ -1,0 +1,59 @@
+#include "client/gimi/ping_table.hpp"
+
+#include "client/gimi/deadline.hpp"
+
+namespace gimnet::gimi {
+
+void PingTable::expect(std::uint32_t number, Peer peer) {
+  const MutexLock lock(mutex_);
+  waiting_[number] = {peer, steady_now_ns(), std::nullopt};
+}
+
+void PingTable::forget(std::uint32_t number) {
+  const MutexLock lock(mutex_);
+  waiting_.erase(number);
+}
+
+Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadline, Timeout timeout) {
+  const MutexLock lock(mutex_);
+  const auto place = waiting_.find(number);
+  if (place == waiting_.end()) return Failure{Status::bad_argument, "no such ping"};
+  while (!place->second.answer) {
+    if (closed_) {
+      place->second.answer = Failure{Status::closed, "cannot ping: the node was closed"};
+    } else if (is_over(deadline)) {
+      place->second.answer = Failure{Status::timeout, place->second.peer.text() + " did not answer within " +
+                                                          std::to_string(timeout.count()) + " ms"};
+    } else {
+      static_cast<void>(answered_.wait_until(mutex_, deadline));
+    }
+  }
+  auto answer = std::move(*place->second.answer);
+  waiting_.erase(place);
+  return answer;
+}
+
+void PingTable::on_pong(std::uint32_t number, Peer from) {
+  const std::int64_t now = steady_now_ns();
+  const MutexLock lock(mutex_);
+  const auto place = waiting_.find(number);
+  if (place == waiting_.end() || place->second.peer != from) return;
+  place->second.answer = now - place->second.sent_ns;
+  answered_.notify_all();
+}
+
+void PingTable::on_lost(std::uint32_t number, const std::string& why) {
+  const MutexLock lock(mutex_);
+  const auto place = waiting_.find(number);
+  if (place == waiting_.end()) return;
+  place->second.answer = Failure{Status::not_delivered, "cannot ping " + place->second.peer.text() + ": " + why};
+  answered_.notify_all();
+}
+
+void PingTable::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  answered_.notify_all();
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "base/mutex.hpp"
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/outcome.hpp"
+
+namespace gimnet::gimi {
+
+/// PINGs of the program that wait for their PONG. Thread safety: any thread.
+class PingTable {
+ public:
+  void expect(std::uint32_t number, Peer peer) GIMNET_EXCLUDES(mutex_);
+  /// The round trip in ns, or why there is none by `deadline`, which `timeout` led to. The number is forgotten.
+  [[nodiscard]] Outcome<std::int64_t> wait(std::uint32_t number, std::int64_t deadline, Timeout timeout)
+      GIMNET_EXCLUDES(mutex_);
+  /// The PING was not sent.
+  void forget(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
+
+  void on_pong(std::uint32_t number, Peer from) GIMNET_EXCLUDES(mutex_);
+  /// The hub could not deliver it.
+  void on_lost(std::uint32_t number, const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void close() GIMNET_EXCLUDES(mutex_);
+
+ private:
+  struct Waiting {
+    Peer peer;
+    std::int64_t sent_ns = 0;
+    std::optional<Outcome<std::int64_t>> answer;
+  };
+  Mutex mutex_;
+  Condition answered_;
+  std::map<std::uint32_t, Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);
+  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,85 @@
+#include "client/gimi/published_service.hpp"
+
+#include "client/gimi/deadline.hpp"
+
+namespace gimnet::gimi {
+
+Outcome<void> PublishedService::publish(BytesView data, More more) {
+  Envelope envelope{0, NIF_GROUP, NIF_POLICY_DEFAULT, options_.lane, options_.key, 0, 0};
+  if (options_.delivery == Delivery::latest) envelope.policy = NIF_LATEST;
+  if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
+  std::uint32_t sequence = 0;
+  {
+    const MutexLock lock(mutex_);
+    while (sending_ && !closed_) changed_.wait(mutex_);
+    if (closed_) return Failure{Status::closed, "cannot publish " + full_name_ + ": the node was closed"};
+    if (group_ == 0) {
+      return Failure{Status::refused, "cannot publish " + full_name_ + ": the hub refused the service after a break"};
+    }
+    sequence = ++sequence_;
+    if (subscribers_ == 0 && subscribers_known_) {
+      ++published_;
+      return {};
+    }
+    envelope.to = group_;
+    sending_ = true;
+  }
+  const nif_status status =
+      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0}, options_.timestamp, data, NIF_FOREVER);
+  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name_);
+  const MutexLock lock(mutex_);
+  sending_ = false;
+  changed_.notify_all();
+  if (status != NIF_OK) return failure;
+  ++published_;
+  return {};
+}
+
+std::size_t PublishedService::subscribers() {
+  const MutexLock lock(mutex_);
+  return subscribers_;
+}
+
+Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  const MutexLock lock(mutex_);
+  while (subscribers_ < count) {
+    if (closed_) return Failure{Status::closed, "cannot wait for subscribers: the node was closed"};
+    if (is_over(deadline)) {
+      return Failure{Status::timeout, full_name_ + " has " + std::to_string(subscribers_) + " subscribers, not " +
+                                          std::to_string(count)};
+    }
+    static_cast<void>(changed_.wait_until(mutex_, deadline));
+  }
+  return {};
+}
+
+std::uint64_t PublishedService::published() {
+  const MutexLock lock(mutex_);
+  return published_;
+}
+
+void PublishedService::on_group(std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  group_ = group;
+}
+
+void PublishedService::on_subscribers(std::size_t count) {
+  const MutexLock lock(mutex_);
+  subscribers_ = count;
+  subscribers_known_ = true;
+  changed_.notify_all();
+}
+
+void PublishedService::on_reconnected() {
+  const MutexLock lock(mutex_);
+  subscribers_known_ = false;
+}
+
+void PublishedService::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  changed_.notify_all();
+}
+
+}  // namespace gimnet::gimi

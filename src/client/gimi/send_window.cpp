@@ -1,0 +1,119 @@
+#include "client/gimi/send_window.hpp"
+
+#include <algorithm>
+
+#include "base/check.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+constexpr std::int64_t kPatienceMinNs = 200'000'000;
+constexpr std::int64_t kPatienceRoundTrips = 4;
+/// A PING that is not answered is repeated, each time after twice as long, up to 16 times the patience.
+constexpr std::uint32_t kDoublingsMax = 4;
+
+bool at_or_before(std::uint32_t sequence, std::uint32_t other) {
+  return static_cast<std::int32_t>(other - sequence) >= 0;
+}
+
+bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_t bitmap) {
+  const std::uint32_t behind = highest - sequence;
+  if (behind == 0) return true;
+  return behind <= 64 && ((bitmap >> (behind - 1)) & 1) != 0;
+}
+
+}  // namespace
+
+bool SendWindow::has_room() const {
+  if (!synchronized()) return true;
+  // The span keeps the oldest within reach of the bitmap of any ACK.
+  return unacknowledged_ < messages_max_ &&
+         (waiting_.empty() || next_sequence_ - waiting_.front().sequence <= kWindowMax);
+}
+
+std::uint32_t SendWindow::open(std::int64_t now_ns) {
+  GIMNET_ASSERT(has_room());
+  const std::uint32_t sequence = next_sequence_++;
+  if (!synchronized()) return sequence;
+  waiting_.push_back({sequence, false, now_ns});
+  ++unacknowledged_;
+  return sequence;
+}
+
+bool SendWindow::cancel(std::uint32_t sequence) {
+  GIMNET_ASSERT(sequence + 1 == next_sequence_);
+  next_sequence_ = sequence;
+  if (waiting_.empty() || waiting_.back().sequence != sequence) return false;
+  if (!waiting_.back().acknowledged) --unacknowledged_;
+  waiting_.pop_back();
+  return true;
+}
+
+SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t pong,
+                                          std::int64_t now_ns) {
+  Freed freed;
+  const bool answers_ping = pong != 0 && pong == ping_number_;
+  for (Waiting& waiting : waiting_) {
+    if (waiting.acknowledged) continue;
+    if (is_acknowledged(waiting.sequence, highest, bitmap)) {
+      waiting.acknowledged = true;
+      ++freed.acknowledged;
+      if (waiting.sequence == highest && pong == 0) round_trip_ns_ = now_ns - waiting.sent_ns;
+    } else if (answers_ping && at_or_before(waiting.sequence, ping_covers_)) {
+      waiting.acknowledged = true;
+      ++freed.lost;
+    }
+  }
+  unacknowledged_ -= freed.acknowledged + freed.lost;
+  if (answers_ping) ping_number_ = 0;
+  drop_front();
+  return freed;
+}
+
+SendWindow::Freed SendWindow::lose(std::uint32_t sequence) {
+  for (Waiting& waiting : waiting_) {
+    if (waiting.sequence != sequence || waiting.acknowledged) continue;
+    waiting.acknowledged = true;
+    --unacknowledged_;
+    drop_front();
+    return {0, 1};
+  }
+  return {};
+}
+
+SendWindow::Freed SendWindow::lose_all() {
+  const Freed freed{0, unacknowledged_};
+  waiting_.clear();
+  unacknowledged_ = 0;
+  drop_front();
+  return freed;
+}
+
+bool SendWindow::ping_due(std::int64_t now_ns) const {
+  if (unacknowledged_ == 0) return false;
+  if (ping_number_ != 0) return now_ns >= ping_again_ns_;
+  return hurried_ || now_ns >= waiting_.front().sent_ns + patience_ns();
+}
+
+void SendWindow::ping_sent(std::uint32_t number, std::int64_t now_ns) {
+  hurried_ = false;
+  if (number != ping_number_) {
+    ping_number_ = number;
+    ping_covers_ = next_sequence_ - 1;
+    pings_ = 0;
+  }
+  ping_again_ns_ = now_ns + (patience_ns() << std::min(pings_, kDoublingsMax));
+  ++pings_;
+}
+
+std::int64_t SendWindow::patience_ns() const { return std::max(kPatienceRoundTrips * round_trip_ns_, kPatienceMinNs); }
+
+void SendWindow::drop_front() {
+  while (!waiting_.empty() && waiting_.front().acknowledged) waiting_.pop_front();
+  if (waiting_.empty()) {
+    ping_number_ = 0;
+    hurried_ = false;
+  }
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+#include "gimnet/gimi/options.hpp"
+
+namespace gimnet::gimi {
+
+/// The DATA of one stream that wait for their ACK, and when to ask for it with a PING (docs/protocol.md, section 7).
+/// Knows no sockets and no clock: it is told the time, steady_now_ns(). Thread safety: one thread at a time.
+/// Time alone never frees: an ACK does, and the ACK that belongs to a PONG, and what the caller knows to be lost.
+class SendWindow {
+ public:
+  /// What an event freed.
+  struct Freed {
+    std::size_t acknowledged = 0;
+    std::size_t lost = 0;
+    [[nodiscard]] bool any() const { return acknowledged + lost != 0; }
+  };
+
+  /// `messages_max` 1..kWindowMax; 0: nothing is counted, there is always room.
+  explicit SendWindow(std::size_t messages_max) : messages_max_(messages_max) {}
+
+  [[nodiscard]] bool synchronized() const { return messages_max_ != 0; }
+  [[nodiscard]] bool has_room() const;
+  [[nodiscard]] std::size_t size() const { return waiting_.size(); }
+  [[nodiscard]] bool empty() const { return waiting_.empty(); }
+
+  /// The sequence of the next DATA, which waits from now on. REQUIRES: has_room().
+  std::uint32_t open(std::int64_t now_ns);
+  /// The DATA of the last open() was not sent. False: it did not wait any more.
+  bool cancel(std::uint32_t sequence);
+
+  /// `pong` is the PING that the ACK belongs to, or 0.
+  Freed acknowledge(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t pong, std::int64_t now_ns);
+  Freed lose(std::uint32_t sequence);
+  Freed lose_all();
+
+  /// A PING should stand behind what waits, now. It stays due until ping_sent().
+  [[nodiscard]] bool ping_due(std::int64_t now_ns) const;
+  /// The number of the PING that is open already, to be repeated; 0: none.
+  [[nodiscard]] std::uint32_t ping_number() const { return ping_number_; }
+  void ping_sent(std::uint32_t number, std::int64_t now_ns);
+  /// Ask at the next occasion: something says that messages were lost.
+  void hurry() { hurried_ = true; }
+
+  [[nodiscard]] std::int64_t round_trip_ns() const { return round_trip_ns_; }
+
+ private:
+  struct Waiting {
+    std::uint32_t sequence;
+    bool acknowledged;
+    std::int64_t sent_ns;
+  };
+  [[nodiscard]] std::int64_t patience_ns() const;
+  void drop_front();
+
+  std::size_t messages_max_;
+  std::deque<Waiting> waiting_;  ///< ascending; acknowledged ones only behind one that is not
+  std::size_t unacknowledged_ = 0;
+  std::uint32_t next_sequence_ = 1;
+  std::uint32_t ping_number_ = 0;
+  std::uint32_t ping_covers_ = 0;  ///< the last DATA before the open PING
+  std::int64_t ping_again_ns_ = 0;
+  std::uint32_t pings_ = 0;  ///< how often the open PING was sent
+  std::int64_t round_trip_ns_ = 0;
+  bool hurried_ = false;
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,212 @@
+#include "client/gimi/service_table.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "client/gimi/deadline.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+constexpr std::int32_t kLeaveTimeoutMs = 1000;
+
+nif_service description_of(const std::string& name, MessageKey key, const std::string& metadata) {
+  nif_service service{};
+  service.struct_size = sizeof service;
+  service.name = name.c_str();
+  service.message_type = key.type;
+  service.instance = key.instance;
+  service.metadata = metadata.empty() ? nullptr : metadata.c_str();
+  return service;
+}
+
+}  // namespace
+
+class ServiceTable::Asking {
+ public:
+  explicit Asking(ServiceTable& table) : table_(table) {
+    const MutexLock lock(table_.mutex_);
+    ++table_.open_;
+  }
+  ~Asking() {
+    {
+      const MutexLock lock(table_.mutex_);
+      --table_.open_;
+    }
+    static_cast<void>(nif_deliver(table_.uplink_.node()));
+  }
+  Asking(const Asking&) = delete;
+  Asking& operator=(const Asking&) = delete;
+
+ private:
+  ServiceTable& table_;
+};
+
+std::optional<Failure> ServiceTable::obstacle(const std::string& own_name, const std::string& name) {
+  if (own_name.empty()) {
+    return Failure{Status::denied, "a node without a name has no services: give it one to offer '" + name + "'"};
+  }
+  if (own_names_.contains(name)) {
+    return Failure{Status::taken, "this node offers " + own_name + "/" + name + " already"};
+  }
+  return std::nullopt;
+}
+
+Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, const std::string& name,
+                                                   const PublishOptions& options, Timeout timeout) {
+  const MutexLock turn(asking_);
+  if (auto failure = obstacle(own_name, name)) return *failure;
+  const Asking asking(*this);
+  nif_service service = description_of(name, options.key, options.metadata);
+  service.direction = NIF_PROVIDES;
+  service.delivery = static_cast<std::uint8_t>(options.delivery);
+  std::uint32_t group = 0;
+  std::uint32_t subscribers = 0;
+  const nif_status status = nif_advertise(uplink_.node(), &service, &group, &subscribers, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "advertise " + own_name + "/" + name);
+  auto published = std::make_unique<PublishedService>(uplink_, name, own_name + "/" + name, options);
+  published->on_group(group);
+  published->on_subscribers(subscribers);
+  own_names_.insert(name);
+  const MutexLock lock(mutex_);
+  if (closed_) published->close();
+  published_by_group_[group] = published.get();
+  return published_.emplace_back(std::move(published)).get();
+}
+
+Outcome<void> ServiceTable::accept(const std::string& own_name, const std::string& name, const AcceptOptions& options,
+                                   Timeout timeout) {
+  const MutexLock turn(asking_);
+  if (auto failure = obstacle(own_name, name)) return *failure;
+  nif_service service = description_of(name, options.key, options.metadata);
+  service.direction = NIF_ACCEPTS;
+  std::uint32_t group = 0;
+  const nif_status status = nif_advertise(uplink_.node(), &service, &group, nullptr, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "accept " + own_name + "/" + name);
+  own_names_.insert(name);
+  return {};
+}
+
+void ServiceTable::withdraw(PublishedService& service) {
+  const MutexLock turn(asking_);
+  std::uint32_t group = 0;
+  own_names_.erase(service.name());
+  service.close();
+  {
+    const MutexLock lock(mutex_);
+    for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
+      if (place->second != &service) continue;
+      group = place->first;
+      published_by_group_.erase(place);
+      break;
+    }
+  }
+  if (group != 0) static_cast<void>(nif_withdraw(uplink_.node(), group, kLeaveTimeoutMs));
+}
+
+SubscribedService& ServiceTable::entry(const std::string& full_name, const QueueOptions& options) {
+  const auto place = subscribed_.find(full_name);
+  if (place != subscribed_.end()) return *place->second;
+  auto service = std::make_unique<SubscribedService>(full_name, inbox_.add_queue(options));
+  if (closed_) service->close();
+  return *subscribed_.emplace(full_name, std::move(service)).first->second;
+}
+
+/// A former group leads to the service until as many younger ones came: the event that a provider left may overtake
+/// what it published.
+void ServiceTable::set_group(SubscribedService& service, std::uint32_t group) {
+  constexpr std::size_t kFormerGroups = 4;
+  service.on_group(group);
+  if (group == 0 || std::ranges::find(service.groups, group) != service.groups.end()) return;
+  subscribed_by_group_[group] = &service;
+  service.groups.push_back(group);
+  if (service.groups.size() <= kFormerGroups) return;
+  forget_group(service, service.groups.front());
+  service.groups.erase(service.groups.begin());
+}
+
+void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group) {
+  const auto place = subscribed_by_group_.find(group);
+  if (place != subscribed_by_group_.end() && place->second == &service) subscribed_by_group_.erase(place);
+}
+
+Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
+                                                    Timeout timeout) {
+  const MutexLock turn(asking_);
+  const Asking asking(*this);
+  SubscribedService* service = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    service = &entry(full_name, options);
+  }
+  inbox_.set(service->queue(), options);
+  if (service->handles == 0) {
+    nif_subscription found{};
+    const nif_status status = nif_subscribe(uplink_.node(), full_name.c_str(), &found, nif_timeout(timeout));
+    if (status != NIF_OK) return failure_of(status, "subscribe " + full_name);
+    const MutexLock lock(mutex_);
+    set_group(*service, found.group);
+  }
+  ++service->handles;
+  return service;
+}
+
+void ServiceTable::unsubscribe(SubscribedService& service) {
+  const MutexLock turn(asking_);
+  if (--service.handles != 0) return;
+  static_cast<void>(nif_unsubscribe(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
+  const MutexLock lock(mutex_);
+  service.on_group(0);
+  for (const std::uint32_t group : service.groups) forget_group(service, group);
+  service.groups.clear();
+}
+
+ServiceTable::Found ServiceTable::subscribed(std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  const auto place = subscribed_by_group_.find(group);
+  if (place == subscribed_by_group_.end()) return {unknown(), nullptr};
+  return {Place::found, place->second};
+}
+
+ServiceTable::Place ServiceTable::on_subscribers(std::uint32_t group, std::size_t count) {
+  const MutexLock lock(mutex_);
+  const auto place = published_by_group_.find(group);
+  if (place == published_by_group_.end()) return unknown();
+  place->second->on_subscribers(count);
+  return Place::found;
+}
+
+ServiceTable::Place ServiceTable::on_service_moved(const std::string& full_name, std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  if (open_ != 0) return Place::not_yet;
+  const auto place = subscribed_.find(full_name);
+  if (place == subscribed_.end()) return Place::unknown;
+  set_group(*place->second, group);
+  return Place::found;
+}
+
+void ServiceTable::on_own_service_moved(const std::string& name, std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
+    PublishedService* service = place->second;
+    if (service->name() != name) continue;
+    published_by_group_.erase(place);
+    if (group != 0) published_by_group_[group] = service;
+    service->on_group(group);
+    return;
+  }
+}
+
+void ServiceTable::on_reconnected() {
+  const MutexLock lock(mutex_);
+  for (auto& [group, service] : published_by_group_) service->on_reconnected();
+}
+
+void ServiceTable::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  for (auto& service : published_) service->close();
+  for (auto& [name, service] : subscribed_) service->close();
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "client/gimi/inbox.hpp"
+#include "client/gimi/published_service.hpp"
+#include "client/gimi/subscribed_service.hpp"
+#include "client/gimi/uplink.hpp"
+
+namespace gimnet::gimi {
+
+/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread. What was subscribed
+/// or advertised once stays in the table until the node is closed, so that messages on their way find it.
+class ServiceTable {
+ public:
+  ServiceTable(Uplink& uplink, Inbox& inbox) : uplink_(uplink), inbox_(inbox) {}
+
+  /// The calls of a program; they ask the hub, one after another.
+  [[nodiscard]] Outcome<PublishedService*> advertise(const std::string& own_name, const std::string& name,
+                                                     const PublishOptions& options, Timeout timeout)
+      GIMNET_EXCLUDES(asking_, mutex_);
+  [[nodiscard]] Outcome<void> accept(const std::string& own_name, const std::string& name, const AcceptOptions& options,
+                                     Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
+  void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
+
+  [[nodiscard]] Outcome<SubscribedService*> subscribe(const std::string& full_name, const QueueOptions& options,
+                                                      Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
+  /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
+  void unsubscribe(SubscribedService& service) GIMNET_EXCLUDES(asking_, mutex_);
+
+  /// From the library's thread. `not_yet`: the program is just asking the hub about a service, and this may belong
+  /// behind the answer: nif_deliver() comes with it.
+  enum class Place : std::uint8_t { found, unknown, not_yet };
+  struct Found {
+    Place place = Place::unknown;
+    SubscribedService* service = nullptr;
+  };
+  [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_service_moved(const std::string& full_name, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  void on_own_service_moved(const std::string& name, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  void on_reconnected() GIMNET_EXCLUDES(mutex_);
+  void close() GIMNET_EXCLUDES(mutex_);
+
+ private:
+  /// While one of these lives, groups that nobody knows are `not_yet`.
+  class Asking;
+  /// Why a service of that name cannot be declared; nothing if it can.
+  [[nodiscard]] std::optional<Failure> obstacle(const std::string& own_name, const std::string& name)
+      GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) { return open_ != 0 ? Place::not_yet : Place::unknown; }
+  [[nodiscard]] SubscribedService& entry(const std::string& full_name, const QueueOptions& options)
+      GIMNET_REQUIRES(mutex_);
+  void set_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
+  void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
+
+  Uplink& uplink_;
+  Inbox& inbox_;
+
+  Mutex asking_;  ///< held while the hub is asked: its answers must be applied in the order of the questions
+  std::set<std::string, std::less<>> own_names_ GIMNET_GUARDED_BY(asking_);  ///< of services that are declared now
+
+  Mutex mutex_;
+  std::size_t open_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::vector<std::unique_ptr<PublishedService>> published_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::string, std::unique_ptr<SubscribedService>, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::uint32_t, SubscribedService*> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);
+  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,49 @@
+#include "client/gimi/subscribed_service.hpp"
+
+#include "client/gimi/deadline.hpp"
+
+namespace gimnet::gimi {
+
+bool SubscribedService::exists() {
+  const MutexLock lock(mutex_);
+  return group_ != 0;
+}
+
+Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
+  const MutexLock lock(mutex_);
+  while (group_ == 0) {
+    if (closed_) return Failure{Status::closed, "cannot wait for " + *name_ + ": the node was closed"};
+    if (is_over(deadline)) return Failure{Status::timeout, "nobody provides " + *name_ + " yet"};
+    static_cast<void>(changed_.wait_until(mutex_, deadline));
+  }
+  return {};
+}
+
+std::uint64_t SubscribedService::missed() {
+  const MutexLock lock(mutex_);
+  return missed_;
+}
+
+void SubscribedService::on_message(std::uint32_t from, std::uint32_t sequence) {
+  const MutexLock lock(mutex_);
+  const auto step = static_cast<std::int32_t>(sequence - sequence_);
+  // The first of a provider says where it stands; a provider that began again counts from 1.
+  if (from == provider_ && step > 0) missed_ += static_cast<std::uint32_t>(step - 1);
+  provider_ = from;
+  sequence_ = sequence;
+}
+
+void SubscribedService::on_group(std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  group_ = group;
+  changed_.notify_all();
+}
+
+void SubscribedService::close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  changed_.notify_all();
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "client/gimi/message_queue.hpp"
+#include "gimnet/gimi/outcome.hpp"
+
+namespace gimnet::gimi {
+
+/// A service of another node that this one subscribed, and the queue of its messages. Thread safety: any thread.
+class SubscribedService {
+ public:
+  SubscribedService(std::string full_name, MessageQueue& queue)
+      : name_(std::make_shared<const std::string>(std::move(full_name))), queue_(queue) {}
+
+  [[nodiscard]] const std::shared_ptr<const std::string>& shared_name() const { return name_; }
+  [[nodiscard]] const std::string& name() const { return *name_; }
+  [[nodiscard]] MessageQueue& queue() const { return queue_; }
+
+  [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
+
+  /// One of its messages is in the queue.
+  void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
+  /// 0: there is no provider.
+  void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  void close() GIMNET_EXCLUDES(mutex_);
+
+  /// Handles of the program; guarded by the table's asking mutex.
+  std::size_t handles = 0;
+  /// Group ids that lead to it, the youngest last; guarded by the table's mutex.
+  std::vector<std::uint32_t> groups;
+
+ private:
+  const std::shared_ptr<const std::string> name_;
+  MessageQueue& queue_;
+
+  Mutex mutex_;
+  Condition changed_;
+  std::uint32_t group_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint32_t provider_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,95 @@
+#include "client/gimi/uplink.hpp"
+
+#include <array>
+#include <cstddef>
+
+#include "base/clock.hpp"
+
+namespace gimnet::gimi {
+
+Status status_of(nif_status status) {
+  switch (status) {
+    case NIF_TIMEOUT:
+      return Status::timeout;
+    case NIF_BAD_ARGUMENT:
+    case NIF_BAD_REQUEST:
+    case NIF_IN_CALLBACK:
+    case NIF_BUFFER_TOO_SMALL:
+      return Status::bad_argument;
+    case NIF_NO_HUB:
+      return Status::no_hub;
+    case NIF_NOT_CONNECTED:
+      return Status::not_connected;
+    case NIF_BAD_VERSION:
+      return Status::bad_version;
+    case NIF_NAME_TAKEN:
+      return Status::name_taken;
+    case NIF_BAD_NAME:
+      return Status::bad_name;
+    case NIF_HUB_FULL:
+    case NIF_REFUSED:
+    case NIF_REPLACED:
+    case NIF_NOT_SUPPORTED:
+      return Status::refused;
+    case NIF_NOT_FOUND:
+      return Status::not_found;
+    case NIF_TAKEN:
+      return Status::taken;
+    case NIF_DENIED:
+      return Status::denied;
+    case NIF_LIMIT:
+      return Status::limit;
+    case NIF_TOO_LARGE:
+      return Status::too_large;
+    case NIF_NOT_DELIVERED:
+      return Status::not_delivered;
+    case NIF_PROTOCOL:
+      return Status::protocol;
+    case NIF_NO_MEMORY:
+    case NIF_SYSTEM:
+      return Status::system;
+    case NIF_OK:
+    case NIF_CLOSED:
+    case NIF_FORKED:
+      break;
+  }
+  return Status::closed;
+}
+
+Failure failure_of(nif_status status, std::string_view doing) {
+  std::string sentence = "cannot " + std::string(doing) + ": ";
+  if (status == NIF_TIMEOUT) {
+    sentence += "the time given was not enough";
+  } else {
+    const char* words = nif_error_text();
+    sentence += *words != '\0' ? words : nif_status_text(status);
+  }
+  return {status_of(status), std::move(sentence)};
+}
+
+nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header, bool stamped, BytesView data,
+                            std::int32_t timeout_ms) const {
+  std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
+  const auto stamp = stamped ? std::optional(wall_now_ns()) : std::nullopt;
+  const std::size_t prefix_size = proto::gimi::write_message_prefix(header, stamp, prefix);
+  const std::array<nif_bytes, 2> parts{nif_bytes{prefix.data(), prefix_size}, nif_bytes{data.data(), data.size()}};
+  nif_outgoing outgoing = NIF_OUTGOING_INIT;
+  outgoing.kind = static_cast<std::uint8_t>(envelope.kind);
+  outgoing.lane = static_cast<std::uint8_t>(envelope.lane);
+  outgoing.policy = static_cast<std::uint8_t>(envelope.policy);
+  outgoing.flags = static_cast<std::uint8_t>(envelope.flags | NIF_FLAG_KEYED);
+  outgoing.to = envelope.to;
+  outgoing.key = proto::gimi::StreamKey{envelope.key.type, envelope.key.instance}.value();
+  outgoing.parts = parts.data();
+  outgoing.part_count = parts.size();
+  outgoing.age_ms_max = envelope.age_max_ms;
+  return nif_send(node(), &outgoing, timeout_ms);
+}
+
+std::uint32_t Uplink::next_ping() {
+  std::uint32_t number = 0;
+  while (number == 0) number = ++pings_;
+  return number;
+}
+
+}  // namespace gimnet::gimi

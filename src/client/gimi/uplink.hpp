@@ -1,0 +1,51 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/outcome.hpp"
+#include "gimnet/nif.h"
+#include "proto/gimi/message_header.hpp"
+
+namespace gimnet::gimi {
+
+[[nodiscard]] Status status_of(nif_status status);
+/// What NIF answered in this thread just now, as a Failure; `doing` as in "send to 7.17".
+[[nodiscard]] Failure failure_of(nif_status status, std::string_view doing);
+
+/// Where a message goes and how.
+struct Envelope {
+  std::uint32_t to = 0;
+  nif_kind kind = NIF_UNICAST;
+  nif_policy policy = NIF_POLICY_DEFAULT;
+  Lane lane = Lane::normal;
+  MessageKey key;
+  std::uint32_t age_max_ms = 0;
+  unsigned flags = 0;  ///< NIF_FLAG_*; KEYED is added
+};
+
+/// The way to NIF: GIMI messages in, frames out. Thread safety: any thread. The handle stays usable when it was closed;
+/// NIF then answers NIF_CLOSED.
+class Uplink {
+ public:
+  void open(nif_node* node) { node_.store(node); }
+  /// Null: not connected for the first time yet.
+  [[nodiscard]] nif_node* node() const { return node_.load(); }
+
+  /// As nif_send(); `stamped`: with the time of this call.
+  [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header, bool stamped,
+                                    BytesView data, std::int32_t timeout_ms) const;
+
+  /// A number for a PING; never 0.
+  [[nodiscard]] std::uint32_t next_ping();
+
+ private:
+  std::atomic<nif_node*> node_{nullptr};
+  std::atomic<std::uint32_t> pings_{0};
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,118 @@
+#include "client/gimi/inbox.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/client/gimi/support/made_message.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+using test::make_message;
+
+struct CountingReceipt final : Receipt {
+  void on_kept() override { ++kept; }
+  int kept = 0;
+};
+
+class InboxTest : public testing::Test {
+ protected:
+  bool put(MessageKey key, std::uint32_t sequence = 1) {
+    Message message = make_message("x", sequence, key);
+    return inbox_.put(key, message, nullptr);
+  }
+  std::atomic<int> rooms_{0};
+  Inbox inbox_{2, 1000, [this] { ++rooms_; }};
+};
+
+TEST_F(InboxTest, KeepsKeysApart) {
+  EXPECT_TRUE(put({1, 0}, 10));
+  EXPECT_TRUE(put({1, 1}, 20));
+  EXPECT_EQ(inbox_.receive(inbox_.queue({1, 1}, nullptr), kNoWait)->sequence(), 20u);
+  EXPECT_EQ(inbox_.receive(inbox_.queue({1, 0}, nullptr), kNoWait)->sequence(), 10u);
+}
+
+TEST_F(InboxTest, GivesWhatWaitedLongestOfAll) {
+  EXPECT_TRUE(put({1, 0}, 1));
+  EXPECT_TRUE(put({2, 0}, 2));
+  EXPECT_TRUE(put({1, 0}, 3));
+  for (std::uint32_t sequence = 1; sequence <= 3; ++sequence) {
+    EXPECT_EQ(inbox_.receive_any(kNoWait)->sequence(), sequence);
+  }
+  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout));
+}
+
+TEST_F(InboxTest, SaysWhenTheTimeIsUp) {
+  EXPECT_TRUE(inbox_.receive(inbox_.queue({1, 0}, nullptr), Timeout{1}).is(Status::timeout));
+  EXPECT_FALSE(inbox_.try_receive(inbox_.queue({1, 0}, nullptr)));
+}
+
+TEST_F(InboxTest, WakesWhoWaits) {
+  MessageQueue& queue = inbox_.queue({1, 0}, nullptr);
+  std::uint32_t got = 0;
+  std::thread waiter([&] { got = inbox_.receive(queue, kForever)->sequence(); });
+  EXPECT_TRUE(put({1, 0}, 5));
+  waiter.join();
+  EXPECT_EQ(got, 5u);
+  std::thread any([&] { got = inbox_.receive_any(kForever)->sequence(); });
+  EXPECT_TRUE(put({9, 9}, 6));
+  any.join();
+  EXPECT_EQ(got, 6u);
+}
+
+TEST_F(InboxTest, ClosingEndsAllWaits) {
+  MessageQueue& queue = inbox_.queue({1, 0}, nullptr);
+  std::thread one([&] { EXPECT_TRUE(inbox_.receive(queue, kForever).is(Status::closed)); });
+  std::thread any([&] { EXPECT_TRUE(inbox_.receive_any(kForever).is(Status::closed)); });
+  inbox_.close();
+  one.join();
+  any.join();
+}
+
+TEST_F(InboxTest, WhatCameBeforeClosingIsStillThere) {
+  EXPECT_TRUE(put({1, 0}, 5));
+  inbox_.close();
+  EXPECT_EQ(inbox_.receive(inbox_.queue({1, 0}, nullptr), kForever)->sequence(), 5u);
+}
+
+TEST_F(InboxTest, ARefusingQueueTellsWhenItIsHalfEmpty) {
+  const QueueOptions options{4, AtFullQueue::stop_reading};
+  MessageQueue& queue = inbox_.queue({1, 0}, &options);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(put({1, 0}));
+  EXPECT_FALSE(put({1, 0}));
+  EXPECT_TRUE(inbox_.try_receive(queue));
+  EXPECT_EQ(rooms_, 0);
+  EXPECT_TRUE(inbox_.try_receive(queue));
+  EXPECT_EQ(rooms_, 1);
+  EXPECT_TRUE(inbox_.try_receive(queue));
+  EXPECT_EQ(rooms_, 1) << "once";
+}
+
+TEST_F(InboxTest, AMessageThatIsRefusedIsUnchanged) {
+  const QueueOptions options{1, AtFullQueue::stop_reading};
+  inbox_.queue({1, 0}, &options);
+  EXPECT_TRUE(put({1, 0}));
+  Message message = make_message("text");
+  CountingReceipt receipt;
+  EXPECT_FALSE(inbox_.put(MessageKey{1, 0}, message, &receipt));
+  EXPECT_EQ(message.text(), "text");
+  EXPECT_EQ(receipt.kept, 0);
+  EXPECT_TRUE(inbox_.put(MessageKey{2, 0}, message, &receipt));
+  EXPECT_EQ(receipt.kept, 1);
+}
+
+TEST_F(InboxTest, DropsMessagesOfTooManyKeys) {
+  for (std::uint32_t type = 0; type < Inbox::kUnaskedKeysMax; ++type) EXPECT_TRUE(put({type, 0}));
+  EXPECT_EQ(inbox_.dropped(), 0u);
+  EXPECT_TRUE(put({5000, 0}));
+  EXPECT_EQ(inbox_.dropped(), 1u);
+  const QueueOptions options;
+  inbox_.queue({5000, 0}, &options);
+  EXPECT_TRUE(put({5000, 0}));
+  EXPECT_EQ(inbox_.dropped(), 1u) << "one that is asked for has room";
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

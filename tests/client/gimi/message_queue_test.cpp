@@ -1,0 +1,79 @@
+#include "client/gimi/message_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include "client/gimi/inbox.hpp"
+#include "tests/client/gimi/support/made_message.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+using test::make_message;
+
+constexpr std::size_t kBytesMax = 100;
+
+class MessageQueueTest : public testing::Test {
+ protected:
+  Inbox inbox_{64, kBytesMax, [] {}};
+  MessageQueue queue_{inbox_, {3, AtFullQueue::overwrite_oldest}, kBytesMax};
+};
+
+TEST_F(MessageQueueTest, GivesTheOldestFirst) {
+  queue_.push(make_message("a"), 1);
+  queue_.push(make_message("b"), 2);
+  EXPECT_EQ(queue_.first_arrival(), 1u);
+  EXPECT_EQ(queue_.pop()->text(), "a");
+  EXPECT_EQ(queue_.pop()->text(), "b");
+  EXPECT_FALSE(queue_.pop());
+}
+
+TEST_F(MessageQueueTest, OverwritesTheOldestWhenFull) {
+  for (std::uint32_t number = 1; number <= 10; ++number) queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.size(), 3u);
+  EXPECT_EQ(queue_.received(), 10u);
+  EXPECT_EQ(queue_.overwritten(), 7u);
+  EXPECT_EQ(queue_.pop()->sequence(), 8u);
+}
+
+TEST_F(MessageQueueTest, OfSizeOneHoldsTheNewest) {
+  queue_.resize(1);
+  for (std::uint32_t number = 1; number <= 5; ++number) queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.pop()->sequence(), 5u);
+}
+
+TEST_F(MessageQueueTest, ChangesItsSizeWhileItRuns) {
+  for (std::uint32_t number = 1; number <= 3; ++number) queue_.push(make_message("x", number), number);
+  queue_.resize(2);
+  EXPECT_EQ(queue_.overwritten(), 1u);
+  queue_.resize(4);
+  for (std::uint32_t number = 4; number <= 5; ++number) queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.size(), 4u);
+  EXPECT_EQ(queue_.pop()->sequence(), 2u);
+  queue_.resize(0);
+  EXPECT_EQ(queue_.size(), 1u) << "a queue holds one at least";
+}
+
+TEST_F(MessageQueueTest, RefusesAtItsLimitsIfItIsToldTo) {
+  queue_.set({2, AtFullQueue::stop_reading});
+  queue_.push(make_message("a"), 1);
+  EXPECT_FALSE(queue_.refuses());
+  queue_.push(make_message("b"), 2);
+  EXPECT_TRUE(queue_.refuses());
+  queue_.set({10, AtFullQueue::stop_reading});
+  EXPECT_FALSE(queue_.refuses());
+  const std::string large(kBytesMax, 'x');
+  queue_.push(make_message(large), 3);
+  EXPECT_TRUE(queue_.refuses()) << "in bytes, too";
+  while (queue_.pop()) continue;
+  EXPECT_FALSE(queue_.refuses());
+}
+
+TEST_F(MessageQueueTest, GivesTheNewestAndForgetsTheOthers) {
+  EXPECT_FALSE(queue_.pop_newest());
+  for (std::uint32_t number = 1; number <= 3; ++number) queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.pop_newest()->sequence(), 3u);
+  EXPECT_TRUE(queue_.empty());
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

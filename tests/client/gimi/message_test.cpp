@@ -1,0 +1,55 @@
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+#include "client/gimi/message_access.hpp"
+#include "gimnet/gimi/message.hpp"
+#include "tests/client/gimi/support/made_message.hpp"
+
+namespace gimnet {
+namespace {
+
+TEST(Peer, IsWrittenAndReadAsText) {
+  EXPECT_EQ(Peer{(7u << 20) | 17}.text(), "7.17");
+  EXPECT_EQ(Peer::parse("7.17"), (Peer{(7u << 20) | 17}));
+  for (const char* text : {"", "7", "7.", ".17", "7.17.1", "robot", "7.1048576", "4096.1", "-7.1", "7#17"}) {
+    EXPECT_FALSE(Peer::parse(text)) << text;
+  }
+}
+
+TEST(Message, TellsWhatItIs) {
+  const Message message = test::make_message("hello", 9, {1, 2});
+  EXPECT_EQ(message.text(), "hello");
+  EXPECT_EQ(message.size(), 5u);
+  EXPECT_EQ(message.from().text(), "7.5");
+  EXPECT_EQ(message.key(), (MessageKey{1, 2}));
+  EXPECT_EQ(message.lane(), Lane::bulk);
+  EXPECT_EQ(message.sequence(), 9u);
+  EXPECT_EQ(message.arrival_ns(), 1000);
+  EXPECT_FALSE(message.sent_ns());
+  EXPECT_EQ(message.service(), "");
+}
+
+TEST(Message, Moves) {
+  Message first = test::make_message("first");
+  Message second = std::move(first);
+  EXPECT_EQ(second.text(), "first");
+  first = test::make_message("other");
+  second = std::move(first);
+  EXPECT_EQ(second.text(), "other");
+}
+
+TEST(BytesView, LooksAtAnyBytes) {
+  const std::string text = "abc";
+  const std::vector<std::byte> bytes{std::byte{1}, std::byte{2}};
+  const std::vector<unsigned char> letters{1, 2, 3, 4};
+  EXPECT_EQ(BytesView("ab").size(), 2u);
+  EXPECT_EQ(BytesView(text).size(), 3u);
+  EXPECT_EQ(BytesView(bytes).data(), bytes.data());
+  EXPECT_EQ(BytesView(letters).size(), 4u);
+  EXPECT_EQ(BytesView().size(), 0u);
+}
+
+}  // namespace
+}  // namespace gimnet

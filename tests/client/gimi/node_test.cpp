@@ -1,0 +1,225 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gimnet/gimi.hpp"
+#include "tests/client/gimi/support/hub_process.hpp"
+
+namespace gimnet {
+namespace {
+
+using test::eventually;
+using test::HubProcess;
+using test::kPatience;
+
+constexpr Timeout kWait = std::chrono::duration_cast<Timeout>(kPatience);
+
+class NodeTest : public testing::Test {
+ protected:
+  [[nodiscard]] Node join(const std::string& name = {}) { return Node(name, hub_.url()); }
+  HubProcess hub_{{"--shards", "2"}};
+};
+
+TEST_F(NodeTest, JoinsWithAName) {
+  const Node node = join("robot");
+  const NodeState state = node.state();
+  EXPECT_EQ(state.name, "robot");
+  EXPECT_EQ(state.hub_id, 7u);
+  EXPECT_TRUE(state.connected);
+  EXPECT_EQ(state.peer, node.peer());
+  EXPECT_TRUE(node.peer());
+}
+
+TEST_F(NodeTest, SaysWhyItCannotJoin) {
+  const Node holder = join("robot");
+  EXPECT_THROW(join("robot"), GimnetError);
+  NodeOptions options;
+  options.hub = hub_.url();
+  options.name = "no spaces";
+  EXPECT_TRUE(Node::join(options).is(Status::bad_name));
+  options.hub = "tcp://127.0.0.1:1";
+  options.name = "";
+  EXPECT_TRUE(Node::join(options).is(Status::no_hub));
+  options.hub = "pigeon://roof";
+  EXPECT_TRUE(Node::join(options).is(Status::bad_argument));
+}
+
+TEST_F(NodeTest, SendsByNameAndById) {
+  const Node sender = join();
+  const Node receiver = join("B");
+  sender.send("B", "by name").or_throw();
+  sender.send(receiver.peer(), "by id").or_throw();
+  sender.send(receiver.peer().text(), "by id as text").or_throw();
+  for (const char* text : {"by name", "by id", "by id as text"}) {
+    const auto message = receiver.receive(MessageKey{}, kWait);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(message->text(), text);
+    EXPECT_EQ(message->from(), sender.peer());
+  }
+  EXPECT_TRUE(sender.send("nobody", "x").is(Status::not_found));
+}
+
+TEST_F(NodeTest, StampsMessages) {
+  const Node sender = join();
+  const Node receiver = join();
+  SendOptions options;
+  options.timestamp = true;
+  options.lane = Lane::real_time;
+  sender.send(receiver.peer(), "x", options).or_throw();
+  const auto message = receiver.receive(kWait);
+  ASSERT_TRUE(message);
+  ASSERT_TRUE(message->sent_ns());
+  EXPECT_LE(*message->sent_ns(), message->arrival_ns());
+  EXPECT_EQ(message->lane(), Lane::real_time);
+}
+
+TEST_F(NodeTest, AcknowledgedMessagesArriveInOrder) {
+  const Node sender = join();
+  const Node receiver = join("B");
+  const Queue queue = receiver.queue({}, {100000, AtFullQueue::stop_reading});
+  SendOptions options;
+  options.window = 5;
+  const Sender stream = sender.sender("B", options).or_throw();
+  for (int i = 0; i < 5000; ++i) stream.send(std::to_string(i), kForever, i % 7 != 0 ? More::yes : More::no).or_throw();
+  stream.settle(kWait).or_throw();
+  EXPECT_EQ(stream.counts().acknowledged, 5000u);
+  for (int i = 0; i < 5000; ++i) ASSERT_EQ(queue.receive(kNoWait)->text(), std::to_string(i));
+}
+
+TEST_F(NodeTest, SynchronizedStreamsTellWhenTheReceiverGoes) {
+  const Node sender = join();
+  Node receiver = join();
+  SendOptions options;
+  options.window = 2;
+  const Sender stream = sender.sender(receiver.peer(), options).or_throw();
+  stream.send("x").or_throw();
+  stream.settle(kWait).or_throw();
+  receiver.close();
+  stream.send("y").or_throw();
+  EXPECT_TRUE(stream.settle(kWait).is(Status::not_delivered));
+}
+
+TEST_F(NodeTest, AFullQueueOverwritesTheOldest) {
+  const Node sender = join();
+  const Node receiver = join();
+  const Queue queue = receiver.queue({1, 0}, {10, AtFullQueue::overwrite_oldest});
+  SendOptions options;
+  options.key = {1, 0};
+  options.window = 1;
+  const Sender stream = sender.sender(receiver.peer(), options).or_throw();
+  for (int i = 1; i <= 100; ++i) stream.send(std::to_string(i)).or_throw();
+  stream.settle(kWait).or_throw();
+  EXPECT_EQ(queue.overwritten(), 90u);
+  EXPECT_EQ(queue.received(), 100u);
+  for (int i = 91; i <= 100; ++i) EXPECT_EQ(queue.try_receive()->text(), std::to_string(i));
+}
+
+TEST_F(NodeTest, AQueueThatStopsReadingLosesNothing) {
+  const Node sender = join();
+  const Node receiver = join();
+  const Queue queue = receiver.queue({}, {4, AtFullQueue::stop_reading});
+  const Sender stream = sender.sender(receiver.peer()).or_throw();
+  for (int i = 0; i < 1000; ++i) stream.send(std::to_string(i)).or_throw();
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(queue.receive(kWait)->text(), std::to_string(i));
+  EXPECT_EQ(queue.overwritten(), 0u);
+}
+
+TEST_F(NodeTest, PingsAnyNode) {
+  const Node first = join();
+  Node second = join();
+  const auto round_trip = first.ping(second.peer(), kWait, Lane::real_time, "echo");
+  ASSERT_TRUE(round_trip);
+  EXPECT_GT(*round_trip, 0);
+  const Peer gone = second.peer();
+  second.close();
+  EXPECT_TRUE(first.ping(gone, kWait).is(Status::not_delivered));
+}
+
+TEST_F(NodeTest, ListsNodesServicesAndCounters) {
+  const Node robot = join("robot");
+  const Node watcher = join();
+  const auto odometry = robot.advertise("odom", {Delivery::latest, {4, 2}, Lane::normal, true, "pose"}).or_throw();
+  AcceptOptions drive;
+  drive.key = {5, 0};
+  const Queue commands = robot.accept("drive", drive).or_throw();
+  const auto services = watcher.services("robot/*").or_throw();
+  ASSERT_EQ(services.size(), 2u);
+  EXPECT_EQ(services[0].name, "robot/odom");
+  EXPECT_EQ(services[0].key, (MessageKey{4, 2}));
+  EXPECT_EQ(services[0].metadata, "pose");
+  EXPECT_EQ(services[0].delivery, Delivery::latest);
+  EXPECT_EQ(services[1].direction, Direction::accepts);
+  EXPECT_EQ(watcher.nodes("robot").or_throw().at(0).services, 2u);
+  EXPECT_EQ(watcher.nodes().or_throw().size(), 2u);
+  EXPECT_EQ(watcher.find("robot").or_throw(), robot.peer());
+  EXPECT_EQ(watcher.name_of(robot.peer()).or_throw(), "robot");
+  EXPECT_TRUE(watcher.find("nobody").is(Status::not_found));
+  EXPECT_EQ(watcher.hub().or_throw().shards, 2u);
+  EXPECT_EQ(watcher.hub_counters().or_throw().size(), 2u);
+  EXPECT_EQ(watcher.hub_connections().or_throw().size(), 2u);
+  watcher.sender_to_service("robot/drive").or_throw().send("go").or_throw();
+  EXPECT_EQ(commands.receive(kWait)->text(), "go");
+  EXPECT_TRUE(watcher.sender_to_service("robot/odom").is(Status::not_found));
+}
+
+TEST_F(NodeTest, ManyThreadsUseOneNode) {
+  constexpr int kThreads = 4;
+  constexpr int kMessages = 500;
+  const Node sender = join();
+  const Node receiver = join();
+  std::vector<std::thread> threads;
+  std::atomic<int> received{0};
+  for (int thread = 0; thread < kThreads; ++thread) {
+    const MessageKey key{static_cast<std::uint32_t>(thread), 0};
+    const Queue queue = receiver.queue(key, {kMessages, AtFullQueue::stop_reading});
+    threads.emplace_back([&received, queue] {
+      for (std::uint32_t i = 1; i <= kMessages; ++i) received += queue.receive(kWait)->sequence() == i ? 1 : 0;
+    });
+    threads.emplace_back([&sender, &receiver, key] {
+      SendOptions options;
+      options.key = key;
+      options.window = 8;
+      const Sender stream = sender.sender(receiver.peer(), options).or_throw();
+      for (int i = 0; i < kMessages; ++i) stream.send("x").or_throw();
+      stream.settle(kWait).or_throw();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(received, kThreads * kMessages);
+}
+
+TEST_F(NodeTest, ClosingAnswersEverybody) {
+  Node node = join("robot");
+  const Publisher publisher = node.advertise("odom").or_throw();
+  const Subscription subscription = node.subscribe("other/odom").or_throw();
+  const Sender stream = node.sender(node.peer()).or_throw();
+  std::thread waiter([&] { EXPECT_TRUE(subscription.receive().is(Status::closed)); });
+  std::thread subscribers([&] { EXPECT_TRUE(publisher.wait_for_subscribers(1).is(Status::closed)); });
+  node.close();
+  waiter.join();
+  subscribers.join();
+  EXPECT_FALSE(publisher.publish("x"));
+  EXPECT_FALSE(stream.send("x"));
+  EXPECT_FALSE(node.subscribe("a/b"));
+  EXPECT_FALSE(node.ping(Peer{1}));
+  EXPECT_FALSE(node.state().connected);
+  node.close();
+}
+
+TEST_F(NodeTest, TellsWhenTheHubIsGone) {
+  const Node node = join();
+  SendOptions options;
+  options.window = 1;
+  const Sender stream = node.sender(Peer{(7u << 20) | 500}, options).or_throw();
+  hub_.kill();
+  EXPECT_TRUE(eventually([&] { return !node.state().connected; }));
+  EXPECT_FALSE(node.state().trouble.empty());
+  EXPECT_TRUE(stream.send("x", Timeout{1}).is(Status::not_connected));
+}
+
+}  // namespace
+}  // namespace gimnet

@@ -1,0 +1,274 @@
+#include "client/gimi/send_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "gimnet/gimi.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+
+// Streams as they are seen on the wire, by a hub that answers what the test wants.
+
+namespace gimnet::gimi {
+namespace {
+
+using nif::test::FakeConnection;
+using nif::test::FakeHub;
+using nif::test::Frame;
+using nif::test::kHubNode;
+using nif::test::kOwnId;
+using nif::test::kPeerId;
+using proto::gimi::Operation;
+
+constexpr MessageKey kKey{3, 4};
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+/// A GIMI message in a frame.
+struct Taken {
+  proto::gimi::MessageHeader header;
+  std::string data;
+  proto::FrameHeader frame;
+};
+
+class SendStreamTest : public testing::Test {
+ protected:
+  SendStreamTest() {
+    NodeOptions options;
+    options.hub = fake_.url();
+    options.reconnect = false;
+    std::thread joiner([&] { node_.emplace(Node::join(options).or_throw()); });
+    hub_ = fake_.admit(nif::test::make_welcome());
+    joiner.join();
+  }
+  ~SendStreamTest() override { hub_.close(); }
+
+  [[nodiscard]] Sender sender(std::size_t window, AtFullWindow at_full = AtFullWindow::wait) {
+    SendOptions options;
+    options.key = kKey;
+    options.window = window;
+    options.at_full = at_full;
+    return node_->sender(Peer{kPeerId}, options).or_throw();
+  }
+
+  Taken next() {
+    const auto frame = hub_.next_message();
+    if (!frame) return {};
+    const auto view = frame->view();
+    EXPECT_TRUE(view.key.has_value());
+    const auto message = proto::gimi::parse_message(view.payload);
+    EXPECT_TRUE(message.has_value());
+    if (!message) return {};
+    return {
+        message->header, {reinterpret_cast<const char*>(message->data.data()), message->data.size()}, frame->header};
+  }
+
+  void answer(const proto::gimi::MessageHeader& header, std::span<const std::byte> data) {
+    std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
+    const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
+    std::string payload(reinterpret_cast<const char*>(prefix.data()), size);
+    payload.append(reinterpret_cast<const char*>(data.data()), data.size());
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::unicast;
+    parts.header.dst = kOwnId;
+    parts.header.src = kPeerId;
+    parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
+    hub_.send(parts, payload);
+  }
+  void acknowledge(std::uint32_t sequence, std::uint64_t bitmap = kAll, std::uint32_t pong = 0) {
+    std::array<std::byte, proto::gimi::kAckSize> data;
+    proto::gimi::encode_ack({bitmap, pong}, data);
+    answer({sequence, Operation::ack, 0, 0}, data);
+  }
+  void report(proto::DropReason reason, std::uint32_t count, const Frame& frame) {
+    std::string payload{static_cast<char>(reason), 0, 0, 0};
+    payload.append(reinterpret_cast<const char*>(&count), sizeof count);
+    const std::size_t size = std::min<std::size_t>(frame.bytes.size(), 32);
+    payload.append(reinterpret_cast<const char*>(frame.bytes.data()), size);
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::report;
+    parts.header.dst = kOwnId;
+    parts.header.src = kHubNode;
+    hub_.send(parts, payload);
+  }
+
+  FakeHub fake_;
+  FakeConnection hub_{-1};
+  std::optional<Node> node_;
+};
+
+TEST_F(SendStreamTest, AsksForAnAckOnlyWhenSynchronized) {
+  sender(0).send("free").or_throw();
+  const Taken taken = next();
+  EXPECT_EQ(taken.data, "free");
+  EXPECT_EQ(taken.header.sequence, 1u);
+  EXPECT_FALSE(taken.header.has(proto::gimi::kFlagAckWanted));
+  SendOptions options;
+  options.window = 1;
+  options.key = {9, 9};
+  node_->send(Peer{kPeerId}, "asked", options).or_throw();
+  const Taken asked = next();
+  EXPECT_TRUE(asked.header.has(proto::gimi::kFlagAckWanted));
+  EXPECT_TRUE(asked.frame.has(proto::kFlagReport));
+}
+
+TEST_F(SendStreamTest, NeverHasMoreThanItsWindowUnderWay) {
+  const Sender stream = sender(5);
+  std::thread sending([&] {
+    for (int i = 0; i < 50; ++i) stream.send("x").or_throw();
+  });
+  std::uint32_t acknowledged = 0;
+  while (acknowledged < 50) {
+    const Taken taken = next();
+    if (taken.header.operation != Operation::data) continue;
+    ASSERT_LE(taken.header.sequence, acknowledged + 5);
+    if (taken.header.sequence == acknowledged + 5) acknowledge(acknowledged += 5);
+  }
+  sending.join();
+  EXPECT_TRUE(stream.settle());
+  EXPECT_EQ(stream.counts().acknowledged, 50u);
+}
+
+TEST_F(SendStreamTest, TheCallerChoosesWhatHappensAtAFullWindow) {
+  const Sender waiting = sender(1);
+  waiting.send("1").or_throw();
+  EXPECT_TRUE(waiting.send("2", Timeout{1}).is(Status::timeout));
+  EXPECT_EQ(waiting.counts().sent, 1u);
+}
+
+TEST_F(SendStreamTest, Skips) {
+  const Sender stream = sender(1, AtFullWindow::skip);
+  stream.send("1").or_throw();
+  EXPECT_TRUE(stream.send("2").is(Status::window_full));
+  EXPECT_EQ(next().data, "1");
+  acknowledge(1);
+  EXPECT_TRUE(stream.settle());
+  stream.send("3").or_throw();
+  EXPECT_EQ(next().header.sequence, 2u) << "what was skipped has no number";
+  EXPECT_EQ(stream.counts().skipped, 1u);
+}
+
+TEST_F(SendStreamTest, HoldsOnlyTheLatest) {
+  const Sender stream = sender(1, AtFullWindow::hold_latest);
+  for (const char* text : {"1", "2", "3", "4"}) stream.send(text).or_throw();
+  EXPECT_EQ(next().data, "1");
+  acknowledge(1);
+  Taken taken = next();
+  EXPECT_EQ(taken.data, "4");
+  EXPECT_EQ(taken.header.sequence, 2u);
+  acknowledge(2);
+  EXPECT_TRUE(stream.settle());
+  EXPECT_EQ(stream.counts().skipped, 2u);
+}
+
+TEST_F(SendStreamTest, AsksForAMissingAckAndGivesUpWhatThePongDoesNotKnow) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  next();
+  next();
+  const Taken ping = next();
+  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_TRUE(ping.header.has(proto::gimi::kFlagAckWanted));
+  const Taken again = next();
+  EXPECT_EQ(again.header.sequence, ping.header.sequence) << "not answered: repeated";
+  acknowledge(2, 0, ping.header.sequence);
+  const auto settled = stream.settle();
+  EXPECT_TRUE(settled.is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().acknowledged, 1u);
+  EXPECT_EQ(stream.counts().lost, 1u);
+}
+
+TEST_F(SendStreamTest, AReportOfOneMessageFreesIt) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  const auto first = hub_.next_message();
+  ASSERT_TRUE(first);
+  report(proto::DropReason::queue_full, 1, *first);
+  next();
+  acknowledge(2, 0);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().lost, 1u);
+  EXPECT_NE(stream.counts().loss.find("queue_full"), std::string::npos);
+}
+
+TEST_F(SendStreamTest, AReportOfAGoneRouteFreesEverythingThere) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  const auto first = hub_.next_message();
+  ASSERT_TRUE(first);
+  report(proto::DropReason::no_such_node, 1, *first);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().lost, 2u);
+}
+
+TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  next();
+  const auto second = hub_.next_message();
+  ASSERT_TRUE(second);
+  report(proto::DropReason::shard_full, 2, *second);
+  const Taken ping = next();
+  EXPECT_EQ(ping.header.operation, Operation::ping);
+  acknowledge(0, 0, ping.header.sequence);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().lost, 2u);
+}
+
+TEST_F(SendStreamTest, ABrokenConnectionFreesEverything) {
+  const Sender stream = sender(1);
+  stream.send("1").or_throw();
+  hub_.close();
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_FALSE(stream.send("2"));
+}
+
+TEST_F(SendStreamTest, ClosingTheNodeEndsAllWaits) {
+  const Sender stream = sender(1);
+  stream.send("1").or_throw();
+  std::thread sending([&] { EXPECT_TRUE(stream.send("2").is(Status::closed)); });
+  std::thread settling([&] { EXPECT_FALSE(stream.settle()); });
+  next();
+  node_->close();
+  sending.join();
+  settling.join();
+  EXPECT_FALSE(stream.send("3"));
+}
+
+TEST_F(SendStreamTest, AnswersPingsByItself) {
+  answer({77, Operation::ping, 0, 0}, std::as_bytes(std::span("time....echo", 12)));
+  const Taken pong = next();
+  EXPECT_EQ(pong.header.operation, Operation::pong);
+  EXPECT_EQ(pong.header.sequence, 77u);
+  EXPECT_EQ(pong.data, "time....echo");
+}
+
+TEST_F(SendStreamTest, AcknowledgesWhatItTookAndAgainBeforeAPong) {
+  const std::array<std::byte, 8> data{};
+  answer({1, Operation::data, proto::gimi::kFlagAckWanted, 0}, data);
+  const Taken ack = next();
+  EXPECT_EQ(ack.header.operation, Operation::ack);
+  EXPECT_EQ(ack.header.sequence, 1u);
+  answer({5, Operation::ping, proto::gimi::kFlagAckWanted, 0}, data);
+  const Taken repeated = next();
+  EXPECT_EQ(repeated.header.operation, Operation::ack);
+  const auto bytes = std::as_bytes(std::span(repeated.data.data(), repeated.data.size()));
+  EXPECT_EQ(proto::gimi::decode_ack(bytes)->pong_sequence, 5u);
+  EXPECT_EQ(next().header.operation, Operation::pong);
+}
+
+TEST_F(SendStreamTest, RefusesWhatCannotBe) {
+  EXPECT_TRUE(node_->sender(Peer{}).is(Status::bad_argument));
+  SendOptions options;
+  options.window = kWindowMax + 1;
+  EXPECT_TRUE(node_->sender(Peer{kPeerId}, options).is(Status::bad_argument));
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

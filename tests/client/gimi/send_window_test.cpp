@@ -1,0 +1,150 @@
+#include "client/gimi/send_window.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::gimi {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+void fill(SendWindow& window, std::size_t messages) {
+  for (std::size_t i = 0; i < messages; ++i) window.open(0);
+}
+
+TEST(SendWindow, TakesAsManyAsItWasTold) {
+  SendWindow window(3);
+  fill(window, 3);
+  EXPECT_FALSE(window.has_room());
+  EXPECT_EQ(window.acknowledge(1, 0, 0, kMs).acknowledged, 1u);
+  EXPECT_TRUE(window.has_room());
+  EXPECT_EQ(window.open(0), 4u);
+  EXPECT_FALSE(window.has_room());
+}
+
+TEST(SendWindow, CountsNothingWhenUnsynchronized) {
+  SendWindow window(0);
+  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence) EXPECT_EQ(window.open(0), sequence);
+  EXPECT_TRUE(window.has_room());
+  EXPECT_TRUE(window.empty());
+}
+
+TEST(SendWindow, OneAckSpeaksOfMany) {
+  SendWindow window(64);
+  fill(window, 64);
+  EXPECT_EQ(window.acknowledge(64, kAll, 0, kMs).acknowledged, 64u);
+  EXPECT_TRUE(window.empty());
+}
+
+TEST(SendWindow, WaitsForTheOneThatIsMissing) {
+  SendWindow window(3);
+  fill(window, 3);
+  EXPECT_EQ(window.acknowledge(3, 0b10, 0, kMs).acknowledged, 2u);  // 3 and 1
+  EXPECT_EQ(window.size(), 2u);
+  EXPECT_EQ(window.acknowledge(3, 0b10, 0, kMs).acknowledged, 0u);
+  EXPECT_EQ(window.acknowledge(2, 0, 0, kMs).acknowledged, 1u);
+  EXPECT_TRUE(window.empty());
+}
+
+TEST(SendWindow, StaysWithinReachOfTheBitmap) {
+  SendWindow window(kWindowMax);
+  fill(window, 64);
+  EXPECT_EQ(window.acknowledge(64, kAll >> 2, 0, kMs).acknowledged, 63u);  // all but 1
+  EXPECT_TRUE(window.has_room());
+  EXPECT_EQ(window.open(0), 65u);
+  EXPECT_FALSE(window.has_room()) << "66 could not be acknowledged together with 1";
+}
+
+TEST(SendWindow, IgnoresAcksOfWhatWasNeverSent) {
+  SendWindow window(2);
+  fill(window, 2);
+  EXPECT_FALSE(window.acknowledge(4000, kAll, 0, kMs).any());
+  EXPECT_FALSE(window.acknowledge(0, 0, 0, kMs).any());
+  EXPECT_EQ(window.size(), 2u);
+}
+
+TEST(SendWindow, AsksWhenAnAckIsLate) {
+  SendWindow window(2);
+  window.open(0);
+  EXPECT_FALSE(window.ping_due(200 * kMs - 1));
+  EXPECT_TRUE(window.ping_due(200 * kMs));
+  window.ping_sent(9, 200 * kMs);
+  EXPECT_FALSE(window.ping_due(400 * kMs - 1));
+  EXPECT_TRUE(window.ping_due(400 * kMs)) << "not answered: repeated";
+  EXPECT_EQ(window.ping_number(), 9u);
+  window.ping_sent(9, 400 * kMs);
+  EXPECT_FALSE(window.ping_due(800 * kMs - 1)) << "each time after twice as long";
+  EXPECT_TRUE(window.ping_due(800 * kMs));
+}
+
+TEST(SendWindow, WaitsLongerWhereTheWayIsLong) {
+  SendWindow window(2);
+  window.open(0);
+  static_cast<void>(window.acknowledge(1, 0, 0, 100 * kMs));
+  EXPECT_EQ(window.round_trip_ns(), 100 * kMs);
+  window.open(1000 * kMs);
+  EXPECT_FALSE(window.ping_due(1400 * kMs - 1));
+  EXPECT_TRUE(window.ping_due(1400 * kMs));
+}
+
+TEST(SendWindow, APongFreesOnlyWhatStoodBeforeThePing) {
+  SendWindow window(4);
+  fill(window, 2);
+  window.ping_sent(9, 200 * kMs);
+  fill(window, 2);
+  const auto freed = window.acknowledge(2, 0, 9, 300 * kMs);
+  EXPECT_EQ(freed.acknowledged, 1u);
+  EXPECT_EQ(freed.lost, 1u) << "1 stood before the PING and did not come";
+  EXPECT_EQ(window.size(), 2u) << "3 and 4 may be on their way";
+  EXPECT_EQ(window.ping_number(), 0u);
+}
+
+TEST(SendWindow, APongOfAnotherPingFreesNothing) {
+  SendWindow window(4);
+  fill(window, 2);
+  window.ping_sent(9, 200 * kMs);
+  EXPECT_EQ(window.acknowledge(0, 0, 8, 300 * kMs).lost, 0u);
+  EXPECT_EQ(window.size(), 2u);
+}
+
+TEST(SendWindow, TimeAloneNeverFrees) {
+  SendWindow window(1);
+  window.open(0);
+  for (std::int64_t now = 0; now < 3600'000 * kMs; now += 1000 * kMs) {
+    if (window.ping_due(now)) window.ping_sent(9, now);
+  }
+  EXPECT_FALSE(window.has_room());
+}
+
+TEST(SendWindow, FreesWhatIsKnownToBeLost) {
+  SendWindow window(3);
+  fill(window, 3);
+  EXPECT_EQ(window.lose(2).lost, 1u);
+  EXPECT_EQ(window.lose(2).lost, 0u);
+  EXPECT_EQ(window.lose(99).lost, 0u);
+  EXPECT_EQ(window.lose_all().lost, 2u);
+  EXPECT_TRUE(window.empty());
+  EXPECT_FALSE(window.ping_due(3600'000 * kMs));
+}
+
+TEST(SendWindow, HurriesWhenSomethingIsDoubtful) {
+  SendWindow window(3);
+  window.open(0);
+  window.hurry();
+  EXPECT_TRUE(window.ping_due(1));
+  window.ping_sent(1, 1);
+  EXPECT_FALSE(window.ping_due(2));
+}
+
+TEST(SendWindow, TakesBackWhatWasNotSent) {
+  SendWindow window(1);
+  const std::uint32_t sequence = window.open(0);
+  EXPECT_TRUE(window.cancel(sequence));
+  EXPECT_TRUE(window.has_room());
+  EXPECT_EQ(window.open(0), sequence);
+  static_cast<void>(window.lose_all());
+  EXPECT_FALSE(window.cancel(sequence)) << "it did not wait any more";
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

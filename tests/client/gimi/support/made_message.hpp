@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "client/gimi/message_access.hpp"
+
+namespace gimnet::test {
+
+/// A message that NIF knows nothing of. `text` must outlive it.
+inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {}) {
+  nif_incoming in{};
+  in.from = (7u << 20) | 5;
+  in.key = key.type | (static_cast<std::uint64_t>(key.instance) << 32);
+  in.lane = 2;
+  in.arrival_ns = 1000;
+  proto::gimi::MessageView view;
+  view.header.sequence = sequence;
+  view.data = std::as_bytes(std::span(text.data(), text.size()));
+  return MessageAccess::make(in, view, nullptr);
+}
+
+}  // namespace gimnet::test
