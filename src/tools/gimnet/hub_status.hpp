@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "gimnet/gimi/records.hpp"
+
+namespace gimnet::tool {
+
+/// What a hub says of itself at one moment. Thread safety: a value type.
+struct HubStatus {
+  HubRecord hub;
+  std::vector<ShardCounts> shards;
+  std::vector<ConnectionRecord> connections;
+};
+
+using Counters = std::vector<std::pair<std::string, std::uint64_t>>;
+
+/// Each counter over all shards and the conductor: the sum, and the largest of those that end in `_max`.
+[[nodiscard]] Counters summed(const std::vector<ShardCounts>& shards);
+
+/// accepted + copies = delivered + dropped + queued (docs/protocol.md, section 9).
+struct Ledger {
+  std::uint64_t accepted = 0;
+  std::uint64_t copies = 0;
+  std::uint64_t delivered = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t queued = 0;
+  /// Holds exactly whenever nothing moves.
+  [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped + queued; }
+};
+[[nodiscard]] Ledger ledger_of(const Counters& counters);
+
+/// One object and a newline.
+[[nodiscard]] std::string json_of(const HubStatus& status);
+[[nodiscard]] std::string text_of(const HubStatus& status);
+
+}  // namespace gimnet::tool

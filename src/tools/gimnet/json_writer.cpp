@@ -1,0 +1,102 @@
+#include "tools/gimnet/json_writer.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "proto/bitestream/utf8.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+constexpr std::string_view kHexDigits = "0123456789abcdef";
+
+bool is_utf8(std::string_view text) {
+  return proto::bitestream::valid_utf8(reinterpret_cast<const unsigned char*>(text.data()), text.size());
+}
+
+}  // namespace
+
+void JsonWriter::separate() {
+  if (!first_) json_ += ',';
+  first_ = false;
+}
+
+JsonWriter& JsonWriter::open(char bracket) {
+  separate();
+  json_ += bracket;
+  first_ = true;
+  return *this;
+}
+
+JsonWriter& JsonWriter::close(char bracket) {
+  json_ += bracket;
+  first_ = false;
+  return *this;
+}
+
+JsonWriter& JsonWriter::literal(std::string_view text) {
+  separate();
+  json_ += text;
+  return *this;
+}
+
+JsonWriter& JsonWriter::key(std::string_view name) {
+  separate();
+  quote(name);
+  json_ += ':';
+  first_ = true;
+  return *this;
+}
+
+JsonWriter& JsonWriter::text(std::string_view value) {
+  separate();
+  quote(value);
+  return *this;
+}
+
+JsonWriter& JsonWriter::boolean(bool value) { return literal(value ? "true" : "false"); }
+
+JsonWriter& JsonWriter::number(double value) {
+  if (!std::isfinite(value)) return literal("null");
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3f", value);
+  return literal(text.data());
+}
+
+JsonWriter& JsonWriter::bytes_member(const std::string& name, std::span<const std::byte> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (is_utf8(text)) return member(name, text);
+  std::string hex;
+  hex.reserve(2 * bytes.size());
+  for (const std::byte byte : bytes) {
+    hex += kHexDigits[std::to_integer<std::size_t>(byte >> 4)];
+    hex += kHexDigits[std::to_integer<std::size_t>(byte & std::byte{15})];
+  }
+  return member(name + "_hex", hex);
+}
+
+void JsonWriter::quote(std::string_view text) {
+  const bool clean = is_utf8(text);
+  json_ += '"';
+  for (const char letter : text) {
+    const auto code = static_cast<unsigned char>(letter);
+    if (letter == '"' || letter == '\\') {
+      json_ += '\\';
+      json_ += letter;
+    } else if (letter == '\n') {
+      json_ += "\\n";
+    } else if (code < 0x20 || code == 0x7F) {
+      json_ += "\\u00";
+      json_ += kHexDigits[code >> 4];
+      json_ += kHexDigits[code & 15];
+    } else if (code >= 0x80 && !clean) {
+      json_ += "\\ufffd";
+    } else {
+      json_ += letter;
+    }
+  }
+  json_ += '"';
+}
+
+}  // namespace gimnet::tool

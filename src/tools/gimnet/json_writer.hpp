@@ -1,0 +1,55 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace gimnet::tool {
+
+/// Writes one JSON value. Text that is no UTF-8 has U+FFFD in place of the bytes that are wrong; bytes() does not lose
+/// them. Thread safety: one thread.
+class JsonWriter {
+ public:
+  JsonWriter& begin_object() { return open('{'); }
+  JsonWriter& end_object() { return close('}'); }
+  JsonWriter& begin_array() { return open('['); }
+  JsonWriter& end_array() { return close(']'); }
+  JsonWriter& key(std::string_view name);
+  JsonWriter& text(std::string_view value);
+  JsonWriter& boolean(bool value);
+  JsonWriter& number(double value);
+  template <std::integral Integer>
+  JsonWriter& number(Integer value) {
+    return literal(std::to_string(value));
+  }
+
+  template <class Value>
+  JsonWriter& member(std::string_view name, const Value& value) {
+    key(name);
+    if constexpr (std::same_as<Value, bool>)
+      return boolean(value);
+    else if constexpr (std::integral<Value> || std::floating_point<Value>)
+      return number(value);
+    else
+      return text(value);
+  }
+  /// As `name` where they are UTF-8, else as `name_hex`.
+  JsonWriter& bytes_member(const std::string& name, std::span<const std::byte> bytes);
+
+  [[nodiscard]] const std::string& str() const { return json_; }
+
+ private:
+  JsonWriter& open(char bracket);
+  JsonWriter& close(char bracket);
+  JsonWriter& literal(std::string_view text);
+  void separate();
+  void quote(std::string_view text);
+
+  std::string json_;
+  bool first_ = true;
+};
+
+}  // namespace gimnet::tool

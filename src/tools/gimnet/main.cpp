@@ -1,0 +1,50 @@
+#include <cstdio>
+#include <exception>
+#include <variant>
+
+#include "tools/gimnet/command_line.hpp"
+#include "tools/gimnet/commands.hpp"
+
+namespace {
+
+using namespace gimnet::tool;
+
+ExitCode run(const Options& options) {
+  StopSignal stop;
+  Session session(options, stop);
+  switch (options.command) {
+    case Command::send:
+      return run_send(session);
+    case Command::recv:
+      return run_recv(session);
+    case Command::pub:
+      return run_pub(session);
+    case Command::echo:
+      return run_echo(session);
+    case Command::ping:
+      return run_ping(session);
+    case Command::nodes:
+      return run_nodes(session);
+    case Command::services:
+      return run_services(session);
+    case Command::status:
+      return run_status(session);
+  }
+  return ExitCode::usage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const auto parsed = parse_command_line(argc, argv);
+    if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {
+      std::fputs(ending->text.c_str(), ending->code == ExitCode::done ? stdout : stderr);
+      return static_cast<int>(ending->code);
+    }
+    return static_cast<int>(run(std::get<Options>(parsed)));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "gimnet: cannot go on: %s\n", error.what());
+    return static_cast<int>(ExitCode::failed);
+  }
+}

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "gimnet/gimi.hpp"
+
+namespace gimnet::tool {
+
+enum class Command : std::uint8_t { send, recv, pub, echo, ping, nodes, services, status };
+
+/// What the command line asks for. Thread safety: immutable once read.
+struct Options {
+  Command command = Command::status;
+  std::string hub;  ///< "": the environment's GIMNET_HUB, else the hub of this machine
+  bool json = false;
+  std::optional<std::uint8_t> shard;
+
+  std::string target;  ///< send, ping: name or id; pub, echo: service; nodes, services: pattern
+  std::string name;    ///< of this node
+  std::string file;
+  bool raw = false;
+  std::uint64_t count = 0;  ///< 0: no end
+  std::uint64_t pings = 10;
+  double interval_s = 0.1;
+  double timeout_s = 1.0;
+  double rate_hz = 0.0;  ///< 0: as fast as possible
+  std::size_t subscribers = 0;
+  std::size_t bytes_max = std::size_t{64} << 20;
+  Delivery delivery = Delivery::stream;
+  Lane lane = Lane::normal;
+  MessageKey key;
+};
+
+}  // namespace gimnet::tool

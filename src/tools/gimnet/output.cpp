@@ -1,0 +1,39 @@
+#include "tools/gimnet/output.hpp"
+
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace gimnet::tool {
+namespace {
+
+constexpr std::size_t kGatheredBytes = 64 * 1024;
+
+}  // namespace
+
+void Output::write(std::string_view text) {
+  if (waiting_.size() + text.size() > kGatheredBytes) flush();
+  if (text.size() >= kGatheredBytes) {
+    write_all(text);
+  } else {
+    waiting_ += text;
+  }
+}
+
+void Output::flush() {
+  write_all(waiting_);
+  waiting_.clear();
+}
+
+void Output::write_all(std::string_view text) {
+  while (!text.empty() && ok()) {
+    const ssize_t count = ::write(descriptor_, text.data(), text.size());
+    if (count >= 0) {
+      text.remove_prefix(static_cast<std::size_t>(count));
+    } else if (errno != EINTR) {
+      error_ = errno;
+    }
+  }
+}
+
+}  // namespace gimnet::tool

@@ -1,0 +1,99 @@
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "base/clock.hpp"
+#include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/round_trips.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+struct Tally {
+  RoundTrips round_trips;
+  std::uint64_t sent = 0;
+  std::uint64_t lost = 0;
+};
+
+std::string microseconds(double value) {
+  std::array<char, 48> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+
+void print_json(Session& session, Peer peer, const Tally& tally) {
+  const RoundTrips::Summary us = tally.round_trips.summary_us();
+  JsonWriter json;
+  json.begin_object().member("target", session.options().target).member("id", peer.text());
+  json.member("sent", tally.sent).member("lost", tally.lost);
+  json.member("min", us.min).member("mean", us.mean).member("p50", us.p50).member("p99", us.p99);
+  json.member("p99.9", us.p99_9).member("max", us.max).end_object();
+  session.output().write(json.str() + "\n");
+}
+
+void print_text(Session& session, const Tally& tally) {
+  const RoundTrips::Summary us = tally.round_trips.summary_us();
+  session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) + " lost\n");
+  if (tally.round_trips.count() == 0) return;
+  session.output().write("round trip in us: min " + microseconds(us.min) + ", mean " + microseconds(us.mean) +
+                         ", p50 " + microseconds(us.p50) + ", p99 " + microseconds(us.p99) + ", p99.9 " +
+                         microseconds(us.p99_9) + ", max " + microseconds(us.max) + "\n");
+}
+
+/// Nothing: go on.
+std::optional<Failure> ping_once(Session& session, Peer peer, Tally& tally) {
+  const Options& options = session.options();
+  ++tally.sent;
+  const auto answer = session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
+  if (answer) {
+    tally.round_trips.add(*answer);
+  } else if (session.stopped()) {
+    --tally.sent;
+  } else {
+    ++tally.lost;
+    if (!answer.is(Status::timeout)) return answer.failure();
+  }
+  if (options.json || session.stopped()) return std::nullopt;
+  session.output().write(answer ? "answer from " + peer.text() + " in " +
+                                      microseconds(static_cast<double>(*answer) / 1000.0) + " us\n"
+                                : answer.failure().sentence + "\n");
+  session.output().flush();
+  return std::nullopt;
+}
+
+}  // namespace
+
+ExitCode run_ping(Session& session) {
+  const Options& options = session.options();
+  NodeOptions how;
+  how.reconnect = false;
+  if (const auto ending = session.join(how)) return *ending;
+  const auto peer = session.find(options.target);
+  if (!peer) return session.code();
+  Tally tally;
+  std::optional<Failure> failure;
+  const auto interval_ns = static_cast<std::int64_t>(std::llround(options.interval_s * 1e9));
+  std::int64_t next_ns = steady_now_ns();
+  while (tally.sent < options.pings && !failure && session.stop().wait_until(next_ns)) {
+    failure = ping_once(session, *peer, tally);
+    next_ns = std::max(next_ns + interval_ns, steady_now_ns());
+  }
+  if (options.json) {
+    print_json(session, *peer, tally);
+  } else {
+    print_text(session, tally);
+  }
+  session.output().flush();
+  if (failure) {
+    static_cast<void>(session.fail(*failure));
+    return failure->status == Status::not_delivered ? ExitCode::not_found : exit_code_of(failure->status);
+  }
+  if (tally.round_trips.count() == 0 && !session.stopped()) {
+    return session.fail(
+        {Status::timeout, options.target + " answered none of " + std::to_string(tally.sent) + " pings"});
+  }
+  return session.finish();
+}
+
+}  // namespace gimnet::tool

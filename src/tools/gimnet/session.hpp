@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "gimnet/gimi.hpp"
+#include "tools/gimnet/exit_code.hpp"
+#include "tools/gimnet/options.hpp"
+#include "tools/gimnet/output.hpp"
+#include "tools/gimnet/stop_signal.hpp"
+
+namespace gimnet::tool {
+
+/// What a command works with. Thread safety: one thread.
+class Session {
+ public:
+  Session(const Options& options, StopSignal& stop) : options_(options), stop_(stop) {}
+  ~Session() { stop_.on_stop({}); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  [[nodiscard]] const Options& options() const { return options_; }
+  [[nodiscard]] StopSignal& stop() { return stop_; }
+  [[nodiscard]] Output& output() { return output_; }
+
+  /// Joins as the options say. Errors: the code to end with; the words are printed.
+  [[nodiscard]] std::optional<ExitCode> join(NodeOptions how);
+  /// REQUIRES: joined.
+  [[nodiscard]] Node& node() { return *node_; }
+
+  /// A node by name or id. Nothing: the words are printed, code() says how to end.
+  [[nodiscard]] std::optional<Peer> find(std::string_view name);
+
+  /// Prints why something did not work, and gives the code to end with: the signal's, if there was one.
+  [[nodiscard]] ExitCode fail(const Failure& failure);
+  /// Ends well, unless the output could not be written or a signal came.
+  [[nodiscard]] ExitCode finish();
+  [[nodiscard]] ExitCode code() const { return code_; }
+  [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
+
+ private:
+  const Options& options_;
+  StopSignal& stop_;
+  Output output_;
+  std::optional<Node> node_;
+  ExitCode code_ = ExitCode::done;
+};
+
+/// A line for people, on standard error.
+void say(const std::string& sentence);
+
+}  // namespace gimnet::tool

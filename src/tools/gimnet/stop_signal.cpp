@@ -1,0 +1,81 @@
+#include "tools/gimnet/stop_signal.hpp"
+
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdint>
+#include <utility>
+
+#include "base/clock.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+/// Ends the watcher; nobody sends it from outside for another reason.
+constexpr int kEndWatcher = SIGUSR1;
+constexpr int kSignalExitBase = 128;
+
+sigset_t watched_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, kEndWatcher);
+  return set;
+}
+
+}  // namespace
+
+StopSignal::StopSignal() : descriptor_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  const sigset_t set = watched_signals();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  watcher_ = std::thread([this] { watch(); });
+}
+
+StopSignal::~StopSignal() {
+  pthread_kill(watcher_.native_handle(), kEndWatcher);
+  watcher_.join();
+  ::close(descriptor_);
+}
+
+void StopSignal::watch() {
+  const sigset_t set = watched_signals();
+  for (int signal = 0; sigwait(&set, &signal) == 0 && signal != kEndWatcher;) {
+    {
+      const MutexLock lock(mutex_);
+      if (signal_ != 0) ::_exit(kSignalExitBase + signal);
+      signal_ = signal;
+      changed_.notify_all();
+    }
+    const std::uint64_t one = 1;
+    static_cast<void>(::write(descriptor_, &one, sizeof one));
+    const MutexLock lock(action_mutex_);
+    if (action_) std::exchange(action_, nullptr)();
+  }
+}
+
+int StopSignal::signal() {
+  const MutexLock lock(mutex_);
+  return signal_;
+}
+
+bool StopSignal::wait_until(std::int64_t deadline_ns) {
+  const MutexLock lock(mutex_);
+  while (signal_ == 0) {
+    if (steady_now_ns() >= deadline_ns) return true;
+    static_cast<void>(changed_.wait_until(mutex_, deadline_ns));
+  }
+  return false;
+}
+
+void StopSignal::on_stop(std::function<void()> action) {
+  const bool late = signal() != 0;
+  const MutexLock lock(action_mutex_);
+  action_ = std::move(action);
+  if (late && action_) std::exchange(action_, nullptr)();
+}
+
+}  // namespace gimnet::tool

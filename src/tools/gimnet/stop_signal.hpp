@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+#include <thread>
+
+#include "base/mutex.hpp"
+
+namespace gimnet::tool {
+
+/// Ctrl-C and SIGTERM, turned into a request to stop: waits end, and the program can leave the hub in good order. A
+/// second signal ends it at once. One for a program, made before any other thread. Thread safety: any thread.
+class StopSignal {
+ public:
+  StopSignal();
+  ~StopSignal();
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+
+  /// The signal, or 0.
+  [[nodiscard]] int signal() GIMNET_EXCLUDES(mutex_);
+  /// Readable once there was one.
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  /// Waits until steady_now_ns() reaches `deadline_ns`. False: a signal came before.
+  [[nodiscard]] bool wait_until(std::int64_t deadline_ns) GIMNET_EXCLUDES(mutex_);
+  /// Called once, on another thread, when a signal comes; an empty one takes the last away.
+  void on_stop(std::function<void()> action) GIMNET_EXCLUDES(mutex_, action_mutex_);
+
+ private:
+  void watch();
+
+  int descriptor_ = -1;
+  std::thread watcher_;
+  Mutex action_mutex_;  ///< held while the action runs
+  std::function<void()> action_ GIMNET_GUARDED_BY(action_mutex_);
+  Mutex mutex_;
+  Condition changed_;
+  int signal_ GIMNET_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace gimnet::tool

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""Wrong arguments of tcphub and gimnet: the exit code, and a sentence that says what happened, to what, what to do."""
+
+import json
+import os
+import socket
+import subprocess
+import threading
+import unittest
+
+from support.processes import GIMNET, TCPHUB, Hub, Process, run_gimnet
+from support.wire import Client
+
+
+def run(*arguments, env=None):
+    process = Process(arguments, env=env)
+    try:
+        process.code = process.wait(20)
+    finally:
+        process.end()
+    return process
+
+
+class WrongForTcphub(unittest.TestCase):
+    def refused(self, words, *arguments, code=2):
+        hub = run(TCPHUB, *arguments)
+        self.assertEqual(hub.code, code, hub.err)
+        self.assertTrue(hub.err.startswith("tcphub: "), hub.err)
+        for word in words:
+            self.assertIn(word, hub.err)
+        self.assertEqual(hub.out, b"")
+
+    def test_arguments(self):
+        for words, arguments in (
+            (["--shards", "0"], ["--shards", "0"]),
+            (["--shards", "many"], ["--shards", "many"]),
+            (["--hub-id", "4095"], ["--hub-id", "4095"]),
+            (["http://127.0.0.1:1", "tcp://"], ["--listen", "http://127.0.0.1:1"]),
+            (["tcp://0.0.0.0:0", "--insecure"], ["--listen", "tcp://0.0.0.0:0"]),
+            (["frame_byte", "frame_bytes"], ["--limit", "frame_byte=1"]),
+            (["--limit"], ["--limit", "frame_bytes"]),
+            (["--placement", "hint"], ["--placement", "hnt"]),
+            (["--shard", "--shards"], ["--shard", "2"]),
+        ):
+            with self.subTest(arguments=arguments):
+                self.refused(words, *arguments)
+
+    def test_help_and_version(self):
+        for flag in ("--help", "--version", "--help-limits"):
+            hub = run(TCPHUB, flag)
+            self.assertEqual((hub.code, hub.err), (0, ""), flag)
+            self.assertTrue(hub.out, flag)
+
+
+class WrongForGimnet(unittest.TestCase):
+    def refused(self, code, words, *arguments, env=None):
+        tool = run(GIMNET, *arguments, env=env)
+        self.assertEqual(tool.code, code, tool.err)
+        self.assertTrue(tool.err.startswith("gimnet: "), tool.err)
+        for word in words:
+            self.assertIn(word, tool.err)
+        self.assertEqual(tool.out, b"")
+
+    def test_arguments(self):
+        for words, arguments in (
+            (["sned", "did you mean send?"], ["sned"]),
+            (["frobnicate"], ["frobnicate"]),
+            (["node"], ["send"]),
+            (["--name"], ["recv"]),
+            (["--json", "--raw"], ["recv", "--name", "B", "--json", "--raw"]),
+            (["odom", "NODE/SERVICE"], ["pub", "odom"]),
+            (["robot/odom", "other"], ["pub", "robot/odom", "--name", "other"]),
+            (["--delivery"], ["pub", "robot/odom", "--delivery", "sometimes"]),
+            (["-c", "0"], ["ping", "B", "-c", "0"]),
+            (["--lane"], ["send", "B", "--lane", "fast"]),
+            (["--nonsense"], ["nodes", "--nonsense"]),
+        ):
+            with self.subTest(arguments=arguments):
+                self.refused(2, words, *arguments)
+
+    def test_no_command_shows_the_help(self):
+        tool = run(GIMNET)
+        self.assertEqual(tool.code, 2)
+        self.assertIn("Examples:", tool.err)
+
+    def test_help_begins_with_examples(self):
+        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["ping"], ["nodes"], ["services"], ["status"]):
+            tool = run(GIMNET, *command, "--help")
+            self.assertEqual((tool.code, tool.err), (0, ""), command)
+            text = tool.out.decode()
+            self.assertLess(text.index("Examples:"), text.index("--help"), command)
+        version = run(GIMNET, "--version")
+        self.assertEqual(version.code, 0)
+        self.assertRegex(version.out.decode(), r"^gimnet \d+\.\d+\.\d+\n$")
+
+    def test_no_hub(self):
+        self.refused(3, ["tcp://127.0.0.1:1"], "--hub", "tcp://127.0.0.1:1", "nodes")
+        self.refused(3, ["tcp://127.0.0.1:1"], "nodes", "--hub", "tcp://127.0.0.1:1")
+        self.refused(3, ["tcp://127.0.0.1:1"], "nodes", env={"GIMNET_HUB": "tcp://127.0.0.1:1"})
+
+    def test_wrong_url(self):
+        self.refused(2, ["pigeon://roof"], "--hub", "pigeon://roof", "nodes")
+
+    def test_no_such_file(self):
+        hub = Hub(self)
+        Client(self, hub).join("B")
+        tool = run_gimnet(hub, "send", "B", "--file", "/nonexistent/file")
+        self.assertEqual(tool.code, 1)
+        self.assertIn("/nonexistent/file", tool.err)
+
+    def test_no_such_node(self):
+        hub = Hub(self)
+        Client(self, hub).join("robot")
+        tool = run_gimnet(hub, "send", "robto", data=b"x\n")
+        self.assertEqual(tool.code, 4)
+        self.assertIn("did you mean robot?", tool.err)
+
+    def test_bad_name(self):
+        hub = Hub(self)
+        tool = run_gimnet(hub, "recv", "--name", "no spaces")
+        self.assertEqual(tool.code, 2)
+        self.assertIn("no spaces", tool.err)
+
+    def test_output_that_nobody_reads(self):
+        hub = Hub(self)
+        reader, writer = os.pipe()
+        os.close(reader)
+        with subprocess.Popen([GIMNET, "--hub", hub.url, "status"], stdout=writer, stderr=subprocess.PIPE) as tool:
+            os.close(writer)
+            _, words = tool.communicate(timeout=20)
+        self.assertEqual(tool.returncode, 1)
+        self.assertIn(b"standard output", words)
+
+    def test_another_version(self):
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+
+        def answer():
+            with listener.accept()[0] as peer:
+                peer.recv(4096)
+                body = bytes([3 << 3, 1, 0, 0, 2, 1, 0])
+                goodbye = b"\x03\0\0\0" + body
+                peer.sendall(b"GIMnet\x02\x00" + len(goodbye).to_bytes(4, "little") + bytes(8) + b"\x10\0\0\1" + goodbye)
+                peer.recv(4096)
+        thread = threading.Thread(target=answer)
+        thread.start()
+        self.refused(7, ["version"], "--hub", f"tcp://127.0.0.1:{listener.getsockname()[1]}", "nodes")
+        thread.join()
+
+    def test_json_before_or_after_the_command(self):
+        hub = Hub(self)
+        for words in (("--json", "status"), ("status", "--json")):
+            status = json.loads(run_gimnet(hub, *words).out)
+            self.assertEqual(status["hub"]["id"], 7)
+            self.assertEqual(status["connections"][0]["shard"], 0)
+            self.assertIn("mailbox_wakeups", status["counters"])
+            self.assertIn("dropped.queue_full", status["shards"][0]["counters"])
+
+
+if __name__ == "__main__":
+    unittest.main()

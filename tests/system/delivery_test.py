@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+"""A robot's log by `gimnet send` arrives in `gimnet recv` in order, byte for byte, and the ledger is exact."""
+
+import subprocess
+import tempfile
+import threading
+import unittest
+
+from support.logs import robot_log
+from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.waiting import wait_until
+from support.wire import Client, random_bytes
+
+
+class Chatter:
+    """Nodes that send small messages to each other in a ring, and drop what they get, until stop()."""
+
+    def __init__(self, test, hub, nodes=100, shards=1):
+        self.clients = [Client(test, hub).join(shard=number % shards) for number in range(nodes)]
+        self.sent = 0
+        self._stopping = threading.Event()
+        self._threads = [threading.Thread(target=self._send), threading.Thread(target=self._receive)]
+        for client in self.clients:
+            client.socket.setblocking(False)
+        for thread in self._threads:
+            thread.start()
+        test.addCleanup(self.stop)
+
+    def _send(self):
+        while not self._stopping.wait(0.002):
+            for client, peer in zip(self.clients, self.clients[1:] + self.clients[:1]):
+                try:
+                    client.socket.send(client.frame(peer.id, b"chatter"))
+                except BlockingIOError:
+                    continue
+                self.sent += 1
+
+    def _receive(self):
+        while not self._stopping.wait(0.005):
+            for client in self.clients:
+                try:
+                    client.socket.recv(1 << 16)
+                except BlockingIOError:
+                    continue
+
+    def stop(self):
+        self._stopping.set()
+        for thread in self._threads:
+            thread.join()
+        for client in self.clients:
+            client.socket.close()
+
+
+class Delivery(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.log = robot_log()
+
+    def send_log(self, hub, sender_shard, receiver_shard):
+        lines = self.log.count(b"\n")
+        receiver = start_recv(self, hub, "B", "-n", str(lines), "--shard", str(receiver_shard))
+        sent = run_gimnet(hub, "send", "B", "--json", "--shard", str(sender_shard), data=self.log)
+        self.assertEqual(sent.code, 0, sent.err)
+        self.assertIn(f'"acknowledged":{lines}'.encode(), sent.out)
+        self.assertEqual(receiver.wait(), 0, receiver.err)
+        self.assertEqual(receiver.out, self.log)
+
+    def test_through_one_shard(self):
+        hub = Hub(self, shards=1)
+        self.send_log(hub, 0, 0)
+        status = hub.quiet_status(self)
+        self.assertEqual(status["counters"]["mailbox_entries"], 0)
+        self.assertEqual(status["ledger"]["dropped"], 0, status["counters"])
+        self.assertGreaterEqual(status["ledger"]["delivered"], self.log.count(b"\n"))
+
+    def test_through_two_shards_from_one_to_the_other(self):
+        hub = Hub(self, shards=2)
+        before = hub.counter("mailbox_frames")
+        self.send_log(hub, 0, 1)
+        status = hub.quiet_status(self)
+        self.assertGreaterEqual(status["counters"]["mailbox_frames"] - before, self.log.count(b"\n"))
+        self.assertGreater(status["counters"]["mailbox_entries"], 0)
+        self.assertEqual(status["ledger"]["dropped"], 0, status["counters"])
+
+    def test_on_the_same_of_two_shards(self):
+        hub = Hub(self, shards=2)
+        self.send_log(hub, 1, 1)
+        status = hub.quiet_status(self)
+        self.assertEqual(status["counters"]["mailbox_entries"], 0)
+        self.assertEqual(status["shards"][0]["ledger"]["accepted"], 0)
+
+    def test_with_a_hundred_others_chattering(self):
+        hub = Hub(self, shards=2)
+        chatter = Chatter(self, hub, shards=2)
+        self.send_log(hub, 0, 1)
+        chatter.stop()
+        self.assertGreater(chatter.sent, 0)
+        hub.quiet_status(self)
+
+    def test_through_a_unix_socket(self):
+        hub = Hub(self)
+        hub.url = hub.addresses[1]
+        self.assertTrue(hub.url.startswith("unix:"))
+        self.send_log(hub, 0, 0)
+
+
+class Sizes(unittest.TestCase):
+    def test_lines_of_all_sizes_near_the_limits(self):
+        hub = Hub(self, shards=2)
+        sizes = [0, 1, 15, 16, 17, 4095, 4096, 4097, 8191, 8192, 8193, *range(65519, 65538), 0]
+        lines = [b"x" * size for size in sizes]
+        data = b"".join(line + b"\n" for line in lines)
+        receiver = start_recv(self, hub, "B", "-n", str(len(lines)), "--shard", "1")
+        sent = run_gimnet(hub, "send", "B", "--shard", "0", data=data)
+        self.assertEqual((sent.code, receiver.wait()), (0, 0), sent.err)
+        self.assertEqual(receiver.out, data)
+        hub.quiet_status(self)
+
+    def send_file(self, hub, size, *receiver_options):
+        content = random_bytes(size)[:size]
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(content)
+            file.flush()
+            receiver = start_recv(self, hub, "B", "-n", "1", *receiver_options)
+            sent = run_gimnet(hub, "send", "B", "--file", file.name)
+        self.assertEqual(sent.code, 0, sent.err)
+        self.assertEqual(receiver.wait(), 0, receiver.err)
+        self.assertEqual(receiver.out == content + b"\n", True, f"{receiver.out_size} of {size} bytes arrived")
+
+    def test_files(self):
+        hub = Hub(self, shards=2)
+        for size in (0, 1, 8193, 1 << 20, 16 << 20, 64 << 20):
+            with self.subTest(size=size):
+                self.send_file(hub, size)
+        hub.quiet_status(self)
+
+    def test_a_file_that_the_receiver_does_not_take(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B", "--max-size", "100000")
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(bytes(2 << 20))
+            file.flush()
+            sent = run_gimnet(hub, "send", "B", "--file", file.name)
+        self.assertEqual(sent.code, 1)
+        self.assertIn("refuse", sent.err)
+        self.assertEqual(receiver.out_size, 0)
+
+
+class Losses(unittest.TestCase):
+    def test_send_says_when_the_receiver_goes(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B", "-n", "10")
+        sent = run_gimnet(hub, "send", "B", data=b"line\n" * 10000)
+        self.assertEqual(receiver.wait(), 0)
+        self.assertEqual(receiver.out, b"line\n" * 10)
+        self.assertEqual(sent.code, 1)
+        self.assertIn("not acknowledged", sent.err)
+        self.assertIn("the hub reports", sent.err)
+
+    def test_send_ends_when_the_hub_goes(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B")
+        sender = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE)
+        sender.popen.stdin.write(b"first\n")
+        sender.popen.stdin.flush()
+        wait_until(lambda: receiver.out == b"first\n", "the first message")
+        hub.process.signal(9)
+        hub.process.wait()
+        sender.feed(b"second\n")
+        self.assertEqual(sender.wait(), 1)
+        self.assertTrue(sender.err)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,133 @@
+#!/usr/bin/env python3
+"""A hub's start and end: drain by SIGTERM, a port freed by kill -9, addresses in use; nodes that leave and come back."""
+
+import os
+import signal
+import unittest
+
+from support.processes import TCPHUB, Hub, Process, run_gimnet, start_gimnet, start_recv
+from support.waiting import wait_until
+from support.wire import Client, Closed
+
+
+class Ends(unittest.TestCase):
+    def test_sigterm_tells_everybody_and_writes_what_waits(self):
+        hub = Hub(self, shards=2)
+        receiver = Client(self, hub).join("B", shard=0)
+        sender = Client(self, hub).join(shard=1)
+        for number in range(1000):
+            sender.send(sender.frame(receiver.id, number.to_bytes(4, "little")))
+        wait_until(lambda: hub.status()["ledger"]["accepted"] >= 1000, "the hub took 1,000 frames")
+        hub.process.signal(signal.SIGTERM)
+        frames = receiver.until_closed()
+        data = [frame.payload for frame in frames if frame.src == sender.id]
+        self.assertEqual(data, [number.to_bytes(4, "little") for number in range(1000)])
+        self.assertEqual([frame.goodbye for frame in frames if frame.goodbye], ["draining"])
+        self.assertEqual(sender.goodbye(), "draining")
+        self.assertEqual(hub.process.wait(20), 0, hub.process.err)
+        self.assertFalse(os.path.exists(hub.socket_path))
+
+    def test_sigint_too(self):
+        hub = Hub(self)
+        hub.process.signal(signal.SIGINT)
+        self.assertEqual(hub.process.wait(20), 0, hub.process.err)
+
+    def test_newcomers_are_refused_while_it_drains(self):
+        hub = Hub(self)
+        slow = Client(self, hub, receive_bytes=4096).join("slow")
+        sender = Client(self, hub).join()
+        for _ in range(40):
+            sender.send(sender.frame(slow.id, bytes(60000), lane=2))
+        wait_until(lambda: hub.status()["ledger"]["accepted"] >= 20, "frames that wait")
+        hub.process.signal(signal.SIGTERM)
+        self.assertEqual(sender.goodbye(), "draining")
+        with self.assertRaises((ConnectionError, Closed, AssertionError)):
+            Client(self, hub).join("late")
+
+    def test_a_port_freed_by_kill_9_can_be_bound(self):
+        first = Hub(self)
+        client = Client(self, first).join("B")
+        first.process.signal(signal.SIGKILL)
+        first.process.wait()
+        self.assertTrue(os.path.exists(first.socket_path))
+        second = Hub(self, listen=[first.url, f"unix:{first.socket_path}"])
+        self.assertEqual(second.url, first.url)
+        client.socket.close()
+        self.assertEqual(run_gimnet(f"unix:{first.socket_path}", "nodes").code, 0)
+
+    def test_an_address_in_use_is_named(self):
+        hub = Hub(self)
+        for address in hub.addresses:
+            second = Process([TCPHUB, "--listen", address])
+            self.addCleanup(second.end)
+            self.assertEqual(second.wait(20), 1)
+            self.assertIn(address, second.err)
+            self.assertIn("in use", second.err)
+        self.assertEqual(run_gimnet(hub, "nodes").code, 0)
+
+    def test_a_foreign_file_is_not_replaced(self):
+        hub = Hub(self)
+        path = hub.socket_path + ".txt"
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("precious")
+        second = Process([TCPHUB, "--listen", f"unix:{path}"])
+        self.addCleanup(second.end)
+        self.assertEqual(second.wait(20), 1)
+        self.assertIn(path, second.err)
+        with open(path, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "precious")
+
+
+class Nodes(unittest.TestCase):
+    def test_ctrl_c_leaves_at_once(self):
+        hub = Hub(self)
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            receiver = start_recv(self, hub, "B")
+            receiver.signal(number)
+            self.assertEqual(receiver.wait(20), code)
+            self.assertEqual([node["name"] for node in hub.nodes() if node["name"]], [])
+
+    def test_a_killed_node_keeps_its_name_for_the_grace_time(self):
+        hub = Hub(self, "--limit", "grace_ms=500")
+        receiver = start_recv(self, hub, "B")
+        receiver.signal(signal.SIGKILL)
+        receiver.wait()
+        wait_until(lambda: any(not node["connected"] for node in hub.nodes() if node["name"] == "B") or
+                   not any(node["name"] == "B" for node in hub.nodes()), "B away")
+        wait_until(lambda: not any(node["name"] == "B" for node in hub.nodes()), "B forgotten")
+
+    def test_a_token_brings_name_and_id_back(self):
+        hub = Hub(self)
+        first = Client(self, hub).join("B")
+        first.socket.close()
+        wait_until(lambda: any(not node["connected"] for node in hub.nodes()), "B away")
+        again = Client(self, hub).join("B", token=first.welcome[2])
+        self.assertEqual(again.id, first.id)
+        third = Client(self, hub).join("B", token=again.welcome[2])
+        self.assertEqual(third.id, first.id)
+        self.assertEqual(again.goodbye(), "replaced")
+
+    def test_recv_comes_back_after_the_hub_did(self):
+        first = Hub(self)
+        receiver = start_recv(self, first, "B", "-n", "1")
+        first.process.signal(signal.SIGKILL)
+        first.process.wait()
+        wait_until(lambda: "connect again" in receiver.err, "the words that it tries")
+        second = Hub(self, listen=[first.url])
+        second.wait_for_node("B")
+        self.assertEqual(run_gimnet(second, "send", "B", data=b"hello\n").code, 0)
+        self.assertEqual(receiver.wait(), 0)
+        self.assertEqual(receiver.out, b"hello\n")
+
+    def test_a_silent_newcomer_does_not_stay(self):
+        hub = Hub(self, "--limit", "handshake_ms=200")
+        self.assertEqual(Client(self, hub).first_answer().goodbye, "hello_timeout")
+
+    def test_echo_says_that_it_waits(self):
+        hub = Hub(self)
+        waiting = start_gimnet(self, hub, "echo", "a/b")
+        wait_until(lambda: "nobody provides a/b yet" in waiting.err, "the words that it waits")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Services, names and pings through `gimnet`, and through a raw client that looks at the frames."""
+
+import json
+import subprocess
+import unittest
+
+from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.waiting import wait_until
+from support.wire import FLAG_KEYED, NS, Client, number, text
+
+
+def subscribers_of(hub, service):
+    found = json.loads(run_gimnet(hub, "services", service, "--json").out)
+    return found[0]["subscribers"] if found else None
+
+
+class Services(unittest.TestCase):
+    def test_what_is_published_is_echoed(self):
+        for shards in (1, 2):
+            with self.subTest(shards=shards):
+                hub = Hub(self, shards=shards)
+                echo = start_gimnet(self, hub, "echo", "robot/odom", "-n", "1000", "--raw", "--shard", "0")
+                data = b"".join(b"line %d\n" % number for number in range(1000))
+                pub = run_gimnet(hub, "pub", "robot/odom", "--wait", "1", "--shard", str(shards - 1), data=data)
+                self.assertEqual((pub.code, echo.wait()), (0, 0), pub.err)
+                self.assertEqual(echo.out, data)
+                hub.quiet_status(self)
+
+    def test_json_of_a_message(self):
+        hub = Hub(self)
+        echo = start_gimnet(self, hub, "echo", "a/b/c", "-n", "2", "--json")
+        pub = run_gimnet(hub, "pub", "a/b/c", "--wait", "1", "--type", "5", "--instance", "9",
+                         data=b'say "hi"\n\xff\n')
+        self.assertEqual((pub.code, echo.wait()), (0, 0), pub.err)
+        first, second = (json.loads(line) for line in echo.out.splitlines())
+        self.assertEqual((first["text"], first["type"], first["instance"], first["sequence"], first["service"]),
+                         ('say "hi"', 5, 9, 1, "a/b/c"))
+        self.assertEqual(second["text_hex"], "ff")
+        self.assertGreaterEqual(first["age_us"], 0)
+
+    def test_a_subscription_survives_its_provider(self):
+        hub = Hub(self)
+        echo = start_gimnet(self, hub, "echo", "robot/odom", "-n", "2", "--raw")
+        for line in (b"before\n", b"after\n"):
+            self.assertEqual(run_gimnet(hub, "pub", "robot/odom", "--wait", "1", data=line).code, 0)
+        self.assertEqual(echo.wait(), 0)
+        self.assertEqual(echo.out, b"before\nafter\n")
+
+    def test_services_and_nodes_are_listed(self):
+        hub = Hub(self)
+        pub = start_gimnet(self, hub, "pub", "robot/scan", "--delivery", "latest", stdin=subprocess.PIPE)
+        found = wait_until(lambda: json.loads(run_gimnet(hub, "--json", "services").out), "the service")
+        self.assertEqual([(s["name"], s["delivery"], s["direction"], s["subscribers"]) for s in found],
+                         [("robot/scan", "latest", "provides", 0)])
+        robot = hub.wait_for_node("robot")
+        self.assertEqual((robot["id"], robot["connected"], robot["services"]), (found[0]["node"], True, 1))
+        self.assertTrue(robot["id"].startswith("7."))
+        echo = start_gimnet(self, hub, "echo", "robot/scan")
+        wait_until(lambda: subscribers_of(hub, "robot/scan") == 1, "one subscriber")
+        echo.signal(2)
+        self.assertEqual(echo.wait(), 130)
+        wait_until(lambda: subscribers_of(hub, "robot/scan") == 0, "no subscriber")
+        pub.feed(b"")
+        self.assertEqual(pub.wait(), 0)
+
+    def test_rate(self):
+        hub = Hub(self)
+        echo = start_gimnet(self, hub, "echo", "robot/odom", "-n", "11", "--json")
+        pub = run_gimnet(hub, "pub", "robot/odom", "--wait", "1", "--rate", "100", data=b"x\n" * 11)
+        self.assertEqual((pub.code, echo.wait()), (0, 0), pub.err)
+        sent = [json.loads(line)["sent_ns"] for line in echo.out.splitlines()]
+        self.assertGreaterEqual(sent[-1] - sent[0], 95e6)
+
+    def test_subscriber_of_its_own_makes_the_ledger_count_copies(self):
+        hub = Hub(self, shards=2)
+        echoes = [start_gimnet(self, hub, "echo", "a/b", "-n", "100", "--raw", "--shard", str(i % 2)) for i in range(4)]
+        pub = run_gimnet(hub, "pub", "a/b", "--wait", "4", data=b"x\n" * 100)
+        self.assertEqual([pub.code, *(echo.wait() for echo in echoes)], [0] * 5)
+        ledger = hub.quiet_status(self)["ledger"]
+        self.assertEqual((ledger["accepted"], ledger["copies"], ledger["delivered"]), (100, 300, 400))
+
+
+class Pings(unittest.TestCase):
+    def test_every_node_answers(self):
+        hub = Hub(self, shards=2)
+        start_recv(self, hub, "B", "--shard", "1")
+        ping = run_gimnet(hub, "ping", "B", "-c", "200", "-i", "0", "--json", "--shard", "0")
+        self.assertEqual(ping.code, 0, ping.err)
+        said = json.loads(ping.out)
+        self.assertEqual((said["sent"], said["lost"]), (200, 0))
+        self.assertLessEqual(0 < said["min"], said["p50"] <= said["p99"] <= said["p99.9"] <= said["max"])
+
+    def test_who_does_not_answer_is_lost(self):
+        hub = Hub(self)
+        mute = Client(self, hub).join("mute")
+        ping = run_gimnet(hub, "ping", "mute", "-c", "2", "-W", "0.1", "-i", "0", "--json")
+        self.assertEqual(ping.code, 5)
+        self.assertEqual(json.loads(ping.out)["lost"], 2)
+        self.assertEqual(mute.next_data().flags & FLAG_KEYED, FLAG_KEYED)
+
+    def test_nobody_there(self):
+        hub = Hub(self)
+        self.assertEqual(run_gimnet(hub, "ping", "nobody").code, 4)
+        gone = run_gimnet(hub, "ping", "7.999", "-c", "1")
+        self.assertEqual(gone.code, 4)
+        self.assertIn("no_such_node", gone.err)
+
+
+class Acknowledgements(unittest.TestCase):
+    """`gimnet send` to a raw client, which sees exactly what is on the wire."""
+
+    def test_at_most_64_wait_and_a_ping_asks(self):
+        hub = Hub(self)
+        client = Client(self, hub).join("B")
+        sender = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE).feed(b"x\n" * 100)
+        frames = [client.next_data() for _ in range(65)]
+        operations = [frame.payload[8 + 4] for frame in frames]
+        self.assertEqual(operations, [0] * 64 + [5], "64 DATA and, after 200 ms, a PING")
+        sequences = [int.from_bytes(frame.payload[8:12], "little") for frame in frames[:64]]
+        self.assertEqual(sequences, list(range(1, 65)))
+        ping = frames[64].payload[8:12]
+        # An ACK of all but the third, which the PONG's number makes final.
+        bitmap = (1 << 64) - 1 & ~(1 << 60)  # 64 - 1 - 60 = 3
+        ack = (64).to_bytes(4, "little") + b"\x01\0\0\0" + bitmap.to_bytes(8, "little") + ping
+        client.send(client.frame(frames[0].src, bytes(8) + ack, flags=FLAG_KEYED))
+        rest = [client.next_data() for _ in range(36)]
+        last = int.from_bytes(rest[-1].payload[8:12], "little")
+        self.assertEqual(last, 100)
+        ack = (100).to_bytes(4, "little") + b"\x01\0\0\0" + ((1 << 64) - 1).to_bytes(8, "little") + bytes(4)
+        client.send(client.frame(frames[0].src, bytes(8) + ack, flags=FLAG_KEYED))
+        self.assertEqual(sender.wait(), 1)
+        self.assertIn("1 of 100 messages were not acknowledged", sender.err)
+
+
+class Names(unittest.TestCase):
+    def test_a_name_is_held_once(self):
+        hub = Hub(self)
+        start_recv(self, hub, "B")
+        second = run_gimnet(hub, "recv", "--name", "B")
+        self.assertEqual(second.code, 1)
+        self.assertIn("B", second.err)
+
+    def test_raw_resolve_and_subscribe(self):
+        hub = Hub(self)
+        client = Client(self, hub).join("raw/client")
+        self.assertEqual(client.ask(NS, 3, text(3, "raw/client"))[3], client.id)
+        self.assertEqual(client.ask(NS, 3, text(3, "nobody"))[1], 3)
+        answer = client.ask(NS, 7, text(3, "odom") + number(4, 4, 1) + number(5, 4, 2))
+        self.assertNotIn(answer.get(1), (1, 2, 3, 4, 5, 6))
+        other = Client(self, hub).join()
+        self.assertEqual(other.ask(NS, 10, text(3, "raw/client/odom"))[3], answer[3])
+        joined = client.next_where(lambda got: got.kind == NS and got.operation == 33)
+        self.assertEqual(joined.fields[4], other.id)
+
+
+if __name__ == "__main__":
+    unittest.main()

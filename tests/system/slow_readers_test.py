@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""Receivers that are slow, stopped, or that flood each other: nobody else notices."""
+
+import signal
+import struct
+import subprocess
+import threading
+import time
+import unittest
+
+from support.pacing import SlowReader
+from support.processes import GIMNET, Hub, run_gimnet, start_gimnet, start_recv
+from support.waiting import wait_until
+from support.wire import (DROP, FLAG_FRAGMENT, FLOW, GROUP, NS, PAUSE, UNICAST, Client, text)
+
+MEGABYTE = 1_000_000
+RECEIVE_BUFFER = 64 * 1024
+
+
+def is_connected(hub, name):
+    return any(node["connected"] for node in hub.nodes() if node["name"] == name)
+
+
+class Stopped(unittest.TestCase):
+    def test_a_stopped_receiver_is_closed_as_silent_and_told_when_it_is_back(self):
+        hub = Hub(self, shards=2)
+        stopped = start_recv(self, hub, "stopped", "-n", "20", "--shard", "0")
+        first = run_gimnet(hub, "send", "stopped", data=b"before\n" * 10)
+        self.assertEqual(first.code, 0, first.err)
+        stopped.signal(signal.SIGSTOP)
+        lines = b"line\n" * 5000
+        deadline = time.monotonic() + 20
+        rounds = 0
+        while is_connected(hub, "stopped"):
+            self.assertLess(time.monotonic(), deadline, "the stopped receiver was never closed")
+            other = start_recv(self, hub, "other", "-n", "5000", "--shard", str(rounds % 2))
+            sent = run_gimnet(hub, "send", "other", "--shard", "0", data=lines)
+            self.assertEqual((sent.code, other.wait()), (0, 0), sent.err)
+            self.assertEqual(other.out, lines)
+            rounds += 1
+        self.assertEqual(hub.counter("silent"), 1)
+        stopped.signal(signal.SIGCONT)
+        wait_until(lambda: is_connected(hub, "stopped"), "back again")
+        wait_until(lambda: "silent" in stopped.err, "the reason, told to the receiver")
+        second = run_gimnet(hub, "send", "stopped", data=b"after\n" * 10)
+        self.assertEqual((second.code, stopped.wait()), (0, 0), second.err)
+        self.assertEqual(stopped.out, b"before\n" * 10 + b"after\n" * 10)
+
+    def test_who_keeps_alive_but_does_not_read_is_a_slow_consumer(self):
+        hub = Hub(self, "--limit", "slow_consumer_ms=1000")
+        slow = Client(self, hub, receive_bytes=4096).join("slow")
+        sender = Client(self, hub).join()
+        for _ in range(100):
+            sender.send(sender.frame(slow.id, bytes(60000), lane=2, flags=DROP))
+
+        def closed():
+            try:
+                slow.ping()
+            except OSError:
+                pass
+            return hub.counter("slow_consumers") == 1
+        wait_until(closed, "a slow consumer")
+        again = Client(self, hub).join("slow", token=slow.welcome[2])
+        self.assertEqual((again.id, again.welcome[16]), (slow.id, 10), "told the reason when it is back")
+        self.assertTrue(again.welcome[17])
+
+
+class RealTime(unittest.TestCase):
+    def overtake(self, bulk_shard, real_time_shard):
+        """Bytes of bulk that a reader of 1 MB/s gets between the sending of a real-time message and its arrival."""
+        hub = Hub(self, shards=2)
+        reader = Client(self, hub, receive_bytes=RECEIVE_BUFFER).join("reader", shard=0)
+        real_time = Client(self, hub).join(shard=real_time_shard)
+        chunk = bytes(32 * 1024)
+        bulk = [Client(self, hub).join(shard=bulk_shard) for _ in range(8)]
+        threads = [threading.Thread(target=self.flood, args=(client, reader.id, chunk, 64), daemon=True)
+                   for client in bulk]  # 16 MiB together
+        for thread in threads:
+            thread.start()
+        paced = SlowReader(reader, MEGABYTE)
+        taken = 0
+        while taken < MEGABYTE:
+            taken += len(paced.next().payload)
+        real_time.send(real_time.frame(reader.id, b"now", lane=0))
+        ahead = 0
+        while True:
+            got = paced.next()
+            if got.lane == 0 and got.payload == b"now":
+                break
+            ahead += len(got.payload)
+        for client in [*bulk, reader]:
+            client.socket.close()
+        for thread in threads:
+            thread.join()
+        return ahead
+
+    @staticmethod
+    def flood(client, to, chunk, count):
+        try:
+            for _ in range(count):
+                client.send(client.frame(to, chunk, lane=2))
+        except OSError:
+            pass  # closed at the end of the test
+
+    def test_goes_before_bulk_of_the_same_shard(self):
+        self.assertLessEqual(self.overtake(0, 0), 256 * 1024)
+
+    def test_goes_before_bulk_of_another_shard(self):
+        self.assertLessEqual(self.overtake(1, 1), 256 * 1024)
+
+
+class Latest(unittest.TestCase):
+    def test_a_slow_reader_always_gets_the_newest_and_whole_messages(self):
+        hub = Hub(self)
+        size, rate, seconds = 200_000, 100, 3
+        lines = b"".join(str(number).encode().rjust(size, b"0") + b"\n" for number in range(rate * seconds))
+        reader = Client(self, hub, receive_bytes=RECEIVE_BUFFER).join()
+        reader.ask(NS, 10, text(3, "camera/image"))
+        pub = start_gimnet(self, hub, "pub", "camera/image", "--delivery", "latest", "--lane", "bulk", "--rate", str(rate),
+                           "--wait", "1", stdin=subprocess.PIPE).feed(lines)
+        ages, numbers = [], []
+        for message, sent_ns in self.messages(SlowReader(reader, MEGABYTE)):
+            ages.append(time.time() - sent_ns / 1e9)
+            self.assertEqual(len(message), size)
+            numbers.append(int(message[-9:]))
+            if numbers[-1] == rate * seconds - 1:
+                break
+        self.assertEqual(pub.wait(), 0, pub.err)
+        self.assertEqual(numbers, sorted(set(numbers)))
+        self.assertGreater(hub.counter("dropped.replaced"), 0)
+        # Two transmission times, and what a loaded machine adds.
+        self.assertLessEqual(max(ages), 2 * size / MEGABYTE + 0.35, ages)
+
+    @staticmethod
+    def messages(reader):
+        """Data and time stamp of each GIMI message of a service; AssertionError if one is torn."""
+        parts, number = b"", None
+        while True:
+            got = reader.next()
+            assert got.goodbye is None, got.fields
+            if got.kind != GROUP:
+                continue
+            assert got.flags & FLAG_FRAGMENT, got
+            message, offset, total = struct.unpack_from("<III", got.payload)
+            if offset == 0:
+                assert number is None, "torn"
+                parts, number = b"", message
+            assert (message, offset) == (number, len(parts)), (message, offset, number, len(parts))
+            parts += got.payload[12 + 8:]
+            if len(parts) == total:
+                extension = struct.unpack_from("<H", parts, 6)[0]
+                yield parts[8 + extension:], struct.unpack_from("<q", parts, 8)[0]
+                number = None
+
+
+class Floods(unittest.TestCase):
+    def test_two_nodes_that_flood_each_other_do_not_stand_still(self):
+        for shards in (1, 2):
+            with self.subTest(shards=shards):
+                hub = Hub(self, shards=shards)
+                first = Client(self, hub).join(shard=0)
+                second = Client(self, hub).join(shard=shards - 1)
+                got = {}
+                threads = []
+                for client, peer in ((first, second), (second, first)):
+                    client.pong = lambda ping: None  # whatever this end sends tells the hub that it is alive
+                    threads.append(threading.Thread(target=self.send, args=(client, peer.id)))
+                    threads.append(threading.Thread(target=self.receive, args=(client, got)))
+                for thread in threads:
+                    thread.start()
+                for thread in threads:
+                    thread.join(60)
+                    self.assertFalse(thread.is_alive(), "stands still")
+                self.assertEqual(got, {first.id: list(range(2000)), second.id: list(range(2000))})
+                hub.quiet_status(self)
+
+    @staticmethod
+    def send(client, to):
+        for number in range(2000):
+            client.send(client.frame(to, struct.pack("<I", number) + bytes(16000)))
+
+    @staticmethod
+    def receive(client, got):
+        numbers = []
+        while len(numbers) < 2000:
+            frame = client.next_where(lambda frame: frame.kind == UNICAST)
+            numbers.append(struct.unpack_from("<I", frame.payload)[0])
+        got[client.id] = numbers
+
+    def test_a_blocked_sender_is_paused_and_resumed(self):
+        hub = Hub(self)
+        slow = Client(self, hub, receive_bytes=4096).join()
+        fast = Client(self, hub).join()
+        sender = Client(self, hub).join()
+        for _ in range(30):
+            sender.send(sender.frame(slow.id, bytes(60000)))
+        pause = sender.next_where(lambda got: got.kind == FLOW and got.payload[0] == PAUSE)
+        self.assertEqual(struct.unpack_from("<BBxI", pause.payload, 1), (UNICAST, 1, slow.id))
+        sender.send(sender.frame(fast.id, b"steer"))
+        self.assertEqual(fast.next_data().payload, b"steer")
+        for _ in range(30):
+            slow.next_data()
+        sender.next_where(lambda got: got.kind == FLOW and got.payload[0] == PAUSE + 1)
+        self.assertEqual(hub.quiet_status(self)["ledger"]["dropped"], 0)
+
+    def test_recv_whose_output_nobody_reads_loses_nothing(self):
+        hub = Hub(self)
+        data = b"".join(b"%d %s\n" % (number, b"x" * 1000) for number in range(40000))
+        with subprocess.Popen([GIMNET, "--hub", hub.url, "recv", "--name", "B", "--raw", "-n", "40000"],
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as recv:
+            hub.wait_for_node("B")
+            send = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE).feed(data)
+            accepted = [0, 0, 0]
+
+            def stands_still():
+                accepted.append(hub.counter("accepted"))
+                return accepted[-1] > 4096 and len(set(accepted[-3:])) == 1
+            wait_until(stands_still, "a full way")
+            self.assertIsNone(send.popen.poll(), "40 MB fit into no queue")
+            self.assertEqual(recv.stdout.read(), data)
+        self.assertEqual((send.wait(), recv.returncode), (0, 0), send.err)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,33 @@
+"""Readers of a given speed."""
+
+import time
+
+
+class SlowReader:
+    """Takes frames from a client at so many bytes a second, in pieces of at most 16 KiB, and no faster. Keeps alive."""
+
+    def __init__(self, client, bytes_per_s):
+        self._client, self._rate = client, bytes_per_s
+        self._begin, self._taken = time.monotonic(), 0
+        self._pinged = self._begin
+        take, recv = client._take, client.socket.recv
+
+        def paced(size):
+            while len(client._bytes) < size:
+                due = self._begin + self._taken / self._rate
+                time.sleep(max(0.0, due - time.monotonic()))
+                if time.monotonic() - self._pinged > 0.5:
+                    self._pinged = time.monotonic()
+                    client.ping()
+                # Time in which nothing was there to read is not made up for.
+                self._begin = max(self._begin, time.monotonic() - (self._taken + 65536) / self._rate)
+                more = recv(16384)
+                if not more:
+                    break
+                self._taken += len(more)
+                client._bytes += more
+            return take(size)
+        client._take = paced
+
+    def next(self):
+        return self._client.next()

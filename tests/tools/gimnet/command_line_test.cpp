@@ -1,0 +1,81 @@
+#include "tools/gimnet/command_line.hpp"
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+#include <vector>
+
+namespace gimnet::tool {
+namespace {
+
+std::variant<Options, CommandLineEnding> parse(std::initializer_list<const char*> words) {
+  std::vector<const char*> arguments{"gimnet"};
+  arguments.insert(arguments.end(), words);
+  return parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+}
+Options options(std::initializer_list<const char*> words) {
+  const auto parsed = parse(words);
+  if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {
+    ADD_FAILURE() << ending->text;
+    return {};
+  }
+  return std::get<Options>(parsed);
+}
+std::string refusal(std::initializer_list<const char*> words) {
+  const auto parsed = parse(words);
+  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  if (ending == nullptr || ending->code != ExitCode::usage) return "not refused";
+  return ending->text;
+}
+
+TEST(CommandLine, TakesCommonOptionsBeforeAndAfterTheCommand) {
+  for (const Options& read : {options({"--hub", "tcp://h:1", "--json", "--shard", "1", "nodes"}),
+                              options({"nodes", "--hub", "tcp://h:1", "--json", "--shard", "1"})}) {
+    EXPECT_EQ(read.command, Command::nodes);
+    EXPECT_EQ(read.hub, "tcp://h:1");
+    EXPECT_TRUE(read.json);
+    EXPECT_EQ(read.shard, 1);
+  }
+}
+
+TEST(CommandLine, ReadsEachCommand) {
+  EXPECT_EQ(options({"send", "B", "--lane", "bulk", "--type", "5", "--instance", "6"}).lane, Lane::bulk);
+  EXPECT_EQ(options({"send", "B", "--type", "5", "--instance", "6"}).key, (MessageKey{5, 6}));
+  EXPECT_EQ(options({"recv", "--name", "B", "-n", "1000", "--raw"}).count, 1000u);
+  EXPECT_EQ(options({"pub", "robot/odom", "--delivery", "latest", "--rate", "2.5"}).delivery, Delivery::latest);
+  EXPECT_EQ(options({"pub", "a/b", "--wait", "3"}).subscribers, 3u);
+  EXPECT_EQ(options({"echo", "robot/odom", "-n", "2"}).target, "robot/odom");
+  EXPECT_EQ(options({"ping", "B", "-c", "1000", "-i", "0.001"}).pings, 1000u);
+  EXPECT_EQ(options({"services", "robot/*"}).target, "robot/*");
+  EXPECT_EQ(options({"status"}).command, Command::status);
+}
+
+TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
+  EXPECT_NE(refusal({"sned", "B"}).find("did you mean send?"), std::string::npos);
+  EXPECT_NE(refusal({"--hub", "tcp://h:1", "ehco"}).find("did you mean echo?"), std::string::npos);
+}
+
+TEST(CommandLine, RefusesContradictions) {
+  EXPECT_NE(refusal({"recv", "--name", "B", "--json", "--raw"}).find("--raw"), std::string::npos);
+  EXPECT_NE(refusal({"pub", "odom"}).find("NODE/SERVICE"), std::string::npos);
+  EXPECT_NE(refusal({"pub", "robot/"}).find("NODE/SERVICE"), std::string::npos);
+  EXPECT_NE(refusal({"pub", "robot/odom", "--name", "rob"}).find("rob"), std::string::npos);
+}
+
+TEST(CommandLine, RefusesValuesOutOfRange) {
+  EXPECT_NE(refusal({"ping", "B", "-c", "0"}).find("-c"), std::string::npos);
+  EXPECT_NE(refusal({"send", "B", "--lane", "fast"}).find("--lane"), std::string::npos);
+  EXPECT_NE(refusal({"recv", "--name", "B", "--max-size", "1073741825"}).find("--max-size"), std::string::npos);
+  EXPECT_NE(refusal({"send"}), "not refused");
+}
+
+TEST(CommandLine, HelpEndsWell) {
+  const auto parsed = parse({"send", "--help"});
+  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  ASSERT_NE(ending, nullptr);
+  EXPECT_EQ(ending->code, ExitCode::done);
+  EXPECT_NE(ending->text.find("Examples:"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gimnet::tool

@@ -1,0 +1,41 @@
+#include "tools/gimnet/json_writer.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::tool {
+namespace {
+
+TEST(JsonWriter, NestsObjectsAndArrays) {
+  JsonWriter json;
+  json.begin_object().member("a", 1).key("b").begin_array().number(2).text("x").begin_object().end_object();
+  json.end_array().member("c", true).member("d", 0.5).end_object();
+  EXPECT_EQ(json.str(), R"({"a":1,"b":[2,"x",{}],"c":true,"d":0.500})");
+}
+
+TEST(JsonWriter, EscapesText) {
+  JsonWriter json;
+  json.text("\"\\\n\t\x7f");
+  EXPECT_EQ(json.str(), R"("\"\\\n\u0009\u007f")");
+}
+
+TEST(JsonWriter, KeepsUtf8AndReplacesWhatIsNone) {
+  JsonWriter json;
+  json.begin_array().text("ä€").text("a\xff").end_array();
+  EXPECT_EQ(json.str(), "[\"ä€\",\"a\\ufffd\"]");
+}
+
+TEST(JsonWriter, WritesBytesAsTextOrAsHex) {
+  const std::byte bytes[] = {std::byte{'h'}, std::byte{'i'}, std::byte{0xFF}};
+  JsonWriter json;
+  json.begin_object().bytes_member("a", std::span(bytes, 2)).bytes_member("b", bytes).end_object();
+  EXPECT_EQ(json.str(), R"({"a":"hi","b_hex":"6869ff"})");
+}
+
+TEST(JsonWriter, HasNoNumberForInfinity) {
+  JsonWriter json;
+  json.number(1.0 / 0.0);
+  EXPECT_EQ(json.str(), "null");
+}
+
+}  // namespace
+}  // namespace gimnet::tool

@@ -1,0 +1,96 @@
+#include "tools/gimnet/line_input.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <string>
+#include <thread>
+
+namespace gimnet::tool {
+namespace {
+
+class Pipe {
+ public:
+  Pipe() { EXPECT_EQ(::pipe(ends_.data()), 0); }
+  ~Pipe() {
+    ::close(ends_[0]);
+    end();
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  [[nodiscard]] int reader() const { return ends_[0]; }
+  void write(const std::string& text) {
+    EXPECT_EQ(::write(ends_[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  }
+  void end() {
+    if (ends_[1] >= 0) ::close(ends_[1]);
+    ends_[1] = -1;
+  }
+
+ private:
+  std::array<int, 2> ends_{};
+};
+
+TEST(LineInput, GivesLinesAndAnUnfinishedLast) {
+  Pipe pipe;
+  pipe.write("first\n\nthird\nlast");
+  pipe.end();
+  LineInput input(pipe.reader());
+  std::string_view line;
+  for (const char* wanted : {"first", "", "third", "last"}) {
+    ASSERT_EQ(input.next(line), LineInput::State::line);
+    EXPECT_EQ(line, wanted);
+  }
+  EXPECT_EQ(input.next(line), LineInput::State::end);
+  EXPECT_EQ(input.next(line), LineInput::State::end);
+}
+
+TEST(LineInput, KnowsWhetherAnotherLineIsHere) {
+  Pipe pipe;
+  pipe.write("first\nsecond\nhal");
+  LineInput input(pipe.reader());
+  std::string_view line;
+  EXPECT_FALSE(input.has_line());
+  ASSERT_EQ(input.next(line), LineInput::State::line);
+  EXPECT_TRUE(input.has_line());
+  ASSERT_EQ(input.next(line), LineInput::State::line);
+  EXPECT_FALSE(input.has_line());
+}
+
+TEST(LineInput, TakesLongLines) {
+  const std::string text(3'000'000, 'x');
+  Pipe pipe;
+  std::thread writer([&] {
+    for (std::size_t at = 0; at < text.size(); at += 50'000) pipe.write(text.substr(at, 50'000));
+    pipe.write("\nshort\n");
+    pipe.end();
+  });
+  LineInput input(pipe.reader());
+  std::string_view line;
+  ASSERT_EQ(input.next(line), LineInput::State::line);
+  EXPECT_EQ(line, text);
+  ASSERT_EQ(input.next(line), LineInput::State::line);
+  EXPECT_EQ(line, "short");
+  EXPECT_EQ(input.next(line), LineInput::State::end);
+  writer.join();
+}
+
+TEST(LineInput, StopsWaiting) {
+  Pipe pipe;
+  Pipe stop;
+  stop.write("x");
+  LineInput input(pipe.reader(), stop.reader());
+  std::string_view line;
+  EXPECT_EQ(input.next(line), LineInput::State::stopped);
+}
+
+TEST(LineInput, SaysThatItCannotRead) {
+  LineInput input(::getpid() + 100000);
+  std::string_view line;
+  EXPECT_EQ(input.next(line), LineInput::State::failed);
+  EXPECT_NE(input.error(), 0);
+}
+
+}  // namespace
+}  // namespace gimnet::tool

@@ -1,0 +1,22 @@
+#include "tools/gimnet/printer.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/client/gimi/support/made_message.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+TEST(Printer, ALineForPeopleHidesControlCharacters) {
+  EXPECT_EQ(text_line(test::make_message("a\x1b[2Jb", 3)), "7.5 #3: a.[2Jb\n");
+  EXPECT_EQ(text_line(test::make_message("x", 1, {4, 2})), "7.5 4/2 #1: x\n");
+}
+
+TEST(Printer, AnObjectForPrograms) {
+  EXPECT_EQ(json_line(test::make_message("a\"b", 3, {4, 2})),
+            R"({"from":"7.5","type":4,"instance":2,"sequence":3,"arrival_ns":1000,"size":3,"text":"a\"b"})"
+            "\n");
+}
+
+}  // namespace
+}  // namespace gimnet::tool
