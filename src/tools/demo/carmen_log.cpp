@@ -1,0 +1,202 @@
+#include "tools/demo/carmen_log.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "tools/demo/line_reader.hpp"
+#include "tools/demo/log_pacing.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+// Words of a line; blanks between them, as fscanf would take them.
+class Words {
+ public:
+  explicit Words(std::string_view line) : rest_(line) {}
+
+  [[nodiscard]] std::optional<std::string_view> next() {
+    const std::size_t begin = rest_.find_first_not_of(" \t");
+    if (begin == std::string_view::npos) return std::nullopt;
+    const std::size_t end = rest_.find_first_of(" \t", begin);
+    const std::string_view word = rest_.substr(begin, end == std::string_view::npos ? end : end - begin);
+    rest_ = end == std::string_view::npos ? std::string_view{} : rest_.substr(end);
+    ++taken_;
+    return word;
+  }
+
+  [[nodiscard]] std::size_t taken() const { return taken_; }
+
+ private:
+  std::string_view rest_;
+  std::size_t taken_ = 0;
+};
+
+// What a person can read of bytes that may be anything.
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kShown = 24;
+  std::string shown;
+  for (const char c : text.substr(0, kShown)) {
+    if (c >= ' ' && c <= '~') {
+      shown += c;
+    } else {
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    }
+  }
+  return fmt::format("\"{}{}\"", shown, text.size() > kShown ? "..." : "");
+}
+
+struct Range {
+  double least;
+  double most;
+};
+
+constexpr Range kPosition{-1e6, 1e6};
+constexpr Range kAngle{-1e4, 1e4};
+constexpr Range kDistance{0.0, 1e4};
+constexpr Range kSpeed{-1e4, 1e4};
+constexpr Range kStamp{0.0, 1e11};
+
+// Reads named numbers from words and keeps the first complaint; after it, everything answers 0.
+class Fields {
+ public:
+  Fields(std::string_view message, Words& words) : message_(message), words_(words) {}
+
+  double number(std::string_view name, const Range& range) {
+    const std::optional<std::string_view> word = next(name);
+    if (!word) return 0.0;
+    double value = 0.0;
+    const auto [end, code] = std::from_chars(word->data(), word->data() + word->size(), value);
+    if (code != std::errc{} || end != word->data() + word->size() || !std::isfinite(value)) {
+      complain(fmt::format("{}: {} is {}, which is no number", message_, name, quoted(*word)));
+      return 0.0;
+    }
+    if (value < range.least || value > range.most) {
+      complain(fmt::format("{}: {} is {}, outside {} .. {}", message_, name, value, range.least, range.most));
+      return 0.0;
+    }
+    return value;
+  }
+
+  Pose pose(std::string_view prefix) {
+    Pose pose;
+    pose.x_m = number(fmt::format("{}x", prefix), kPosition);
+    pose.y_m = number(fmt::format("{}y", prefix), kPosition);
+    pose.heading_rad = normalized_angle(number(fmt::format("{}theta", prefix), kAngle));
+    return pose;
+  }
+
+  void skip_word(std::string_view name) { (void)next(name); }
+
+  void end() {
+    if (complaint_.empty() && words_.next()) {
+      complain(fmt::format("{}: more than the {} fields it should have", message_, words_.taken() - 1));
+    }
+  }
+
+  void complain(std::string sentence) {
+    if (complaint_.empty()) complaint_ = std::move(sentence);
+  }
+
+  [[nodiscard]] const std::string& complaint() const { return complaint_; }
+
+ private:
+  std::optional<std::string_view> next(std::string_view name) {
+    if (!complaint_.empty()) return std::nullopt;
+    const std::optional<std::string_view> word = words_.next();
+    if (!word) complain(fmt::format("{}: the line ends before {}; was it cut?", message_, name));
+    return word;
+  }
+
+  std::string_view message_;
+  Words& words_;
+  std::string complaint_;
+};
+
+// x y theta tv rv accel stamp host logger_stamp
+void read_odometry(Fields& fields, LogRecord& record) {
+  record.pose = fields.pose("");
+  (void)fields.number("tv", kSpeed);
+  (void)fields.number("rv", kSpeed);
+  (void)fields.number("accel", kSpeed);
+  record.stamp_s = fields.number("timestamp", kStamp);
+  fields.skip_word("host");
+  (void)fields.number("logger timestamp", kStamp);
+  fields.end();
+}
+
+// count ranges... x y theta odom_x odom_y odom_theta stamp host logger_stamp
+void read_scan(Fields& fields, LogRecord& record) {
+  const double beams = fields.number("number of beams", {1.0, static_cast<double>(kLogBeamsMax)});
+  if (beams != std::floor(beams)) fields.complain(fmt::format("FLASER: {} is no number of beams", beams));
+  if (!fields.complaint().empty()) return;
+  record.ranges_m.resize(static_cast<std::size_t>(beams));
+  for (float& range : record.ranges_m) range = static_cast<float>(fields.number("range", kDistance));
+  record.pose = fields.pose("");
+  (void)fields.pose("odom_");
+  record.stamp_s = fields.number("timestamp", kStamp);
+  fields.skip_word("host");
+  (void)fields.number("logger timestamp", kStamp);
+  fields.end();
+}
+
+// Names of CARMEN messages: capitals, then capitals, digits and underscores.
+bool is_message_name(std::string_view word) {
+  for (const char c : word) {
+    if (!((c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_')) return false;
+  }
+  return !word.empty() && word.size() <= 64 && word.front() >= 'A' && word.front() <= 'Z';
+}
+
+}  // namespace
+
+Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record) {
+  Words words(line);
+  const std::optional<std::string_view> name = words.next();
+  if (!name || name->front() == '#') return LineKind::kIgnored;
+  Fields fields(*name, words);
+  record = LogRecord{};
+  if (*name == "ODOM") {
+    read_odometry(fields, record);
+  } else if (*name == "FLASER") {
+    read_scan(fields, record);
+  } else if (is_message_name(*name)) {
+    return LineKind::kIgnored;
+  } else {
+    return Error{fmt::format("the line begins with {}, which is no CARMEN message (expected ODOM, FLASER, PARAM, ...)",
+                             quoted(*name))};
+  }
+  if (!fields.complaint().empty()) return Error{fields.complaint()};
+  return *name == "FLASER" ? LineKind::kScan : LineKind::kOdometry;
+}
+
+Result<RobotLog> load_robot_log(const std::string& path) {
+  Result<LineReader> reader = LineReader::open(path);
+  if (!reader) return reader.error();
+  RobotLog log;
+  std::string_view line;
+  while (true) {
+    const Result<bool> more = reader->next(line);
+    if (!more) return more.error();
+    if (!*more) break;
+    LogRecord record;
+    const Result<LineKind> kind = parse_carmen_line(line, record);
+    if (!kind) return Error{fmt::format("{}:{}: {}", path, reader->line_number(), kind.error().sentence)};
+    if (*kind == LineKind::kIgnored) continue;
+    if (*kind == LineKind::kScan) ++log.scans;
+    log.records.push_back(std::move(record));
+    if (log.records.size() > kLogRecordsMax) {
+      return Error{fmt::format("{}: more than {} ODOM and FLASER lines; cut the log", path, kLogRecordsMax)};
+    }
+  }
+  if (log.records.empty()) {
+    return Error{
+        fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?", path, reader->line_number())};
+  }
+  pace_log(log);
+  return log;
+}
+
+}  // namespace gimnet::demo

@@ -1,0 +1,74 @@
+#include "tools/demo/driver.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "tools/demo/log_player.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+constexpr double kSpeeds[] = {kPlaySpeedMin, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, kPlaySpeedMax};
+
+double faster_than(double speed) {
+  const double* next = std::upper_bound(std::begin(kSpeeds), std::end(kSpeeds), speed);
+  return next == std::end(kSpeeds) ? kPlaySpeedMax : *next;
+}
+
+double slower_than(double speed) {
+  const double* same = std::lower_bound(std::begin(kSpeeds), std::end(kSpeeds), speed);
+  return same == std::begin(kSpeeds) ? kPlaySpeedMin : *std::prev(same);
+}
+
+bool plays_log(const Monitor& monitor) { return monitor.info() && monitor.info()->is_log(); }
+
+}  // namespace
+
+void Driver::change_speed(double speed) {
+  speed_ = speed;
+  changed_ = true;
+}
+
+void Driver::press(Key key, const Monitor& monitor, std::int64_t now_ns) {
+  if (plays_log(monitor)) {
+    const double speed = speed_.value_or(monitor.info()->speed);
+    if (key == Key::kFaster) change_speed(faster_than(speed));
+    if (key == Key::kSlower) change_speed(slower_than(speed));
+    if (key == Key::kStop) {
+      paused_ = !paused_;
+      changed_ = true;
+    }
+    return;
+  }
+  if (key == Key::kAutopilot) autopilot_ = !autopilot_;
+  const bool drives =
+      key == Key::kForward || key == Key::kBack || key == Key::kLeft || key == Key::kRight || key == Key::kStop;
+  // Whoever takes the wheel has it.
+  if (drives) autopilot_ = false;
+  teleop_.press(key, now_ns);
+}
+
+Twist Driver::wanted(const Monitor& monitor, std::int64_t now_ns) {
+  if (!autopilot_) return teleop_.twist(now_ns);
+  if (!course_ && monitor.plan()) course_.emplace(monitor.plan()->waypoints());
+  if (!course_ || !monitor.odometry()) return {};
+  return course_->steer(monitor.odometry()->pose);
+}
+
+std::optional<DriveCommand> Driver::next(const Monitor& monitor, std::int64_t now_ns) {
+  if (finish_said_ || !monitor.info()) return std::nullopt;
+  const bool due = plays_log(monitor) ? changed_ : now_ns >= next_ns_;
+  if (!due && !finish_) return std::nullopt;
+  next_ns_ = std::max(next_ns_ + kPeriod_ns, now_ns - kPeriod_ns);
+  changed_ = false;
+  finish_said_ = finish_;
+  DriveCommand command;
+  command.stamp = {++number_, now_ns};
+  command.speed = speed_.value_or(monitor.info()->speed);
+  command.paused = paused_;
+  command.finish = finish_;
+  if (!finish_ && !plays_log(monitor)) command.twist = wanted(monitor, now_ns);
+  return command;
+}
+
+}  // namespace gimnet::demo

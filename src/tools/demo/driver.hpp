@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "tools/demo/course.hpp"
+#include "tools/demo/messages.hpp"
+#include "tools/demo/monitor.hpp"
+#include "tools/demo/teleop.hpp"
+
+namespace gimnet::demo {
+
+/// Decides what the robot is told, and when: a simulated one 20 times a second, by the keyboard or by the course; a log
+/// only when its speed or its holding changes. Thread safety: one thread.
+class Driver {
+ public:
+  static constexpr std::int64_t kPeriod_ns = 50'000'000;
+
+  explicit Driver(bool autopilot) : autopilot_(autopilot) {}
+
+  /// Takes a key of driving or playing; others are not its business.
+  void press(Key key, const Monitor& monitor, std::int64_t now_ns);
+
+  /// From now on only one thing is said: finish.
+  void finish() { finish_ = true; }
+
+  /// The command that is due, if one is.
+  [[nodiscard]] std::optional<DriveCommand> next(const Monitor& monitor, std::int64_t now_ns);
+
+  [[nodiscard]] bool autopilot() const { return autopilot_; }
+  /// Corners of the course that were reached.
+  [[nodiscard]] std::size_t corners_reached() const { return course_ ? course_->reached() : 0; }
+  /// Commands that were given out.
+  [[nodiscard]] std::uint64_t commands() const { return number_; }
+
+ private:
+  void change_speed(double speed);
+  [[nodiscard]] Twist wanted(const Monitor& monitor, std::int64_t now_ns);
+
+  bool autopilot_;
+  bool finish_ = false;
+  bool finish_said_ = false;
+  bool changed_ = false;
+  bool paused_ = false;
+  std::optional<double> speed_;
+  std::optional<Course> course_;
+  Teleop teleop_;
+  std::int64_t next_ns_ = 0;
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace gimnet::demo

@@ -1,0 +1,161 @@
+#include "tools/demo/figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+#include <string_view>
+
+#include "tools/demo/text_format.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+double degrees(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
+
+// Rows from top to bottom, clipped at the area's end.
+class Column {
+ public:
+  Column(Canvas& canvas, const Area& area) : canvas_(canvas), area_(area), row_(area.corner.row) {}
+
+  [[nodiscard]] int left() const { return area_.corner.column + 1; }
+  [[nodiscard]] int right() const { return area_.corner.column + area_.extent.columns - 1; }
+  [[nodiscard]] int rows_left() const { return area_.corner.row + area_.extent.rows - row_; }
+
+  void space() { ++row_; }
+  void heading(std::string_view title, std::string_view more, Ink ink = Ink::kDim) {
+    put(left(), title, Ink::kTitle);
+    put_right(right(), more, ink);
+    ++row_;
+  }
+  void heading_over(std::string_view title, std::string_view first, std::string_view second) {
+    put(left(), title, Ink::kTitle);
+    put_right(right() - 9, first, Ink::kDim);
+    put_right(right(), second, Ink::kDim);
+    ++row_;
+  }
+  // A label on the left, one or two figures that end at fixed columns.
+  void row(std::string_view label, std::string_view first, std::string_view second, Ink ink = Ink::kPlain) {
+    put(left(), label, Ink::kLabel);
+    put_right(right() - 9, first, ink);
+    put_right(right(), second, ink);
+    ++row_;
+  }
+  void curve(const std::vector<std::int64_t>& samples_ns) {
+    constexpr char32_t kSteps[] = {U'▁', U'▂', U'▃', U'▄', U'▅', U'▆', U'▇', U'█'};
+    std::int64_t most_ns = 1;
+    for (const std::int64_t sample_ns : samples_ns) most_ns = std::max(most_ns, sample_ns);
+    int column = left();
+    for (const std::int64_t sample_ns : samples_ns) {
+      const std::int64_t step = std::clamp<std::int64_t>(sample_ns * 8 / (most_ns + 1), 0, 7);
+      if (rows_left() > 0) canvas_.put({column, row_}, {kSteps[step], Ink::kScan});
+      ++column;
+    }
+    ++row_;
+  }
+
+ private:
+  void put(int column, std::string_view text, Ink ink) {
+    if (rows_left() > 0) canvas_.text({column, row_}, text, ink);
+  }
+  void put_right(int end, std::string_view text, Ink ink) {
+    put(end - static_cast<int>(decoded_utf8(text).size()), text, ink);
+  }
+
+  Canvas& canvas_;
+  Area area_;
+  int row_;
+};
+
+std::string_view driver_text(const Monitor& monitor, const ScreenState& state) {
+  if (monitor.info() && monitor.info()->is_log()) return monitor.info()->ended ? "log has ended" : "recorded";
+  return state.autopilot ? "autopilot" : "driven by you";
+}
+
+void draw_robot_figures(Column& column, const Monitor& monitor, const ScreenState& state) {
+  const bool bumped = monitor.odometry() && monitor.odometry()->bumped;
+  column.heading("ROBOT", bumped ? "at a wall" : driver_text(monitor, state), bumped ? Ink::kWarn : Ink::kDim);
+  const Odometry odometry = monitor.odometry().value_or(Odometry{});
+  column.row("x, y", fmt::format("{:.2f}", odometry.pose.x_m), fmt::format("{:.2f} m", odometry.pose.y_m));
+  column.row("heading", "", fmt::format("{:.0f}°", degrees(odometry.pose.heading_rad)));
+  column.row("speed", fmt::format("{:.2f} m/s", odometry.twist.linear_mps),
+             fmt::format("{:.0f}°/s", degrees(odometry.twist.angular_radps)));
+}
+
+void draw_stream_figures(Column& column, const Monitor& monitor, std::int64_t now_ns) {
+  column.heading_over("STREAMS", "Hz", "lost");
+  const auto stream = [&](std::string_view label, const StreamRecord& record) {
+    const std::uint64_t lost = record.missed + record.disordered;
+    column.row(label, fmt::format("{:.1f}", record.rate.rate_hz(now_ns)), count_text(lost),
+               lost == 0 ? Ink::kPlain : Ink::kBad);
+  };
+  stream("← odom", monitor.odometry_stream());
+  stream("← scan", monitor.scan_stream());
+  stream("→ drive", monitor.drive_stream());
+}
+
+void draw_latency_figures(Column& column, const Monitor& monitor) {
+  column.heading_over("LATENCY", "p50", "p99");
+  const auto age = [&](std::string_view label, const SampleWindow& window) {
+    column.row(label, duration_text(window.percentile_ns(50)), duration_text(window.percentile_ns(99)));
+  };
+  age("odom", monitor.odometry_age());
+  age("scan", monitor.scan_age());
+  age("loop", monitor.loop_age());
+  column.curve(monitor.odometry_age().latest(static_cast<std::size_t>(column.right() - column.left())));
+}
+
+void draw_hub_figures(Column& column, const Monitor& monitor) {
+  if (!monitor.hub()) {
+    column.heading("HUB", "no counters yet");
+    return;
+  }
+  const HubCounters& hub = *monitor.hub();
+  const bool exact = hub.exact();
+  column.heading("HUB", exact ? "ledger exact ✓" : "ledger open ✗", exact ? Ink::kGood : Ink::kWarn);
+  column.row("accepted", "", count_text(hub.accepted + hub.copies));
+  column.row("delivered", "", count_text(hub.delivered));
+  column.row("dropped", "", count_text(hub.dropped()), hub.dropped() == 0 ? Ink::kGood : Ink::kBad);
+}
+
+}  // namespace
+
+void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
+  Column column(canvas, area);
+  // Four blocks of 4, 4, 5 and 4 rows; blank rows between them only where all of them fit.
+  const bool roomy = area.extent.rows >= 20;
+  const auto gap = [&] {
+    if (roomy) column.space();
+  };
+  draw_robot_figures(column, monitor, state);
+  gap();
+  draw_stream_figures(column, monitor, state.now_ns);
+  gap();
+  draw_latency_figures(column, monitor);
+  gap();
+  draw_hub_figures(column, monitor);
+}
+
+void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
+  const Odometry odometry = monitor.odometry().value_or(Odometry{});
+  const int column = area.corner.column + 1;
+  int row = area.corner.row;
+  canvas.text({column, row++},
+              fmt::format("{:.2f} {:.2f} m  {:.0f}°  {:.2f} m/s  {}", odometry.pose.x_m, odometry.pose.y_m,
+                          degrees(odometry.pose.heading_rad), odometry.twist.linear_mps, driver_text(monitor, state)),
+              Ink::kPlain);
+  canvas.text({column, row++},
+              fmt::format("odom {:.0f} Hz  scan {:.0f} Hz  p50 {}  p99 {}",
+                          monitor.odometry_stream().rate.rate_hz(state.now_ns),
+                          monitor.scan_stream().rate.rate_hz(state.now_ns),
+                          duration_text(monitor.odometry_age().percentile_ns(50)),
+                          duration_text(monitor.odometry_age().percentile_ns(99))),
+              Ink::kPlain);
+  if (!monitor.hub()) return;
+  const std::uint64_t dropped = monitor.hub()->dropped();
+  canvas.text({column, row},
+              fmt::format("hub: {} delivered, {} dropped", count_text(monitor.hub()->delivered), count_text(dropped)),
+              dropped == 0 ? Ink::kGood : Ink::kBad);
+}
+
+}  // namespace gimnet::demo

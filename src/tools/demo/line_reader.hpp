@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+
+struct gzFile_s;
+
+namespace gimnet::demo {
+
+/// Reads a text file line by line; a file compressed with gzip is read as what it holds.
+/// Ownership: closes its file. Thread safety: one thread. Limits: `kLineBytesMax` a line, `kFileBytesMax` altogether,
+/// so that a hostile archive ends with a sentence and not with the machine's memory.
+class LineReader {
+ public:
+  static constexpr std::size_t kLineBytesMax = 1U << 20;
+  static constexpr std::uint64_t kFileBytesMax = 1ULL << 30;
+
+  /// Errors: no such file, not a regular file, not readable.
+  static Result<LineReader> open(const std::string& path);
+
+  /// Stores the next line without its end in `line`; false at the end of the file.
+  /// Errors: damaged or cut archive, a limit passed; the sentence names file and line. Valid until: the next call.
+  [[nodiscard]] Result<bool> next(std::string_view& line);
+
+  /// Number of the line that next() gave last, from 1.
+  [[nodiscard]] std::uint64_t line_number() const { return line_number_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  struct Closer {
+    void operator()(gzFile_s* file) const;
+  };
+
+  LineReader(std::string path, gzFile_s* file);
+  [[nodiscard]] Result<bool> fill();
+  [[nodiscard]] Error failure(std::string_view what) const;
+
+  std::string path_;
+  std::unique_ptr<gzFile_s, Closer> file_;
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  std::uint64_t line_number_ = 0;
+  std::uint64_t bytes_read_ = 0;
+  bool at_end_ = false;
+};
+
+}  // namespace gimnet::demo

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "tools/demo/hub_counters.hpp"
+#include "tools/demo/messages.hpp"
+#include "tools/demo/occupancy_map.hpp"
+#include "tools/demo/sample_window.hpp"
+#include "tools/demo/world_map.hpp"
+
+namespace gimnet::demo {
+
+/// What is known about one stream of numbered messages.
+struct StreamRecord {
+  RateMeter rate;
+  std::uint64_t received = 0;
+  /// Numbers that were skipped. What comes twice or out of order counts in `disordered`.
+  std::uint64_t missed = 0;
+  std::uint64_t disordered = 0;
+  std::uint64_t last_number = 0;
+  /// The sender began before: the first number may be any.
+  bool joined_late = false;
+
+  void take(std::uint64_t number, std::int64_t now_ns);
+};
+
+/// Everything that the viewer has heard, ready to be shown. Times are ns since 1970. Thread safety: one thread.
+/// Limits: a trail of `kTrailPointsMax` points, thinned out when it is full.
+class Monitor {
+ public:
+  static constexpr std::size_t kTrailPointsMax = 20'000;
+  static constexpr double kTrailStep_m = 0.04;
+
+  /// `joined_late`: the robot may have begun before, so what came before the first message is not missed.
+  explicit Monitor(std::int64_t start_ns, bool joined_late = false) : start_ns_(start_ns) {
+    odometry_stream_.joined_late = scan_stream_.joined_late = joined_late;
+  }
+
+  void take(const Odometry& message, std::int64_t now_ns);
+  void take(const Scan& message, std::int64_t now_ns);
+  void take(const RobotInfo& message, std::int64_t now_ns);
+  void take(const HubCounters& counters) { hub_ = counters; }
+  /// A command was sent.
+  void sent(const DriveCommand& message, std::int64_t now_ns);
+  /// A message that could not be read.
+  void garbled() { ++garbled_; }
+
+  [[nodiscard]] std::int64_t start_ns() const { return start_ns_; }
+  [[nodiscard]] const std::optional<Odometry>& odometry() const { return odometry_; }
+  [[nodiscard]] const std::optional<PlacedScan>& scan() const { return scan_; }
+  [[nodiscard]] const std::optional<RobotInfo>& info() const { return info_; }
+  [[nodiscard]] const std::optional<HubCounters>& hub() const { return hub_; }
+  /// The hall, where the robot sent one.
+  [[nodiscard]] const std::optional<WorldMap>& plan() const { return plan_; }
+  [[nodiscard]] const OccupancyMap& seen() const { return seen_; }
+  [[nodiscard]] const std::vector<Point>& trail() const { return trail_; }
+
+  [[nodiscard]] const StreamRecord& odometry_stream() const { return odometry_stream_; }
+  [[nodiscard]] const StreamRecord& scan_stream() const { return scan_stream_; }
+  [[nodiscard]] const StreamRecord& drive_stream() const { return drive_stream_; }
+  [[nodiscard]] const SampleWindow& odometry_age() const { return odometry_age_; }
+  [[nodiscard]] const SampleWindow& scan_age() const { return scan_age_; }
+  /// From a command's sending to the first odometry that follows it.
+  [[nodiscard]] const SampleWindow& loop_age() const { return loop_age_; }
+  [[nodiscard]] std::uint64_t garbled_messages() const { return garbled_; }
+  /// Metres driven.
+  [[nodiscard]] double way_m() const { return way_m_; }
+
+ private:
+  void extend_trail(const Pose& pose);
+
+  std::int64_t start_ns_;
+  std::optional<Odometry> odometry_;
+  std::optional<PlacedScan> scan_;
+  std::optional<RobotInfo> info_;
+  std::optional<HubCounters> hub_;
+  std::optional<WorldMap> plan_;
+  OccupancyMap seen_;
+  std::vector<Point> trail_;
+  StreamRecord odometry_stream_;
+  StreamRecord scan_stream_;
+  StreamRecord drive_stream_;
+  SampleWindow odometry_age_{2000};
+  SampleWindow scan_age_{500};
+  SampleWindow loop_age_{500};
+  std::uint64_t answered_ = 0;
+  std::uint64_t garbled_ = 0;
+  double way_m_ = 0.0;
+};
+
+}  // namespace gimnet::demo

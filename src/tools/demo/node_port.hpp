@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "tools/demo/hub_counters.hpp"
+#include "tools/demo/messages.hpp"
+
+namespace gimnet::demo {
+
+/// The four services of the demo (messages.hpp).
+enum class Service : std::uint8_t { kOdometry, kScan, kInfo, kDrive };
+
+/// What robot and viewer need of the network: a seam, so that tests put two ends together without a hub.
+/// Thread safety: one thread. Ownership: of its connection, which ends with it.
+class NodePort {
+ public:
+  /// A message of a service: to the viewer from odom, scan and info; to the robot from drive.
+  struct Event {
+    Service service = Service::kInfo;
+    Bytes payload;
+    /// When it was read from the network, in ns since 1970.
+    std::int64_t arrival_ns = 0;
+  };
+
+  virtual ~NodePort() = default;
+
+  /// Sends a message to all subscribers of an own service. Errors: the connection ended for good.
+  [[nodiscard]] virtual std::optional<Error> publish(Service service, std::span<const std::byte> payload) = 0;
+
+  /// Sends a command to the robot, in the lane that goes first. Errors: the connection ended for good.
+  [[nodiscard]] virtual std::optional<Error> command(std::span<const std::byte> payload) = 0;
+
+  /// The next message; nothing if none comes within `wait_ns`. Also the time in which events are seen to.
+  /// Errors: the connection ended for good.
+  [[nodiscard]] virtual Result<std::optional<Event>> receive(std::int64_t wait_ns) = 0;
+
+  /// Are there subscribers of all own services that are provided?
+  [[nodiscard]] virtual bool heard() const = 0;
+
+  /// Does the connection to the hub stand?
+  [[nodiscard]] virtual bool connected() const = 0;
+
+  /// What the hub counted so far; nothing if it does not answer in time.
+  [[nodiscard]] virtual std::optional<HubCounters> hub_counters() = 0;
+};
+
+}  // namespace gimnet::demo

@@ -1,0 +1,168 @@
+#include "tools/demo/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <vector>
+
+#include "tools/demo/log_player.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+constexpr std::string_view kUsage =
+    R"(gimnet-demo: a robot, a hub, and a live picture of the robot in the terminal
+
+  gimnet-demo                       a simulated robot, driven with W A S D
+  gimnet-demo --log FILE.log.gz     the recorded run of a real robot (CARMEN format)
+  gimnet-demo --seconds 10          drives a course by itself, ends with a summary from the hub's counters;
+                                    the exit code is 0 if nothing was lost, else 1
+
+Starts a hub of its own, and the robot as a separate process. For your own hub, or two computers:
+
+  gimnet-demo robot --hub URL       only the robot
+  gimnet-demo view --hub URL        only the viewer and driver
+
+  --log FILE       plays a log, compressed with gzip or not
+  --speed X        plays it X times as fast as recorded, 0.1 to 100 (1)
+  --map FILE       another hall for the simulated robot: lines of # (wall), blanks, @ (start), 1 to 9 (course)
+  --seconds N      ends after N seconds
+  --hub URL        tcp://host:port or unix:/path; also from GIMNET_HUB
+  --robot NAME     the robot's name in the network (robot)
+  --ascii, --utf8  which characters to draw with; found out by default
+  --help           this text
+
+NO_COLOR turns colours off. While it runs, ? shows the keys.
+)";
+
+struct Argument {
+  std::string_view name;
+  bool takes_value;
+};
+constexpr Argument kArguments[] = {{"--log", true},   {"--map", true},   {"--speed", true},  {"--seconds", true},
+                                   {"--hub", true},   {"--robot", true}, {"--ascii", false}, {"--utf8", false},
+                                   {"--help", false}, {"-h", false}};
+
+struct Bounds {
+  double least;
+  double most;
+};
+
+Result<double> number_of(std::string_view name, std::string_view text, const Bounds& bounds) {
+  double value = 0.0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  // The comparison is false for what is no number, too.
+  const bool within = value >= bounds.least && value <= bounds.most;
+  if (code != std::errc{} || end != text.data() + text.size() || !within) {
+    return Error{fmt::format("{} takes a number from {} to {}, not '{}'", name, bounds.least, bounds.most, text)};
+  }
+  return value;
+}
+
+// Does a node's name hold to docs/protocol.md, section 8, as one part?
+bool is_node_name(std::string_view name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  };
+  return !name.empty() && name.size() <= 200 && std::all_of(name.begin(), name.end(), allowed);
+}
+
+std::optional<Error> apply(Options& options, std::string_view name, std::string_view value) {
+  if (name == "--log") options.log = value;
+  if (name == "--map") options.map = value;
+  if (name == "--hub") options.hub_url = value;
+  if (name == "--ascii") options.glyphs = Glyphs::kAscii;
+  if (name == "--utf8") options.glyphs = Glyphs::kUtf8;
+  if (name == "--help" || name == "-h") options.help = true;
+  if (name == "--robot") {
+    if (!is_node_name(value)) {
+      return Error{fmt::format("--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
+    }
+    options.robot = value;
+  }
+  if (name == "--speed") {
+    const Result<double> number = number_of(name, value, {kPlaySpeedMin, kPlaySpeedMax});
+    if (!number) return number.error();
+    options.speed = *number;
+  }
+  if (name == "--seconds") {
+    const Result<double> number = number_of(name, value, {0.1, Options::kSecondsMax});
+    if (!number) return number.error();
+    options.seconds = *number;
+  }
+  return std::nullopt;
+}
+
+std::optional<Error> contradiction(const Options& options, const std::vector<std::string_view>& given) {
+  const auto has = [&](std::string_view name) { return std::find(given.begin(), given.end(), name) != given.end(); };
+  if (has("--log") && has("--map")) {
+    return Error{"--log and --map exclude each other: a log brings its own world; leave one out"};
+  }
+  if (has("--speed") && !has("--log")) return Error{"--speed is the speed of a log; add --log FILE, or leave it out"};
+  if (has("--ascii") && has("--utf8")) return Error{"--ascii and --utf8 exclude each other; leave one out"};
+  if (options.role == Role::kAll && has("--hub")) {
+    return Error{"--hub is for one part of the demo: say 'robot' or 'view' first, or leave it out"};
+  }
+  if (options.role == Role::kView) {
+    for (const std::string_view name : {"--log", "--map", "--speed"}) {
+      if (has(name)) return Error{fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", name)};
+    }
+  }
+  if (options.role == Role::kRobot) {
+    for (const std::string_view name : {"--seconds", "--ascii", "--utf8"}) {
+      if (has(name)) return Error{fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", name)};
+    }
+  }
+  for (const std::string_view name : {"--log", "--map", "--hub"}) {
+    const std::string& value = name == "--log" ? options.log : name == "--map" ? options.map : options.hub_url;
+    if (has(name) && value.empty()) return Error{fmt::format("{} is empty; give it a value, or leave it out", name)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view usage_text() { return kUsage; }
+
+Result<Options> parse_options(std::span<const char* const> arguments) {
+  Options options;
+  std::vector<std::string_view> given;
+  std::size_t index = 0;
+  if (!arguments.empty()) {
+    const std::string_view first = arguments.front();
+    if (first == "robot" || first == "view") {
+      options.role = first == "robot" ? Role::kRobot : Role::kView;
+      index = 1;
+    }
+  }
+  for (; index < arguments.size(); ++index) {
+    const std::string_view word = arguments[index];
+    const std::size_t equals = word.starts_with("--") ? word.find('=') : std::string_view::npos;
+    const std::string_view name = word.substr(0, equals);
+    const auto* known = std::find_if(std::begin(kArguments), std::end(kArguments),
+                                     [&](const Argument& argument) { return argument.name == name; });
+    if (known == std::end(kArguments)) {
+      return Error{fmt::format("there is no argument '{}'; 'gimnet-demo --help' lists them", word)};
+    }
+    if (std::find(given.begin(), given.end(), name) != given.end()) {
+      return Error{fmt::format("{} is given twice; leave one out", name)};
+    }
+    given.push_back(name);
+    std::string_view value;
+    if (equals != std::string_view::npos) {
+      if (!known->takes_value) return Error{fmt::format("{} takes no value; write only {}", name, name)};
+      value = word.substr(equals + 1);
+    } else if (known->takes_value) {
+      if (++index >= arguments.size()) return Error{fmt::format("{} needs a value behind it", name)};
+      value = arguments[index];
+    }
+    if (const std::optional<Error> error = apply(options, name, value)) return *error;
+    if (options.help) return options;
+  }
+  if (const std::optional<Error> error = contradiction(options, given)) return *error;
+  return options;
+}
+
+}  // namespace gimnet::demo

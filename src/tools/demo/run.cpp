@@ -1,0 +1,145 @@
+#include "tools/demo/run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "tools/demo/carmen_log.hpp"
+#include "tools/demo/gimi_port.hpp"
+#include "tools/demo/log_player.hpp"
+#include "tools/demo/own_network.hpp"
+#include "tools/demo/robot.hpp"
+#include "tools/demo/simulated_robot.hpp"
+#include "tools/demo/stop_signal.hpp"
+#include "tools/demo/viewer.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+constexpr Extent kPicture{80, 24};
+
+// fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep the children alive.
+void say(std::FILE* to, const std::string& text) {
+  (void)std::fwrite(text.data(), 1, text.size(), to);
+  (void)std::fflush(to);
+}
+
+void complain(const Error& error) { say(stderr, fmt::format("gimnet-demo: {}\n", error.sentence)); }
+
+Result<Robot::SourceMaker> source_maker(const Options& options) {
+  if (!options.log.empty()) {
+    Result<RobotLog> log = load_robot_log(options.log);
+    if (!log) return log.error();
+    const std::string name = std::filesystem::path(options.log).filename().string();
+    return Robot::SourceMaker([log = std::move(*log), name, speed = options.speed](std::int64_t now_ns) {
+      return std::make_unique<LogPlayer>(log, LogPlayer::Start{name, speed, now_ns});
+    });
+  }
+  Result<WorldMap> map = options.map.empty() ? Result<WorldMap>(WorldMap::hall()) : WorldMap::load(options.map);
+  if (!map) return map.error();
+  return Robot::SourceMaker(
+      [map = std::move(*map)](std::int64_t now_ns) { return std::make_unique<SimulatedRobot>(map, now_ns); });
+}
+
+// What the screen can show: the choice of the user, then the environment, then the terminal itself.
+TerminalStyle style_for(const Options& options, Terminal* terminal) {
+  TerminalStyle style;
+  style.colours = terminal == nullptr ? ColourDepth::kNone : colours_of_environment();
+  std::optional<bool> utf8 = utf8_of_environment();
+  if (!utf8 && terminal != nullptr) utf8 = terminal->understands_utf8();
+  if (options.glyphs != Glyphs::kAuto) utf8 = options.glyphs == Glyphs::kUtf8;
+  style.utf8 = utf8.value_or(false);
+  return style;
+}
+
+// A demo that was told to run for a time, or has no keyboard, drives by itself.
+bool drives_itself(const Options& options, const Terminal* terminal) {
+  return options.seconds.has_value() || terminal == nullptr;
+}
+
+// Checks what the robot's process would only find later, where the sentence would be harder to find.
+std::optional<Error> unusable_input(const Options& options) {
+  if (options.role != Role::kAll) return std::nullopt;
+  const Result<Robot::SourceMaker> maker = source_maker(options);
+  return maker ? std::nullopt : std::optional(maker.error());
+}
+
+void print_summary(const Viewer& viewer, const TerminalStyle& style, bool interactive) {
+  if (!interactive) say(stdout, viewer.last_picture(kPicture) + "\n");
+  say(stdout, summary_text(viewer.monitor(), viewer.record(), style.utf8));
+}
+
+}  // namespace
+
+ExitCode run_robot(const Options& options) {
+  Result<Robot::SourceMaker> maker = source_maker(options);
+  if (!maker) {
+    complain(maker.error());
+    return ExitCode::kUsage;
+  }
+  Result<std::unique_ptr<NodePort>> port = connect_robot({options.hub_url, options.robot});
+  if (!port) {
+    complain(port.error());
+    return ExitCode::kNoNetwork;
+  }
+  say(stdout, "ready\n");
+  Robot robot(**port, std::move(*maker));
+  while (stop_signal() == 0) {
+    if (const std::optional<Error> error = robot.step()) {
+      complain(*error);
+      return ExitCode::kLost;
+    }
+  }
+  return ExitCode::kGood;
+}
+
+ExitCode run_viewer(const Options& options) {
+  if (const std::optional<Error> error = unusable_input(options)) {
+    complain(*error);
+    return ExitCode::kUsage;
+  }
+  std::optional<OwnNetwork> network;
+  ViewerOptions viewing;
+  viewing.hub_url = options.hub_url;
+  viewing.own_robot = options.role == Role::kAll;
+  if (viewing.own_robot) {
+    Result<OwnNetwork> started = OwnNetwork::start(options, folder_of_this_program());
+    if (!started) {
+      complain(started.error());
+      return ExitCode::kNoNetwork;
+    }
+    network.emplace(std::move(*started));
+    viewing.hub_url = network->hub_url();
+    viewing.trouble = [&network] { return network->trouble(); };
+  }
+  Result<std::unique_ptr<NodePort>> port = connect_viewer({viewing.hub_url, options.robot});
+  if (!port) {
+    complain(port.error());
+    return ExitCode::kNoNetwork;
+  }
+
+  std::unique_ptr<Terminal> terminal = Terminal::open({STDIN_FILENO, STDOUT_FILENO});
+  const bool interactive = terminal != nullptr;
+  viewing.seconds = options.seconds;
+  viewing.autopilot = drives_itself(options, terminal.get());
+  viewing.style = style_for(options, terminal.get());
+  if (!interactive) viewing.on_progress = [](const std::string& line) { say(stderr, line + "\n"); };
+  const TerminalStyle style = viewing.style;
+  Viewer viewer(**port, terminal.get(), std::move(viewing));
+  const std::optional<Error> error = viewer.run();
+  terminal.reset();
+  if (error) {
+    complain(*error);
+    return ExitCode::kLost;
+  }
+  print_summary(viewer, style, interactive);
+  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood : ExitCode::kLost;
+}
+
+}  // namespace gimnet::demo

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+
+#include "tools/demo/options.hpp"
+
+namespace gimnet::demo {
+
+/// Exit codes of the demo.
+enum class ExitCode : std::uint8_t { kGood = 0, kLost = 1, kUsage = 2, kNoNetwork = 3 };
+
+/// Runs the robot's process until it is told to end.
+[[nodiscard]] ExitCode run_robot(const Options& options);
+
+/// Runs the viewer's process, with an own hub and robot unless the role is kView; prints the summary at the end.
+[[nodiscard]] ExitCode run_viewer(const Options& options);
+
+}  // namespace gimnet::demo

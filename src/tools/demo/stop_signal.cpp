@@ -1,0 +1,34 @@
+#include "tools/demo/stop_signal.hpp"
+
+#include <unistd.h>
+
+#include <csignal>
+#include <initializer_list>
+
+namespace gimnet::demo {
+namespace {
+
+volatile std::sig_atomic_t received = 0;
+unsigned patience = 0;
+
+// alarm() is one of the calls that POSIX allows in a signal handler.
+extern "C" void remember(int signal) {
+  received = signal;
+  ::alarm(patience);
+}
+
+}  // namespace
+
+void remember_stop_signals(unsigned patience_s) {
+  patience = patience_s;
+  struct sigaction action{};
+  action.sa_handler = remember;
+  sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(signal, &action, nullptr);
+  action.sa_handler = SIG_IGN;
+  ::sigaction(SIGPIPE, &action, nullptr);
+}
+
+int stop_signal() { return received; }
+
+}  // namespace gimnet::demo

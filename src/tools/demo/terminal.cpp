@@ -1,0 +1,167 @@
+#include "tools/demo/terminal.hpp"
+
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+
+#include "base/check.hpp"
+#include "base/clock.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+constexpr std::string_view kEnter = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J";
+constexpr std::string_view kLeave = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l";
+constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+
+// For the crash handler, which can ask nobody.
+struct Taken {
+  volatile std::sig_atomic_t active = 0;
+  Terminal::Ends ends = {};
+  termios before = {};
+};
+constinit Taken taken;
+
+// Only calls that POSIX allows in a signal handler.
+extern "C" void restore_and_crash(int signal) {
+  if (taken.active != 0) {
+    taken.active = 0;
+    (void)!::write(taken.ends.screen, kLeave.data(), kLeave.size());
+    (void)::tcsetattr(taken.ends.keyboard, TCSANOW, &taken.before);
+  }
+  (void)::raise(signal);
+}
+
+void on_crash(void (*handler)(int)) {
+  struct sigaction action{};
+  action.sa_handler = handler;
+  // The second raise, within the handler, ends the process as without one.
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_NODEFER);
+  sigemptyset(&action.sa_mask);
+  for (const int signal : kCrashes) ::sigaction(signal, &action, nullptr);
+}
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+bool wait_readable(int descriptor, int wait_ms) {
+  pollfd waiting{descriptor, POLLIN, 0};
+  return ::poll(&waiting, 1, wait_ms) > 0;
+}
+
+}  // namespace
+
+std::unique_ptr<Terminal> Terminal::open(const Ends& ends) {
+  const std::string term = environment("TERM");
+  if (term.empty() || term == "dumb") return nullptr;
+  if (::isatty(ends.keyboard) != 1 || ::isatty(ends.screen) != 1) return nullptr;
+  termios before{};
+  if (::tcgetattr(ends.keyboard, &before) != 0) return nullptr;
+  GIMNET_CHECK(taken.active == 0);
+  taken.ends = ends;
+  taken.before = before;
+  taken.active = 1;
+  on_crash(restore_and_crash);
+  termios raw = before;
+  // Signals off as well: Ctrl-C is a key, so that it is not lost between two programs of the foreground.
+  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO | ISIG | IEXTEN);
+  raw.c_iflag &= ~static_cast<tcflag_t>(IXON | ICRNL | INLCR);
+  raw.c_cc[VMIN] = 0;
+  raw.c_cc[VTIME] = 0;
+  (void)::tcsetattr(ends.keyboard, TCSANOW, &raw);
+  std::unique_ptr<Terminal> terminal(new Terminal(ends, before));
+  terminal->write(kEnter);
+  return terminal;
+}
+
+Terminal::~Terminal() {
+  write(kLeave);
+  (void)::tcsetattr(ends_.keyboard, TCSAFLUSH, &before_);
+  taken.active = 0;
+  on_crash(SIG_DFL);
+}
+
+Extent Terminal::extent() const {
+  winsize size{};
+  if (::ioctl(ends_.screen, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) return {80, 24};
+  return {size.ws_col, size.ws_row};
+}
+
+bool Terminal::read(std::string& bytes) {
+  bytes.clear();
+  pollfd waiting{ends_.keyboard, POLLIN, 0};
+  if (::poll(&waiting, 1, 0) <= 0) return true;
+  char buffer[256];
+  const ssize_t got = ::read(ends_.keyboard, buffer, sizeof buffer);
+  if (got > 0) bytes.assign(buffer, static_cast<std::size_t>(got));
+  return got > 0 || (got < 0 && (errno == EINTR || errno == EAGAIN));
+}
+
+void Terminal::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(ends_.screen, bytes.data(), bytes.size());
+    if (put > 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(put));
+    } else if (put < 0 && errno == EAGAIN) {
+      pollfd waiting{ends_.screen, POLLOUT, 0};
+      if (::poll(&waiting, 1, 1000) <= 0) return;
+    } else if (put == 0 || errno != EINTR) {
+      return;
+    }
+  }
+}
+
+std::optional<bool> Terminal::understands_utf8() {
+  write("\x1b[1;1H\xe2\xa3\xbf\x1b[6n");
+  constexpr std::int64_t kPatience_ns = 300'000'000;
+  const std::int64_t until_ns = steady_now_ns() + kPatience_ns;
+  std::string answer;
+  while (answer.find('R') == std::string::npos) {
+    const std::int64_t left_ns = until_ns - steady_now_ns();
+    if (left_ns <= 0 || answer.size() > 64) return std::nullopt;
+    if (!wait_readable(ends_.keyboard, static_cast<int>(left_ns / 1'000'000) + 1)) return std::nullopt;
+    std::string more;
+    if (!read(more)) return std::nullopt;
+    answer += more;
+  }
+  write("\x1b[2J");
+  // The answer is ESC [ row ; column R.
+  const std::size_t separator = answer.rfind(';');
+  if (separator == std::string::npos) return std::nullopt;
+  return answer.compare(separator + 1, 2, "2R") == 0;
+}
+
+ColourDepth colours_of_environment() {
+  const std::string term = environment("TERM");
+  if (!environment("NO_COLOR").empty() || term.empty() || term == "dumb" || term.starts_with("vt")) {
+    return ColourDepth::kNone;
+  }
+  const bool rich = term.find("256color") != std::string::npos || term.find("direct") != std::string::npos ||
+                    term.find("kitty") != std::string::npos || !environment("COLORTERM").empty();
+  return rich ? ColourDepth::k256 : ColourDepth::k16;
+}
+
+std::optional<bool> utf8_of_environment() {
+  // The Linux console reads UTF-8, but its font has no braille.
+  if (environment("TERM") == "linux") return false;
+  for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {
+    std::string value = environment(name);
+    if (value.empty()) continue;
+    std::transform(value.begin(), value.end(), value.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (value.find("utf-8") != std::string::npos || value.find("utf8") != std::string::npos) return true;
+    if (value.find('.') != std::string::npos) return false;
+    return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+}  // namespace gimnet::demo

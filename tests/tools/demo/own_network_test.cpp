@@ -1,0 +1,63 @@
+#include "tools/demo/own_network.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace gimnet::demo {
+namespace {
+
+using testing::HasSubstr;
+
+// Puts a shell script in the place of a program.
+void plant(const TemporaryFolder& folder, const std::string& name, const std::string& script) {
+  const std::string path = folder / name;
+  std::ofstream(path) << "#!/bin/sh\n" << script << "\n";
+  std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+}
+
+TEST(ReadyLine, NamesBothAddresses) {
+  const HubAddresses addresses = parse_ready_line("ready tcp://127.0.0.1:41233 unix:/tmp/x/hub.sock").value();
+  EXPECT_EQ(addresses.tcp, "tcp://127.0.0.1:41233");
+  EXPECT_EQ(addresses.unix_socket, "unix:/tmp/x/hub.sock");
+}
+
+TEST(ReadyLine, AnotherLineIsRefused) {
+  for (const char* line : {"", "ready", "ready tcp://127.0.0.1:1", "steady tcp://127.0.0.1:1 unix:/x"}) {
+    EXPECT_THAT(parse_ready_line(line).error().sentence, HasSubstr("instead of 'ready'")) << line;
+  }
+}
+
+TEST(OwnNetwork, SaysThatTheHubIsMissing) {
+  const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
+  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence, HasSubstr("cannot start the hub"));
+}
+
+TEST(OwnNetwork, PassesOnWhyTheHubDoesNotStart) {
+  const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
+  plant(programs, "tcphub", "echo 'no room' >&2; exit 1");
+  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence, HasSubstr("ended at once: no room"));
+}
+
+TEST(OwnNetwork, GivesTheRobotItsArgumentsAndNoticesItsEnd) {
+  const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
+  plant(programs, "tcphub", "echo ready tcp://127.0.0.1:1 unix:/x; exec tail -f /dev/null");
+  plant(programs, "gimnet-demo", "echo ready; echo \"$*\" >&2; exit 3");
+  Options options;
+  options.log = "a b.log";
+  options.speed = 2.5;
+  Result<OwnNetwork> network = OwnNetwork::start(options, programs.path());
+  ASSERT_TRUE(network) << network.error().sentence;
+  EXPECT_EQ(network->hub_url(), "tcp://127.0.0.1:1");
+  std::optional<Error> trouble;
+  while (!trouble) trouble = network->trouble();
+  EXPECT_THAT(trouble->sentence, HasSubstr("the robot ended by itself with status 3: robot --hub unix:/x --robot robot "
+                                           "--log a b.log --speed 2.5"));
+}
+
+TEST(OwnNetwork, FindsTheFolderOfThisProgram) { EXPECT_TRUE(std::filesystem::is_directory(folder_of_this_program())); }
+
+}  // namespace
+}  // namespace gimnet::demo

@@ -1,0 +1,148 @@
+#include "tools/demo/run.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <vector>
+
+#include "tests/tools/demo/temporary_file.hpp"
+#include "tools/demo/child_process.hpp"
+#include "tools/demo/own_network.hpp"
+#include "tools/demo/temporary_folder.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr std::int64_t kPatience_ns = 60'000'000'000;
+
+// What the program said, and how it ended.
+struct Outcome {
+  int status = -1;
+  std::string out;
+  std::string err;
+};
+
+// The demo as it is shipped, with its own hub and robot.
+class RunTest : public testing::Test {
+ protected:
+  Result<ChildProcess> start(const std::vector<std::string>& arguments) {
+    std::vector<std::string> words = {folder_of_this_program() + "/gimnet-demo"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return ChildProcess::start({"the demo", words, folder_ / "err"});
+  }
+
+  Outcome run(const std::vector<std::string>& arguments) {
+    Result<ChildProcess> demo = start(arguments);
+    if (!demo) return {-1, "", demo.error().sentence};
+    return ended(*demo);
+  }
+
+  Outcome ended(ChildProcess& demo) {
+    Outcome outcome;
+    while (Result<std::string> line = demo.read_line(kPatience_ns)) outcome.out += *line + "\n";
+    outcome.status = demo.wait(kPatience_ns).value_or(-1);
+    outcome.err = said();
+    return outcome;
+  }
+
+  // Its standard error so far.
+  [[nodiscard]] std::string said() const {
+    std::ifstream file(folder_ / "err");
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
+  [[nodiscard]] std::ptrdiff_t files_left() const {
+    return std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator());
+  }
+
+  TemporaryFolder folder_ = std::move(TemporaryFolder::make().value());
+};
+
+TEST_F(RunTest, DrivesACourseByItselfAndLosesNothing) {
+  const Outcome outcome = run({"--seconds", "2", "--utf8"});
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("simulation for 2."));
+  EXPECT_THAT(outcome.out, HasSubstr("exact"));
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(outcome.err, HasSubstr("odom"));
+}
+
+TEST_F(RunTest, PlaysALog) {
+  std::string log;
+  for (int step = 0; step < 200; ++step) {
+    const std::string stamp = std::to_string(step * 0.02);
+    log += "ODOM " + std::to_string(step * 0.01) + " 0 0 0 0 0 " + stamp + " host " + stamp + "\n";
+    if (step % 10 == 0) log += "FLASER 3 1 2 1 0 0 0 0 0 0 " + stamp + " host " + stamp + "\n";
+  }
+  const TemporaryFile file(log, true);
+  const Outcome outcome = run({"--log", file.path(), "--seconds", "1.5", "--speed", "2"});
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
+}
+
+TEST_F(RunTest, ASignalEndsItWithASummaryAndNothingIsLeft) {
+  ASSERT_EQ(::setenv("TMPDIR", folder_.path().c_str(), 1), 0);
+  Result<ChildProcess> demo = start({});
+  ASSERT_TRUE(demo);
+  // Something is heard once a line of progress is there.
+  std::string err;
+  while (err.find("odom") == std::string::npos) {
+    ASSERT_FALSE(demo->ended());
+    std::ifstream file(folder_ / "err");
+    std::getline(file, err);
+  }
+  ASSERT_EQ(::unsetenv("TMPDIR"), 0);
+  EXPECT_EQ(files_left(), 2);
+  ASSERT_EQ(::kill(demo->id(), SIGINT), 0);
+  const Outcome outcome = ended(*demo);
+  EXPECT_EQ(files_left(), 1);
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
+}
+
+TEST_F(RunTest, ClosesDownWhereNobodyReadsAnyMore) {
+  ASSERT_EQ(::setenv("TMPDIR", folder_.path().c_str(), 1), 0);
+  const std::string program = folder_of_this_program() + "/gimnet-demo";
+  Result<ChildProcess> shell = ChildProcess::start(
+      {"the shell", {"/bin/sh", "-c", "{ " + program + " --seconds 1; echo $? >&2; } | true"}, folder_ / "err"});
+  ASSERT_EQ(::unsetenv("TMPDIR"), 0);
+  ASSERT_TRUE(shell);
+  EXPECT_EQ(shell->wait(kPatience_ns), 0);
+  EXPECT_THAT(said(), testing::EndsWith("\n0\n"));
+  EXPECT_EQ(files_left(), 1);
+}
+
+TEST_F(RunTest, BadArgumentsAreExplained) {
+  const Outcome outcome = run({"--sceonds", "2"});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("there is no argument '--sceonds'"));
+  EXPECT_EQ(run({"--help"}).status, 0);
+}
+
+TEST_F(RunTest, AnUnusableLogIsRefusedBeforeAnythingStarts) {
+  EXPECT_EQ(run({"--log", "/nowhere.log"}).status, 2);
+  const TemporaryFile garbage("not a log\n");
+  const Outcome outcome = run({"--log", garbage.path()});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr(garbage.path() + ":1: the line begins with \"not\""));
+}
+
+TEST_F(RunTest, AViewerWithoutAHubSaysSo) {
+  EXPECT_EQ(run({"view", "--hub", "unix:" + (folder_ / "none.sock")}).status, 3);
+}
+
+}  // namespace
+}  // namespace gimnet::demo

@@ -1,0 +1,148 @@
+#include "tools/demo/terminal.hpp"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+namespace gimnet::demo {
+namespace {
+
+using testing::HasSubstr;
+
+// A terminal without glass: what is shown comes out of `master`, what is written there was typed.
+class TerminalTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(::setenv("TERM", "xterm-256color", 1), 0);
+    master_ = ::posix_openpt(O_RDWR | O_NOCTTY);
+    ASSERT_GE(master_, 0);
+    ASSERT_EQ(::grantpt(master_), 0);
+    ASSERT_EQ(::unlockpt(master_), 0);
+    slave_ = ::open(::ptsname(master_), O_RDWR | O_NOCTTY);
+    ASSERT_GE(slave_, 0);
+  }
+  void TearDown() override {
+    ::close(slave_);
+    ::close(master_);
+  }
+
+  [[nodiscard]] std::string shown() const {
+    std::string text;
+    char buffer[4096];
+    pollfd waiting{master_, POLLIN, 0};
+    while (::poll(&waiting, 1, 0) > 0) {
+      const ssize_t got = ::read(master_, buffer, sizeof buffer);
+      if (got <= 0) break;
+      text.append(buffer, static_cast<std::size_t>(got));
+    }
+    return text;
+  }
+  void type(std::string_view text) const {
+    ASSERT_EQ(::write(master_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  }
+  [[nodiscard]] std::unique_ptr<Terminal> open() const { return Terminal::open({slave_, slave_}); }
+  [[nodiscard]] tcflag_t local_modes() const {
+    termios modes{};
+    EXPECT_EQ(::tcgetattr(slave_, &modes), 0);
+    return modes.c_lflag;
+  }
+
+  int master_ = -1;
+  int slave_ = -1;
+};
+
+TEST_F(TerminalTest, IsTakenOverAndGivenBack) {
+  const tcflag_t before = local_modes();
+  std::unique_ptr<Terminal> terminal = open();
+  ASSERT_NE(terminal, nullptr);
+  EXPECT_EQ(local_modes() & (ICANON | ECHO | ISIG), 0U);
+  EXPECT_THAT(shown(), HasSubstr("\x1b[?1049h"));
+  terminal.reset();
+  EXPECT_EQ(local_modes(), before);
+  EXPECT_THAT(shown(), HasSubstr("\x1b[?1049l"));
+}
+
+TEST_F(TerminalTest, GivesKeysAtOnceAndNeverWaits) {
+  const std::unique_ptr<Terminal> terminal = open();
+  std::string bytes = "old";
+  EXPECT_TRUE(terminal->read(bytes));
+  EXPECT_EQ(bytes, "");
+  type("w\x03");
+  while (bytes.size() < 2) {
+    std::string more;
+    ASSERT_TRUE(terminal->read(more));
+    bytes += more;
+  }
+  EXPECT_EQ(bytes, "w\x03");
+}
+
+TEST_F(TerminalTest, KnowsItsExtent) {
+  const std::unique_ptr<Terminal> terminal = open();
+  EXPECT_EQ(terminal->extent(), (Extent{80, 24}));
+  winsize size{};
+  size.ws_col = 132;
+  size.ws_row = 43;
+  ASSERT_EQ(::ioctl(slave_, TIOCSWINSZ, &size), 0);
+  EXPECT_EQ(terminal->extent(), (Extent{132, 43}));
+}
+
+TEST_F(TerminalTest, AsksWhetherItReadsUtf8) {
+  const std::unique_ptr<Terminal> terminal = open();
+  type("\x1b[1;2R");
+  EXPECT_EQ(terminal->understands_utf8(), true);
+  type("\x1b[1;4R");
+  EXPECT_EQ(terminal->understands_utf8(), false);
+  EXPECT_EQ(terminal->understands_utf8(), std::nullopt);
+}
+
+TEST_F(TerminalTest, IsNotTakenWhereItCanDoNothing) {
+  ASSERT_EQ(::setenv("TERM", "dumb", 1), 0);
+  EXPECT_EQ(open(), nullptr);
+  ASSERT_EQ(::setenv("TERM", "xterm", 1), 0);
+  int pipe_ends[2];
+  ASSERT_EQ(::pipe(pipe_ends), 0);
+  EXPECT_EQ(Terminal::open({pipe_ends[0], pipe_ends[1]}), nullptr);
+  ::close(pipe_ends[0]);
+  ::close(pipe_ends[1]);
+}
+
+TEST(Environment, TellsTheColours) {
+  ::unsetenv("NO_COLOR");
+  ::unsetenv("COLORTERM");
+  ::setenv("TERM", "xterm-256color", 1);
+  EXPECT_EQ(colours_of_environment(), ColourDepth::k256);
+  ::setenv("NO_COLOR", "1", 1);
+  EXPECT_EQ(colours_of_environment(), ColourDepth::kNone);
+  ::setenv("NO_COLOR", "", 1);
+  ::setenv("TERM", "screen", 1);
+  EXPECT_EQ(colours_of_environment(), ColourDepth::k16);
+  ::setenv("COLORTERM", "truecolor", 1);
+  EXPECT_EQ(colours_of_environment(), ColourDepth::k256);
+  ::setenv("TERM", "dumb", 1);
+  EXPECT_EQ(colours_of_environment(), ColourDepth::kNone);
+}
+
+TEST(Environment, TellsTheEncodingIfItKnows) {
+  ::setenv("TERM", "xterm", 1);
+  ::unsetenv("LC_ALL");
+  ::unsetenv("LC_CTYPE");
+  ::setenv("LANG", "en_GB.UTF-8", 1);
+  EXPECT_EQ(utf8_of_environment(), true);
+  ::setenv("LC_ALL", "de_DE.ISO-8859-1", 1);
+  EXPECT_EQ(utf8_of_environment(), false);
+  ::setenv("LC_ALL", "C.utf8", 1);
+  EXPECT_EQ(utf8_of_environment(), true);
+  ::setenv("LC_ALL", "C", 1);
+  EXPECT_EQ(utf8_of_environment(), std::nullopt);
+  ::unsetenv("LC_ALL");
+  ::unsetenv("LANG");
+  EXPECT_EQ(utf8_of_environment(), std::nullopt);
+}
+
+}  // namespace
+}  // namespace gimnet::demo

@@ -1,0 +1,96 @@
+#include "tools/demo/viewer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "tests/tools/demo/fake_network.hpp"
+#include "tools/demo/log_player.hpp"
+#include "tools/demo/robot.hpp"
+#include "tools/demo/simulated_robot.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+// A robot in the hall and its viewer, half a second long.
+class ViewerTest : public testing::Test {
+ protected:
+  ViewerTest() {
+    network_.viewer.when_idle = [this] { EXPECT_FALSE(robot_.step()); };
+    options_.seconds = 0.5;
+    options_.autopilot = true;
+    options_.hub_url = "tcp://127.0.0.1:1";
+    options_.style = {true, ColourDepth::kNone};
+  }
+
+  FakeNetwork network_;
+  Robot robot_{network_.robot,
+               [](std::int64_t now_ns) { return std::make_unique<SimulatedRobot>(WorldMap::hall(), now_ns); }};
+  ViewerOptions options_;
+};
+
+TEST_F(ViewerTest, DrivesTheCourseAndLosesNothing) {
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), IsEmpty());
+  EXPECT_TRUE(viewer.record().finished);
+  EXPECT_GE(viewer.monitor().odometry_stream().received, 18U);
+  EXPECT_GT(viewer.record().commands, 5U);
+  EXPECT_TRUE(robot_.finished());
+}
+
+TEST_F(ViewerTest, SeesThatMessagesWereLost) {
+  network_.lose_each = 7;
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), Not(IsEmpty()));
+}
+
+TEST_F(ViewerTest, ReportsProgressAndPaints) {
+  std::string progress;
+  options_.on_progress = [&](const std::string& line) { progress += line; };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(progress, HasSubstr("odom"));
+  EXPECT_THAT(viewer.last_picture({80, 24}), HasSubstr("simulation"));
+}
+
+TEST_F(ViewerTest, EndsWhenAnotherProcessIsInTrouble) {
+  options_.trouble = [] { return std::optional(Error{"the hub ended"}); };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  const std::optional<Error> error = viewer.run();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->sentence, "the hub ended");
+}
+
+TEST_F(ViewerTest, WithoutAUserItEndsWithTheLog) {
+  RobotLog log;
+  log.records.resize(3);
+  log.records[2].due_s = 0.1;
+  Robot player(network_.robot, [log](std::int64_t now_ns) {
+    return std::make_unique<LogPlayer>(log, LogPlayer::Start{"a.log", 1.0, now_ns});
+  });
+  network_.viewer.when_idle = [&player] { EXPECT_FALSE(player.step()); };
+  options_.seconds.reset();
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), IsEmpty());
+  EXPECT_EQ(viewer.monitor().odometry_stream().received, 3U);
+}
+
+TEST_F(ViewerTest, ARobotOfOthersIsNotToldToFinish) {
+  options_.own_robot = false;
+  options_.seconds = 0.2;
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_FALSE(robot_.finished());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), IsEmpty());
+}
+
+}  // namespace
+}  // namespace gimnet::demo
