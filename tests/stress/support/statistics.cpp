@@ -1,0 +1,49 @@
+#include "tests/stress/support/statistics.hpp"
+
+#include <stdexcept>
+
+#include "proto/control/ctrl.hpp"
+
+namespace gimnet::stress {
+
+Statistics Statistics::of(RawNode& observer) {
+  Statistics statistics;
+  const auto answer = observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{});
+  for (const auto& shard : answer.shards) {
+    for (const auto& counter : shard.counters) statistics.counters_[counter.name] += counter.value;
+  }
+  return statistics;
+}
+
+std::uint64_t Statistics::dropped() const {
+  std::uint64_t sum = 0;
+  for (const auto& [name, value] : counters_) {
+    if (name.starts_with("dropped.")) sum += value;
+  }
+  return sum;
+}
+
+bool Statistics::is_balanced() const {
+  return (*this)["accepted"] + (*this)["copies"] == (*this)["delivered"] + dropped() + (*this)["queued"];
+}
+
+std::string Statistics::text() const {
+  std::string text;
+  for (const auto& [name, value] : counters_) {
+    if (value != 0) text += name + "=" + std::to_string(value) + " ";
+  }
+  return text;
+}
+
+Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics&)>& condition,
+                    const std::string& what) {
+  const Deadline deadline;
+  for (;;) {
+    Statistics statistics = Statistics::of(observer);
+    if (condition(statistics)) return statistics;
+    if (deadline.is_over()) throw std::runtime_error("waited in vain: " + what + ": " + statistics.text());
+    wait_readable({}, 5);
+  }
+}
+
+}  // namespace gimnet::stress

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "tests/stress/support/raw_node.hpp"
+
+namespace gimnet::stress {
+
+/// The counters of a hub, all shards together, as CTRL STATISTICS tells them.
+class Statistics {
+ public:
+  /// REQUIRES: no data frames are on their way to `observer`.
+  static Statistics of(RawNode& observer);
+
+  /// REQUIRES: the hub has a counter of that name.
+  [[nodiscard]] std::uint64_t operator[](const std::string& name) const { return counters_.at(name); }
+  /// Sum over all reasons.
+  [[nodiscard]] std::uint64_t dropped() const;
+  /// accepted + copies = delivered + dropped + queued.
+  [[nodiscard]] bool is_balanced() const;
+  /// All counters that are not zero, for messages.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  std::map<std::string, std::uint64_t> counters_;
+};
+
+/// Asks until the condition holds, and returns what held; throws, with the last counters, when time is over.
+[[nodiscard]] Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics&)>& condition,
+                                  const std::string& what);
+
+}  // namespace gimnet::stress
