@@ -1,0 +1,107 @@
+"""docs/performance.md from the JSON document of a run."""
+
+from driver.goals import FIELD_TITLES, GOALS, Goal
+from driver.summary import COLUMNS, cells, shown
+
+INTRODUCTION = """# Performance
+
+What the hub costs, measured against the cheapest relay that there can be. This page is written by `./dev perf --report`;
+nothing here is edited by hand.
+
+## The yardstick
+
+**Null relay** (`perf/null_relay.cpp`): one thread, epoll, `recv` into a buffer of 256 KiB, `send` of the same bytes, no parsing,
+with the hub's socket options and on the hub's processor. It moves connection 2k to 2k+1, or connection 0 to all others, and it is given
+byte for byte the frames that the hub is given. **Cost** is the processor time (user and system) of the measured process
+divided by the messages that arrived; every message is compared byte for byte at its receiver, and what did not arrive is counted. The subject has one
+processor for itself and the generator another, except in `ping_one_cpu`. Each run has a fresh process; hub and null relay take turns, and a
+row is the median of its runs. What is measured is `build/release/bin/tcphub` as it starts by default. Absolute figures differ from
+machine to machine; the ratios of one run are what counts.
+
+At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
+fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`.
+
+| scenario | what happens |
+| --- | --- |
+| one_to_one | one node sends to another |
+| one_to_one_unbatched | a system call for each message |
+| four_to_four | four such pairs |
+| in_turns | one node sends each message to another of 8 nodes; compared with the one_to_one null relay |
+| fan_out_N | a service with N subscribers; compared with a null relay that sends to all |
+| list_100, broadcast_100 | the same by recipient list, and by broadcast to all nodes of the hub; compared with the null fan_out_100 |
+| ping_one_cpu | round trips of 16 B, generator and hub on one processor: the software's path without idle wake-ups |
+| ping_two_cpus, ping_paced | round trips between two processors, without a pause, and at 1 kHz |
+| ping_under_bulk, ping_under_300MBps | round trips in lane 0 while another pair moves 64 KiB messages in lane 2, at full speed and at 300 MB/s |
+| stalled_subscriber | a service at line rate with a subscriber that does not read beside one that does |
+| idle_10000 | 10,000 nodes that say nothing but keep-alives |
+| connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
+"""
+
+
+def with_derived(rows: list[dict]) -> list[dict]:
+    """Adds the figures that need two rows."""
+    null_seconds = {(row["scenario"], row["transport"]): row["seconds"] for row in rows
+                    if row["subject"] == "null" and "seconds" in row}
+    derived = []
+    for row in rows:
+        other = null_seconds.get((row["scenario"], row["transport"]))
+        extra = {"seconds_over_null": row["seconds"] - other} if other is not None and row["subject"] != "null" else {}
+        derived.append(row | extra)
+    return derived
+
+
+def table(titles: list[str], lines: list[list[str]]) -> str:
+    head = ["| " + " | ".join(titles) + " |", "| " + " | ".join("---" for _ in titles) + " |"]
+    return "\n".join(head + ["| " + " | ".join(line) + " |" for line in lines])
+
+
+def verdict(goal: Goal, value: float) -> str:
+    if goal.holds(value, goal.goal):
+        return "goal met"
+    if goal.bound is None:
+        return "goal open"
+    return "bound met, goal open" if goal.holds(value, goal.bound) else "**bound missed**"
+
+
+def goal_table(rows: list[dict]) -> str:
+    measured = {(row["scenario"], row["size"], row["transport"]): row for row in rows if row["subject"] == "tcphub"}
+    lines = []
+    for goal in GOALS:
+        row = measured.get((goal.scenario, goal.size, goal.transport))
+        value = row.get(goal.field) if row is not None else None
+        sign = ">=" if goal.at_least else "<="
+        lines.append([goal.scenario, str(goal.size), goal.transport, FIELD_TITLES[goal.field],
+                      f"{sign} {shown(goal.bound)}" if goal.bound is not None else "", f"{sign} {shown(goal.goal)}",
+                      shown(value) if value is not None else "not measured",
+                      verdict(goal, value) if value is not None else ""])
+    return table(["scenario", "bytes", "transport", "figure", "bound", "goal", "measured", ""], lines)
+
+
+def other_figures(rows: list[dict]) -> str:
+    """Memory, rates and times that have no column of their own."""
+    names = {"rate_kept": "rate kept beside a stalled subscriber", "rss_growth_bytes": "bytes grown by meanwhile",
+             "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
+             "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s"}
+    lines = [[row["subject"], row["transport"], row["scenario"], title, shown(row[name])] for row in rows
+             for name, title in names.items() if name in row]
+    return table(["subject", "transport", "scenario", "figure", "median"], lines)
+
+
+def make_document(result: dict) -> str:
+    rows = with_derived(result["results"])
+    machine = result["machine"]
+    hub = " ".join(result["hub_arguments"]) or "none"
+    return "\n".join([
+        INTRODUCTION,
+        "## Where and when", "",
+        f"{result['date']}; {machine['processor']}, {machine['cpus_allowed']} processors, {machine['system']}, "
+        f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}; {result['seconds']} s a run; "
+        f"further arguments of the hub: {hub}.", "",
+        "## Bounds and goals", "",
+        "A bound must hold; a goal is where the hub is to get.", "",
+        goal_table(rows), "",
+        "## All figures", "",
+        "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
+        "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000.", "",
+        table([title for _, title in COLUMNS], [cells(row) for row in rows]), "",
+        other_figures(rows), ""])

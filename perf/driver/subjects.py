@@ -1,0 +1,144 @@
+"""The programs that are measured: how each is started, pinned to its processor, found ready, and ended."""
+
+import ctypes
+import os
+import pathlib
+import select
+import signal
+import subprocess
+import tempfile
+import time
+
+READY_SECONDS = 15
+PR_SET_PDEATHSIG = 1
+# The hub sets this on every connection; the null relay gets the same.
+SEND_BUFFER_BYTES = 256 * 1024
+
+
+class SubjectError(Exception):
+    """A subject did not start, or ended before it was told to."""
+
+
+def allowed_cpus() -> list[int]:
+    return sorted(os.sched_getaffinity(0))
+
+
+def child_setup(cpu: int):
+    """For subprocess: pins the child, and ends it when this program dies."""
+    libc = ctypes.CDLL(None, use_errno=True)
+
+    def set_up():
+        os.sched_setaffinity(0, {cpu})
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+    return set_up
+
+
+class Subject:
+    """A running hub or relay, for `with`. Listens on TCP and on a Unix socket, on one processor."""
+
+    name = ""
+    wire = ""
+
+    def __init__(self, build: pathlib.Path, cpu: int):
+        self._build = build
+        self._cpu = cpu
+        self._folder = tempfile.TemporaryDirectory(prefix="gimnet-perf-")
+        self._process: subprocess.Popen | None = None
+        self.urls: dict[str, str] = {}
+
+    def command(self, folder: str) -> list[str]:
+        raise NotImplementedError
+
+    def __enter__(self) -> "Subject":
+        self._log = open(os.path.join(self._folder.name, "log"), "w+b")
+        command = self.command(self._folder.name)
+        try:
+            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                             stderr=self._log, preexec_fn=child_setup(self._cpu))
+            self._await_ready()
+        except OSError as error:
+            self._close()
+            raise SubjectError(f"{self.name} cannot be started: {error}") from None
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._close()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def check_alive(self) -> None:
+        """Raises SubjectError, with the end of its log, when it is gone."""
+        status = self._process.poll()
+        if status is None:
+            return
+        how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
+        raise SubjectError(f"{self.name} ended by itself with {how}: {self._log_end()}")
+
+    def _await_ready(self) -> None:
+        deadline = time.monotonic() + READY_SECONDS
+        line = b""
+        output = self._process.stdout.fileno()
+        while not line.endswith(b"\n"):
+            ready, _, _ = select.select([output], [], [], max(0.0, deadline - time.monotonic()))
+            piece = os.read(output, 4096) if ready else b""
+            if not piece:
+                self._process.wait(1) if ready else None
+                self.check_alive()
+                raise SubjectError(f"{self.name} was not ready within {READY_SECONDS} s: {self._log_end()}")
+            line += piece
+        words = line.decode().split()
+        if len(words) != 3 or words[0] != "ready":
+            raise SubjectError(f"{self.name} did not print its addresses, but: {line.decode().strip()}")
+        self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in words[1:]}
+
+    def _log_end(self) -> str:
+        self._log.seek(0)
+        return self._log.read()[-2000:].decode(errors="replace").strip() or "it logged nothing"
+
+    def _close(self) -> None:
+        if self._process is not None:
+            self._process.terminate()
+            try:
+                self._process.wait(2)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+            self._process.stdout.close()
+        self._log.close()
+        self._folder.cleanup()
+
+
+class NullRelay(Subject):
+    """The yardstick."""
+
+    name = "null"
+    wire = "null"
+
+    def __init__(self, build: pathlib.Path, cpu: int, mode: str):
+        super().__init__(build, cpu)
+        self._mode = mode
+
+    def command(self, folder: str) -> list[str]:
+        return [str(self._build / "bin" / "null_relay"), "--mode", self._mode, "--listen", "tcp://127.0.0.1:0",
+                "--listen", f"unix:{folder}/socket", "--send-buffer", str(SEND_BUFFER_BYTES)]
+
+
+class TcpHub(Subject):
+    """The shipped hub as it starts by default, apart from where it listens."""
+
+    name = "tcphub"
+    wire = "gimnet"
+
+    def __init__(self, build: pathlib.Path, cpu: int, arguments: list[str]):
+        super().__init__(build, cpu)
+        self._arguments = arguments
+
+    def command(self, folder: str) -> list[str]:
+        return [str(self._build / "bin" / "tcphub"), "--listen", "tcp://127.0.0.1:0", "--listen",
+                f"unix:{folder}/socket", "--hub-id", "7", "--state-dir", f"{folder}/state", *self._arguments]

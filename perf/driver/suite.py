@@ -1,0 +1,96 @@
+"""The scenarios, what each is compared with, and which of them make up a quick, a whole and a smoke run."""
+
+from dataclasses import dataclass
+
+SIZES = (16, 256, 1024, 4096, 65536)
+CPU = "cpu_ns_per_message"
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """How a scenario is run and judged. The generator (perf/generator/scenario.cpp) knows what it does."""
+
+    relay_mode: str | None = "pair"  # how the null relay runs its baseline; None: there is nothing to compare with
+    baseline: str | None = None  # the null relay's scenario where it is another one
+    metric: str = CPU  # the figure whose ratio, minimum and maximum are reported: less is better
+    one_cpu: bool = False  # generator on the subject's processor
+    sizes: tuple[int, ...] = (16,)
+    transports: tuple[str, ...] = ("tcp", "unix")
+
+
+SCENARIOS = {
+    "one_to_one": Scenario(sizes=SIZES),
+    "one_to_one_unbatched": Scenario(sizes=(16, 256, 1024, 4096)),
+    "four_to_four": Scenario(sizes=(16, 256, 4096, 65536)),
+    "in_turns": Scenario(baseline="one_to_one", sizes=(16, 256, 4096, 65536)),
+    "fan_out_10": Scenario(relay_mode="fan_out", sizes=(16, 1024, 65536)),
+    "fan_out_100": Scenario(relay_mode="fan_out", sizes=(16, 1024, 65536)),
+    "fan_out_1000": Scenario(relay_mode="fan_out", sizes=(16, 1024)),
+    "list_100": Scenario(relay_mode="fan_out", baseline="fan_out_100", sizes=(16, 1024)),
+    "broadcast_100": Scenario(relay_mode="fan_out", baseline="fan_out_100", sizes=(16, 1024)),
+    "ping_one_cpu": Scenario(metric="p50_us", one_cpu=True),
+    "ping_two_cpus": Scenario(metric="p50_us"),
+    "ping_paced": Scenario(metric="p50_us"),
+    "ping_under_bulk": Scenario(metric="p99_us"),
+    "ping_under_300MBps": Scenario(metric="p99_us"),
+    "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), transports=("tcp",)),
+    "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", transports=("tcp",)),
+    "connect_10000": Scenario(metric="seconds", transports=("tcp",)),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the table."""
+
+    scenario: str
+    size: int
+    transport: str
+
+    @property
+    def spec(self) -> Scenario:
+        return SCENARIOS[self.scenario]
+
+    @property
+    def baseline(self) -> "Case | None":
+        """What the null relay is asked to do for comparison."""
+        if self.spec.relay_mode is None:
+            return None
+        return Case(self.spec.baseline or self.scenario, self.size, self.transport)
+
+    def __str__(self) -> str:
+        return f"{self.scenario} {self.size} B {self.transport}"
+
+
+def whole_cases() -> list[Case]:
+    return [Case(name, size, transport) for name, spec in SCENARIOS.items() for transport in spec.transports
+            for size in spec.sizes]
+
+
+def quick_cases() -> list[Case]:
+    over_tcp = [("one_to_one", 16), ("one_to_one", 256), ("one_to_one", 4096), ("one_to_one", 65536),
+                ("one_to_one_unbatched", 16), ("four_to_four", 16), ("in_turns", 16), ("fan_out_10", 16),
+                ("fan_out_100", 16), ("fan_out_1000", 16), ("fan_out_1000", 1024), ("list_100", 16),
+                ("broadcast_100", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16), ("ping_under_bulk", 16),
+                ("stalled_subscriber", 1024), ("idle_10000", 16), ("connect_10000", 16)]
+    over_unix = [("one_to_one", 16), ("one_to_one", 65536), ("one_to_one_unbatched", 16), ("ping_one_cpu", 16)]
+    return [Case(*case, "tcp") for case in over_tcp] + [Case(*case, "unix") for case in over_unix]
+
+
+def smoke_cases() -> list[Case]:
+    """Every scenario once, the basic ones in every size class and on both transports."""
+    cases = [Case(name, spec.sizes[0], "tcp") for name, spec in SCENARIOS.items()]
+    cases += [Case("one_to_one", size, transport) for size in (4096, 65536) for transport in ("tcp", "unix")]
+    cases += [Case("in_turns", 65536, "tcp"), Case("fan_out_10", 65536, "unix"), Case("ping_one_cpu", 16, "unix")]
+    return cases
+
+
+# In a smoke run nothing is compared; the null relay is run in each of its modes, so that it cannot rot.
+SMOKE_NULL_SCENARIOS = frozenset({"one_to_one", "fan_out_10", "ping_one_cpu"})
+
+
+def chosen_cases(scenarios: list[str], sizes: list[int], transports: list[str]) -> list[Case]:
+    """The scenarios asked for, in the sizes asked for, which may be others than usual."""
+    return [Case(name, size, transport) for name in scenarios or SCENARIOS
+            for transport in SCENARIOS[name].transports if not transports or transport in transports
+            for size in sizes or SCENARIOS[name].sizes]

@@ -1,0 +1,138 @@
+#include "generator/engine.hpp"
+
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace gimnet::perf {
+namespace {
+
+constexpr std::size_t kReadBytes = 256 * 1024;
+/// The longest incomplete message that is carried over to the next read.
+constexpr std::size_t kCarryBytesMax = 2 * 1024 * 1024;
+constexpr std::size_t kEventsMax = 512;
+constexpr std::size_t kJoiningMax = 64;
+constexpr std::chrono::milliseconds kKeepAlive{900};
+constexpr std::chrono::seconds kAnswerLimit{10};
+
+}  // namespace
+
+Engine::Engine(Wire& wire, Endpoint endpoint)
+    : wire_(wire),
+      endpoint_(std::move(endpoint)),
+      epoll_(::epoll_create1(EPOLL_CLOEXEC)),
+      buffer_(std::make_unique<std::byte[]>(kCarryBytesMax + kReadBytes)),
+      next_keep_alive_(Clock::now() + kKeepAlive) {}
+
+Engine::~Engine() {
+  clients_.clear();
+  ::close(epoll_);
+}
+
+void Engine::connect(std::size_t count) {
+  const std::size_t first = clients_.size();
+  for (std::size_t index = first; index < first + count; ++index) {
+    clients_.push_back(std::make_unique<Client>(index, connect_to(endpoint_)));
+    Client& added = *clients_.back();
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = index;
+    if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, added.socket(), &event) != 0) fail("epoll_ctl", errno);
+    wire_.open(added);
+    if (added.is_joined) ++joined_count_;
+    const bool room = poll_until([this, index] { return index + 1 - joined_count_ < kJoiningMax; }, kAnswerLimit);
+    if (!room) fail("the subject admits nobody any more: no answer within 10 s");
+  }
+  const bool all = poll_until([this] { return joined_count_ == clients_.size(); }, kAnswerLimit);
+  if (!all) fail("the subject did not admit all clients within 10 s");
+}
+
+void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
+  Client& provider = client(0);
+  if (!provider.is_in_group) {
+    wire_.provide(provider);
+    if (!poll_until([&provider] { return provider.is_in_group; }, kAnswerLimit)) fail("no answer to ADVERTISE");
+  }
+  for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
+    Client& subscriber = client(index);
+    wire_.subscribe(subscriber);
+    // Not a round trip each: every so many the last one's answer is waited for.
+    if (index % kJoiningMax != 0) continue;
+    if (!poll_until([&subscriber] { return subscriber.is_in_group; }, kAnswerLimit)) fail("no answer to SUBSCRIBE");
+  }
+  const auto all_in_group = [this, first_subscriber, count] {
+    for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
+      if (!client(index).is_in_group) return false;
+    }
+    return true;
+  };
+  if (!poll_until(all_in_group, kAnswerLimit)) fail("the subject did not answer every SUBSCRIBE within 10 s");
+}
+
+std::uint64_t Engine::poll(std::chrono::nanoseconds timeout) {
+  if (Clock::now() >= next_keep_alive_) keep_alive();
+  std::array<epoll_event, kEventsMax> events;
+  const timespec wait{.tv_sec = timeout.count() / 1'000'000'000, .tv_nsec = timeout.count() % 1'000'000'000};
+  const int count = ::epoll_pwait2(epoll_, events.data(), kEventsMax, &wait, nullptr);
+  if (count < 0 && errno != EINTR) fail("epoll_pwait2", errno);
+  std::uint64_t settled = 0;
+  for (int index = 0; index < count; ++index) {
+    Client& ready = *clients_[events[static_cast<std::size_t>(index)].data.u64];
+    const std::uint64_t before = ready.inbox.settled();
+    read(ready);
+    settled += ready.inbox.settled() - before;
+  }
+  return settled;
+}
+
+bool Engine::poll_until(const std::function<bool()>& done, std::chrono::nanoseconds limit) {
+  const auto deadline = Clock::now() + limit;
+  while (!done()) {
+    if (Clock::now() >= deadline) return false;
+    poll(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+void Engine::stop_reading(Client& client) {
+  client.is_reading = false;
+  epoll_event event{};
+  event.data.u64 = client.index();
+  if (::epoll_ctl(epoll_, EPOLL_CTL_MOD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
+}
+
+void Engine::read(Client& client) {
+  if (client.is_closed) return on_closed(client);
+  auto& carry = client.carry();
+  if (carry.size() > kCarryBytesMax) fail("a message without an end");
+  std::memcpy(buffer_.get(), carry.data(), carry.size());
+  const ssize_t size = ::recv(client.socket(), buffer_.get() + carry.size(), kReadBytes, 0);
+  if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (size <= 0) return on_closed(client);
+  const std::span<const std::byte> bytes(buffer_.get(), carry.size() + static_cast<std::size_t>(size));
+  const bool was_joined = client.is_joined;
+  const auto rest = bytes.subspan(wire_.take(client, bytes));
+  if (client.is_joined && !was_joined) ++joined_count_;
+  carry.assign(rest.begin(), rest.end());
+}
+
+void Engine::on_closed(Client& client) {
+  if (!is_closing_tolerated_) fail("the subject closed the connection of client " + std::to_string(client.index()));
+  client.is_closed = true;
+  ++closed_count_;
+  if (::epoll_ctl(epoll_, EPOLL_CTL_DEL, client.socket(), nullptr) != 0) fail("epoll_ctl", errno);
+}
+
+void Engine::keep_alive() {
+  next_keep_alive_ = Clock::now() + kKeepAlive;
+  for (auto& client : clients_) {
+    if (client->is_joined && !client->is_closed) wire_.keep_alive(*client);
+  }
+}
+
+}  // namespace gimnet::perf

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "generator/client.hpp"
+#include "generator/wire.hpp"
+#include "net/socket.hpp"
+
+namespace gimnet::perf {
+
+using Clock = std::chrono::steady_clock;
+
+/// All clients of a run, on one thread and one epoll: connects them, reads them, keeps them alive.
+/// A subject that refuses, closes or does not answer ends the program with a sentence.
+class Engine {
+ public:
+  Engine(Wire& wire, Endpoint endpoint);
+  ~Engine();
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  /// Connects `count` more clients, at most 64 of them waiting for their admission at a time.
+  void connect(std::size_t count);
+  /// Client 0 provides the group, clients 1..count subscribe to it.
+  void join_group(std::size_t first_subscriber, std::size_t count);
+
+  /// Waits at most `timeout` for something to read, then reads every ready client once. Returns the messages that
+  /// were settled (delivered or known as lost) by that.
+  std::uint64_t poll(std::chrono::nanoseconds timeout);
+  /// Polls until `done` holds; false after `limit`.
+  [[nodiscard]] bool poll_until(const std::function<bool()>& done, std::chrono::nanoseconds limit);
+
+  /// Whether a client that the subject closes ends the program, which is the default.
+  void tolerate_closing(bool tolerated) { is_closing_tolerated_ = tolerated; }
+  void stop_reading(Client& client);
+
+  [[nodiscard]] Client& client(std::size_t index) { return *clients_[index]; }
+  [[nodiscard]] std::size_t client_count() const { return clients_.size(); }
+  [[nodiscard]] Wire& wire() { return wire_; }
+  [[nodiscard]] std::size_t closed_count() const { return closed_count_; }
+
+ private:
+  void read(Client& client);
+  void on_closed(Client& client);
+  void keep_alive();
+
+  Wire& wire_;
+  const Endpoint endpoint_;
+  const int epoll_;
+  std::unique_ptr<std::byte[]> buffer_;
+  std::vector<std::unique_ptr<Client>> clients_;
+  Clock::time_point next_keep_alive_;
+  std::size_t joined_count_ = 0;
+  std::size_t closed_count_ = 0;
+  bool is_closing_tolerated_ = false;
+};
+
+}  // namespace gimnet::perf

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "generator/engine.hpp"
+#include "generator/publisher.hpp"
+
+namespace gimnet::perf {
+
+/// Publishes in a window, so that nobody is measured while it drops: at most 2 MiB are under way, or 128 KiB a
+/// recipient where that is more. Of unbatched messages at most 64 a recipient are: where a subject that was not
+/// scheduled for a moment finds many of them at once, its cost says nothing about one. Counts what was sent to how
+/// many, and what became of it.
+class Flood {
+ public:
+  /// `recipients_a_message`: copies that the subject makes of each message. `bytes_a_second` 0: no pace.
+  Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message, double bytes_a_second = 0);
+
+  /// One turn: each publisher writes once if the window lets it, then every ready client is read once.
+  /// Waits at most `patience` where nothing could be written. Returns messages settled.
+  std::uint64_t turn(std::chrono::nanoseconds patience);
+  /// Turns until `duration` is over.
+  void run_for(std::chrono::nanoseconds duration);
+  /// Reads until all is settled. What does not come within 2 s counts as lost.
+  void drain();
+
+  /// Deliveries that were asked for and are settled. Those of other messages that turn() settled are taken out.
+  void forget_settled(std::uint64_t foreign) { settled_ -= foreign; }
+  [[nodiscard]] std::uint64_t expected() const { return expected_; }
+  [[nodiscard]] std::uint64_t missing() const { return missing_; }
+  /// A recipient is not waited for any more.
+  void set_recipients_a_message(std::size_t count) { recipients_a_message_ = count; }
+
+ private:
+  bool publish();
+  [[nodiscard]] std::uint64_t deliveries_allowed() const;
+
+  Engine& engine_;
+  std::vector<Publisher> publishers_;
+  std::size_t recipients_a_message_;
+  const double bytes_a_second_;
+  const std::size_t message_bytes_;
+  const bool is_unbatched_;
+  Clock::time_point begin_;
+  std::uint64_t begun_bytes_ = 0;  ///< for the pace
+  std::uint64_t expected_ = 0;     ///< deliveries
+  std::uint64_t settled_ = 0;      ///< deliveries
+  std::uint64_t missing_ = 0;      ///< deliveries given up
+};
+
+}  // namespace gimnet::perf

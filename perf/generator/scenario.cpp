@@ -1,0 +1,83 @@
+#include "generator/scenario.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace gimnet::perf {
+namespace {
+
+struct Named {
+  const char* name;
+  Scenario scenario;
+};
+
+template <std::size_t count>
+Findings fan_out_to(Engine& engine, const RunOptions& options) {
+  return fan_out(engine, options, count);
+}
+
+Findings ping_under_300MBps(Engine& engine, const RunOptions& options) {
+  RunOptions paced = options;
+  paced.bulk_bytes_a_second = 300e6;
+  return ping_under_bulk(engine, paced);
+}
+
+// ping_one_cpu and ping_two_cpus are one scenario here: where the processes run is the driver's affair.
+constexpr Named kScenarios[] = {
+    {"one_to_one", one_to_one},
+    {"one_to_one_unbatched", one_to_one_unbatched},
+    {"four_to_four", four_to_four},
+    {"in_turns", in_turns},
+    {"fan_out_10", fan_out_to<10>},
+    {"fan_out_100", fan_out_to<100>},
+    {"fan_out_1000", fan_out_to<1000>},
+    {"list_100", list_100},
+    {"broadcast_100", broadcast_100},
+    {"ping_one_cpu", ping},
+    {"ping_two_cpus", ping},
+    {"ping_paced", ping_paced},
+    {"ping_under_bulk", ping_under_bulk},
+    {"ping_under_300MBps", ping_under_300MBps},
+    {"stalled_subscriber", stalled_subscriber},
+    {"idle_10000", idle},
+    {"connect_10000", connect_many},
+};
+
+}  // namespace
+
+std::string Findings::json() const {
+  std::string text = "{";
+  for (const auto& [name, value] : values_) {
+    char number[64];
+    std::snprintf(number, sizeof(number), "%.12g", std::isfinite(value) ? value : 0.0);
+    text += (text.size() > 1 ? ", \"" : "\"") + name + "\": " + number;
+  }
+  return text + "}";
+}
+
+void add_ledger(Engine& engine, Findings& findings) {
+  if (!engine.wire().ask_for_ledger(engine.client(0))) return;
+  const auto answered = [&engine] { return engine.wire().ledger().has_value(); };
+  if (!engine.poll_until(answered, std::chrono::seconds(10))) fail("the subject did not answer STATISTICS within 10 s");
+  const Ledger ledger = *engine.wire().ledger();
+  const auto gap =
+      static_cast<std::int64_t>(ledger.accepted + ledger.copies - ledger.delivered - ledger.dropped - ledger.queued);
+  findings.add("dropped_frames", static_cast<double>(ledger.dropped));
+  findings.add("queued_frames", static_cast<double>(ledger.queued));
+  findings.add("ledger_gap", static_cast<double>(gap));
+}
+
+Scenario find_scenario(const std::string& name) {
+  for (const auto& entry : kScenarios) {
+    if (name == entry.name) return entry.scenario;
+  }
+  return nullptr;
+}
+
+std::vector<std::string> scenario_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : kScenarios) names.emplace_back(entry.name);
+  return names;
+}
+
+}  // namespace gimnet::perf

@@ -1,0 +1,42 @@
+// Runs one scenario against one subject and prints what it found as one JSON object. perf/run.py starts it, beside the
+// subject and on the right processor; docs/performance.md says what the scenarios are.
+//
+//     load_generator --wire gimnet --connect tcp://127.0.0.1:7450 --process PID --scenario one_to_one --size 16
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <string>
+
+#include "generator/engine.hpp"
+#include "generator/scenario.hpp"
+#include "generator/wire.hpp"
+#include "net/socket.hpp"
+
+int main(int argc, char** argv) {
+  using namespace gimnet::perf;
+  CLI::App app{"load_generator: measures a hub, or the null relay, from outside"};
+  std::string wire_name = "gimnet";
+  std::string url;
+  std::string scenario_name;
+  double seconds = 1;
+  RunOptions options;
+  app.add_option("--wire", wire_name, "how the subject is spoken to: gimnet or null");
+  app.add_option("--connect", url, "tcp://HOST:PORT or unix:PATH")->required();
+  app.add_option("--process", options.process, "process id of the subject")->required();
+  app.add_option("--scenario", scenario_name)->required()->check(CLI::IsMember(scenario_names()));
+  app.add_option("--size", options.payload_bytes, "payload in bytes")
+      ->check(CLI::Range(kPayloadBytesMin, kPayloadBytesMax));
+  app.add_option("--seconds", seconds, "how long is measured")->check(CLI::Range(0.01, 3600.0));
+  app.add_option("--clients", options.client_count, "connections of idle_10000 and connect_10000")
+      ->check(CLI::Range(2, 1'000'000));
+  CLI11_PARSE(app, argc, argv);
+
+  options.duration = std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
+  raise_descriptor_limit();
+  const auto wire = make_wire(wire_name);
+  if (wire == nullptr) fail("there is no wire of that name");
+  Engine engine(*wire, parse_endpoint(url));
+  Findings findings = find_scenario(scenario_name)(engine, options);
+  add_ledger(engine, findings);
+  std::puts(findings.json().c_str());
+}

@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Measures the shipped hub against the null relay. `./dev perf` calls it after building; docs/performance.md explains
+what is measured and how. The table and all progress go to standard error; --json prints one document on standard output."""
+
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import platform
+import re
+import signal
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
+from driver import suite  # noqa: E402
+from driver.document import make_document  # noqa: E402
+from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
+from driver.subjects import allowed_cpus  # noqa: E402
+from driver.summary import make_rows, text_table  # noqa: E402
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+QUICK_SECONDS = 0.5
+WHOLE_SECONDS = 1.0
+SMOKE_SECONDS = 0.1
+SMOKE_CLIENTS = 200
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="the scenarios that decide, in a few minutes")
+    parser.add_argument("--smoke", action="store_true", help="every scenario for a moment: nothing lost? not timed")
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--report", action="store_true", help="write docs/performance.md")
+    parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
+                        metavar="NAME", help=", ".join(suite.SCENARIOS))
+    parser.add_argument("--size", nargs="+", action="extend", type=int, default=[], metavar="BYTES")
+    parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
+    parser.add_argument("--seconds", type=float, help="length of each measurement")
+    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3)")
+    parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
+    parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
+                        help="more for the hub's command line; repeatable, write --hub-argument=--shards")
+    return parser.parse_args()
+
+
+def choose_cases(arguments: argparse.Namespace) -> list[suite.Case]:
+    if arguments.scenario or arguments.size or arguments.transport:
+        return suite.chosen_cases(arguments.scenario, arguments.size, arguments.transport)
+    if arguments.smoke:
+        return suite.smoke_cases()
+    return suite.quick_cases() if arguments.quick else suite.whole_cases()
+
+
+def make_settings(arguments: argparse.Namespace) -> Settings:
+    usual = SMOKE_SECONDS if arguments.smoke else QUICK_SECONDS if arguments.quick else WHOLE_SECONDS
+    return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
+                    runs=arguments.runs or (1 if arguments.smoke else 3),
+                    clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument,
+                    null_scenarios=suite.SMOKE_NULL_SCENARIOS if arguments.smoke else None)
+
+
+def processor_name() -> str:
+    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return line.split(":", 1)[1].strip()
+    return platform.machine()
+
+
+def describe_machine() -> dict:
+    return {"processor": processor_name(), "cpus": os.cpu_count(), "cpus_allowed": len(allowed_cpus()),
+            "kernel": platform.release(), "system": platform.freedesktop_os_release().get("PRETTY_NAME", "")}
+
+
+def program_version() -> str:
+    """The version of the project and, where this is a git work tree, the commit."""
+    found = re.search(r"project\(gimnet VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
+    version = found.group(1) if found else "unknown"
+    try:
+        commit = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True,
+                                text=True, timeout=10)
+        return f"{version} ({commit.stdout.strip()})" if commit.returncode == 0 else version
+    except (OSError, subprocess.TimeoutExpired):
+        return version
+
+
+def judge(outcomes: list[Outcome], rows: list[dict], is_smoke: bool) -> int:
+    """The exit status: nothing failed, nothing arrived wrong, ledgers are exact; in a smoke run nothing was lost either."""
+    status = 0
+    for outcome in outcomes:
+        if outcome.error is not None:
+            say(f"error: {outcome.error}")
+            status = 1
+    for row in rows:
+        where = f"{row['subject']}, {row['scenario']} {row['size']} B {row['transport']}"
+        if row.get("wrong"):
+            say(f"error: {where}: {row['wrong']} messages arrived that were not sent so")
+            status = 1
+        if row.get("ledger_gap"):
+            say(f"error: {where}: the hub's ledger does not explain {row['ledger_gap']} frames")
+            status = 1
+        if row.get("lost"):
+            say(f"{'error' if is_smoke else 'warning'}: {where}: {row['lost']} messages were lost")
+            status = 1 if is_smoke else status
+    return status
+
+
+def main() -> int:
+    arguments = parse_arguments()
+    settings = make_settings(arguments)
+    for program in ("tcphub", "null_relay", "load_generator"):
+        if not (settings.build / "bin" / program).exists():
+            say(f"error: {settings.build}/bin/{program} is not there: build it first (./dev build)")
+            return 1
+    if len(allowed_cpus()) < 2:
+        say("warning: one processor only: the generator takes the subject's time")
+    outcomes = run_cases(choose_cases(arguments), settings)
+    rows = make_rows(outcomes)
+    say(text_table(rows))
+    document = {"results": rows, "machine": describe_machine(), "version": program_version(),
+                "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+                "seconds": settings.seconds, "hub_arguments": settings.hub_arguments}
+    if arguments.json:
+        print(json.dumps(document, indent=1))
+    if arguments.report:
+        (ROOT / "docs" / "performance.md").write_text(make_document(document))
+    return judge(outcomes, rows, arguments.smoke)
+
+
+if __name__ == "__main__":
+    # So that `with` blocks end their children when this program is told to stop.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)

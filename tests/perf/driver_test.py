@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+"""perf/run.py without the programs that it runs: what is compared with what, and how rows and the document are made."""
+
+import pathlib
+import sys
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "perf"))
+
+from driver import suite  # noqa: E402
+from driver.document import make_document, with_derived  # noqa: E402
+from driver.goals import GOALS, Goal  # noqa: E402
+from driver.measure import Outcome  # noqa: E402
+from driver.summary import make_rows, shown, text_table  # noqa: E402
+
+
+def outcome(subject: str, case: suite.Case, costs: list[float], lost: int = 0) -> Outcome:
+    return Outcome(subject, case, [{case.spec.metric: cost, "lost": lost, "wrong": 0} for cost in costs])
+
+
+class Suite(unittest.TestCase):
+    def test_every_list_of_cases_is_legal(self):
+        for cases in (suite.whole_cases(), suite.quick_cases(), suite.smoke_cases()):
+            self.assertEqual(len(cases), len(set(cases)))
+            for case in cases:
+                self.assertIn(case.scenario, suite.SCENARIOS)
+                self.assertIn(case.transport, case.spec.transports)
+
+    def test_smoke_leaves_no_scenario_out(self):
+        self.assertEqual({case.scenario for case in suite.smoke_cases()}, set(suite.SCENARIOS))
+
+    def test_in_turns_is_compared_with_one_to_one(self):
+        self.assertEqual(suite.Case("in_turns", 16, "tcp").baseline, suite.Case("one_to_one", 16, "tcp"))
+
+    def test_quick_measures_every_goal(self):
+        quick = set(suite.quick_cases())
+        for goal in GOALS:
+            self.assertIn(suite.Case(goal.scenario, goal.size, goal.transport), quick)
+
+
+class Rows(unittest.TestCase):
+    def test_ratio_is_of_medians(self):
+        case = suite.Case("one_to_one", 16, "tcp")
+        rows = make_rows([outcome("null", case, [10, 30, 20]), outcome("tcphub", case, [50, 30, 30])])
+        self.assertEqual([row["ratio_to_null"] for row in rows], [1.0, 1.5])
+        self.assertEqual((rows[1]["min"], rows[1]["max"], rows[1]["runs"]), (30, 50, 3))
+
+    def test_unix_is_compared_with_tcp_too(self):
+        tcp, unix = suite.Case("one_to_one", 16, "tcp"), suite.Case("one_to_one", 16, "unix")
+        rows = make_rows([outcome("null", tcp, [10]), outcome("null", unix, [8]), outcome("tcphub", unix, [4])])
+        self.assertEqual(rows[2]["ratio_to_null"], 0.5)
+        self.assertEqual(rows[2]["ratio_to_null_tcp"], 0.4)
+
+    def test_losses_of_all_runs_are_summed(self):
+        case = suite.Case("fan_out_10", 16, "tcp")
+        self.assertEqual(make_rows([outcome("tcphub", case, [1, 2], lost=3)])[0]["lost"], 6)
+
+    def test_a_failed_case_has_no_row(self):
+        case = suite.Case("in_turns", 16, "tcp")
+        self.assertEqual(make_rows([Outcome("tcphub", case, [], "it died")]), [])
+
+    def test_a_row_without_a_baseline_has_no_ratio(self):
+        case = suite.Case("idle_10000", 16, "tcp")
+        self.assertIsNone(make_rows([outcome("tcphub", case, [300])])[0]["ratio_to_null"])
+
+
+class Document(unittest.TestCase):
+    def test_says_whether_bounds_and_goals_are_met(self):
+        case = suite.Case("one_to_one", 16, "tcp")
+        rows = make_rows([outcome("null", case, [10]), outcome("tcphub", case, [15])])
+        document = make_document({"results": rows, "machine": {"processor": "p", "cpus_allowed": 2, "system": "s",
+                                                               "kernel": "k"}, "date": "d", "version": "v",
+                                  "seconds": 1, "hub_arguments": []})
+        self.assertIn("| one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | bound met, goal open |",
+                      document)
+        self.assertIn("not measured", document)
+
+    def test_derives_the_time_beyond_the_null_relay(self):
+        case = suite.Case("connect_10000", 16, "tcp")
+        rows = with_derived(make_rows([outcome("null", case, [0.25]), outcome("tcphub", case, [0.75])]))
+        self.assertEqual(rows[1]["seconds_over_null"], 0.5)
+
+    def test_a_limit_itself_is_met(self):
+        goal = Goal("one_to_one", 16, "tcp", "ratio_to_null", 2.0, 1.25)
+        self.assertTrue(goal.holds(1.25, goal.goal))
+        self.assertFalse(goal.holds(1.26, goal.goal))
+
+    def test_figures_are_short(self):
+        self.assertEqual([shown(value) for value in (None, 0.01234, 12.34, 1234.5)], ["", "0.0123", "12.3", "1,234"])
+
+    def test_table_has_a_line_a_row(self):
+        case = suite.Case("one_to_one", 16, "tcp")
+        self.assertEqual(len(text_table(make_rows([outcome("null", case, [10])])).splitlines()), 2)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,116 @@
+#include "generator/inbox.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace gimnet::perf {
+namespace {
+
+constexpr StreamId kStream = 3;
+constexpr std::size_t kBytes = 64;
+
+std::vector<std::byte> message(std::uint64_t sequence, StreamId stream = kStream, std::size_t size = kBytes) {
+  const auto pattern = pattern_payload(size);
+  std::vector<std::byte> payload(pattern.begin(), pattern.end());
+  store_u64(payload.data(), make_stamp(stream, sequence));
+  return payload;
+}
+
+Inbox inbox_for(std::size_t size) {
+  Inbox inbox;
+  inbox.expect(kStream, size);
+  return inbox;
+}
+
+TEST(Inbox, CountsWhatArrivesInOrder) {
+  for (const std::size_t size : {std::size_t{16}, std::size_t{17}, kBytes, std::size_t{65536}}) {
+    Inbox inbox = inbox_for(size);
+    for (std::uint64_t sequence = 0; sequence < 3; ++sequence) inbox.on_message(message(sequence, kStream, size));
+    EXPECT_EQ(inbox.delivered(), 3u);
+    EXPECT_EQ(inbox.lost(), 0u);
+    EXPECT_EQ(inbox.wrong(), 0u);
+  }
+}
+
+TEST(Inbox, CountsAGapAsLost) {
+  Inbox inbox = inbox_for(kBytes);
+  inbox.on_message(message(0));
+  inbox.on_message(message(5));
+  EXPECT_EQ(inbox.delivered(), 2u);
+  EXPECT_EQ(inbox.lost(), 4u);
+  EXPECT_EQ(inbox.settled(), 6u);
+  EXPECT_EQ(inbox.wrong(), 0u);
+}
+
+TEST(Inbox, SeesRepeatedAndForeignMessages) {
+  Inbox inbox = inbox_for(kBytes);
+  inbox.on_message(message(0));
+  inbox.on_message(message(0));
+  inbox.on_message(message(1, kStream + 1));
+  EXPECT_EQ(inbox.delivered(), 1u);
+  EXPECT_EQ(inbox.wrong(), 2u);
+}
+
+TEST(Inbox, SeesEveryChangedByte) {
+  for (std::size_t at = kStampBytes; at < kBytes; ++at) {
+    Inbox inbox = inbox_for(kBytes);
+    auto changed = message(0);
+    changed[at] ^= std::byte{1};
+    inbox.on_message(changed);
+    EXPECT_EQ(inbox.wrong(), 1u) << "byte " << at;
+  }
+}
+
+TEST(Inbox, SeesAnotherSize) {
+  Inbox inbox = inbox_for(kBytes);
+  inbox.on_message(message(0, kStream, kBytes - 1));
+  inbox.on_message(message(0, kStream, kBytes + 1));
+  EXPECT_EQ(inbox.wrong(), 2u);
+}
+
+TEST(Inbox, PutsPiecesTogether) {
+  Inbox inbox = inbox_for(kBytes);
+  const auto whole = message(0);
+  const std::span<const std::byte> bytes(whole);
+  inbox.on_piece(0, kBytes, bytes.first(20));
+  EXPECT_EQ(inbox.delivered(), 0u);
+  inbox.on_piece(20, kBytes, bytes.subspan(20));
+  EXPECT_EQ(inbox.delivered(), 1u);
+  EXPECT_EQ(inbox.wrong(), 0u);
+}
+
+TEST(Inbox, SeesAMissingARepeatedAndAChangedPiece) {
+  const auto whole = message(0);
+  const std::span<const std::byte> bytes(whole);
+  Inbox missing = inbox_for(kBytes);
+  missing.on_piece(0, kBytes, bytes.first(20));
+  missing.on_piece(40, kBytes, bytes.subspan(40));
+  EXPECT_EQ(missing.wrong(), 1u);
+  EXPECT_EQ(missing.delivered(), 0u);
+
+  Inbox repeated = inbox_for(kBytes);
+  repeated.on_piece(0, kBytes, bytes.first(20));
+  repeated.on_piece(20, kBytes, bytes.subspan(20, 20));
+  repeated.on_piece(20, kBytes, bytes.subspan(20, 20));
+  EXPECT_EQ(repeated.wrong(), 1u);
+
+  Inbox changed = inbox_for(kBytes);
+  auto other = whole;
+  other[50] ^= std::byte{1};
+  changed.on_piece(0, kBytes, bytes.first(20));
+  changed.on_piece(20, kBytes, std::span<const std::byte>(other).subspan(20));
+  EXPECT_EQ(changed.wrong(), 1u);
+  EXPECT_EQ(changed.delivered(), 0u);
+}
+
+TEST(Inbox, SeesPiecesThatLieAboutTheTotal) {
+  Inbox inbox = inbox_for(kBytes);
+  const auto whole = message(0);
+  inbox.on_piece(0, kBytes - 1, whole);
+  inbox.on_piece(0, kBytes + 1, whole);
+  EXPECT_EQ(inbox.wrong(), 2u);
+}
+
+}  // namespace
+}  // namespace gimnet::perf
