@@ -117,11 +117,12 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_, limits_, membership_,    wiring_.counters,
-                         now,    effects, wiring_.queues, wiring_.refusals};
+  HandlerContext context{facts_,  limits_,        membership_,      wiring_.counters, now,
+                         effects, wiring_.queues, wiring_.refusals, &name_counters_};
   const Request request{*session, view->header, payload};
   const Handler handle = handler_for(session->role, kind, view->header.operation);
   const proto::Payload answer = handle(context, request);
+  if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
   carry_out(effects);
   SendControlCommand command;
   command.session = event.session;

@@ -14,6 +14,7 @@
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
+#include "hub/observe/name_counters.hpp"
 #include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/shard/commands.hpp"
@@ -83,6 +84,7 @@ class Conductor {
   // The conductor's thread only
   Membership membership_;
   TablePublisher publisher_;
+  NameCounters name_counters_;
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;
 };

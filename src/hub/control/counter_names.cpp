@@ -76,4 +76,17 @@ void for_each_counter(const RefusalCounters& counters,
   take("refused.no_descriptor", counters.no_descriptor.value());
 }
 
+void for_each_counter(const NameCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
+  for (std::uint16_t operation = 0; operation < counters.by_operation.size(); ++operation) {
+    const char* name = proto::ns::operation_name(operation);
+    if (name != nullptr) take(std::string{"names."} + name, counters.by_operation[operation].value());
+  }
+  take("names.unknown", counters.unknown.value());
+  for (std::size_t status = 1; status < counters.refused.size(); ++status) {
+    const auto* name = proto::status_name(static_cast<proto::Status>(status));
+    take(std::string{"names.refused."} + name, counters.refused[status].value());
+  }
+}
+
 }  // namespace gimnet::hub

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "hub/observe/counters.hpp"
+#include "hub/observe/name_counters.hpp"
 #include "hub/observe/refusal_counters.hpp"
 
 namespace gimnet::hub {
@@ -16,6 +17,9 @@ void for_each_counter(const ShardCounters& counters,
 /// The same for the peers that were not admitted: "refused.hub_full" and so on, "refused.garbage",
 /// "refused.no_descriptor".
 void for_each_counter(const RefusalCounters& counters,
+                      const std::function<void(const std::string& name, std::uint64_t value)>& take);
+/// The same for HubNS requests: "names.resolve" and so on, "names.unknown", "names.refused.not_found" and so on.
+void for_each_counter(const NameCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 
 }  // namespace gimnet::hub

@@ -3,11 +3,6 @@
 #include <cstring>
 
 namespace gimnet::proto {
-namespace {
-
-constexpr std::size_t kStatusCount = 7;
-
-}  // namespace
 
 const char* status_name(Status status) {
   constexpr const char* kNames[kStatusCount] = {"done",  "not_supported", "bad_request", "not_found",
@@ -45,6 +40,15 @@ Refusal read_status(std::span<const std::byte> body) {
   std::string sentence = fields.text(kSentenceKey, "sentence", kSentenceBytesMax);
   if (fields.failed()) return {Status::bad_request, fields.error().sentence};
   return {static_cast<Status>(status), std::move(sentence)};
+}
+
+Status peek_status(std::span<const std::byte> payload) {
+  const auto view = split_control(payload);
+  if (!view) return Status::bad_request;
+  bitestream::Reader reader(view->body);
+  const auto first = reader.next();
+  const auto status = first && first->key() == bitestream::Key(kStatusKey) ? first->as<std::uint16_t>() : std::nullopt;
+  return status ? static_cast<Status>(*status) : Status::bad_request;
 }
 
 }  // namespace gimnet::proto

@@ -43,6 +43,7 @@ enum class Status : std::uint16_t {
   denied = 5,
   limit = 6,
 };
+inline constexpr std::size_t kStatusCount = 7;
 /// The status as documents and tools print it, for example "not_found".
 [[nodiscard]] const char* status_name(Status status);
 
@@ -108,6 +109,9 @@ template <class Message>
 
 /// Status and sentence of any answer; a body that cannot be read counts as refused with `bad_request`.
 [[nodiscard]] Refusal read_status(std::span<const std::byte> body);
+
+/// The status of an answer that this side wrote, at the cost of one value. `bad_request`: it is no answer.
+[[nodiscard]] Status peek_status(std::span<const std::byte> payload);
 
 /// Reads an answer. Refusal: the other side said no, or (bad_request) sent what cannot be read.
 template <class Answer>

@@ -53,6 +53,29 @@ void write_page_request(bitestream::Writer& writer, const std::string& pattern, 
 
 }  // namespace
 
+const char* operation_name(std::uint16_t operation) {
+  switch (static_cast<Operation>(operation)) {
+    case Operation::resolve:
+      return "resolve";
+    case Operation::reverse:
+      return "reverse";
+    case Operation::list:
+      return "list";
+    case Operation::advertise:
+      return "advertise";
+    case Operation::withdraw:
+      return "withdraw";
+    case Operation::services:
+      return "services";
+    case Operation::subscribe:
+      return "subscribe";
+    case Operation::unsubscribe:
+      return "unsubscribe";
+    default:
+      return nullptr;
+  }
+}
+
 void Resolve::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
 Resolve Resolve::read(Fields& fields) { return {read_name(fields, 3, "name")}; }
 

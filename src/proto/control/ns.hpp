@@ -33,6 +33,11 @@ enum class Operation : std::uint16_t {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
+/// Operations of requests are below this, those of events above.
+inline constexpr std::size_t kRequestsEnd = 32;
+/// The request as counters and documents name it, for example "resolve"; nullptr: there is no such request.
+[[nodiscard]] const char* operation_name(std::uint16_t operation);
+
 enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
 enum class Delivery : std::uint8_t { stream = 0, latest = 1 };
 

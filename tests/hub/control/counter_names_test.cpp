@@ -48,5 +48,19 @@ TEST(CounterNames, RefusalsAreListedByCode) {
   EXPECT_FALSE(all.contains("refused.unknown"));
 }
 
+TEST(CounterNames, RequestsAreListedByOperationAndRefusalsByStatus) {
+  NameCounters counters;
+  counters.count(proto::ns::Resolve::kOperation, proto::Status::done);
+  counters.count(proto::ns::Resolve::kOperation, proto::Status::not_found);
+  counters.count(0x7fff, proto::Status::not_supported);
+  const auto all = read(counters);
+  EXPECT_EQ(all.at("names.resolve"), 2u);
+  EXPECT_EQ(all.at("names.list"), 0u);
+  EXPECT_EQ(all.at("names.unknown"), 1u);
+  EXPECT_EQ(all.at("names.refused.not_found"), 1u);
+  EXPECT_EQ(all.at("names.refused.not_supported"), 1u);
+  EXPECT_FALSE(all.contains("names.refused.done"));
+}
+
 }  // namespace
 }  // namespace gimnet::hub

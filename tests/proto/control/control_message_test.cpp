@@ -53,6 +53,13 @@ TEST(ControlMessage, AnswerWithoutStatusIsBad) {
   EXPECT_EQ(answer.error().status, Status::bad_request);
 }
 
+TEST(ControlMessage, TellsTheStatusOfAnAnswerWithoutReadingIt) {
+  EXPECT_EQ(peek_status(payload_of("ns/resolve_answer")), Status::done);
+  EXPECT_EQ(peek_status(encode_refusal({3, 1}, {Status::denied, "no"})), Status::denied);
+  EXPECT_EQ(peek_status(test::from_hex("03 80 01 00")), Status::bad_request);
+  EXPECT_EQ(peek_status(Bytes(3)), Status::bad_request);
+}
+
 TEST(ControlMessage, OfAnotherOperationIsRefused) {
   EXPECT_FALSE(decode<ns::Reverse>(payload_of("ns/resolve")));
   EXPECT_FALSE(decode_answer<ns::ReverseAnswer>(payload_of("ns/resolve_answer")));

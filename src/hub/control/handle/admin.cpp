@@ -20,12 +20,15 @@ ctrl::HubInfoAnswer hub_info(const HandlerContext& context) {
   return answer;
 }
 
-void add_refusals(const RefusalCounters& refusals, ctrl::StatisticsAnswer& answer) {
+/// What is no shard's: those counters that are not 0.
+void add_conductor(const HandlerContext& context, ctrl::StatisticsAnswer& answer) {
   ctrl::ShardRecord record;
   record.shard = ctrl::kConductorRecord;
-  for_each_counter(refusals, [&record](const std::string& name, std::uint64_t value) {
+  const auto add = [&record](const std::string& name, std::uint64_t value) {
     if (value != 0) record.counters.push_back({name, value});
-  });
+  };
+  if (context.refusals != nullptr) for_each_counter(*context.refusals, add);
+  if (context.names != nullptr) for_each_counter(*context.names, add);
   if (!record.counters.empty()) answer.shards.push_back(std::move(record));
 }
 
@@ -38,7 +41,7 @@ ctrl::StatisticsAnswer statistics(const HandlerContext& context) {
       record.counters.push_back({name, value});
     });
   }
-  if (context.refusals != nullptr) add_refusals(*context.refusals, answer);
+  add_conductor(context, answer);
   return answer;
 }
 

@@ -8,6 +8,7 @@
 #include "hub/control/state/membership.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
+#include "hub/observe/name_counters.hpp"
 #include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "proto/control/control_message.hpp"
@@ -24,6 +25,7 @@ struct HandlerContext {
   Effects& effects;                              ///< carried out before the answer leaves
   std::span<const QueueGauges* const> queues{};  ///< one per shard, or none
   const RefusalCounters* refusals = nullptr;     ///< or none
+  const NameCounters* names = nullptr;           ///< or none
 };
 
 /// A request of kind NS or CTRL. Valid until: the handler returns.

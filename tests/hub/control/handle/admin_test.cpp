@@ -15,6 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 namespace ctrl = proto::ctrl;
+namespace ns = proto::ns;
 
 class AdminTest : public ::testing::Test, protected TestConductor {
  protected:
@@ -59,6 +60,16 @@ TEST_F(AdminTest, TellsWhoWasRefusedInARecordOfItsOwn) {
   ASSERT_EQ(statistics.shards.size(), 3u);
   EXPECT_EQ(statistics.shards[2],
             (ctrl::ShardRecord{ctrl::kConductorRecord, {{"refused.hub_full", 1}, {"refused.garbage", 3}}}));
+}
+
+TEST_F(AdminTest, TellsWhatWasAskedAboutNames) {
+  const Node robot = join("robot");
+  ASSERT_TRUE(ask<ns::ResolveAnswer>(robot, ns::Resolve{"robot"}));
+  ASSERT_FALSE(ask<ns::ResolveAnswer>(robot, ns::Resolve{"nobody"}));
+  const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
+  ASSERT_EQ(statistics.shards.size(), 3u);
+  EXPECT_EQ(statistics.shards[2],
+            (ctrl::ShardRecord{ctrl::kConductorRecord, {{"names.resolve", 2}, {"names.refused.not_found", 1}}}));
 }
 
 TEST_F(AdminTest, StatisticsOfTheMostShardsFitInAFrame) {
