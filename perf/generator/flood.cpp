@@ -22,11 +22,12 @@ Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t reci
       recipients_a_message_(recipients_a_message),
       bytes_a_second_(bytes_a_second),
       message_bytes_(publishers_.front().message_bytes()),
+      window_bytes_(std::max(kWindowBytes, kWindowBytesARecipient * recipients_a_message)),
       is_unbatched_(publishers_.front().is_unbatched()),
       begin_(Clock::now()) {}
 
 std::uint64_t Flood::deliveries_allowed() const {
-  std::size_t window = std::max(kWindowBytes, kWindowBytesARecipient * recipients_a_message_) / message_bytes_;
+  std::size_t window = window_bytes_ / message_bytes_;
   if (is_unbatched_) window = std::min(window, kUnbatchedMessagesARecipient * recipients_a_message_);
   const std::uint64_t under_way = expected_ - settled_ - missing_;
   return under_way >= window ? 0 : window - under_way;

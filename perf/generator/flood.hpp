@@ -31,8 +31,8 @@ class Flood {
   void forget_settled(std::uint64_t foreign) { settled_ -= foreign; }
   [[nodiscard]] std::uint64_t expected() const { return expected_; }
   [[nodiscard]] std::uint64_t missing() const { return missing_; }
-  /// A recipient is not waited for any more.
-  void set_recipients_a_message(std::size_t count) { recipients_a_message_ = count; }
+  /// At most so many bytes are under way: for recipients whose queue drops what does not fit.
+  void set_window(std::size_t bytes) { window_bytes_ = bytes; }
 
  private:
   bool publish();
@@ -43,6 +43,7 @@ class Flood {
   std::size_t recipients_a_message_;
   const double bytes_a_second_;
   const std::size_t message_bytes_;
+  std::size_t window_bytes_;
   const bool is_unbatched_;
   Clock::time_point begin_;
   std::uint64_t begun_bytes_ = 0;  ///< for the pace
