@@ -16,18 +16,16 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::uint16_t kDefaultPort = 7450;
-
 Result<std::vector<ListenUrl>> addresses_for(const HubOptions& options) {
   if (!options.listen.empty()) return options.listen;
-  const Result<std::string> folder = runtime_folder();
-  if (!folder) return folder.error();
-  ListenUrl tcp;
-  tcp.host = "127.0.0.1";
-  tcp.port = kDefaultPort;
-  const Result<ListenUrl> local = parse_listen_url("unix:" + *folder + "/tcphub.sock");
-  if (!local) return local.error();
-  return std::vector{tcp, *local};
+  if (const Result<std::string> folder = runtime_folder(); !folder) return folder.error();
+  std::vector<ListenUrl> urls;
+  for (const std::string& text : default_addresses()) {
+    const Result<ListenUrl> url = parse_listen_url(text);
+    if (!url) return url.error();
+    urls.push_back(*url);
+  }
+  return urls;
 }
 
 Secret fresh_secret() {

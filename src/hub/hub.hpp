@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/result.hpp"
-#include "hub/config/options.hpp"
+#include "hub/config/hub_options.hpp"
 
 namespace gimnet::hub {
 

@@ -6,11 +6,13 @@
 #include <string_view>
 
 // Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp, shown by
-// `tcphub --help-limits` and set by `tcphub --limit NAME=VALUE`.
+// `tcphub --help-limits`, and set by `tcphub --limit NAME=VALUE`, by TCPHUB_LIMITS_NAME or in the configuration's
+// [limits].
 
 namespace gimnet::hub {
 
-/// The limits in force. Thread safety: immutable after start-up.
+/// The limits in force. Thread safety: each thread that looks at them has its own, which it changes between two steps
+/// of its work.
 struct Limits {
   // Frames and turns
   std::uint64_t frame_bytes = 65'536;
@@ -60,13 +62,22 @@ struct LimitInfo {
   std::uint64_t least;
   std::uint64_t most;
   std::string_view reason;
+  /// May it change while the hub runs? Not what memory was laid out by, nor what peers were told and rely on.
+  bool reloads = false;
 };
 
 /// All limits, in the order in which documents list them.
 [[nodiscard]] std::span<const LimitInfo> limit_table();
 
-/// Sets one limit from "NAME=VALUE" (VALUE a whole number, with an optional suffix k, M or G for powers of 1,024).
-/// Returns an empty string, or what is wrong and what to do, naming the nearest limit for an unknown name.
+/// nullptr: there is none of that name.
+[[nodiscard]] const LimitInfo* find_limit(std::string_view name);
+/// "; did you mean nodes?" for the limit whose name is nearest, or "".
+[[nodiscard]] std::string nearest_limit(std::string_view name);
+
+/// Sets one limit to a whole number, with an optional suffix k, M or G for powers of 1,024 (not for times). Returns an
+/// empty string, or what is wrong and what to do.
+[[nodiscard]] std::string set_limit(Limits& limits, const LimitInfo& limit, std::string_view value);
+/// Sets one limit from "NAME=VALUE". Errors also: an unknown name, with the nearest one.
 [[nodiscard]] std::string set_limit(Limits& limits, std::string_view assignment);
 
 }  // namespace gimnet::hub

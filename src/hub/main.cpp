@@ -1,4 +1,5 @@
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
@@ -21,8 +22,10 @@ void raise_descriptor_limit() {
   static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
 }
 
-int run(const hub::HubOptions& options) {
+int run(const hub::CommandLine& line) {
+  const hub::HubOptions& options = line.configuration.options;
   set_log_level(options.log_level);
+  for (const std::string& warning : line.warnings) log_warning(warning);
   raise_descriptor_limit();
   std::signal(SIGPIPE, SIG_IGN);
   const auto hub = hub::Hub::start(options);
@@ -40,12 +43,12 @@ int run(const hub::HubOptions& options) {
 
 int main(int argc, char** argv) {
   try {
-    const auto parsed = hub::parse_command_line(argc, argv);
+    const auto parsed = hub::parse_command_line(argc, argv, ::environ);
     if (const auto* ending = std::get_if<hub::CommandLineEnding>(&parsed)) {
       std::fputs(ending->text.c_str(), ending->exit_code == 0 ? stdout : stderr);
       return ending->exit_code;
     }
-    return run(std::get<hub::HubOptions>(parsed));
+    return run(std::get<hub::CommandLine>(parsed));
   } catch (const std::exception& error) {
     // Start-up only: out of memory or descriptors before anything was served.
     std::fprintf(stderr, "tcphub: cannot run: %s\n", error.what());

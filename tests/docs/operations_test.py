@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The table of limits in docs/operations.md says what `tcphub --help-limits` says."""
+"""docs/operations.md and docs/tcphub.toml say what `tcphub --help-limits` and `--print-config` say."""
 
 import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -29,6 +30,16 @@ def limits_in_force(tcphub):
     return rows
 
 
+def printed(tcphub, *arguments):
+    return subprocess.run([tcphub, "--print-config", *arguments], check=True, capture_output=True, text=True,
+                          timeout=20).stdout
+
+
+def keys_in(text):
+    """Key and value of every line KEY = VALUE, commented out or not."""
+    return dict(re.findall(r"^#?([a-z0-9_]+) = (.*?)(?:  #.*)?$", text, re.MULTILINE))
+
+
 class Operations(unittest.TestCase):
     tcphub = ""
 
@@ -36,6 +47,30 @@ class Operations(unittest.TestCase):
         in_force = limits_in_force(self.tcphub)
         self.assertGreater(len(in_force), 20)
         self.assertEqual(documented_limits(), in_force)
+
+    def test_documents_every_key(self):
+        text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+        documented = set(re.findall(r"^\| ([a-z_]+) \| `--", text, re.MULTILINE))
+        self.assertEqual(documented, set(keys_in(printed(self.tcphub).split("[limits]")[0])))
+
+    def test_the_example_is_the_default_configuration(self):
+        example = ROOT / "docs" / "tcphub.toml"
+        checked = subprocess.run([self.tcphub, "--check-config", "--config", example], capture_output=True, text=True,
+                                 timeout=20, check=False)
+        self.assertEqual((checked.returncode, checked.stderr), (0, ""))
+        text = example.read_text(encoding="utf-8")
+        self.assertLessEqual(set(keys_in(text)), set(keys_in(printed(self.tcphub))))
+        self.assertLessEqual(set(keys_in(printed(self.tcphub).split("[limits]")[0])), set(keys_in(text)))
+        # Whoever takes the comments away gets what there is without the file.
+        uncommented = re.sub(r"^#(?=[a-z_]+ = )", "", text, flags=re.MULTILINE)
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(uncommented)
+            file.flush()
+            told = printed(self.tcphub, "--config", file.name)
+        defaults = printed(self.tcphub)
+        for key, value in keys_in(told).items():
+            if key not in ("listen", "shards"):  # of the user and of the machine
+                self.assertEqual(value, keys_in(defaults)[key], key)
 
 
 if __name__ == "__main__":

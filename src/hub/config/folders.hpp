@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/result.hpp"
 
@@ -13,6 +14,12 @@ namespace gimnet::hub {
 /// The user's folder for sockets of this network, made ready: XDG_RUNTIME_DIR/gimnet, or, where that is not set, a
 /// folder of mode 0700 named after the user id in the system's temporary folder.
 [[nodiscard]] Result<std::string> runtime_folder();
+
+/// The same folder's path; nothing is made.
+[[nodiscard]] std::string runtime_folder_path();
+
+/// Where a hub listens if nobody says: loopback, and a Unix socket in the runtime folder. Nothing is made.
+[[nodiscard]] std::vector<std::string> default_addresses();
 
 /// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used.
 [[nodiscard]] std::string prepare_state_folder(const std::string& path);

@@ -1,26 +1,20 @@
 #include "hub/config/options.hpp"
 
-#include <sched.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <optional>
 #include <string_view>
 
 #include "base/suggest.hpp"
 #include "hub/version.hpp"
-#include "proto/control/names.hpp"
 
 namespace gimnet::hub {
 namespace {
 
-constexpr std::array<std::string_view, 12> kOptionNames{"--listen",    "--shards",   "--hub-id",    "--hub-name",
-                                                        "--state-dir", "--limit",    "--help",      "--help-limits",
-                                                        "--placement", "--insecure", "--log-level", "--version"};
-constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
-constexpr std::array<std::string_view, 5> kLogLevels{"error", "warning", "info", "debug", "off"};
+constexpr std::array<std::string_view, 15> kOptionNames{
+    "--listen",    "--shards",  "--hub-id",       "--hub-name",     "--state-dir",
+    "--limit",     "--help",    "--help-limits",  "--placement",    "--insecure",
+    "--log-level", "--version", "--check-config", "--print-config", "--config"};
 
 /// The arguments as they were given.
 struct Raw {
@@ -32,19 +26,15 @@ struct Raw {
   std::vector<std::string> limits;
   std::string placement;
   std::string log_level;
+  std::string config;
   bool insecure = false;
   bool help_limits = false;
   bool version = false;
+  bool check_config = false;
+  bool print_config = false;
 };
 
 CommandLineEnding wrong(const std::string& sentence) { return {2, "tcphub: " + sentence + "\n"}; }
-
-std::optional<std::size_t> number_in(std::string_view text, std::size_t least, std::size_t most) {
-  std::size_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < least || value > most) return std::nullopt;
-  return value;
-}
 
 void declare(CLI::App& app, Raw& raw) {
   app.allow_extras();
@@ -69,12 +59,19 @@ void declare(CLI::App& app, Raw& raw) {
       ->type_name("HOW");
   app.add_flag("--insecure", raw.insecure, "Allows to listen on addresses that other machines reach");
   app.add_option("--log-level", raw.log_level, "error, warning, info (default), debug or off")->type_name("LEVEL");
+  app.add_option(
+         "--config", raw.config,
+         "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the first that is there of\n"
+         "gimnet/tcphub.toml in the user's configuration folder, /etc/gimnet/tcphub.toml. No file is needed")
+      ->type_name("FILE");
+  app.add_flag("--check-config", raw.check_config, "Says everything that is wrong with the configuration, and ends");
+  app.add_flag("--print-config", raw.print_config, "Shows every value and where it came from, and ends");
   app.add_flag("--version", raw.version, "Says the version and ends");
 }
 
 std::string help_limits() {
   const Limits defaults;
-  std::string text = "Limits, set with --limit NAME=VALUE (k, M and G are powers of 1,024):\n\n";
+  std::string text = "Limits, set with --limit NAME=VALUE (k, M and G are powers of 1,024; times take no suffix):\n\n";
   for (const LimitInfo& limit : limit_table()) {
     std::string line = "  " + std::string{limit.name};
     line.resize(std::max<std::size_t>(line.size(), 25), ' ');
@@ -83,71 +80,11 @@ std::string help_limits() {
     text += line + " " + std::string{limit.reason} + " (" + std::to_string(limit.least) + " to " +
             std::to_string(limit.most) + ")\n";
   }
-  return text;
-}
-
-/// Limits that only make sense together.
-std::string limits_error(const Limits& limits) {
-  if (limits.silent_ms <= limits.keep_alive_ms) {
-    return "limit silent_ms (" + std::to_string(limits.silent_ms) + ") must be larger than keep_alive_ms (" +
-           std::to_string(limits.keep_alive_ms) + "), or healthy nodes are closed as silent";
+  std::string changing;
+  for (const LimitInfo& limit : limit_table()) {
+    if (limit.reloads) changing += (changing.empty() ? "" : ", ") + std::string{limit.name};
   }
-  return {};
-}
-
-std::string read_listen(const Raw& raw, HubOptions& options) {
-  for (const std::string& text : raw.listen) {
-    const Result<ListenUrl> url = parse_listen_url(text);
-    if (!url) return url.error().sentence;
-    if (!url->is_local() && !raw.insecure) {
-      return "cannot listen on " + url->text() + ": an open address needs TLS, or --insecure";
-    }
-    if (std::find(options.listen.begin(), options.listen.end(), *url) != options.listen.end() && url->port != 0) {
-      return "--listen " + text + " is given twice";
-    }
-    options.listen.push_back(*url);
-  }
-  return {};
-}
-
-std::string read_names(const Raw& raw, HubOptions& options) {
-  if (!raw.hub_id.empty()) {
-    const auto id = number_in(raw.hub_id, 1, kHubIdMax);
-    if (!id) return "--hub-id cannot be '" + raw.hub_id + "': give a whole number from 1 to 4094";
-    options.id = HubId{static_cast<std::uint16_t>(*id)};
-  }
-  options.name = raw.hub_name.empty() ? "hub-" + std::to_string(options.id.value()) : raw.hub_name;
-  if (const char* fault = proto::name_fault(options.name)) {
-    return "--hub-name cannot be '" + escaped(options.name, 60) + "': " + fault;
-  }
-  options.state_dir = raw.state_dir;
-  options.insecure = raw.insecure;
-  return {};
-}
-
-std::string read_running(const Raw& raw, HubOptions& options) {
-  options.shards = default_shards();
-  if (!raw.shards.empty()) {
-    const auto shards = number_in(raw.shards, 1, kShardCountMax);
-    if (!shards) {
-      return "--shards cannot be '" + raw.shards + "': give a whole number from 1 to " + std::to_string(kShardCountMax);
-    }
-    options.shards = *shards;
-  }
-  if (!raw.placement.empty()) {
-    if (raw.placement != "spread" && raw.placement != "hint") {
-      return "--placement cannot be '" + raw.placement + "': spread or hint" + did_you_mean(raw.placement, kPlacements);
-    }
-    options.placement = raw.placement == "hint" ? Placement::hint : Placement::spread;
-  }
-  if (!raw.log_level.empty() && !parse_log_level(raw.log_level, options.log_level)) {
-    return "--log-level cannot be '" + raw.log_level + "': error, warning, info, debug or off" +
-           did_you_mean(raw.log_level, kLogLevels);
-  }
-  for (const std::string& assignment : raw.limits) {
-    if (std::string error = set_limit(options.limits, assignment); !error.empty()) return error;
-  }
-  return limits_error(options.limits);
+  return text + "\nA reload changes: " + changing + ". The others need a restart.\n";
 }
 
 /// What CLI11 found, in the words of this house.
@@ -157,16 +94,74 @@ std::string syntax_error(const CLI::ParseError& error) {
   return what + "; tcphub --help shows what there is";
 }
 
-}  // namespace
-
-std::size_t default_shards() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  const int processors = ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
-  return static_cast<std::size_t>(std::clamp(processors / 2, 1, 8));
+Given flag(const std::string& key, const std::string& label, std::string text) {
+  Given given;
+  given.key = key;
+  given.label = label;
+  given.origin = "flag " + label;
+  given.value.text = std::move(text);
+  return given;
 }
 
-std::variant<HubOptions, CommandLineEnding> parse_command_line(int argc, const char* const* argv) {
+/// The flags that were given, as values of their keys. Returns what is wrong with their form, or "".
+std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sources) {
+  if (!raw.listen.empty()) {
+    Given& listen = sources.flags.emplace_back(flag("listen", "--listen", {}));
+    listen.value.kind = Value::Kind::list;
+    for (const std::string& url : raw.listen) listen.value.items.push_back({Value::Kind::words, url, {}, {}});
+  }
+  const std::array<std::pair<const char*, const std::string*>, 6> texts{{{"--shards", &raw.shards},
+                                                                         {"--hub-id", &raw.hub_id},
+                                                                         {"--hub-name", &raw.hub_name},
+                                                                         {"--state-dir", &raw.state_dir},
+                                                                         {"--placement", &raw.placement},
+                                                                         {"--log-level", &raw.log_level}}};
+  for (const auto& [name, text] : texts) {
+    if (app.count(name) == 0) continue;
+    std::string key = std::string{name}.substr(2);
+    std::ranges::replace(key, '-', '_');
+    sources.flags.push_back(flag(key, name, *text));
+  }
+  if (raw.insecure) sources.flags.push_back(flag("insecure", "--insecure", "true"));
+  for (const std::string& assignment : raw.limits) {
+    const std::size_t equals = assignment.find('=');
+    if (equals == std::string::npos) {
+      return "--limit " + escaped(assignment, 60) + " has no value: write NAME=VALUE, for example nodes=1000";
+    }
+    sources.flags.push_back(flag("limits." + assignment.substr(0, equals), "--limit", assignment.substr(equals + 1)));
+  }
+  sources.file = raw.config;
+  return {};
+}
+
+std::string checked(const CommandLine& line) {
+  std::string text;
+  for (const std::string& warning : line.warnings) text += "warning: " + warning + "\n";
+  text += "the configuration is right; read:";
+  for (const std::string& file : line.files) text += " " + file;
+  return text + (line.files.empty() ? " no file\n" : "\n");
+}
+
+std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLine line) {
+  ReadConfiguration read = read_configuration(line.sources);
+  if (!read.faults.empty()) {
+    CommandLineEnding ending{2, {}};
+    for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
+    return ending;
+  }
+  // Read again it is the same file, or an error: a hub does not lose its configuration because a file went.
+  if (line.sources.file.empty() && !read.files.empty()) line.sources.file = read.files.front();
+  line.configuration = std::move(read.configuration);
+  line.files = std::move(read.files);
+  if (raw.check_config) return CommandLineEnding{0, checked(line)};
+  if (raw.print_config) return CommandLineEnding{0, print(line.configuration)};
+  return line;
+}
+
+}  // namespace
+
+std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const char* const* argv,
+                                                                const char* const* environment) {
   CLI::App app{"tcphub carries messages between the nodes of a GIMnet.", "tcphub"};
   Raw raw;
   declare(app, raw);
@@ -184,11 +179,10 @@ std::variant<HubOptions, CommandLineEnding> parse_command_line(int argc, const c
   }
   if (raw.version) return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};
   if (raw.help_limits) return CommandLineEnding{0, help_limits()};
-  HubOptions options;
-  for (const auto read : {read_listen, read_names, read_running}) {
-    if (const std::string error = read(raw, options); !error.empty()) return wrong(error);
-  }
-  return options;
+  CommandLine line;
+  if (const std::string error = read_flags(app, raw, line.sources); !error.empty()) return wrong(error);
+  line.warnings = read_environment(line.sources, environment);
+  return read_all(raw, std::move(line));
 }
 
 }  // namespace gimnet::hub

@@ -3,22 +3,28 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
+#include "tests/hub/control/support/folder.hpp"
+
 namespace gimnet::hub {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-std::variant<HubOptions, CommandLineEnding> parse(std::vector<const char*> arguments) {
+std::variant<CommandLine, CommandLineEnding> parse(std::vector<const char*> arguments,
+                                                   std::vector<const char*> environment = {}) {
   arguments.insert(arguments.begin(), "tcphub");
-  return parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+  environment.push_back(nullptr);
+  return parse_command_line(static_cast<int>(arguments.size()), arguments.data(), environment.data());
 }
 
 HubOptions options(const std::vector<const char*>& arguments) {
   const auto parsed = parse(arguments);
   const auto* ending = std::get_if<CommandLineEnding>(&parsed);
   EXPECT_EQ(ending, nullptr) << ending->text;
-  return ending == nullptr ? std::get<HubOptions>(parsed) : HubOptions{};
+  return ending == nullptr ? std::get<CommandLine>(parsed).configuration.options : HubOptions{};
 }
 
 CommandLineEnding ending(const std::vector<const char*>& arguments) {
@@ -113,9 +119,30 @@ TEST(Options, HelpAndVersionEndWell) {
   for (const LimitInfo& limit : limit_table()) EXPECT_THAT(limits.text, HasSubstr(std::string{limit.name}));
 }
 
-TEST(Options, DefaultShardsAreBounded) {
-  EXPECT_GE(default_shards(), 1u);
-  EXPECT_LE(default_shards(), 8u);
+TEST(Options, FlagsAreStrongerThanTheEnvironment) {
+  const auto parsed = parse({"--shards", "3"}, {"TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=5"});
+  const auto& line = std::get<CommandLine>(parsed);
+  EXPECT_EQ(line.configuration.options.shards, 3u);
+  EXPECT_EQ(line.configuration.options.id, HubId{5});
+}
+
+TEST(Options, ChecksTheConfigurationAndEnds) {
+  const TestFolder folder;
+  const std::string path = folder.path("hub.toml");
+  std::ofstream(path) << "shards = 2\n";
+  EXPECT_EQ(ending({"--check-config", "--config", path.c_str()}).exit_code, 0);
+  EXPECT_THAT(ending({"--check-config", "--config", path.c_str()}).text, HasSubstr(path));
+  std::ofstream(path) << "shards = 99\nhub_id = 'x'\n";
+  const CommandLineEnding wrong = ending({"--check-config", "--config", path.c_str()});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_EQ(wrong.text, path + ":1:10: shards cannot be '99': give a whole number from 1 to 16\n" + path +
+                            ":2:10: hub_id is a whole number, not a text: write hub_id = 1\n");
+}
+
+TEST(Options, PrintsTheConfigurationAndEnds) {
+  const CommandLineEnding printed = ending({"--print-config", "--hub-id", "9"});
+  EXPECT_EQ(printed.exit_code, 0);
+  EXPECT_THAT(printed.text, AllOf(HasSubstr("hub_id = 9  # flag --hub-id\n"), HasSubstr("[limits]\n")));
 }
 
 }  // namespace

@@ -1,0 +1,279 @@
+#include "hub/config/settings.hpp"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+
+#include "base/suggest.hpp"
+#include "hub/config/folders.hpp"
+#include "hub/config/toml_file.hpp"
+#include "hub/version.hpp"
+#include "proto/control/names.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using Kind = Value::Kind;
+
+constexpr std::size_t kQuotedMax = 60;
+constexpr std::string_view kLimits = "limits.";
+constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
+constexpr std::array<std::string_view, 5> kLogLevels{"error", "warning", "info", "debug", "off"};
+
+std::string_view kind_name(Kind kind) {
+  constexpr std::array<std::string_view, 8> kNames{"words",      "a text",         "a whole number", "true or false",
+                                                   "a fraction", "a date or time", "a list",         "a table"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+Fault fault(const Given& given, std::string sentence) { return {given.value.place, std::move(sentence)}; }
+
+/// Is the value of that kind? If not, what to write instead is a fault.
+bool has_kind(const Given& given, Kind wanted, const std::string& example, Faults& faults) {
+  if (given.value.kind == wanted || given.value.kind == Kind::words) return true;
+  faults.push_back(fault(given, given.label + " is " + std::string{kind_name(wanted)} + ", not " +
+                                    std::string{kind_name(given.value.kind)} + ": write " + example));
+  return false;
+}
+
+std::optional<std::size_t> number_in(const Given& given, std::size_t least, std::size_t most, Faults& faults) {
+  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(least), faults)) return std::nullopt;
+  const std::string& text = given.value.text;
+  std::size_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc{} && end == text.data() + text.size() && value >= least && value <= most) return value;
+  faults.push_back(fault(given, given.label + " cannot be '" + escaped(text, kQuotedMax) +
+                                    "': give a whole number from " + std::to_string(least) + " to " +
+                                    std::to_string(most)));
+  return std::nullopt;
+}
+
+/// One of a few words.
+bool one_of(const Given& given, std::span<const std::string_view> words, const std::string& list, Faults& faults) {
+  if (!has_kind(given, Kind::text, given.label + " = \"" + std::string{words.front()} + "\"", faults)) return false;
+  if (std::ranges::find(words, given.value.text) != words.end()) return true;
+  faults.push_back(fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': " + list +
+                                    did_you_mean(given.value.text, words)));
+  return false;
+}
+
+/// Each of them is another one.
+bool any_free_port(const ListenUrl& url) { return url.scheme == ListenUrl::Scheme::tcp && url.port == 0; }
+
+void set_listen(Configuration& configuration, const Given& given, Faults& faults) {
+  std::vector<Value> urls = given.value.items;
+  if (given.value.kind == Kind::text) urls = {given.value};
+  if (given.value.kind != Kind::text && !has_kind(given, Kind::list, "listen = [\"tcp://127.0.0.1:7450\"]", faults)) {
+    return;
+  }
+  configuration.options.listen.clear();
+  configuration.listen_places.clear();
+  if (urls.empty()) {
+    faults.push_back(fault(given, given.label + " names no address; leave it out for the default ones"));
+  }
+  for (const Value& url : urls) {
+    if (url.kind != Kind::text && url.kind != Kind::words) {
+      faults.push_back({url.place, "an address of listen is a text, not " + std::string{kind_name(url.kind)} +
+                                       ": write \"tcp://127.0.0.1:7450\""});
+      continue;
+    }
+    const Result<ListenUrl> parsed = parse_listen_url(url.text);
+    std::vector<ListenUrl>& all = configuration.options.listen;
+    if (!parsed) {
+      faults.push_back({url.place, parsed.error().sentence});
+    } else if (std::find(all.begin(), all.end(), *parsed) != all.end() && !any_free_port(*parsed)) {
+      faults.push_back({url.place, given.label + " " + escaped(url.text, kQuotedMax) + " is given twice"});
+    } else {
+      all.push_back(*parsed);
+      configuration.listen_places.push_back({url.place, given.label});
+    }
+  }
+}
+
+void set_shards(Configuration& configuration, const Given& given, Faults& faults) {
+  if (const auto shards = number_in(given, 1, kShardCountMax, faults)) configuration.options.shards = *shards;
+}
+
+void set_hub_id(Configuration& configuration, const Given& given, Faults& faults) {
+  const auto id = number_in(given, 1, kHubIdMax, faults);
+  if (id) configuration.options.id = HubId{static_cast<std::uint16_t>(*id)};
+}
+
+void set_hub_name(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!has_kind(given, Kind::text, "hub_name = \"hall\"", faults)) return;
+  if (const char* wrong = proto::name_fault(given.value.text)) {
+    faults.push_back(
+        fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': " + wrong));
+    return;
+  }
+  configuration.options.name = given.value.text;
+}
+
+void set_state_dir(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!has_kind(given, Kind::text, "state_dir = \"/var/lib/tcphub\"", faults)) return;
+  if (given.value.text.find('\0') != std::string::npos) {
+    faults.push_back(fault(given, given.label + " cannot be a path: there is a zero byte in it"));
+    return;
+  }
+  configuration.options.state_dir = given.value.text;
+}
+
+void set_placement(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!one_of(given, kPlacements, "spread or hint", faults)) return;
+  configuration.options.placement = given.value.text == "hint" ? Placement::hint : Placement::spread;
+}
+
+void set_insecure(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!has_kind(given, Kind::boolean, "insecure = true", faults)) return;
+  if (given.value.text != "true" && given.value.text != "false") {
+    faults.push_back(
+        fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': write true or false"));
+    return;
+  }
+  configuration.options.insecure = given.value.text == "true";
+}
+
+void set_log_level(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!one_of(given, kLogLevels, "error, warning, info, debug or off", faults)) return;
+  static_cast<void>(parse_log_level(given.value.text, configuration.options.log_level));
+}
+
+std::string show_listen(const HubOptions& options) {
+  std::vector<std::string> urls;
+  for (const ListenUrl& url : options.listen) urls.push_back(url.text());
+  if (urls.empty()) urls = default_addresses();
+  std::string list;
+  for (const std::string& url : urls) list += (list.empty() ? "" : ", ") + toml_quoted(url);
+  return "[" + list + "]";
+}
+
+std::string show_log_level(const HubOptions& options) {
+  return toml_quoted(kLogLevels[static_cast<std::size_t>(options.log_level)]);
+}
+
+constexpr std::array kSettings{
+    Setting{"listen", "addresses to listen on: tcp://HOST:PORT or unix:/PATH", false, set_listen, show_listen},
+    Setting{"shards", "threads that carry data, 1 to 16", false, set_shards,
+            [](const HubOptions& options) { return std::to_string(options.shards); }},
+    Setting{"hub_id", "the hub's number, 1 to 4094", false, set_hub_id,
+            [](const HubOptions& options) { return std::to_string(options.id.value()); }},
+    Setting{"hub_name", "its name for people", false, set_hub_name,
+            [](const HubOptions& options) { return toml_quoted(options.name); }},
+    Setting{"state_dir", "folder of what the hub keeps; \"\" is none", false, set_state_dir,
+            [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
+    Setting{"placement", "where new nodes live: spread or hint", false, set_placement,
+            [](const HubOptions& options) {
+              return toml_quoted(kPlacements[options.placement == Placement::hint ? 1 : 0]);
+            }},
+    Setting{"insecure", "allows addresses that other machines reach", false, set_insecure,
+            [](const HubOptions& options) { return std::string{options.insecure ? "true" : "false"}; }},
+    Setting{"log_level", "error, warning, info, debug or off", true, set_log_level, show_log_level},
+};
+
+std::string nearest_key(std::string_view key) {
+  std::vector<std::string_view> keys;
+  std::vector<std::string> limits;
+  for (const Setting& setting : kSettings) keys.push_back(setting.key);
+  for (const LimitInfo& limit : limit_table()) limits.push_back(std::string{kLimits} + std::string{limit.name});
+  keys.emplace_back("limits");
+  for (const std::string& limit : limits) {
+    if (limit.substr(kLimits.size()) == key) return "; it is a limit: write it below [limits]";
+    keys.emplace_back(limit);
+  }
+  return did_you_mean(key, keys) + " (tcphub --print-config shows all)";
+}
+
+void apply_limit(Configuration& configuration, const Given& given, std::string_view name, Faults& faults) {
+  const LimitInfo* limit = find_limit(name);
+  if (limit == nullptr) {
+    faults.push_back({given.place, "there is no limit '" + escaped(name, kQuotedMax) + "'" + nearest_limit(name) +
+                                       " (tcphub --help-limits shows all)"});
+    return;
+  }
+  // A text may have a suffix: "64k".
+  const bool number = given.value.kind == Kind::text || given.value.kind == Kind::words;
+  if (!number && !has_kind(given, Kind::integer, std::string{name} + " = " + std::to_string(limit->least), faults)) {
+    return;
+  }
+  std::string error = set_limit(configuration.options.limits, *limit, given.value.text);
+  if (!error.empty()) faults.push_back(fault(given, std::move(error)));
+}
+
+void keep_origin(Configuration& configuration, const Given& given) {
+  configuration.origins[given.key] = given.origin;
+  configuration.places[given.key] = {given.value.place, given.label};
+}
+
+std::string origin_of(const Configuration& configuration, const std::string& key) {
+  const auto found = configuration.origins.find(key);
+  return found == configuration.origins.end() ? "default" : found->second;
+}
+
+}  // namespace
+
+std::size_t default_shards() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  const int processors = ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+  return static_cast<std::size_t>(std::clamp(processors / 2, 1, 8));
+}
+
+std::span<const Setting> settings() { return kSettings; }
+
+void apply(Configuration& configuration, const Given& given, Faults& faults) {
+  const std::size_t before = faults.size();
+  if (given.key.starts_with(kLimits)) {
+    apply_limit(configuration, given, std::string_view{given.key}.substr(kLimits.size()), faults);
+  } else if (const auto* setting = std::ranges::find(kSettings, given.key, &Setting::key); setting != kSettings.end()) {
+    setting->set(configuration, given, faults);
+  } else if (given.key == "limits") {
+    if (given.value.kind != Kind::table) {
+      faults.push_back({given.place, "limits is a table: write [limits], and below it a line NAME = NUMBER for each"});
+    }
+    return;
+  } else {
+    faults.push_back({given.place, "there is no key '" + escaped(given.key, kQuotedMax) + "'" + nearest_key(given.key) +
+                                       "; tcphub --print-config shows all"});
+  }
+  if (faults.size() == before) keep_origin(configuration, given);
+}
+
+void complete(Configuration& configuration, Faults& faults) {
+  HubOptions& options = configuration.options;
+  if (options.name.empty()) options.name = "hub-" + std::to_string(options.id.value());
+  for (std::size_t i = 0; i < options.listen.size(); ++i) {
+    if (options.listen[i].is_local() || options.insecure) continue;
+    const Fault& where = configuration.listen_places[i];
+    faults.push_back({where.place, "cannot listen on " + options.listen[i].text() + ": an open address needs TLS, or " +
+                                       (where.place.empty() ? "--insecure" : "insecure = true")});
+  }
+  const Limits& limits = options.limits;
+  if (limits.silent_ms <= limits.keep_alive_ms) {
+    auto where = configuration.places.find("limits.silent_ms");
+    if (where == configuration.places.end()) where = configuration.places.find("limits.keep_alive_ms");
+    faults.push_back({where == configuration.places.end() ? "" : where->second.place,
+                      "limit silent_ms (" + std::to_string(limits.silent_ms) + ") must be larger than keep_alive_ms (" +
+                          std::to_string(limits.keep_alive_ms) + "), or healthy nodes are closed as silent"});
+  }
+}
+
+std::string print(const Configuration& configuration) {
+  std::string text =
+      "# tcphub " + std::string{kVersion} + ": the configuration in force, and where each value came from\n\n";
+  for (const Setting& setting : kSettings) {
+    const std::string key{setting.key};
+    text += key + " = " + setting.show(configuration.options) + "  # " + origin_of(configuration, key) + "\n";
+  }
+  text += "\n[limits]\n";
+  for (const LimitInfo& limit : limit_table()) {
+    const std::string name{limit.name};
+    text += name + " = " + std::to_string(configuration.options.limits.*limit.field) + "  # " +
+            origin_of(configuration, std::string{kLimits} + name) + "\n";
+  }
+  return text;
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,203 @@
+#include "hub/config/sources.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "base/log.hpp"
+#include "base/suggest.hpp"
+#include "hub/config/toml_file.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPrefix = "TCPHUB_";
+constexpr std::string_view kLimitsPrefix = "TCPHUB_LIMITS_";
+constexpr std::string_view kFileVariable = "TCPHUB_CONFIG";
+constexpr std::size_t kQuotedMax = 60;
+
+std::string upper(std::string_view text) {
+  std::string result{text};
+  std::ranges::transform(result, result.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return result;
+}
+
+/// "" for a variable that is no key.
+std::string key_of(std::string_view variable) {
+  for (const Setting& setting : settings()) {
+    if (variable == std::string{kPrefix} + upper(setting.key)) return std::string{setting.key};
+  }
+  for (const LimitInfo& limit : limit_table()) {
+    if (variable == std::string{kLimitsPrefix} + upper(limit.name)) return "limits." + std::string{limit.name};
+  }
+  return {};
+}
+
+std::string nearest_variable(std::string_view variable) {
+  std::vector<std::string> all{std::string{kFileVariable}};
+  for (const Setting& setting : settings()) all.push_back(std::string{kPrefix} + upper(setting.key));
+  for (const LimitInfo& limit : limit_table()) all.push_back(std::string{kLimitsPrefix} + upper(limit.name));
+  const std::vector<std::string_view> views(all.begin(), all.end());
+  return did_you_mean(variable, views);
+}
+
+/// Addresses stand side by side in a variable, with blanks or commas between them.
+std::vector<Value> split(std::string_view text) {
+  constexpr std::string_view kBetween = ", \t";
+  std::vector<Value> parts;
+  for (std::size_t at = text.find_first_not_of(kBetween); at != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kBetween, at), text.size());
+    parts.push_back({Value::Kind::words, std::string{text.substr(at, end - at)}, {}, {}});
+    at = text.find_first_not_of(kBetween, end);
+  }
+  return parts;
+}
+
+Given from_environment(const std::string& variable, const std::string& key, std::string_view text) {
+  Given given;
+  given.key = key;
+  given.label = variable;
+  given.origin = "environment " + variable;
+  given.value.text = text;
+  if (key == "listen") {
+    given.value.kind = Value::Kind::list;
+    given.value.items = split(text);
+  }
+  return given;
+}
+
+/// The whole file, or why it cannot be had.
+struct FileText {
+  std::string text;
+  std::string error;
+};
+
+FileText read_file(const std::string& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (error || !fs::exists(status)) {
+    return {{}, error ? error.message() : std::generic_category().message(ENOENT)};
+  }
+  if (fs::is_directory(status)) return {{}, "it is a folder"};
+  errno = 0;
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return {{}, std::generic_category().message(errno != 0 ? errno : EIO)};
+  FileText file;
+  file.text.resize(kConfigBytesMax + 1);
+  stream.read(file.text.data(), static_cast<std::streamsize>(file.text.size()));
+  if (stream.bad()) return {{}, std::generic_category().message(EIO)};
+  file.text.resize(static_cast<std::size_t>(stream.gcount()));
+  return file;
+}
+
+/// Line and column of a place.
+std::pair<std::size_t, std::size_t> position_in(const std::string& place) {
+  const std::size_t column = place.rfind(':');
+  const std::size_t line = column == std::string::npos ? column : place.rfind(':', column - 1);
+  if (line == std::string::npos) return {};
+  return {std::strtoul(place.c_str() + line + 1, nullptr, 10), std::strtoul(place.c_str() + column + 1, nullptr, 10)};
+}
+
+void read_one(const std::string& path, ReadConfiguration& read) {
+  const FileText file = read_file(path);
+  read.files.push_back(path);
+  if (!file.error.empty()) {
+    read.faults.push_back(
+        {path, "cannot read this file: " + file.error + "; give the path of a TOML file with --config"});
+    return;
+  }
+  TomlFile toml = read_toml(file.text, path);
+  Faults faults = std::move(toml.faults);
+  for (const Given& given : toml.keys) apply(read.configuration, given, faults);
+  std::ranges::stable_sort(faults, {}, [](const Fault& fault) { return position_in(fault.place); });
+  if (faults.size() > kConfigFaultsMax) faults.resize(kConfigFaultsMax);
+  read.faults.insert(read.faults.end(), faults.begin(), faults.end());
+}
+
+/// The *.toml of the folder, by name.
+std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
+  std::vector<std::string> files;
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return files;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().extension() == ".toml") files.push_back(entry->path().string());
+  }
+  if (error) faults.push_back({folder.string(), "cannot read this folder: " + error.message() + "; give it rights"});
+  std::ranges::sort(files);
+  if (files.size() > kConfigFilesMax) {
+    faults.push_back({folder.string(), "there are " + std::to_string(files.size()) + " files; at most " +
+                                           std::to_string(kConfigFilesMax) + " are read"});
+    files.clear();
+  }
+  return files;
+}
+
+/// The first of the default places where there is a file; "": none.
+std::string file_in_default_place() {
+  std::error_code ignored;
+  for (const std::string& file : default_config_files()) {
+    if (fs::exists(file, ignored)) return file;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> default_config_files() {
+  std::vector<std::string> files;
+  const char* config = std::getenv("XDG_CONFIG_HOME");
+  const char* home = std::getenv("HOME");
+  if (config != nullptr && *config == '/') {
+    files.push_back(std::string{config} + "/gimnet/tcphub.toml");
+  } else if (home != nullptr && *home == '/') {
+    files.push_back(std::string{home} + "/.config/gimnet/tcphub.toml");
+  }
+  files.emplace_back("/etc/gimnet/tcphub.toml");
+  return files;
+}
+
+std::vector<std::string> read_environment(ConfigSources& sources, const char* const* environment) {
+  std::vector<std::string> warnings;
+  for (; *environment != nullptr; ++environment) {
+    const std::string_view entry = *environment;
+    const std::size_t equals = entry.find('=');
+    if (!entry.starts_with(kPrefix) || equals == std::string_view::npos) continue;
+    const std::string variable{entry.substr(0, equals)};
+    const std::string_view value = entry.substr(equals + 1);
+    if (variable == kFileVariable) {
+      if (sources.file.empty()) sources.file = value;
+    } else if (const std::string key = key_of(variable); !key.empty()) {
+      sources.environment.push_back(from_environment(variable, key, value));
+    } else {
+      warnings.push_back("the environment's " + escaped(variable, kQuotedMax) + " is no key of the configuration" +
+                         nearest_variable(variable));
+    }
+  }
+  std::ranges::sort(sources.environment, {}, &Given::label);
+  return warnings;
+}
+
+ReadConfiguration read_configuration(const ConfigSources& sources) {
+  ReadConfiguration read;
+  read.configuration.options.shards = default_shards();
+  const std::string file = sources.file.empty() ? file_in_default_place() : sources.file;
+  if (!file.empty()) {
+    read_one(file, read);
+    for (const std::string& part : files_in(fs::path{file}.parent_path() / "conf.d", read.faults)) read_one(part, read);
+  }
+  for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
+  for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);
+  complete(read.configuration, read.faults);
+  return read;
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hub/config/settings.hpp"
+#include "hub/config/value.hpp"
+
+namespace gimnet::hub {
+
+/// Most files in a conf.d.
+inline constexpr std::size_t kConfigFilesMax = 256;
+
+/// Where a hub's configuration comes from, the weakest first: defaults, a file, the files in conf.d beside it, the
+/// environment, the flags. Kept so that all of it can be read again. A value type.
+struct ConfigSources {
+  std::string file;                ///< of --config or TCPHUB_CONFIG; "": the first of the default places that is there
+  std::vector<Given> environment;  ///< TCPHUB_...
+  std::vector<Given> flags;
+};
+
+/// What was read.
+struct ReadConfiguration {
+  Configuration configuration;  ///< whole only where there are no faults
+  Faults faults;
+  std::vector<std::string> files;  ///< that were read, the one beside conf.d first
+};
+
+/// The places of the file if nobody says: the user's and the system's.
+[[nodiscard]] std::vector<std::string> default_config_files();
+
+/// The variables of this process that configure a hub; TCPHUB_CONFIG sets `sources.file` unless it is set. Warnings:
+/// variables that are no key.
+[[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources, const char* const* environment);
+
+/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, is one.
+/// Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each.
+[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources);
+
+}  // namespace gimnet::hub

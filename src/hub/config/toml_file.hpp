@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hub/config/value.hpp"
+
+namespace gimnet::hub {
+
+/// Most bytes of one configuration file.
+inline constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20;
+/// Most faults that are told of one file.
+inline constexpr std::size_t kConfigFaultsMax = 100;
+
+/// What a configuration file says, and what is no TOML in it.
+struct TomlFile {
+  std::vector<Given> keys;  ///< in the order of the file; those of [limits] as "limits.key"
+  Faults faults;            ///< in the order of the file
+};
+
+/// Reads TOML 1.0. What is wrong is left out and the rest is read all the same, so that everything that is wrong is
+/// told at once. `name` is how places call the file. Thread safety: any thread. Limits: kConfigBytesMax,
+/// kConfigFaultsMax.
+[[nodiscard]] TomlFile read_toml(std::string_view text, const std::string& name);
+
+/// `text` as a TOML basic string, in quotes.
+[[nodiscard]] std::string toml_quoted(std::string_view text);
+
+}  // namespace gimnet::hub

@@ -1,0 +1,140 @@
+#include "hub/config/sources.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "hub/config/toml_file.hpp"
+#include "tests/hub/control/support/folder.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class SourcesTest : public ::testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& text) { std::ofstream(folder_.path(name)) << text; }
+  void make_conf_d() { ASSERT_EQ(::mkdir(folder_.path("conf.d").c_str(), 0700), 0); }
+  ReadConfiguration read() { return read_configuration(sources_); }
+  void environment(std::vector<const char*> variables) {
+    variables.push_back(nullptr);
+    warnings_ = read_environment(sources_, variables.data());
+  }
+
+  TestFolder folder_;
+  ConfigSources sources_{folder_.path("hub.toml"), {}, {}};
+  std::vector<std::string> warnings_;
+};
+
+TEST_F(SourcesTest, AStrongerSourceWinsOverAWeakerOne) {
+  make_conf_d();
+  write("hub.toml", "shards = 1\nhub_id = 1\nhub_name = 'file'\nplacement = 'hint'\n[limits]\nnodes = 1\n");
+  write("conf.d/1.toml", "shards = 2\nhub_id = 2\nhub_name = 'first'\n");
+  write("conf.d/2.toml", "shards = 3\nhub_id = 3\n");
+  environment({"TCPHUB_SHARDS=4", "TCPHUB_HUB_ID=4", "PATH=x"});
+  Given flag;
+  flag.key = "shards";
+  flag.label = "--shards";
+  flag.origin = "flag --shards";
+  flag.value.text = "5";
+  sources_.flags.push_back(flag);
+  const ReadConfiguration all = read();
+  EXPECT_THAT(all.faults, IsEmpty());
+  EXPECT_EQ(all.configuration.options.shards, 5u);
+  EXPECT_EQ(all.configuration.options.id, HubId{4});
+  EXPECT_EQ(all.configuration.options.name, "first");
+  EXPECT_EQ(all.configuration.options.placement, Placement::hint);
+  EXPECT_EQ(all.configuration.options.limits.nodes, 1u);
+  EXPECT_THAT(all.files,
+              ElementsAre(folder_.path("hub.toml"), folder_.path("conf.d/1.toml"), folder_.path("conf.d/2.toml")));
+  const auto& origins = all.configuration.origins;
+  EXPECT_EQ(origins.at("shards"), "flag --shards");
+  EXPECT_EQ(origins.at("hub_id"), "environment TCPHUB_HUB_ID");
+  EXPECT_EQ(origins.at("hub_name"), folder_.path("conf.d/1.toml") + ":3");
+  EXPECT_EQ(origins.at("limits.nodes"), folder_.path("hub.toml") + ":6");
+}
+
+TEST_F(SourcesTest, WhatIsOverruledHasToBeRightAllTheSame) {
+  write("hub.toml", "shards = 99\n");
+  environment({"TCPHUB_SHARDS=4"});
+  EXPECT_THAT(read().faults, SizeIs(1));
+}
+
+TEST_F(SourcesTest, EveryKeyHasAVariable) {
+  write("hub.toml", "");
+  environment({"TCPHUB_LISTEN=unix:/a, unix:/b", "TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=7", "TCPHUB_HUB_NAME=hall",
+               "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint", "TCPHUB_INSECURE=true", "TCPHUB_LOG_LEVEL=debug",
+               "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
+  EXPECT_THAT(warnings_, IsEmpty());
+  const ReadConfiguration all = read();
+  EXPECT_THAT(all.faults, IsEmpty());
+  EXPECT_THAT(all.configuration.options.listen, SizeIs(2));
+  EXPECT_TRUE(all.configuration.options.insecure);
+  EXPECT_EQ(all.configuration.options.limits.budget_bytes, 64ull << 20);
+  EXPECT_EQ(all.configuration.origins.size(), settings().size() + 1);
+}
+
+TEST_F(SourcesTest, AWrongVariableIsNamed) {
+  write("hub.toml", "");
+  environment({"TCPHUB_SHARDS=0", "TCPHUB_SHARD=2"});
+  ASSERT_THAT(warnings_, SizeIs(1));
+  EXPECT_THAT(warnings_[0], HasSubstr("TCPHUB_SHARD is no key of the configuration; did you mean TCPHUB_SHARDS?"));
+  const ReadConfiguration all = read();
+  ASSERT_THAT(all.faults, SizeIs(1));
+  EXPECT_EQ(all.faults[0].line(), "tcphub: TCPHUB_SHARDS cannot be '0': give a whole number from 1 to 16");
+}
+
+TEST_F(SourcesTest, TheVariableNamesTheFileUnlessAFlagDoes) {
+  sources_.file.clear();
+  environment({"TCPHUB_CONFIG=/some/file"});
+  EXPECT_EQ(sources_.file, "/some/file");
+  environment({"TCPHUB_CONFIG=/another"});
+  EXPECT_EQ(sources_.file, "/some/file");
+}
+
+TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
+  ASSERT_THAT(read().faults, SizeIs(1));
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("hub.toml: cannot read this file: No such file or directory"));
+  ASSERT_EQ(::mkdir(folder_.path("hub.toml").c_str(), 0700), 0);
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("it is a folder"));
+}
+
+TEST_F(SourcesTest, TheUsersFileIsFoundAndNoneIsNeeded) {
+  sources_.file.clear();
+  ::setenv("XDG_CONFIG_HOME", folder_.path("").c_str(), 1);
+  EXPECT_THAT(default_config_files(), ElementsAre(folder_.path("/gimnet/tcphub.toml"), "/etc/gimnet/tcphub.toml"));
+  EXPECT_THAT(read().faults, IsEmpty());
+  ASSERT_EQ(::mkdir(folder_.path("gimnet").c_str(), 0700), 0);
+  write("gimnet/tcphub.toml", "hub_id = 9\n");
+  EXPECT_EQ(read().configuration.options.id, HubId{9});
+  ::unsetenv("XDG_CONFIG_HOME");
+}
+
+TEST_F(SourcesTest, FaultsComeInTheOrderOfTheFile) {
+  write("hub.toml", "shards = 99\nx =\nhub_id = 0\n");
+  std::vector<std::string> lines;
+  for (const Fault& fault : read().faults) lines.push_back(fault.line().substr(folder_.path("hub.toml").size(), 3));
+  EXPECT_THAT(lines, ElementsAre(":1:", ":2:", ":3:"));
+}
+
+TEST_F(SourcesTest, OnlySoManyFilesAreRead) {
+  make_conf_d();
+  write("hub.toml", "");
+  for (std::size_t i = 0; i < kConfigFilesMax; ++i) write("conf.d/" + std::to_string(i) + ".toml", "");
+  write("conf.d/readme", "no TOML");
+  EXPECT_THAT(read().faults, IsEmpty());
+  EXPECT_THAT(read().files, SizeIs(kConfigFilesMax + 1));
+  write("conf.d/one_more.toml", "");
+  ASSERT_THAT(read().faults, SizeIs(1));
+  EXPECT_THAT(read().faults[0].line(), HasSubstr("at most 256"));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,113 @@
+#include "hub/config/toml_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+std::vector<std::string> places(const TomlFile& file) {
+  std::vector<std::string> found;
+  for (const Fault& fault : file.faults) found.push_back(fault.place);
+  return found;
+}
+
+std::vector<std::string> keys(const TomlFile& file) {
+  std::vector<std::string> found;
+  for (const Given& given : file.keys) found.push_back(given.key);
+  return found;
+}
+
+TEST(TomlFile, KnowsWhereEveryKeyAndValueStands) {
+  const TomlFile file = read_toml("# a hub\nshards = 2\n\n[limits]\n  nodes   = 10\n", "hub.toml");
+  EXPECT_THAT(file.faults, IsEmpty());
+  ASSERT_THAT(keys(file), ElementsAre("shards", "limits.nodes"));
+  EXPECT_EQ(file.keys[0].place, "hub.toml:2:1");
+  EXPECT_EQ(file.keys[0].value.place, "hub.toml:2:10");
+  EXPECT_EQ(file.keys[0].origin, "hub.toml:2");
+  EXPECT_EQ(file.keys[1].place, "hub.toml:5:3");
+  EXPECT_EQ(file.keys[1].value.place, "hub.toml:5:13");
+}
+
+TEST(TomlFile, TellsTheKindsApart) {
+  const TomlFile file = read_toml("a = 1\nb = 'x'\nc = true\nd = 1.5\ne = 1979-05-27\nf = ['x', 2]\n[g]\n", "f");
+  ASSERT_THAT(file.keys, SizeIs(7));
+  using Kind = Value::Kind;
+  const Kind kinds[] = {Kind::integer, Kind::text, Kind::boolean, Kind::fraction, Kind::time, Kind::list, Kind::table};
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(file.keys[i].value.kind, kinds[i]) << i;
+  ASSERT_THAT(file.keys[5].value.items, SizeIs(2));
+  EXPECT_EQ(file.keys[5].value.items[0].text, "x");
+  EXPECT_EQ(file.keys[5].value.items[1].place, "f:6:11");
+}
+
+TEST(TomlFile, EveryWayToWriteALimitIsTheSameKey) {
+  EXPECT_THAT(keys(read_toml("[limits]\nnodes = 1", "f")), ElementsAre("limits.nodes"));
+  EXPECT_THAT(keys(read_toml("limits.nodes = 1", "f")), ElementsAre("limits.nodes"));
+  EXPECT_THAT(keys(read_toml("limits = { nodes = 1 }", "f")), ElementsAre("limits.nodes"));
+}
+
+TEST(TomlFile, TellsEverySyntaxErrorAtItsPlaceAndReadsTheRest) {
+  const TomlFile file = read_toml("shards = \nhub_id = 3\nbad line\n= 4\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+  EXPECT_THAT(places(file), ElementsAre("f:1:10", "f:3:5", "f:4:1", "f:6:10"));
+  EXPECT_THAT(keys(file), ElementsAre("hub_id", "limits.grace_ms"));
+}
+
+TEST(TomlFile, AKeyGivenTwiceIsTold) {
+  const TomlFile file = read_toml("shards = 1\n  shards = 2\n", "f");
+  ASSERT_THAT(file.faults, SizeIs(1));
+  EXPECT_EQ(file.faults[0].line(), "f:2:3: 'shards' is given twice; leave one of them out");
+}
+
+TEST(TomlFile, AnErrorInALongerValueCostsThatValueAlone) {
+  const TomlFile file = read_toml("hub_id = 1\nlisten = [\n  'a',\n  'b'\nshards = 2\n", "f");
+  EXPECT_THAT(places(file), ElementsAre("f:5:1"));
+  EXPECT_THAT(keys(file), ElementsAre("hub_id"));
+  const TomlFile open = read_toml("hub_id = 1\nname = '''x\n\n", "f");
+  EXPECT_THAT(places(open), SizeIs(1));
+  EXPECT_THAT(keys(open), ElementsAre("hub_id"));
+}
+
+TEST(TomlFile, WhatStandsBelowABrokenHeaderIsNobodys) {
+  const TomlFile file = read_toml("shards = 1\n[limits\nnodes = 2\n", "f");
+  EXPECT_THAT(places(file), ElementsAre("f:2:8"));
+  EXPECT_THAT(keys(file), ElementsAre("shards"));
+}
+
+TEST(TomlFile, OfAnUnknownTableItsNameIsEnough) {
+  EXPECT_THAT(keys(read_toml("[limts]\nnodes = 2\n", "f")), ElementsAre("limts"));
+}
+
+TEST(TomlFile, FaultsAreBounded) {
+  std::string text;
+  for (std::size_t i = 0; i < 2 * kConfigFaultsMax; ++i) text += "bad line\n";
+  EXPECT_THAT(read_toml(text, "f").faults, SizeIs(kConfigFaultsMax));
+}
+
+TEST(TomlFile, TakesItsMostBytesAndNotOneMore) {
+  std::string text = "shards = 1\n#";
+  text.resize(kConfigBytesMax, ' ');
+  EXPECT_THAT(keys(read_toml(text, "f")), ElementsAre("shards"));
+  const TomlFile over = read_toml(text + " ", "f");
+  EXPECT_THAT(over.keys, IsEmpty());
+  ASSERT_THAT(over.faults, SizeIs(1));
+  EXPECT_THAT(over.faults[0].sentence, HasSubstr("1048576 bytes"));
+}
+
+TEST(TomlFile, BytesThatAreNoTextAreTold) {
+  EXPECT_THAT(places(read_toml("shards = 1\n\xff\xfe", "f")), SizeIs(::testing::Ge(1u)));
+}
+
+TEST(TomlFile, QuotesSoThatItReadsBackEqual) {
+  const std::string odd = "a \"b\" \\ \n\t\x7f \xc3\xa4";
+  const TomlFile file = read_toml("x = " + toml_quoted(odd), "f");
+  ASSERT_THAT(file.faults, IsEmpty());
+  EXPECT_EQ(file.keys[0].value.text, odd);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
