@@ -9,13 +9,14 @@ import threading
 import unittest
 
 from support.processes import GIMNET, TCPHUB, Hub, Process, run_gimnet
+from support.waiting import PATIENCE_S
 from support.wire import Client
 
 
 def run(*arguments, env=None):
     process = Process(arguments, env=env)
     try:
-        process.code = process.wait(20)
+        process.code = process.wait()
     finally:
         process.end()
     return process
@@ -127,7 +128,7 @@ class WrongForGimnet(unittest.TestCase):
         os.close(reader)
         with subprocess.Popen([GIMNET, "--hub", hub.url, "status"], stdout=writer, stderr=subprocess.PIPE) as tool:
             os.close(writer)
-            _, words = tool.communicate(timeout=20)
+            _, words = tool.communicate(timeout=PATIENCE_S)
         self.assertEqual(tool.returncode, 1)
         self.assertIn(b"standard output", words)
 

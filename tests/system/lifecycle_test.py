@@ -24,13 +24,13 @@ class Ends(unittest.TestCase):
         self.assertEqual(data, [number.to_bytes(4, "little") for number in range(1000)])
         self.assertEqual([frame.goodbye for frame in frames if frame.goodbye], ["draining"])
         self.assertEqual(sender.goodbye(), "draining")
-        self.assertEqual(hub.process.wait(20), 0, hub.process.err)
+        self.assertEqual(hub.process.wait(), 0, hub.process.err)
         self.assertFalse(os.path.exists(hub.socket_path))
 
     def test_sigint_too(self):
         hub = Hub(self)
         hub.process.signal(signal.SIGINT)
-        self.assertEqual(hub.process.wait(20), 0, hub.process.err)
+        self.assertEqual(hub.process.wait(), 0, hub.process.err)
 
     def test_newcomers_are_refused_while_it_drains(self):
         hub = Hub(self)
@@ -60,7 +60,7 @@ class Ends(unittest.TestCase):
         for address in hub.addresses:
             second = Process([TCPHUB, "--listen", address])
             self.addCleanup(second.end)
-            self.assertEqual(second.wait(20), 1)
+            self.assertEqual(second.wait(), 1)
             self.assertIn(address, second.err)
             self.assertIn("in use", second.err)
         self.assertEqual(run_gimnet(hub, "nodes").code, 0)
@@ -72,7 +72,7 @@ class Ends(unittest.TestCase):
             file.write("precious")
         second = Process([TCPHUB, "--listen", f"unix:{path}"])
         self.addCleanup(second.end)
-        self.assertEqual(second.wait(20), 1)
+        self.assertEqual(second.wait(), 1)
         self.assertIn(path, second.err)
         with open(path, encoding="utf-8") as file:
             self.assertEqual(file.read(), "precious")
@@ -80,12 +80,12 @@ class Ends(unittest.TestCase):
 
 class Nodes(unittest.TestCase):
     def test_ctrl_c_leaves_at_once(self):
-        hub = Hub(self)
+        hub = Hub(self, "--limit", "grace_ms=600000")
         for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
             receiver = start_recv(self, hub, "B")
             receiver.signal(number)
-            self.assertEqual(receiver.wait(20), code)
-            self.assertEqual([node["name"] for node in hub.nodes() if node["name"]], [])
+            self.assertEqual(receiver.wait(), code)
+            wait_until(lambda: not any(node["name"] for node in hub.nodes()), "B, given back long before its grace time")
 
     def test_a_killed_node_keeps_its_name_for_the_grace_time(self):
         hub = Hub(self, "--limit", "grace_ms=500")

@@ -62,7 +62,7 @@ class Process:
         self._threads.append(thread)
         return self
 
-    def wait(self, patience_s=60.0):
+    def wait(self, patience_s=2 * PATIENCE_S):
         """The exit code, when all output was read."""
         try:
             code = self.popen.wait(patience_s)
@@ -155,7 +155,7 @@ def start_gimnet(test, hub, *arguments, stdin=subprocess.DEVNULL):
     return process
 
 
-def run_gimnet(hub, *arguments, data=b"", patience_s=60.0):
+def run_gimnet(hub, *arguments, data=b"", patience_s=2 * PATIENCE_S):
     """gimnet from start to end. Its `code`, `out` and `err`."""
     process = Process([GIMNET, "--hub", hub.url if hasattr(hub, "url") else hub, *arguments],
                       stdin=subprocess.PIPE).feed(data)

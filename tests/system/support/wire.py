@@ -8,6 +8,7 @@ import time
 
 from support.waiting import PATIENCE_S
 
+HEADER = 16
 OPENING = b"GIMnet\x01\x00"
 UNICAST, GROUP, LIST, BROADCAST, SERVICE, REPORT, FLOW, TAKEN = range(8)
 LINK, NS, CTRL, ROUTE = 16, 17, 18, 19
