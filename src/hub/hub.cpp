@@ -37,10 +37,9 @@ Secret fresh_secret() {
 /// The conductor's door to the real shards.
 class Shards final : public ShardProxy {
  public:
-  explicit Shards(const HubShared& shared) {
+  Shards(const HubShared& shared, IoShard::Options options) {
     for (std::size_t i = 0; i < shared.mailboxes.size(); ++i) {
-      shards_.push_back(
-          std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, shared, IoShard::Options{}));
+      shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, shared, options));
     }
   }
   ~Shards() override { stop(); }
@@ -133,7 +132,7 @@ struct Hub::Parts {
       : options(given),
         ground(options),
         shared(ground.shared(options)),
-        shards(shared),
+        shards(shared, {.spin = options.spin}),
         conductor(facts_of(options), options.placement, options.limits,
                   Conductor::Wiring{shards,
                                     {ground.nodes, ground.groups, ground.quiescence},

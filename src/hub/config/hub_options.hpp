@@ -21,6 +21,7 @@ struct HubOptions {
   std::string state_dir;  ///< "": none
   Placement placement = Placement::spread;
   bool insecure = false;
+  bool spin = false;  ///< shards never sleep
   LogLevel log_level = LogLevel::info;
   Limits limits;
 };

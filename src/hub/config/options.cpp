@@ -11,10 +11,10 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::array<std::string_view, 15> kOptionNames{
-    "--listen",    "--shards",  "--hub-id",       "--hub-name",     "--state-dir",
-    "--limit",     "--help",    "--help-limits",  "--placement",    "--insecure",
-    "--log-level", "--version", "--check-config", "--print-config", "--config"};
+constexpr std::array<std::string_view, 16> kOptionNames{
+    "--listen",       "--shards",       "--hub-id",    "--hub-name", "--state-dir", "--limit",
+    "--help",         "--help-limits",  "--placement", "--insecure", "--log-level", "--version",
+    "--check-config", "--print-config", "--config",    "--spin"};
 
 /// The arguments as they were given.
 struct Raw {
@@ -28,6 +28,7 @@ struct Raw {
   std::string log_level;
   std::string config;
   bool insecure = false;
+  bool spin = false;
   bool help_limits = false;
   bool version = false;
   bool check_config = false;
@@ -57,6 +58,7 @@ void declare(CLI::App& app, Raw& raw) {
   app.add_option("--placement", raw.placement,
                  "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)")
       ->type_name("HOW");
+  app.add_flag("--spin", raw.spin, "Shards never sleep: shorter round trips, for a whole processor each");
   app.add_flag("--insecure", raw.insecure, "Allows to listen on addresses that other machines reach");
   app.add_option("--log-level", raw.log_level, "error, warning, info (default), debug or off")->type_name("LEVEL");
   app.add_option(
@@ -122,6 +124,7 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
     std::ranges::replace(key, '-', '_');
     sources.flags.push_back(flag(key, name, *text));
   }
+  if (raw.spin) sources.flags.push_back(flag("spin", "--spin", "true"));
   if (raw.insecure) sources.flags.push_back(flag("insecure", "--insecure", "true"));
   for (const std::string& assignment : raw.limits) {
     const std::size_t equals = assignment.find('=');

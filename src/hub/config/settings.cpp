@@ -126,14 +126,20 @@ void set_placement(Configuration& configuration, const Given& given, Faults& fau
   configuration.options.placement = given.value.text == "hint" ? Placement::hint : Placement::spread;
 }
 
-void set_insecure(Configuration& configuration, const Given& given, Faults& faults) {
-  if (!has_kind(given, Kind::boolean, "insecure = true", faults)) return;
+template <bool HubOptions::* option>
+void set_flag(Configuration& configuration, const Given& given, Faults& faults) {
+  if (!has_kind(given, Kind::boolean, given.label + " = true", faults)) return;
   if (given.value.text != "true" && given.value.text != "false") {
     faults.push_back(
         fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': write true or false"));
     return;
   }
-  configuration.options.insecure = given.value.text == "true";
+  configuration.options.*option = given.value.text == "true";
+}
+
+template <bool HubOptions::* option>
+std::string show_flag(const HubOptions& options) {
+  return options.*option ? "true" : "false";
 }
 
 void set_log_level(Configuration& configuration, const Given& given, Faults& faults) {
@@ -168,8 +174,9 @@ constexpr std::array kSettings{
             [](const HubOptions& options) {
               return toml_quoted(kPlacements[options.placement == Placement::hint ? 1 : 0]);
             }},
-    Setting{"insecure", "allows addresses that other machines reach", false, set_insecure,
-            [](const HubOptions& options) { return std::string{options.insecure ? "true" : "false"}; }},
+    Setting{"spin", "shards never sleep", false, set_flag<&HubOptions::spin>, show_flag<&HubOptions::spin>},
+    Setting{"insecure", "allows addresses that other machines reach", false, set_flag<&HubOptions::insecure>,
+            show_flag<&HubOptions::insecure>},
     Setting{"log_level", "error, warning, info, debug or off", true, set_log_level, show_log_level},
 };
 

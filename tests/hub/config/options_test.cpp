@@ -49,7 +49,10 @@ TEST(Options, DefaultsAreUseful) {
   EXPECT_EQ(defaults.name, "hub-1");
   EXPECT_EQ(defaults.placement, Placement::spread);
   EXPECT_FALSE(defaults.insecure);
+  EXPECT_FALSE(defaults.spin);
 }
+
+TEST(Options, ShardsSpinOnlyWhereAskedTo) { EXPECT_TRUE(options({"--spin"}).spin); }
 
 TEST(Options, ReadsEverything) {
   const HubOptions read = options({"--listen",    "tcp://127.0.0.1:0",

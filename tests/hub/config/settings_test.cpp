@@ -37,7 +37,8 @@ std::string fault(const std::string& text) {
 TEST(Settings, EveryKeyIsRead) {
   const Read result = read(
       "listen = ['tcp://127.0.0.1:0', 'unix:/some/path']\nshards = 2\nhub_id = 7\nhub_name = 'hall'\n"
-      "state_dir = '/some/dir'\nplacement = 'hint'\ninsecure = true\nlog_level = 'debug'\n[limits]\nnodes = 10\n"
+      "state_dir = '/some/dir'\nplacement = 'hint'\nspin = true\ninsecure = true\nlog_level = 'debug'\n[limits]\nnodes "
+      "= 10\n"
       "budget_bytes = '64M'\n");
   EXPECT_THAT(result.faults, IsEmpty());
   const HubOptions& options = result.configuration.options;
@@ -48,6 +49,7 @@ TEST(Settings, EveryKeyIsRead) {
   EXPECT_EQ(options.name, "hall");
   EXPECT_EQ(options.state_dir, "/some/dir");
   EXPECT_EQ(options.placement, Placement::hint);
+  EXPECT_TRUE(options.spin);
   EXPECT_TRUE(options.insecure);
   EXPECT_EQ(options.log_level, LogLevel::debug);
   EXPECT_EQ(options.limits.nodes, 10u);

@@ -70,12 +70,13 @@ TEST_F(SourcesTest, WhatIsOverruledHasToBeRightAllTheSame) {
 TEST_F(SourcesTest, EveryKeyHasAVariable) {
   write("hub.toml", "");
   environment({"TCPHUB_LISTEN=unix:/a, unix:/b", "TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=7", "TCPHUB_HUB_NAME=hall",
-               "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint", "TCPHUB_INSECURE=true", "TCPHUB_LOG_LEVEL=debug",
-               "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
+               "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint", "TCPHUB_SPIN=true", "TCPHUB_INSECURE=true",
+               "TCPHUB_LOG_LEVEL=debug", "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
   EXPECT_THAT(warnings_, IsEmpty());
   const ReadConfiguration all = read();
   EXPECT_THAT(all.faults, IsEmpty());
   EXPECT_THAT(all.configuration.options.listen, SizeIs(2));
+  EXPECT_TRUE(all.configuration.options.spin);
   EXPECT_TRUE(all.configuration.options.insecure);
   EXPECT_EQ(all.configuration.options.limits.budget_bytes, 64ull << 20);
   EXPECT_EQ(all.configuration.origins.size(), settings().size() + 1);
