@@ -5,9 +5,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include "generator/engine.hpp"
+#include "generator/process.hpp"
 #include "generator/scenario.hpp"
 #include "generator/wire.hpp"
 #include "net/socket.hpp"
@@ -17,17 +19,19 @@ int main(int argc, char** argv) {
   CLI::App app{"load_generator: measures a hub, or the null relay, from outside"};
   std::string wire_name = "gimnet";
   std::string url;
+  std::string publish_url;
   std::string scenario_name;
   double seconds = 1;
   RunOptions options;
-  app.add_option("--wire", wire_name, "how the subject is spoken to: gimnet or null");
+  app.add_option("--wire", wire_name, "how the subject is spoken to: gimnet, null, nats, mqtt, resp or zmtp");
   app.add_option("--connect", url, "tcp://HOST:PORT or unix:PATH")->required();
+  app.add_option("--publish-to", publish_url, "where the subject takes messages, if at another address");
   app.add_option("--process", options.process, "process id of the subject")->required();
   app.add_option("--scenario", scenario_name)->required()->check(CLI::IsMember(scenario_names()));
   app.add_option("--size", options.payload_bytes, "payload in bytes")
       ->check(CLI::Range(kPayloadBytesMin, kPayloadBytesMax));
   app.add_option("--seconds", seconds, "how long is measured")->check(CLI::Range(0.01, 3600.0));
-  app.add_option("--clients", options.client_count, "connections of idle_10000 and connect_10000")
+  app.add_option("--clients", options.client_count, "connections of idle_10000, connect_10000 and join_under_load")
       ->check(CLI::Range(2, 1'000'000));
   CLI11_PARSE(app, argc, argv);
 
@@ -35,8 +39,11 @@ int main(int argc, char** argv) {
   raise_descriptor_limit();
   const auto wire = make_wire(wire_name);
   if (wire == nullptr) fail("there is no wire of that name");
-  Engine engine(*wire, parse_endpoint(url));
+  std::optional<Endpoint> publish_endpoint;
+  if (!publish_url.empty()) publish_endpoint = parse_endpoint(publish_url);
+  Engine engine(*wire, parse_endpoint(url), publish_endpoint);
   Findings findings = find_scenario(scenario_name)(engine, options);
+  findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.process)));
   add_ledger(engine, findings);
   std::puts(findings.json().c_str());
 }

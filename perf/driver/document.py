@@ -1,11 +1,11 @@
 """docs/performance.md from the JSON document of a run."""
 
 from driver.goals import FIELD_TITLES, GOALS, Goal
-from driver.summary import COLUMNS, cells, shown
+from driver.summary import COLUMNS, absence_lines, cells, shown
 
 INTRODUCTION = """# Performance
 
-What the hub costs, measured against the cheapest relay that there can be. This page is written by `./dev perf --report`;
+What the hub costs, measured against the cheapest relay that there can be and against other hubs. This page is written by `./dev perf --report`;
 nothing here is edited by hand.
 
 ## The yardstick
@@ -21,6 +21,11 @@ machine to machine; the ratios of one run are what counts.
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
 fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`.
 
+**Other hubs** (`perf/driver/rivals.py`): Debian's packages as their documentation would have them for messages that need not be kept, and in their favour:
+nothing on disk, no passwords, TCP_NODELAY; nats-server; mosquitto at QoS 0; redis-server with RESP 3 and without replies to PUBLISH; ZeroMQ's XPUB/XSUB
+proxy that drops nothing. One raw generator speaks each one's protocol, so that every subject sees the same client. `tcphub_2_shards` has
+a second shard, on a processor of its own where the generator leaves one; `tcphub_spinning` is started with `--spin`.
+
 | scenario | what happens |
 | --- | --- |
 | one_to_one | one node sends to another |
@@ -35,6 +40,7 @@ fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole me
 | stalled_subscriber | a service at line rate with a subscriber that does not read beside one that does |
 | idle_10000 | 10,000 nodes that say nothing but keep-alives |
 | connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
+| join_under_load | the time until 1,000 nodes have joined while one_to_one goes on, and what is left of its rate |
 """
 
 
@@ -79,7 +85,7 @@ def goal_table(rows: list[dict]) -> str:
 
 def other_figures(rows: list[dict]) -> str:
     """Memory, rates and times that have no column of their own."""
-    names = {"rate_kept": "rate kept beside a stalled subscriber", "rss_growth_bytes": "bytes grown by meanwhile",
+    names = {"rate_kept": "rate kept", "rss_growth_bytes": "bytes grown by meanwhile",
              "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
              "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s"}
     lines = [[row["subject"], row["transport"], row["scenario"], title, shown(row[name])] for row in rows
@@ -91,11 +97,12 @@ def make_document(result: dict) -> str:
     rows = with_derived(result["results"])
     machine = result["machine"]
     hub = " ".join(result["hub_arguments"]) or "none"
+    versions = "".join(f"; {name} {version}" for name, version in result.get("versions", {}).items())
     return "\n".join([
         INTRODUCTION,
         "## Where and when", "",
         f"{result['date']}; {machine['processor']}, {machine['cpus_allowed']} processors, {machine['system']}, "
-        f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}; {result['seconds']} s a run; "
+        f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}{versions}; {result['seconds']} s a run; "
         f"further arguments of the hub: {hub}.", "",
         "## Bounds and goals", "",
         "A bound must hold; a goal is where the hub is to get.", "",
@@ -104,4 +111,5 @@ def make_document(result: dict) -> str:
         "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
         "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000.", "",
         table([title for _, title in COLUMNS], [cells(row) for row in rows]), "",
-        other_figures(rows), ""])
+        other_figures(rows), "",
+        *[f"No row: {line}." for line in absence_lines(result.get("absent", []))], ""])

@@ -6,8 +6,9 @@ import subprocess
 import sys
 from dataclasses import dataclass, field
 
-from driver.subjects import NullRelay, Subject, SubjectError, TcpHub, allowed_cpus, child_setup
-from driver.suite import Case
+from driver.catalogue import make_subject, why_absent
+from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
+from driver.suite import Case, Plan
 
 # A generator that takes this much longer than its measurement hangs.
 EXTRA_SECONDS = 45
@@ -18,9 +19,8 @@ class Settings:
     build: pathlib.Path
     seconds: float = 1.0
     runs: int = 3
-    clients: int | None = None  # of idle_10000 and connect_10000
+    clients: int | None = None  # of idle_10000, connect_10000 and join_under_load
     hub_arguments: list[str] = field(default_factory=list)
-    null_scenarios: frozenset[str] | None = None  # with which the null relay is run; None: with all
 
 
 @dataclass
@@ -31,6 +31,7 @@ class Outcome:
     case: Case
     findings: list[dict[str, float]] = field(default_factory=list)
     error: str | None = None
+    is_absent: bool = False  # `error` says why it was not even tried
 
 
 def say(text: str) -> None:
@@ -45,23 +46,18 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         command += ["--clients", str(settings.clients)]
     with subject:
         command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
+        if case.transport in subject.publish_urls:
+            command += ["--publish-to", subject.publish_urls[case.transport]]
         limit = 3 * settings.seconds + EXTRA_SECONDS
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
-                                  preexec_fn=child_setup(cpus[0] if case.spec.one_cpu else cpus[-1]))
+                                  preexec_fn=child_setup([cpus[0] if case.spec.one_cpu else cpus[-1]]))
         except subprocess.TimeoutExpired:
             raise SubjectError(f"{subject.name}: no result within {limit:.0f} s") from None
         subject.check_alive()
         if done.returncode != 0:
             raise SubjectError(f"{subject.name}: {done.stderr.strip() or f'the generator ended with {done.returncode}'}")
         return json.loads(done.stdout)
-
-
-def make_subject(name: str, case: Case, settings: Settings) -> Subject:
-    cpu = allowed_cpus()[0]
-    if name == "null":
-        return NullRelay(settings.build, cpu, case.spec.relay_mode)
-    return TcpHub(settings.build, cpu, settings.hub_arguments)
 
 
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
@@ -71,25 +67,33 @@ def run_group(outcomes: list[Outcome], settings: Settings) -> None:
                 continue
             say(f"  {outcome.subject}: {outcome.case} ({run + 1}/{settings.runs})")
             try:
-                outcome.findings.append(run_once(make_subject(outcome.subject, outcome.case, settings), outcome.case,
-                                                 settings))
+                subject = make_subject(outcome.subject, outcome.case, settings.build, settings.hub_arguments)
+                outcome.findings.append(run_once(subject, outcome.case, settings))
             except SubjectError as error:
-                outcome.error = f"{outcome.case}: {error}"
-                say(f"error: {outcome.error}")
+                outcome.error = str(error)
+                say(f"error: {outcome.case}: {outcome.error}")
 
 
-def run_cases(cases: list[Case], settings: Settings) -> list[Outcome]:
-    """Cases with the same baseline are one group: null relay, hub, null relay, hub, ..."""
-    groups: dict[Case, list[Case]] = {}
-    for case in dict.fromkeys(cases):
-        groups.setdefault(case.baseline or case, []).append(case)
+def make_group(baseline: Case, members: list[tuple[Case, tuple[str, ...]]], build: pathlib.Path) -> list[Outcome]:
+    """The null relay, if somebody is compared with it, then the others, case by case."""
+    group = []
+    if any("null" in subjects for _, subjects in members):
+        group.append(Outcome("null", baseline))
+    group += [Outcome(name, case) for case, subjects in members for name in subjects if name != "null"]
+    for outcome in group:
+        outcome.error = why_absent(outcome.subject, outcome.case, build)
+        outcome.is_absent = outcome.error is not None
+    return group
+
+
+def run_cases(plan: Plan, settings: Settings) -> list[Outcome]:
+    """Cases with the same baseline are one group, whose subjects take turns: null relay, hub, others, null relay, ..."""
+    groups: dict[Case, list[tuple[Case, tuple[str, ...]]]] = {}
+    for case, subjects in plan.items():
+        groups.setdefault(case.baseline or case, []).append((case, subjects))
     outcomes = []
-    for key, members in groups.items():
-        is_compared = members[0].baseline is not None
-        if settings.null_scenarios is not None:
-            is_compared = is_compared and key.scenario in settings.null_scenarios
-        group = [Outcome("null", key)] if is_compared else []
-        group += [Outcome("tcphub", case) for case in members]
+    for baseline, members in groups.items():
+        group = make_group(baseline, members, settings.build)
         run_group(group, settings)
         outcomes += group
     return outcomes

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import pathlib
+import resource
 import select
 import signal
 import subprocess
@@ -23,39 +24,45 @@ def allowed_cpus() -> list[int]:
     return sorted(os.sched_getaffinity(0))
 
 
-def child_setup(cpu: int):
-    """For subprocess: pins the child, and ends it when this program dies."""
+def child_setup(cpus: list[int]):
+    """For subprocess: pins the child, lets it hold many connections, and ends it when this program dies."""
     libc = ctypes.CDLL(None, use_errno=True)
+    _, descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)
 
     def set_up():
-        os.sched_setaffinity(0, {cpu})
+        os.sched_setaffinity(0, cpus)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
         libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
     return set_up
 
 
 class Subject:
-    """A running hub or relay, for `with`. Listens on TCP and on a Unix socket, on one processor."""
+    """A running hub or relay, for `with`. Listens on TCP and, unless `transports` says otherwise, on a Unix socket."""
 
     name = ""
     wire = ""
+    transports = ("tcp", "unix")
+    prints_ready = True  # `ready URL...` on standard output; otherwise that belongs to its log
 
-    def __init__(self, build: pathlib.Path, cpu: int):
+    def __init__(self, build: pathlib.Path, cpus: list[int]):
         self._build = build
-        self._cpu = cpu
-        self._folder = tempfile.TemporaryDirectory(prefix="gimnet-perf-")
+        self._cpus = cpus
         self._process: subprocess.Popen | None = None
         self.urls: dict[str, str] = {}
+        self.publish_urls: dict[str, str] = {}  # where it takes messages, if at other addresses
 
     def command(self, folder: str) -> list[str]:
         raise NotImplementedError
 
     def __enter__(self) -> "Subject":
+        self._folder = tempfile.TemporaryDirectory(prefix="gimnet-perf-")
         self._log = open(os.path.join(self._folder.name, "log"), "w+b")
         command = self.command(self._folder.name)
         try:
-            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                             stderr=self._log, preexec_fn=child_setup(self._cpu))
+            output = subprocess.PIPE if self.prints_ready else self._log
+            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=self._log,
+                                             preexec_fn=child_setup(self._cpus))
             self._await_ready()
         except OSError as error:
             self._close()
@@ -93,9 +100,12 @@ class Subject:
                 raise SubjectError(f"{self.name} was not ready within {READY_SECONDS} s: {self._log_end()}")
             line += piece
         words = line.decode().split()
-        if len(words) != 3 or words[0] != "ready":
+        if len(words) < 3 or words[0] != "ready":
             raise SubjectError(f"{self.name} did not print its addresses, but: {line.decode().strip()}")
-        self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in words[1:]}
+        self.take_ready(words[1:])
+
+    def take_ready(self, urls: list[str]) -> None:
+        self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in urls}
 
     def _log_end(self) -> str:
         self._log.seek(0)
@@ -109,7 +119,9 @@ class Subject:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-            self._process.stdout.close()
+            if self._process.stdout is not None:
+                self._process.stdout.close()
+            self._process = None
         self._log.close()
         self._folder.cleanup()
 
@@ -121,7 +133,7 @@ class NullRelay(Subject):
     wire = "null"
 
     def __init__(self, build: pathlib.Path, cpu: int, mode: str):
-        super().__init__(build, cpu)
+        super().__init__(build, [cpu])
         self._mode = mode
 
     def command(self, folder: str) -> list[str]:
@@ -135,9 +147,10 @@ class TcpHub(Subject):
     name = "tcphub"
     wire = "gimnet"
 
-    def __init__(self, build: pathlib.Path, cpu: int, arguments: list[str]):
-        super().__init__(build, cpu)
+    def __init__(self, build: pathlib.Path, cpus: list[int], arguments: list[str], name: str = "tcphub"):
+        super().__init__(build, cpus)
         self._arguments = arguments
+        self.name = name
 
     def command(self, folder: str) -> list[str]:
         return [str(self._build / "bin" / "tcphub"), "--listen", "tcp://127.0.0.1:0", "--listen",

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-SIZES = (16, 256, 1024, 4096, 65536)
+SIZES = (16, 256, 1024, 4096, 65536, 1048576)
 CPU = "cpu_ns_per_message"
 
 
@@ -36,6 +36,7 @@ SCENARIOS = {
     "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), transports=("tcp",)),
     "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", transports=("tcp",)),
     "connect_10000": Scenario(metric="seconds", transports=("tcp",)),
+    "join_under_load": Scenario(metric="seconds", transports=("tcp",)),
 }
 
 
@@ -67,6 +68,25 @@ def whole_cases() -> list[Case]:
             for size in spec.sizes]
 
 
+# Which subjects a case is measured on.
+Plan = dict[Case, tuple[str, ...]]
+OURS = ("null", "tcphub")
+
+
+def whole_plan(subjects: tuple[str, ...]) -> Plan:
+    return {case: subjects for case in whole_cases()}
+
+
+# What every subject is measured in, also in a quick run.
+QUICK_OF_ALL = frozenset({Case("one_to_one", 16, "tcp"), Case("one_to_one", 65536, "tcp"), Case("fan_out_100", 16, "tcp")})
+
+
+def quick_plan(subjects: tuple[str, ...]) -> Plan:
+    """All subjects in the cases that compare them; the others in the cases that goals are set for."""
+    few = tuple(name for name in subjects if name in OURS)
+    return {case: subjects if case in QUICK_OF_ALL else few for case in quick_cases()}
+
+
 def quick_cases() -> list[Case]:
     over_tcp = [("one_to_one", 16), ("one_to_one", 256), ("one_to_one", 4096), ("one_to_one", 65536),
                 ("one_to_one_unbatched", 16), ("four_to_four", 16), ("in_turns", 16), ("fan_out_10", 16),
@@ -85,12 +105,22 @@ def smoke_cases() -> list[Case]:
     return cases
 
 
-# In a smoke run nothing is compared; the null relay is run in each of its modes, so that it cannot rot.
-SMOKE_NULL_SCENARIOS = frozenset({"one_to_one", "fan_out_10", "ping_one_cpu"})
+# In a smoke run nothing is compared: the null relay is run in each of its modes, so that it cannot rot, and the other
+# subjects in what they do differently.
+SMOKE_OF_NULL = frozenset({Case("one_to_one", 16, "tcp"), Case("fan_out_10", 16, "tcp"), Case("ping_one_cpu", 16, "tcp")})
+SMOKE_OF_OTHERS = frozenset({Case("one_to_one", 16, "tcp"), Case("one_to_one", 65536, "unix"),
+                             Case("fan_out_10", 16, "tcp"), Case("ping_one_cpu", 16, "tcp")})
 
 
-def chosen_cases(scenarios: list[str], sizes: list[int], transports: list[str]) -> list[Case]:
+def smoke_plan(subjects: tuple[str, ...]) -> Plan:
+    def among(case: Case, name: str) -> bool:
+        return name == "tcphub" or case in (SMOKE_OF_NULL if name == "null" else SMOKE_OF_OTHERS)
+
+    return {case: tuple(name for name in subjects if among(case, name)) for case in smoke_cases()}
+
+
+def chosen_plan(scenarios: list[str], sizes: list[int], transports: list[str], subjects: tuple[str, ...]) -> Plan:
     """The scenarios asked for, in the sizes asked for, which may be others than usual."""
-    return [Case(name, size, transport) for name in scenarios or SCENARIOS
+    return {Case(name, size, transport): subjects for name in scenarios or SCENARIOS
             for transport in SCENARIOS[name].transports if not transports or transport in transports
-            for size in sizes or SCENARIOS[name].sizes]
+            for size in sizes or SCENARIOS[name].sizes}

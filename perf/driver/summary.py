@@ -49,6 +49,13 @@ def make_rows(outcomes: list[Outcome]) -> list[dict]:
     return rows
 
 
+def make_absences(outcomes: list[Outcome]) -> list[dict]:
+    """Cases without a row, and why."""
+    return [{"subject": outcome.subject, "transport": outcome.case.transport, "scenario": outcome.case.scenario,
+             "size": outcome.case.size, "reason": outcome.error}
+            for outcome in outcomes if outcome.error is not None and not outcome.findings]
+
+
 def shown(value: float | None) -> str:
     """Three digits that matter, without an exponent."""
     if value is None:
@@ -61,11 +68,21 @@ def shown(value: float | None) -> str:
 COLUMNS = (("subject", "subject"), ("transport", "transport"), ("scenario", "scenario"), ("size", "size"),
            ("cpu_ns_per_message", "CPU ns/message"), ("ratio_to_null", "x null"), ("min", "min"), ("max", "max"),
            ("messages_per_second", "messages/s"), ("p50_us", "p50 us"), ("p99_us", "p99 us"),
-           ("p999_us", "p99.9 us"), ("lost", "lost"))
+           ("p999_us", "p99.9 us"), ("rss_peak_bytes", "peak bytes"), ("lost", "lost"))
 
 
 def cells(row: dict) -> list[str]:
     return [str(row[key]) if isinstance(row.get(key), (str, int)) else shown(row.get(key)) for key, _ in COLUMNS]
+
+
+def absence_lines(absences: list[dict]) -> list[str]:
+    """A line for each subject and reason, with the cases that it keeps out."""
+    cases: dict[tuple[str, str], list[str]] = {}
+    for each in absences:
+        name = f"{each['scenario']} {each['size']} B {each['transport']}"
+        cases.setdefault((each["subject"], each["reason"]), []).append(name)
+    return [f"{subject}: {', '.join(names) if len(names) <= 3 else f'{len(names)} cases'}: {reason}"
+            for (subject, reason), names in cases.items()]
 
 
 def text_table(rows: list[dict]) -> str:

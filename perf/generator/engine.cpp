@@ -22,34 +22,55 @@ constexpr std::chrono::seconds kAnswerLimit{10};
 
 }  // namespace
 
-Engine::Engine(Wire& wire, Endpoint endpoint)
+Engine::Engine(Wire& wire, Endpoint endpoint, std::optional<Endpoint> publish_endpoint)
     : wire_(wire),
       endpoint_(std::move(endpoint)),
+      publish_endpoint_(std::move(publish_endpoint)),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       buffer_(std::make_unique<std::byte[]>(kCarryBytesMax + kReadBytes)),
       next_keep_alive_(Clock::now() + kKeepAlive) {}
 
 Engine::~Engine() {
   clients_.clear();
+  sides_.clear();
   ::close(epoll_);
 }
 
 void Engine::connect(std::size_t count) {
-  const std::size_t first = clients_.size();
-  for (std::size_t index = first; index < first + count; ++index) {
-    clients_.push_back(std::make_unique<Client>(index, connect_to(endpoint_)));
-    Client& added = *clients_.back();
-    epoll_event event{};
-    event.events = EPOLLIN;
-    event.data.u64 = index;
-    if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, added.socket(), &event) != 0) fail("epoll_ctl", errno);
-    wire_.open(added);
-    if (added.is_joined) ++joined_count_;
-    const bool room = poll_until([this, index] { return index + 1 - joined_count_ < kJoiningMax; }, kAnswerLimit);
+  for (std::size_t begun = 0; begun < count; ++begun) {
+    begin_connect();
+    const bool room = poll_until([this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, kAnswerLimit);
     if (!room) fail("the subject admits nobody any more: no answer within 10 s");
   }
-  const bool all = poll_until([this] { return joined_count_ == clients_.size(); }, kAnswerLimit);
+  const bool all = poll_until([this] { return wire_.joined_count() == clients_.size(); }, kAnswerLimit);
   if (!all) fail("the subject did not admit all clients within 10 s");
+}
+
+void Engine::begin_connect() {
+  clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(endpoint_)));
+  Client& added = *clients_.back();
+  watch(added);
+  // A subject with publishing sides may tell only there that it has admitted a client.
+  if (added.index() == 0) open_publisher(added);
+  wire_.open(added);
+}
+
+void Engine::open_publisher(Client& client) {
+  if (!publish_endpoint_ || &client.publishing_side() != &client) return;
+  sides_.push_back(std::make_unique<Client>(client.index(), connect_to(*publish_endpoint_)));
+  Client& side = *sides_.back();
+  side.is_side = true;
+  client.set_publishing_side(side);
+  watch(side);
+  wire_.open_side(side);
+  if (!poll_until([&side] { return side.is_joined; }, kAnswerLimit)) fail("no answer to a publisher within 10 s");
+}
+
+void Engine::watch(Client& client) const {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = &client;
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
 }
 
 void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
@@ -82,7 +103,7 @@ std::uint64_t Engine::poll(std::chrono::nanoseconds timeout) {
   if (count < 0 && errno != EINTR) fail("epoll_pwait2", errno);
   std::uint64_t settled = 0;
   for (int index = 0; index < count; ++index) {
-    Client& ready = *clients_[events[static_cast<std::size_t>(index)].data.u64];
+    Client& ready = *static_cast<Client*>(events[static_cast<std::size_t>(index)].data.ptr);
     const std::uint64_t before = ready.inbox.settled();
     read(ready);
     settled += ready.inbox.settled() - before;
@@ -102,7 +123,7 @@ bool Engine::poll_until(const std::function<bool()>& done, std::chrono::nanoseco
 void Engine::stop_reading(Client& client) {
   client.is_reading = false;
   epoll_event event{};
-  event.data.u64 = client.index();
+  event.data.ptr = &client;
   if (::epoll_ctl(epoll_, EPOLL_CTL_MOD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
 }
 
@@ -115,9 +136,7 @@ void Engine::read(Client& client) {
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
   if (size <= 0) return on_closed(client);
   const std::span<const std::byte> bytes(buffer_.get(), carry.size() + static_cast<std::size_t>(size));
-  const bool was_joined = client.is_joined;
   const auto rest = bytes.subspan(wire_.take(client, bytes));
-  if (client.is_joined && !was_joined) ++joined_count_;
   carry.assign(rest.begin(), rest.end());
 }
 

@@ -17,7 +17,7 @@ namespace gimnet::perf {
 /// (1 MiB), so that no TAKEN is needed.
 class FrameWire : public Wire {
  public:
-  void open(Client& client) override { client.is_joined = true; }
+  void open(Client& client) override { admit(client); }
   void provide(Client& client) override { client.is_in_group = true; }
   void subscribe(Client& client) override { client.is_in_group = true; }
   void append_message(const Client& from, const Target& target, std::uint8_t lane, std::span<const std::byte> payload,

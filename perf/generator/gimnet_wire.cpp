@@ -110,7 +110,7 @@ void GimnetWire::take_link(Client& client, std::span<const std::byte> body) {
   }
   if (client.is_joined) return client.inbox.on_wrong();
   sessions_[client.index()].node_id = decoded<proto::Welcome>(body).node.value();
-  client.is_joined = true;
+  admit(client);
 }
 
 void GimnetWire::take_answer(Client& client, std::span<const std::byte> body) {

@@ -98,6 +98,14 @@ class PingPair {
   std::optional<Flood> bulk_;
 };
 
+/// 2 clients for a pair, 4 with bulk beside it, all but the last of which publish.
+void connect(Engine& engine, std::size_t count) {
+  engine.connect(count);
+  for (std::size_t index = 0; index < std::max<std::size_t>(2, count - 1); ++index) {
+    engine.open_publisher(engine.client(index));
+  }
+}
+
 double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
   if (sorted_ns.empty()) return 0;
   const auto index = static_cast<std::size_t>(share * static_cast<double>(sorted_ns.size()));
@@ -150,19 +158,19 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair, std:
 }  // namespace
 
 Findings ping(Engine& engine, const RunOptions& options) {
-  engine.connect(2);
+  connect(engine, 2);
   PingPair pair(engine, options.payload_bytes);
   return measure(engine, options, pair, std::chrono::nanoseconds(0));
 }
 
 Findings ping_paced(Engine& engine, const RunOptions& options) {
-  engine.connect(2);
+  connect(engine, 2);
   PingPair pair(engine, options.payload_bytes);
   return measure(engine, options, pair, std::chrono::milliseconds(1));
 }
 
 Findings ping_under_bulk(Engine& engine, const RunOptions& options) {
-  engine.connect(4);
+  connect(engine, 4);
   PingPair pair(engine, options.payload_bytes);
   pair.add_bulk(options.bulk_bytes_a_second);
   return measure(engine, options, pair, std::chrono::nanoseconds(0));

@@ -12,5 +12,7 @@ namespace gimnet::perf {
 [[nodiscard]] std::int64_t cpu_time_ns(pid_t process);
 /// Resident memory in bytes.
 [[nodiscard]] std::int64_t resident_bytes(pid_t process);
+/// The most that was resident at any time since its start, in bytes.
+[[nodiscard]] std::int64_t peak_resident_bytes(pid_t process);
 
 }  // namespace gimnet::perf

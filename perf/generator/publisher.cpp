@@ -10,7 +10,7 @@ constexpr std::size_t kWriteBytes = 64 * 1024;
 }  // namespace
 
 Publisher::Publisher(Wire& wire, Client& from, const std::vector<Target>& targets, MessageShape shape, Writing writing)
-    : from_(from), writing_(writing), messages_a_write_(1) {
+    : from_(from.publishing_side()), writing_(writing), messages_a_write_(1) {
   const auto payload = pattern_payload(shape.payload_bytes);
   // Whole rounds through the targets, so that each gets the same share.
   do {

@@ -23,7 +23,7 @@ struct MessageShape {
 /// Sends messages of one client to its targets in turns, as fast as it is asked to.
 class Publisher {
  public:
-  /// REQUIRES: `targets` is not empty; their streams are distinct.
+  /// REQUIRES: `targets` is not empty; their streams are distinct; Engine::open_publisher(from) was called.
   Publisher(Wire& wire, Client& from, const std::vector<Target>& targets, MessageShape shape, Writing writing);
 
   /// Begins at most one write, of at most `messages_max` messages. Returns the messages that were begun: 0 when the

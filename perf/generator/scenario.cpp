@@ -41,6 +41,7 @@ constexpr Named kScenarios[] = {
     {"stalled_subscriber", stalled_subscriber},
     {"idle_10000", idle},
     {"connect_10000", connect_many},
+    {"join_under_load", join_under_load},
 };
 
 }  // namespace

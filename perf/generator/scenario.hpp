@@ -18,7 +18,7 @@ struct RunOptions {
   std::size_t payload_bytes = 16;
   std::chrono::nanoseconds duration{1'000'000'000};
   pid_t process = 0;               ///< the measured hub or relay
-  std::size_t client_count = 0;    ///< of idle and connect; 0: the scenario's own
+  std::size_t client_count = 0;    ///< of idle, connect and join_under_load; 0: the scenario's own
   double bulk_bytes_a_second = 0;  ///< of ping_under_bulk; 0: as fast as it goes
 };
 
@@ -63,5 +63,6 @@ Findings stalled_subscriber(Engine& engine, const RunOptions& options);
 // connection_scenarios.cpp: what many connections cost.
 Findings idle(Engine& engine, const RunOptions& options);
 Findings connect_many(Engine& engine, const RunOptions& options);
+Findings join_under_load(Engine& engine, const RunOptions& options);
 
 }  // namespace gimnet::perf

@@ -32,6 +32,7 @@ constexpr std::size_t kWindowBytes = 1024 * 1024;
 /// Client 0 publishes at line rate to client 1, which reads, first alone and then beside client 2, which does not.
 Findings stalled_subscriber(Engine& engine, const RunOptions& options) {
   engine.connect(3);
+  engine.open_publisher(engine.client(0));
   engine.join_group(1, 1);
   const Inbox& healthy = engine.client(1).inbox;
   engine.client(1).inbox.expect(0, options.payload_bytes);

@@ -62,6 +62,7 @@ Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count
   for (std::size_t pair = 0; pair < pair_count; ++pair) {
     const auto stream = static_cast<StreamId>(pair);
     Client& to = engine.client(2 * pair + 1);
+    engine.open_publisher(engine.client(2 * pair));
     to.inbox.expect(stream, options.payload_bytes);
     const Target target{.kind = Target::Kind::unicast, .recipients = {&to}, .stream = stream};
     traffic.publishers.emplace_back(engine.wire(), engine.client(2 * pair), std::vector{target},
@@ -75,6 +76,7 @@ Findings to_all(Engine& engine, const RunOptions& options, Target target, std::s
   for (std::size_t index = 1; index <= recipient_count; ++index) {
     engine.client(index).inbox.expect(target.stream, options.payload_bytes);
   }
+  engine.open_publisher(engine.client(0));
   Traffic traffic;
   traffic.recipients_a_message = recipient_count;
   traffic.publishers.emplace_back(engine.wire(), engine.client(0), std::vector{std::move(target)},
@@ -102,6 +104,7 @@ Findings in_turns(Engine& engine, const RunOptions& options) {
     to.inbox.expect(stream, options.payload_bytes);
     targets.push_back({.kind = Target::Kind::unicast, .recipients = {&to}, .stream = stream});
   }
+  engine.open_publisher(engine.client(0));
   Traffic traffic;
   traffic.publishers.emplace_back(engine.wire(), engine.client(0), targets,
                                   MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);

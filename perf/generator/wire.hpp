@@ -37,8 +37,10 @@ class Wire {
  public:
   virtual ~Wire() = default;
 
-  /// Sends what `client` has to say first. take() sets client.is_joined once the subject has admitted it.
+  /// Sends what `client` has to say first. take() admits it (client.is_joined) once the subject has.
   virtual void open(Client& client) = 0;
+  /// Sends what a publishing side has to say first, where the subject has such; take() admits it.
+  virtual void open_side(Client& side) { side.is_joined = true; }
   /// Makes `client` the publisher of the one group of a run; take() sets client.is_in_group.
   virtual void provide(Client& client) = 0;
   /// Makes `client` a subscriber of that group. REQUIRES: the publisher is in the group.
@@ -52,15 +54,28 @@ class Wire {
   /// Called once a second for every client.
   virtual void keep_alive(Client& client) = 0;
 
+  /// Clients that were admitted so far, publishing sides not among them.
+  [[nodiscard]] std::size_t joined_count() const { return joined_count_; }
+
   /// Asks for the ledger; false: this subject keeps none. take() sets ledger().
   virtual bool ask_for_ledger(Client&) { return false; }
   [[nodiscard]] const std::optional<Ledger>& ledger() const { return ledger_; }
 
  protected:
+  /// Marks `client` as joined; once.
+  void admit(Client& client) {
+    if (client.is_joined) return;
+    client.is_joined = true;
+    if (!client.is_side) ++joined_count_;
+  }
+
   std::optional<Ledger> ledger_;
+
+ private:
+  std::size_t joined_count_ = 0;
 };
 
-/// "null" or "gimnet"; nullptr for an unknown name.
+/// "null", "gimnet", "nats", "mqtt", "resp" or "zmtp"; nullptr for an unknown name.
 [[nodiscard]] std::unique_ptr<Wire> make_wire(std::string_view name);
 
 }  // namespace gimnet::perf

@@ -3,16 +3,18 @@
 
 import pathlib
 import sys
+import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "perf"))
 
-from driver import suite  # noqa: E402
+import run  # noqa: E402
+from driver import catalogue, suite  # noqa: E402
 from driver.document import make_document, with_derived  # noqa: E402
 from driver.goals import GOALS, Goal  # noqa: E402
-from driver.measure import Outcome  # noqa: E402
-from driver.summary import make_rows, shown, text_table  # noqa: E402
+from driver.measure import Outcome, make_group  # noqa: E402
+from driver.summary import absence_lines, make_absences, make_rows, shown, text_table  # noqa: E402
 
 
 def outcome(subject: str, case: suite.Case, costs: list[float], lost: int = 0) -> Outcome:
@@ -37,6 +39,74 @@ class Suite(unittest.TestCase):
         quick = set(suite.quick_cases())
         for goal in GOALS:
             self.assertIn(suite.Case(goal.scenario, goal.size, goal.transport), quick)
+
+
+    def test_quick_compares_every_subject_in_three_cases(self):
+        plan = suite.quick_plan(catalogue.SUBJECTS)
+        for case in (suite.Case("one_to_one", 16, "tcp"), suite.Case("one_to_one", 65536, "tcp"),
+                     suite.Case("fan_out_100", 16, "tcp")):
+            self.assertEqual(plan[case], catalogue.SUBJECTS)
+        self.assertEqual(plan[suite.Case("in_turns", 16, "tcp")], ("null", "tcphub"))
+
+    def test_smoke_runs_the_hub_in_every_case_and_each_subject_in_some(self):
+        plan = suite.smoke_plan(catalogue.SUBJECTS)
+        self.assertTrue(all("tcphub" in subjects for subjects in plan.values()))
+        self.assertEqual({name for subjects in plan.values() for name in subjects}, set(catalogue.SUBJECTS))
+
+
+class Subjects(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.build = pathlib.Path(folder.name)
+        (self.build / "bin").mkdir()
+
+    def test_a_subject_that_is_not_installed_says_so(self):
+        reason = catalogue.why_absent("zeromq", suite.Case("one_to_one", 16, "tcp"), self.build)
+        self.assertIn("libzmq3-dev", reason)
+        (self.build / "bin" / "zeromq_proxy").touch()
+        self.assertIsNone(catalogue.why_absent("zeromq", suite.Case("one_to_one", 16, "tcp"), self.build))
+
+    def test_what_a_subject_does_not_have_is_said(self):
+        self.assertIn("Unix", catalogue.why_absent("nats", suite.Case("one_to_one", 16, "unix"), self.build))
+        self.assertIn("lists", catalogue.why_absent("redis", suite.Case("list_100", 16, "tcp"), self.build))
+        self.assertIsNotNone(catalogue.why_absent("null", suite.Case("idle_10000", 16, "tcp"), self.build))
+        self.assertIsNone(catalogue.why_absent("tcphub", suite.Case("list_100", 16, "unix"), self.build))
+
+    def test_subjects_take_turns_with_their_baseline(self):
+        case = suite.Case("list_100", 16, "tcp")
+        group = make_group(case.baseline, [(case, ("null", "tcphub", "nats"))], self.build)
+        self.assertEqual([(each.subject, each.case.scenario, each.is_absent) for each in group],
+                         [("null", "fan_out_100", False), ("tcphub", "list_100", False), ("nats", "list_100", True)])
+
+    def test_another_hub_s_failure_is_not_ours(self):
+        case = suite.Case("one_to_one", 16, "tcp")
+        self.assertEqual(run.judge([Outcome("nats", case, [], "it died")], [], is_smoke=False), 0)
+        self.assertEqual(run.judge([Outcome("tcphub", case, [], "it died")], [], is_smoke=False), 1)
+        self.assertEqual(run.judge([Outcome("nats", case, [], "absent", is_absent=True)], [], is_smoke=True), 0)
+
+    def test_a_message_that_was_not_sent_so_fails_the_run(self):
+        row = {"subject": "tcphub", "scenario": "one_to_one", "size": 16, "transport": "tcp"}
+        self.assertEqual(run.judge([], [row | {"wrong": 1}], is_smoke=False), 1)
+        self.assertEqual(run.judge([], [row | {"ledger_gap": 1}], is_smoke=False), 1)
+        self.assertEqual(run.judge([], [row | {"lost": 1}], is_smoke=False), 0)
+        self.assertEqual(run.judge([], [row | {"lost": 1}], is_smoke=True), 1)
+
+    def test_packages_are_those_of_the_subjects(self):
+        arguments = run.parse_arguments(["--only", "nats", "--quick"])
+        self.assertEqual(run.chosen_subjects(arguments), ("null", "nats"))
+        self.assertEqual(run.needed_packages(arguments), ["nats-server"])
+        self.assertEqual(run.needed_packages(run.parse_arguments(["--subjects", "tcphub"])), [])
+
+
+class Absences(unittest.TestCase):
+    def test_one_line_a_subject_and_reason(self):
+        outcomes = [Outcome("nats", suite.Case("one_to_one", size, "unix"), [], "it has no Unix socket", True)
+                    for size in (16, 256)]
+        absences = make_absences(outcomes + [outcome("tcphub", suite.Case("one_to_one", 16, "tcp"), [1])])
+        self.assertEqual([each["size"] for each in absences], [16, 256])
+        self.assertEqual(absence_lines(absences),
+                         ["nats: one_to_one 16 B unix, one_to_one 256 B unix: it has no Unix socket"])
 
 
 class Rows(unittest.TestCase):
