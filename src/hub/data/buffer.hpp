@@ -11,8 +11,8 @@ class BufferPool;
 
 enum class BufferKind : std::uint8_t {
   slab,     ///< what connections read into; frames are routed where they lie
-  chunk,    ///< small memory that waiting frames are copied into
-  foreign,  ///< stands on this shard for a slab of another one
+  chunk,    ///< smaller memory: for waiting frames that are copied, and for a frame that comes slowly
+  foreign,  ///< stands on this shard for a slab or chunk of another one
 };
 
 /// Bytes with a reference count. The count is a plain integer: a buffer belongs to one shard, and another shard holds
@@ -27,8 +27,8 @@ struct Buffer {
   bool pinned = false;  ///< counted against the budget, because a waiting frame keeps it
   BufferPool* pool = nullptr;
   Buffer* next_free = nullptr;
-  Buffer* lender = nullptr;            ///< of a foreign buffer: the slab that it stands for
-  std::atomic<std::uint32_t> lent{0};  ///< of a slab: foreign buffers and mailbox entries that stand for it
+  Buffer* lender = nullptr;            ///< of a foreign buffer: what it stands for
+  std::atomic<std::uint32_t> lent{0};  ///< foreign buffers and mailbox entries that stand for it
 };
 
 /// One reference to a Buffer. Copying is spelled share(). Thread safety: none; one shard.

@@ -30,7 +30,9 @@ Buffer* BufferPool::FreeList::pop() {
 }
 
 BufferPool::BufferPool(std::uint32_t frame_bytes, BudgetLease& budget)
-    : slab_bytes_(static_cast<std::uint32_t>(kSlabReadBytes + kHeaderRoom + frame_bytes)), budget_(budget) {}
+    : slab_bytes_(static_cast<std::uint32_t>(kSlabReadBytes + kHeaderRoom + frame_bytes)),
+      chunk_bytes_{1024, 4 * 1024, 16 * 1024, static_cast<std::uint32_t>(kHeaderRoom + frame_bytes)},
+      budget_(budget) {}
 
 BufferPool::~BufferPool() {
   while (Buffer* slab = free_slabs_.pop()) free_buffer(slab);
@@ -39,25 +41,25 @@ BufferPool::~BufferPool() {
     while (Buffer* chunk = list.pop()) free_buffer(chunk);
   }
   // acquire pairs with the release in end_loan(); shards are joined before their pools go, so no loan is open.
-  for (Buffer* slab : lent_slabs_) {
-    GIMNET_CHECK(slab->lent.load(std::memory_order_acquire) == 0);
-    free_buffer(slab);
+  for (Buffer* buffer : lent_) {
+    GIMNET_CHECK(buffer->lent.load(std::memory_order_acquire) == 0);
+    free_buffer(buffer);
   }
 }
 
 BufferRef BufferPool::take_slab() {
+  if (free_slabs_.head == nullptr) take_back_lent();
   Buffer* slab = free_slabs_.pop();
-  if (slab == nullptr) slab = reclaim_lent_slab();
   if (slab == nullptr) slab = allocate(slab_bytes_, BufferKind::slab);
   return BufferRef(slab);
 }
 
 BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
-  for (std::uint8_t size_class = 0; size_class < kChunkSizes.size(); ++size_class) {
-    if (bytes > kChunkSizes[size_class]) continue;
+  for (std::uint8_t size_class = 0; size_class < chunk_bytes_.size(); ++size_class) {
+    if (bytes > chunk_bytes_[size_class]) continue;
     Buffer* chunk = free_chunks_[size_class].pop();
     if (chunk == nullptr) {
-      chunk = allocate(kChunkSizes[size_class], BufferKind::chunk);
+      chunk = allocate(chunk_bytes_[size_class], BufferKind::chunk);
       chunk->size_class = size_class;
     }
     return BufferRef(chunk);
@@ -68,11 +70,11 @@ BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
 }
 
 Buffer* BufferPool::lend(Buffer& buffer) {
-  Buffer* slab = buffer.kind == BufferKind::foreign ? buffer.lender : &buffer;
+  Buffer* owner = buffer.kind == BufferKind::foreign ? buffer.lender : &buffer;
   // relaxed: the entry itself is published by the mailbox; the count only has to be there before the lender lets go,
   // and the lender is this thread or holds a loan that this thread keeps open.
-  slab->lent.fetch_add(1, std::memory_order_relaxed);
-  return slab;
+  owner->lent.fetch_add(1, std::memory_order_relaxed);
+  return owner;
 }
 
 BufferRef BufferPool::adopt(Buffer* lent) {
@@ -100,7 +102,7 @@ BufferRef BufferPool::adopt(Buffer* lent) {
 }
 
 void BufferPool::end_loan(Buffer* lent) {
-  lent->lent.fetch_sub(1, std::memory_order_release);  // pairs with the acquire load in recycle(), reclaim_lent_slab()
+  lent->lent.fetch_sub(1, std::memory_order_release);  // pairs with the acquire loads in recycle(), take_back_lent()
 }
 
 void BufferPool::pin(Buffer& buffer) {
@@ -126,29 +128,35 @@ void BufferPool::recycle(Buffer& buffer) {
       if (free_foreign_.count < kFreeForeignMax) return free_foreign_.push(buffer);
       break;
     case BufferKind::slab:
-      // acquire pairs with the release in end_loan(): the other shard has read its last byte.
-      if (buffer.lent.load(std::memory_order_acquire) != 0) return lent_slabs_.push_back(&buffer);
-      if (free_slabs_.count < kFreeSlabsMax) return free_slabs_.push(buffer);
-      break;
     case BufferKind::chunk:
-      if (buffer.size_class == kUnpooled) break;
-      if (FreeList& list = free_chunks_[buffer.size_class]; list.count * buffer.capacity < kFreeChunkBytesMax) {
-        return list.push(buffer);
-      }
-      break;
+      // acquire pairs with the release in end_loan(): the other shard has read its last byte.
+      if (buffer.lent.load(std::memory_order_acquire) != 0) return lent_.push_back(&buffer);
+      return keep_or_free(buffer);
   }
   free_buffer(&buffer);
 }
 
-Buffer* BufferPool::reclaim_lent_slab() {
-  for (std::size_t i = 0; i < lent_slabs_.size(); ++i) {
-    Buffer* slab = lent_slabs_[i];
-    if (slab->lent.load(std::memory_order_acquire) != 0) continue;  // pairs with the release in end_loan()
-    lent_slabs_[i] = lent_slabs_.back();
-    lent_slabs_.pop_back();
-    return slab;
+void BufferPool::keep_or_free(Buffer& buffer) {
+  if (buffer.kind == BufferKind::slab) {
+    if (free_slabs_.count < kFreeSlabsMax) return free_slabs_.push(buffer);
+  } else if (buffer.size_class != kUnpooled) {
+    FreeList& list = free_chunks_[buffer.size_class];
+    if (list.count * buffer.capacity < kFreeChunkBytesMax) return list.push(buffer);
   }
-  return nullptr;
+  free_buffer(&buffer);
+}
+
+void BufferPool::take_back_lent() {
+  for (std::size_t i = 0; i < lent_.size();) {
+    Buffer* buffer = lent_[i];
+    if (buffer->lent.load(std::memory_order_acquire) != 0) {  // pairs with the release in end_loan()
+      ++i;
+      continue;
+    }
+    lent_[i] = lent_.back();
+    lent_.pop_back();
+    keep_or_free(*buffer);
+  }
 }
 
 Buffer* BufferPool::allocate(std::uint32_t capacity, BufferKind kind) {

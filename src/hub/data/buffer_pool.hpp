@@ -25,14 +25,14 @@ class BufferPool {
   BufferPool& operator=(const BufferPool&) = delete;
 
   [[nodiscard]] BufferRef take_slab();
-  /// A chunk of at least `bytes`.
+  /// A chunk of at least `bytes`. Up to the largest frame with its header it is kept for the next time.
   [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
 
-  /// Counts a loan of the slab behind `buffer`, for one mailbox entry, and returns that slab. Its bytes stay until the
-  /// borrowing shard has called adopt() and let its reference go, or end_loan().
+  /// Counts a loan of the memory behind `buffer`, for one mailbox entry, and returns its owner. The bytes stay until
+  /// the borrowing shard has called adopt() and let its reference go, or end_loan().
   [[nodiscard]] static Buffer* lend(Buffer& buffer);
-  /// On the borrowing shard: a reference that ends the loan when it is let go. Loans of one slab that follow each other
-  /// become one buffer, so that it is counted once and neighbouring frames in it are seen to be neighbours.
+  /// On the borrowing shard: a reference that ends the loan when it is let go. Loans of one buffer that follow each
+  /// other become one buffer, so that it is counted once and neighbouring frames in it are seen to be neighbours.
   [[nodiscard]] BufferRef adopt(Buffer* lent);
   static void end_loan(Buffer* lent);
 
@@ -43,9 +43,12 @@ class BufferPool {
   [[nodiscard]] std::uint64_t pinned_bytes() const { return pinned_bytes_; }
 
   void recycle(Buffer& buffer);
+  /// Now and then: keeps or frees what other shards have let go meanwhile.
+  void take_back_lent();
+  /// Free here, and still read by other shards when last looked at.
+  [[nodiscard]] std::size_t lent_buffers() const { return lent_.size(); }
 
  private:
-  static constexpr std::array<std::uint32_t, 3> kChunkSizes{1024, 4 * 1024, 16 * 1024};
   static constexpr std::uint8_t kUnpooled = 0xFF;
   static constexpr std::size_t kFreeSlabsMax = 16;
   static constexpr std::size_t kFreeChunkBytesMax = std::size_t{4} << 20;
@@ -59,15 +62,16 @@ class BufferPool {
 
   [[nodiscard]] Buffer* allocate(std::uint32_t capacity, BufferKind kind);
   static void free_buffer(Buffer* buffer);
-  [[nodiscard]] Buffer* reclaim_lent_slab();
+  void keep_or_free(Buffer& buffer);
 
   const std::uint32_t slab_bytes_;
+  const std::array<std::uint32_t, 4> chunk_bytes_;
   BudgetLease& budget_;
   FreeList free_slabs_;
   FreeList free_foreign_;
-  std::vector<Buffer*> adopted_;  ///< foreign buffers in use, the last one of each lending pool
-  std::array<FreeList, kChunkSizes.size()> free_chunks_;
-  std::vector<Buffer*> lent_slabs_;  ///< free here, still read by another shard
+  std::vector<Buffer*> adopted_;         ///< foreign buffers in use, the last one of each lending pool
+  std::array<FreeList, 4> free_chunks_;  ///< by size, as chunk_bytes_
+  std::vector<Buffer*> lent_;            ///< free here, still read by another shard
   std::uint64_t pinned_bytes_ = 0;
 };
 

@@ -8,6 +8,7 @@ namespace gimnet::hub {
 void Keeper::tick() {
   if (state_.now_ms < next_tick_at_ms_) return;
   next_tick_at_ms_ = state_.now_ms + kTickMs;
+  state_.pool.take_back_lent();
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
     if (connection != nullptr && connection->connected) look_at(*connection);
   }

@@ -78,6 +78,36 @@ TEST_F(BufferPoolTest, ALentSlabIsNotReusedBeforeItsLoanEnds) {
   EXPECT_EQ(pool.take_slab().get(), memory) << "reclaimed";
 }
 
+// What one burst lent does not stay for ever, though nobody asks for a slab again.
+TEST_F(BufferPoolTest, TakesBackWhatWasLent) {
+  std::vector<Buffer*> loans;
+  std::vector<BufferRef> used;
+  for (int i = 0; i < 40; ++i) {
+    used.push_back(i % 2 == 0 ? pool.take_slab() : pool.take_chunk(60'000));
+    loans.push_back(BufferPool::lend(*used.back().get()));
+  }
+  const Buffer* const chunk = used.back().get();
+  used.clear();
+  EXPECT_EQ(pool.lent_buffers(), 40u);
+  BufferPool::end_loan(loans.back());
+  loans.pop_back();
+  pool.take_back_lent();
+  EXPECT_EQ(pool.lent_buffers(), 39u) << "the others are still read";
+  EXPECT_EQ(pool.take_chunk(60'000).get(), chunk);
+  for (Buffer* loan : loans) BufferPool::end_loan(loan);
+  pool.take_back_lent();
+  EXPECT_EQ(pool.lent_buffers(), 0u);
+}
+
+TEST_F(BufferPoolTest, KeepsChunksUpToTheLargestFrame) {
+  for (const std::uint32_t bytes : {1'024u, 4'096u, 16'384u, 65'536u + 16}) {
+    BufferRef chunk = pool.take_chunk(bytes);
+    const Buffer* const memory = chunk.get();
+    chunk.reset();
+    EXPECT_EQ(pool.take_chunk(bytes).get(), memory) << bytes;
+  }
+}
+
 TEST_F(BufferPoolTest, ABorrowedSlabIsGivenBackWithTheLastReference) {
   BufferRef slab = pool.take_slab();
   {

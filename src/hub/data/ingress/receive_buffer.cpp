@@ -4,16 +4,19 @@
 #include <cstring>
 
 #include "base/check.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 
 std::span<std::byte> ReceiveBuffer::prepare(FrameTail& tail) {
   reading_.reset();
-  if (tail.owns_slab) {
+  if (tail.own) {
     reading_ = tail.buffer.share();
     begin_ = tail.begin;
-    // A frame that began in the first kSlabReadBytes always ends in the slab; nothing begins behind them.
-    const std::uint32_t limit = std::max(tail.begin + tail.needed, kSlabReadBytes);
+    // A frame that began in the first kSlabReadBytes always ends in the slab; nothing begins behind them. In a chunk
+    // there is only that frame.
+    const std::uint32_t begins_below = reading_->kind == BufferKind::slab ? kSlabReadBytes : 0;
+    const std::uint32_t limit = std::max(tail.begin + tail.needed, begins_below);
     const std::uint32_t filled = tail.begin + tail.size;
     GIMNET_CHECK(limit <= reading_->capacity && filled < limit);
     return {reading_->data + filled, limit - filled};
@@ -39,7 +42,7 @@ std::span<std::byte> ReceiveBuffer::prepare(FrameTail& tail) {
 ReceiveBuffer::Received ReceiveBuffer::commit(FrameTail& tail, std::size_t bytes) {
   const std::byte* begin = reading_->data + begin_;
   const std::uint32_t size = tail.size + static_cast<std::uint32_t>(bytes);
-  if (!tail.owns_slab) used_ = std::min(begin_ + size, kSlabReadBytes);
+  if (!tail.own) used_ = std::min(begin_ + size, kSlabReadBytes);
   forget(tail);
   return {begin, begin + size};
 }
@@ -47,29 +50,40 @@ ReceiveBuffer::Received ReceiveBuffer::commit(FrameTail& tail, std::size_t bytes
 bool ReceiveBuffer::keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed) {
   const auto size = static_cast<std::uint32_t>(end - begin);
   if (size == 0) return true;
-  const bool own = size > kCopyTailBytes;
-  const std::uint32_t cost = own ? reading_->capacity : size;
-  if (tail_bytes_ + cost > tail_bytes_max_) return false;
-  tail_bytes_ += cost;
   tail.size = size;
   tail.needed = needed;
-  tail.owns_slab = own;
-  if (own) {
+  // A slab for each of many slow senders would be far more than they sent.
+  const bool may_stay = reading_->kind == BufferKind::chunk || own_slabs_ < kOwnSlabsMax;
+  const bool large = needed > kLargeFrameBytes && size > proto::kHeaderSize;
+  tail.own = size > kCopyTailBytes || (large && may_stay);
+  const bool stays = tail.own && may_stay;
+  if (stays) {
     tail.begin = static_cast<std::uint32_t>(begin - reading_->data);
     tail.buffer = reading_.share();
     // From here on only this connection reads into that slab.
     if (slab_.get() == reading_.get()) slab_.reset();
   } else {
     tail.begin = 0;
-    tail.buffer = pool_.take_chunk(size);
+    tail.buffer = pool_.take_chunk(tail.own ? needed : size);
     std::memcpy(tail.buffer->data, begin, size);
     tally_.moved_tail_bytes += size;
   }
-  return true;
+  tail_bytes_ += cost(tail);
+  if (owns_slab(tail)) ++own_slabs_;
+  if (tail_bytes_ <= tail_bytes_max_) return true;
+  forget(tail);
+  return false;
 }
 
+bool ReceiveBuffer::owns_slab(const FrameTail& tail) { return tail.own && tail.buffer->kind == BufferKind::slab; }
+
+std::uint32_t ReceiveBuffer::cost(const FrameTail& tail) { return tail.own ? tail.buffer->capacity : tail.size; }
+
 void ReceiveBuffer::forget(FrameTail& tail) {
-  if (!tail.empty()) tail_bytes_ -= tail.owns_slab ? tail.buffer->capacity : tail.size;
+  if (!tail.empty()) {
+    tail_bytes_ -= cost(tail);
+    if (owns_slab(tail)) --own_slabs_;
+  }
   tail = FrameTail{};
 }
 

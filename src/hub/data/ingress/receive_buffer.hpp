@@ -9,21 +9,22 @@
 
 namespace gimnet::hub {
 
-/// The frame that a connection has begun and not finished. Lies in a slab that the connection then has for itself, or,
-/// when it is small, in a copy.
+/// The frame that a connection has begun and not finished. Lies in a buffer that the connection then has for itself,
+/// or, when little of it is there, in a copy.
 struct FrameTail {
   BufferRef buffer;
   std::uint32_t begin = 0;
   std::uint32_t size = 0;
   std::uint32_t needed = 0;  ///< bytes of the whole frame, as far as known
-  bool owns_slab = false;
+  bool own = false;          ///< read on behind it: nobody else reads into that buffer
 
   [[nodiscard]] bool empty() const { return size == 0; }
 };
 
 /// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps a reference, so
 /// that it stays in the cache. A large frame that ends in a later read stays where it began, and its connection goes
-/// on reading behind it: no payload byte is moved.
+/// on reading behind it: no payload byte is moved. Where many are begun at a time, whose senders then are slow, each
+/// further one moves into memory of its own size, once.
 /// Thread safety: one shard.
 class ReceiveBuffer {
  public:
@@ -46,14 +47,23 @@ class ReceiveBuffer {
   /// After all whole frames were handed on: [begin, end) of buffer() is left over, the start of a frame of `needed`
   /// bytes. Returns false if too much is kept for begun frames already; nothing is kept then.
   [[nodiscard]] bool keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed);
+  /// Connections that have a slab to themselves.
+  [[nodiscard]] std::size_t own_slabs() const { return own_slabs_; }
   /// The connection is gone.
   void forget(FrameTail& tail);
 
  private:
   /// A begun frame up to this size is copied; keeping a slab for it would cost more than that.
   static constexpr std::uint32_t kCopyTailBytes = 1024;
+  /// Of a frame from here on no payload byte is copied, as long as there is a slab to leave it in.
+  static constexpr std::uint32_t kLargeFrameBytes = 16 * 1024;
+  /// So many connections may have a slab to themselves.
+  static constexpr std::size_t kOwnSlabsMax = 16;
   /// A slab with less room than this is not read into any more.
   static constexpr std::uint32_t kLeastRoom = 64 * 1024;
+
+  [[nodiscard]] static bool owns_slab(const FrameTail& tail);
+  [[nodiscard]] static std::uint32_t cost(const FrameTail& tail);
 
   BufferPool& pool_;
   Tally& tally_;
@@ -63,6 +73,7 @@ class ReceiveBuffer {
   BufferRef reading_;        ///< of the read that is under way
   std::uint32_t begin_ = 0;  ///< where its bytes begin
   std::uint64_t tail_bytes_ = 0;
+  std::size_t own_slabs_ = 0;
 };
 
 }  // namespace gimnet::hub

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <random>
 
@@ -53,47 +54,87 @@ class ReceiveBufferTest : public ::testing::Test {
 TEST_F(ReceiveBufferTest, GivesTheSameFramesForAnySplit) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     std::mt19937 random(seed);
-    Reading readings[3];
-    std::vector<std::byte> streams[3];
-    std::vector<std::string> sent[3];
-    for (int connection = 0; connection < 3; ++connection) {
-      for (int i = 0; i < 60; ++i) {
+    // Of so many some have a slab to themselves, some a chunk.
+    constexpr std::size_t kConnections = 24;
+    std::array<Reading, kConnections> readings;
+    std::array<std::vector<std::byte>, kConnections> streams;
+    std::array<std::vector<std::string>, kConnections> sent;
+    std::array<std::size_t, kConnections> done{};
+    for (std::size_t connection = 0; connection < kConnections; ++connection) {
+      for (int i = 0; i < 10; ++i) {
         const std::size_t size = random() % 3 == 0 ? random() % 65'537 : random() % 2'000;
         sent[connection].emplace_back(size, static_cast<char>('a' + i % 26));
         const auto frame = EgressRig::bytes(sent[connection].back());
         streams[connection].insert(streams[connection].end(), frame.begin(), frame.end());
       }
     }
-    std::size_t done[3] = {};
-    while (done[0] < streams[0].size() || done[1] < streams[1].size() || done[2] < streams[2].size()) {
-      const std::size_t connection = random() % 3;
+    for (std::size_t finished = 0; finished < kConnections;) {
+      const std::size_t connection = random() % kConnections;
       const std::size_t piece = random() % 2 == 0 ? 1 + random() % 300'000 : 1 + random() % 3'000;
       if (done[connection] == streams[connection].size()) continue;
       done[connection] += read(readings[connection], std::span(streams[connection]).subspan(done[connection]), piece);
+      if (done[connection] == streams[connection].size()) ++finished;
       if (random() % 4 == 0) readings[connection].kept.clear();
     }
-    for (int connection = 0; connection < 3; ++connection) {
+    for (std::size_t connection = 0; connection < kConnections; ++connection) {
       EXPECT_EQ(readings[connection].got, sent[connection]);
       EXPECT_TRUE(readings[connection].tail.empty());
     }
   }
 }
 
-TEST_F(ReceiveBufferTest, ASmallTailIsCopiedAndALargeOneStays) {
+TEST_F(ReceiveBufferTest, OfALargeFrameNoPayloadByteIsMoved) {
   const auto frame = EgressRig::bytes(std::string(60'000, 'x'));
-  Reading small;
-  read(small, frame, 1'024);
-  EXPECT_FALSE(small.tail.owns_slab);
-  EXPECT_EQ(small.tail.size, 1'024u);
-  EXPECT_EQ(small.tail.needed, 60'016u);
-  Reading large;
+  Reading header;
+  read(header, frame, 16);
+  EXPECT_FALSE(header.tail.own);
+  EXPECT_EQ(header.tail.size, 16u);
+  EXPECT_EQ(header.tail.needed, 60'016u);
+  EXPECT_EQ(rig.tally.moved_tail_bytes, 16u);
+  Reading more;
+  read(more, frame, 17);
+  EXPECT_TRUE(more.tail.own);
+  read(more, std::span(frame).subspan(17), 20'000);
+  read(more, std::span(frame).subspan(20'017), 100'000);
+  EXPECT_EQ(more.got.size(), 1u);
+  EXPECT_EQ(rig.tally.moved_tail_bytes, 16u);
+}
+
+TEST_F(ReceiveBufferTest, OfASmallFrameALittleIsCopiedAndMoreStays) {
+  const auto frame = EgressRig::bytes(std::string(2'000, 'x'));
+  Reading little;
+  read(little, frame, 1'024);
+  EXPECT_FALSE(little.tail.own);
+  EXPECT_EQ(rig.tally.moved_tail_bytes, 1'024u);
+  Reading more;
+  read(more, frame, 1'025);
+  EXPECT_TRUE(more.tail.own);
+  EXPECT_EQ(rig.tally.moved_tail_bytes, 1'024u);
+}
+
+TEST_F(ReceiveBufferTest, BeyondAFewSlabsABegunFrameKeepsOnlyItsOwnSize) {
+  const auto frame = EgressRig::bytes(std::string(60'000, 'x'));
+  std::vector<Reading> readings(100);
+  for (Reading& each : readings) read(each, frame, 30'000);
+  EXPECT_EQ(buffer.own_slabs(), 16u);
+  EXPECT_EQ(readings[15].tail.buffer->kind, BufferKind::slab);
+  EXPECT_EQ(readings[16].tail.buffer->kind, BufferKind::chunk);
+  EXPECT_LE(readings[16].tail.buffer->capacity, 65'536u + 16);
+  // It grows where it is, and is moved once.
   const std::uint64_t moved = rig.tally.moved_tail_bytes;
-  read(large, frame, 1'025);
-  EXPECT_TRUE(large.tail.owns_slab);
-  EXPECT_EQ(rig.tally.moved_tail_bytes, moved) << "no payload byte is moved";
-  read(large, std::span(frame).subspan(1'025), 100'000);
-  EXPECT_EQ(large.got.size(), 1u);
+  const Buffer* own = readings[99].tail.buffer.get();
+  read(readings[99], std::span(frame).subspan(30'000), 10'000);
+  EXPECT_EQ(readings[99].tail.buffer.get(), own);
   EXPECT_EQ(rig.tally.moved_tail_bytes, moved);
+  read(readings[99], std::span(frame).subspan(40'000), 100'000);
+  ASSERT_EQ(readings[99].got.size(), 1u);
+  EXPECT_EQ(readings[99].got[0], std::string(60'000, 'x'));
+  EXPECT_TRUE(readings[99].tail.empty());
+  // A slab that is free again may be owned again.
+  read(readings[0], std::span(frame).subspan(30'000), 100'000);
+  EXPECT_EQ(buffer.own_slabs(), 15u);
+  for (Reading& each : readings) buffer.forget(each.tail);
+  EXPECT_EQ(buffer.own_slabs(), 0u);
 }
 
 TEST_F(ReceiveBufferTest, TheLargestFrameMayBeginAtTheLastByteThatIsReadInto) {
