@@ -44,6 +44,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(lane0_demoted),
     GIMNET_COUNTER(pinned_bytes),
     GIMNET_COUNTER(pinned_bytes_max),
+    GIMNET_COUNTER(allocated_bytes),
     GIMNET_COUNTER(too_many_requests),
     GIMNET_COUNTER(no_memory),
 };

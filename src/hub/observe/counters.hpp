@@ -74,6 +74,7 @@ struct alignas(64) ShardCounters {
   Counter lane0_demoted;  ///< frames
   Counter pinned_bytes;   ///< kept from being freed by waiting frames, now
   Counter pinned_bytes_max;
+  Counter allocated_bytes;  ///< by the shard's thread since it began
 };
 
 }  // namespace gimnet::hub

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "hub/data/egress/gather_writer.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
@@ -60,8 +61,8 @@ struct Connection : Recipient {
   std::uint64_t tail_since_ms = 0;
   std::uint64_t sent_bytes = 0;
   std::uint32_t ping_sequence = 0;
-  std::uint32_t unsent_limit = 0;      ///< of the transport; 0: not limited
-  std::unique_ptr<Progress> progress;  ///< while something waits
+  std::uint32_t unsent_limit = 0;    ///< of the transport; 0: not limited
+  std::optional<Progress> progress;  ///< while something waits
   std::unique_ptr<ResumeState> resume;
 
   /// It could not be heard, nor finish a frame, while the hub did not read it.

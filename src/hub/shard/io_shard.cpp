@@ -59,6 +59,7 @@ void IoShard::send(ShardCommand command) {
 
 void IoShard::run() {
   Waker& waker = *state_.shared.wakers[state_.self.value()];
+  meter_ = AllocationMeter();
   while (!stopped_) {
     int timeout_ms = options_.spin ? 0 : sleep_ms();
     if (timeout_ms != 0) {
@@ -147,11 +148,12 @@ void IoShard::serve(std::span<const Ready> ready) {
 
 void IoShard::read_waiting() {
   if (!room_came()) return;
-  for (Connection* connection : std::exchange(state_.waiting_for_room, {})) {
+  for (Connection* connection : state_.waiting_for_room) {
     connection->waits_for_room = false;
     connection->on_read_again(state_.now_ms);
     state_.signals.arm(*connection);
   }
+  state_.waiting_for_room.clear();
 }
 
 void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }
@@ -161,6 +163,7 @@ void IoShard::finish_turn() {
   state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
   state_.counters.pinned_bytes.store(state_.pool.pinned_bytes());
   state_.counters.pinned_bytes_max.raise_to(state_.pool.pinned_bytes());
+  state_.counters.allocated_bytes.store(meter_.bytes());
   state_.tally.publish(state_.counters);
   if (keeper_.take_drained()) state_.tell_conductor({state_.self, DrainedEvent{}});
 }

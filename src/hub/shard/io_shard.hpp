@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <thread>
 
+#include "hub/shard/allocation_meter.hpp"
 #include "hub/shard/attacher.hpp"
 #include "hub/shard/closer.hpp"
 #include "hub/shard/flusher.hpp"
@@ -70,6 +71,7 @@ class IoShard {
   const Options options_;
   bool stopped_ = false;
   bool flush_again_ = false;
+  AllocationMeter meter_;  ///< of the thread that takes the turns
   std::thread thread_;
 };
 

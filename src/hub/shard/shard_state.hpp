@@ -51,6 +51,7 @@ struct ShardState {
   Tally tally;
   BudgetLease budget;
   BufferPool pool;
+  PiecePool pieces;
   DropBook drops;
   Signals signals;
   EgressContext egress;

@@ -10,7 +10,10 @@ Statistics Statistics::of(RawNode& observer) {
   Statistics statistics;
   const auto answer = observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{});
   for (const auto& shard : answer.shards) {
-    for (const auto& counter : shard.counters) statistics.counters_[counter.name] += counter.value;
+    for (const auto& counter : shard.counters) {
+      statistics.counters_[counter.name] += counter.value;
+      statistics.by_shard_[shard.shard][counter.name] = counter.value;
+    }
   }
   return statistics;
 }

@@ -17,6 +17,10 @@ class Statistics {
 
   /// REQUIRES: the hub has a counter of that name.
   [[nodiscard]] std::uint64_t operator[](const std::string& name) const { return counters_.at(name); }
+  /// Of one shard alone. REQUIRES: the hub has that shard and a counter of that name.
+  [[nodiscard]] std::uint64_t of_shard(std::size_t shard, const std::string& name) const {
+    return by_shard_.at(shard).at(name);
+  }
   /// Sum over all reasons.
   [[nodiscard]] std::uint64_t dropped() const;
   /// accepted + copies = delivered + dropped + queued.
@@ -26,6 +30,7 @@ class Statistics {
 
  private:
   std::map<std::string, std::uint64_t> counters_;
+  std::map<std::size_t, std::map<std::string, std::uint64_t>> by_shard_;
 };
 
 /// Asks until the condition holds, and returns what held; throws, with the last counters, when time is over.

@@ -6,6 +6,7 @@
 #include "hub/data/budget.hpp"
 #include "hub/data/buffer_pool.hpp"
 #include "hub/data/egress/drop_book.hpp"
+#include "hub/data/egress/piece_pool.hpp"
 #include "hub/data/tally.hpp"
 #include "hub/limits.hpp"
 #include "proto/frame/flow.hpp"
@@ -28,6 +29,7 @@ class SenderSignals {
 struct EgressContext {
   const Limits& limits;
   BufferPool& pool;
+  PiecePool& pieces;
   BudgetLease& budget;
   Tally& tally;
   DropBook& drops;

@@ -61,7 +61,7 @@ void LaneQueue::push(Entry entry) {
       return;
     }
   }
-  const bool index = streams_ != nullptr && entry.latest && !entry.touched;
+  const bool index = indexed_ && entry.latest && !entry.touched;
   const Entry& placed = entries_.push_back(std::move(entry));
   if (index) (*streams_)[stream_of(placed)] = entries_.end_number() - 1;
 }
@@ -93,9 +93,9 @@ Entry* LaneQueue::find_message(NodeId src, std::uint32_t message_number) {
   return nullptr;
 }
 
-void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last) {
+void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last, PiecePool& pool) {
   discount(entry);
-  entry.append(std::move(fragment));
+  entry.append(std::move(fragment), pool);
   entry.complete = last;
   count(entry);
 }
@@ -103,9 +103,10 @@ void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last) {
 bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   // Streams that left are forgotten when there are more of them than of others.
   constexpr std::size_t kForgottenMin = 64;
-  if (streams() > 2 * entries_.size() + kForgottenMin) streams_.reset();
-  if (!streams_) {
-    streams_ = std::make_unique<StreamIndex>();
+  if (streams() > 2 * entries_.size() + kForgottenMin) forget_streams();
+  if (!indexed_) {
+    if (!streams_) streams_ = std::make_unique<StreamIndex>();
+    indexed_ = true;
     for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
       const Entry& each = entries_.at(number);
       if (each.frames != 0 && each.latest && !each.touched) (*streams_)[stream_of(each)] = number;
@@ -164,7 +165,18 @@ void LaneQueue::pop_front() {
 
 void LaneQueue::skip_dead() {
   while (!entries_.empty() && entries_.front().frames == 0) entries_.pop_front();
-  // The index is only worth its memory while something waits.
+  if (entries_.empty()) forget_streams();
+}
+
+/// Keeps the memory: the next burst fills it again.
+void LaneQueue::forget_streams() {
+  if (!indexed_) return;
+  indexed_ = false;
+  streams_->clear();
+}
+
+void LaneQueue::trim() {
+  entries_.trim();
   if (entries_.empty()) streams_.reset();
 }
 

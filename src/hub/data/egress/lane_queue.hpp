@@ -38,7 +38,7 @@ class LaneQueue {
   [[nodiscard]] bool extend_last(const Run& run, const Buffer& buffer, const std::byte* place);
   /// The entry that still waits for more fragments of that message, or nullptr.
   [[nodiscard]] Entry* find_message(NodeId src, std::uint32_t message_number);
-  void append_fragment(Entry& entry, Run fragment, bool last);
+  void append_fragment(Entry& entry, Run fragment, bool last, PiecePool& pool);
 
   /// Puts `entry`, a LATEST message, in the place of an untouched older one of its stream, which is moved to `older`.
   /// Returns whether there was one. From the first call on, LATEST entries are looked up by stream.
@@ -57,6 +57,8 @@ class LaneQueue {
   [[nodiscard]] RingQueue<Entry>& entries() { return entries_; }
   /// Streams that are remembered.
   [[nodiscard]] std::size_t streams() const { return streams_ ? streams_->size() : 0; }
+  /// Nothing came for a while: gives back memory that only a busy lane needs.
+  void trim();
 
  private:
   using StreamIndex = boost::unordered_flat_map<LatestStream, std::uint64_t>;
@@ -65,12 +67,14 @@ class LaneQueue {
   void count(const Entry& entry);
   void discount(const Entry& entry);
   void skip_dead();
+  void forget_streams();
 
   RingQueue<Entry> entries_;
   std::uint64_t bytes_ = 0;
   std::uint64_t block_bytes_ = 0;
   std::uint64_t latest_bytes_ = 0;
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
+  bool indexed_ = false;           ///< streams_ names every LATEST entry that waits
   std::unique_ptr<StreamIndex> streams_;
 };
 

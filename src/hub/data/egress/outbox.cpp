@@ -137,7 +137,8 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   }
   // The message may have been settled already, and is not looked at again.
   if (backlog_) settle_run(entry.run, entry.shared, context);
-  lanes_[header.lane & proto::kLaneMask].append_fragment(*message, std::move(entry.run), entry.complete);
+  lanes_[header.lane & proto::kLaneMask].append_fragment(*message, std::move(entry.run), entry.complete,
+                                                         context.pieces);
   return true;
 }
 
@@ -319,7 +320,7 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
 void Outbox::trim() {
   control_.trim();
   replay_.trim();
-  for (LaneQueue& lane : lanes_) lane.entries().trim();
+  for (LaneQueue& lane : lanes_) lane.trim();
 }
 
 void Outbox::clear_control() {

@@ -71,7 +71,7 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 78), nullptr);
   Entry* found = lane.find_message(NodeId{7u << 20 | 3}, 77);
   ASSERT_NE(found, nullptr);
-  lane.append_fragment(*found, rig.run({"the end"}, {.src = 3}), true);
+  lane.append_fragment(*found, rig.run({"the end"}, {.src = 3}), true, rig.pieces);
   EXPECT_EQ(found->frames, 2u);
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "complete";
   EXPECT_EQ(lane.bytes(), 4u + 9u + 7u + 3 * proto::kHeaderSize);
@@ -113,6 +113,25 @@ TEST_F(LaneQueueTest, ForgetsStreamsThatLeft) {
   std::memcpy(key.data(), &last, sizeof last);
   Entry next = entry(key, latest);
   EXPECT_TRUE(lane.replace_latest(next, older));
+}
+
+// The index stays for the next burst and knows nothing of the last one.
+TEST_F(LaneQueueTest, RemembersNoStreamOfAnEarlierBurst) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
+  Entry older;
+  for (int burst = 0; burst < 3; ++burst) {
+    Entry first = entry("key____1", latest);
+    EXPECT_FALSE(lane.replace_latest(first, older)) << "burst " << burst;
+    lane.push(std::move(first));
+    EXPECT_EQ(lane.streams(), 1u);
+    Entry second = entry("key____1", latest);
+    EXPECT_TRUE(lane.replace_latest(second, older));
+    lane.pop_front();
+    EXPECT_EQ(lane.streams(), 0u);
+  }
+  lane.trim();
+  Entry again = entry("key____1", latest);
+  EXPECT_FALSE(lane.replace_latest(again, older));
 }
 
 }  // namespace

@@ -38,8 +38,9 @@ class EgressRig {
         budget(limits.budget_bytes),
         lease(budget),
         pool(static_cast<std::uint32_t>(limits.frame_bytes), lease),
+        pieces(lease),
         drops(tally, limits.report_interval_ms),
-        context{limits, pool, lease, tally, drops, signals, 1'000'000, 1'000'000'000} {}
+        context{limits, pool, pieces, lease, tally, drops, signals, 1'000'000, 1'000'000'000} {}
 
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
     proto::FrameHeader header;
@@ -95,6 +96,7 @@ class EgressRig {
   Budget budget;
   BudgetLease lease;
   BufferPool pool;
+  PiecePool pieces;
   Tally tally;
   DropBook drops;
   FakeSignals signals;

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "hub/data/buffer.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::hub {
+
+/// Complete frames that lie one behind the other in one buffer, all with the same header but for the length.
+struct Run {
+  BufferRef buffer;
+  const std::byte* bytes = nullptr;
+  std::uint32_t size = 0;
+  std::uint32_t frames = 0;
+
+  [[nodiscard]] proto::FrameHeader header() const { return proto::load_header(bytes); }
+  [[nodiscard]] Run share() const { return Run{buffer.share(), bytes, size, frames}; }
+  /// Lets the first frame go; returns its size.
+  std::uint32_t skip_frame() {
+    const auto frame = static_cast<std::uint32_t>(header().frame_size());
+    bytes += frame;
+    size -= frame;
+    --frames;
+    return frame;
+  }
+  /// Extends this run by `next` if that lies right behind it in the same buffer.
+  bool extend(const Run& next) {
+    if (buffer.get() != next.buffer.get() || bytes + size != next.bytes) return false;
+    size += next.size;
+    frames += next.frames;
+    return true;
+  }
+};
+
+}  // namespace gimnet::hub
