@@ -15,7 +15,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver import catalogue, suite  # noqa: E402
+from driver import catalogue, instructions, suite  # noqa: E402
 from driver.document import make_document  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.subjects import allowed_cpus  # noqa: E402
@@ -26,6 +26,7 @@ QUICK_SECONDS = 0.5
 WHOLE_SECONDS = 1.0
 SMOKE_SECONDS = 0.1
 SMOKE_CLIENTS = 200
+SKIPPED = 77  # what ctest takes for a test that was left out
 
 
 def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
@@ -36,6 +37,9 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--report", action="store_true", help="write docs/performance.md")
     parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
                         metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; all")
+    parser.add_argument("--instructions", nargs="?", const="", metavar="SCRIPT",
+                        help="instructions per frame against the budget; of one script: where they go")
+    parser.add_argument("--update", action="store_true", help="with --instructions: make what is counted the budget")
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
@@ -63,6 +67,8 @@ def chosen_subjects(arguments: argparse.Namespace) -> tuple[str, ...]:
 
 
 def needed_packages(arguments: argparse.Namespace) -> list[str]:
+    if arguments.instructions is not None:
+        return ["valgrind"]
     packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
@@ -147,11 +153,43 @@ def measure(arguments: argparse.Namespace) -> int:
     return judge(outcomes, rows, arguments.smoke)
 
 
+def count_instructions(arguments: argparse.Namespace) -> int:
+    """The exit status: 1 where a script takes more than its budget allows, 77 (skipped) where none can be had."""
+    program = arguments.build_dir.resolve() / "bin" / "instruction_scripts"
+    try:
+        made_by, scripts = instructions.describe(program)
+        budget = instructions.load_budget()
+        if arguments.instructions:
+            per_frame, costs = instructions.count(program, arguments.instructions)
+            for function, cost in costs.most_common(40):
+                say(f"{cost / sum(costs.values()):7.1%} {cost / sum(costs.values()) * per_frame:9.1f}  {function}")
+            return 0
+        reason = None if arguments.update else instructions.why_incomparable(made_by, budget)
+        if reason is not None:
+            say(f"SKIPPED: {reason}")
+            return SKIPPED
+        verdicts = instructions.measure(program, scripts, budget)
+    except instructions.CountingError as error:
+        say(f"SKIPPED: {error}")
+        return SKIPPED
+    say("\n".join(["instructions per frame:", *map(str, verdicts)]))
+    if arguments.update:
+        instructions.update_budget(made_by, verdicts)
+        return 0
+    if any(verdict.is_slower for verdict in verdicts):
+        say("more than the budget allows: make it cheaper, or say in the change why it is worth it and\n"
+            "    ./dev perf --instructions --update")
+        return 1
+    return 0
+
+
 def main() -> int:
     arguments = parse_arguments()
     if arguments.packages:
         print(" ".join(needed_packages(arguments)))
         return 0
+    if arguments.instructions is not None:
+        return count_instructions(arguments)
     return measure(arguments)
 
 

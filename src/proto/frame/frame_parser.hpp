@@ -63,6 +63,9 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   }
   std::size_t size = header.frame_size();
   std::uint32_t frames = 1;
+#if defined(GIMNET_BUG_SLOW_PARSER)
+  asm volatile("nop\n\tnop");
+#endif
   if (may_form_run(header)) {
     const auto addresses = load_le<std::uint64_t>(begin + 4);
     const auto attributes = load_le<std::uint32_t>(begin + 12);

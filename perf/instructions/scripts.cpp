@@ -1,0 +1,236 @@
+// Fixed pieces of the hub's work, whose instructions are counted (perf/driver/instructions.py) and compared with
+// perf/instructions/budget.json. Under valgrind's callgrind, which counts nothing but what runs below counted().
+//
+//     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames of the counted run
+//     instruction_scripts           prints what compiled it, and the scripts' names
+
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bench/hub/data/support/null_transport.hpp"
+#include "proto/frame/frame_parser.hpp"
+#include "tests/hub/data/support/route_rig.hpp"
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+extern "C" {
+/// Where callgrind switches its counting on and off: never inlined, known by this name.
+[[gnu::noinline]] void counted(const std::function<void()>& work) {
+  work();
+  asm volatile("");  // keeps the call from becoming a jump, which callgrind would not see the end of
+}
+}
+
+namespace gimnet::hub {
+namespace {
+
+constexpr std::uint32_t kDestinations = 8;
+constexpr std::uint32_t kFramesPerTurn = 512;
+constexpr std::uint32_t kFanOut = 100;
+constexpr std::uint32_t kFirstNode = 2;
+const char* const kPayload = "0123456789abcdef";
+
+/// Something to be counted, and how many frames it handles.
+struct Work {
+  std::uint64_t frames;
+  std::function<void()> run;
+};
+
+std::uint32_t node_id(std::uint32_t index) { return make_id<NodeId>(HubId{7}, index).value(); }
+
+/// Frames of 16 bytes; `destinations` take turns.
+std::vector<std::byte> frames_to(std::uint32_t destinations) {
+  std::vector<std::byte> bytes(kFramesPerTurn * (proto::kHeaderSize + std::strlen(kPayload)));
+  std::byte* at = bytes.data();
+  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
+    proto::FrameHeader header;
+    header.length = static_cast<std::uint32_t>(std::strlen(kPayload));
+    header.dst = node_id(kFirstNode + i % destinations);
+    header.src = node_id(1);
+    header.lane = 1;
+    proto::store_header(at, header);
+    std::memcpy(at + proto::kHeaderSize, kPayload, header.length);
+    at += header.frame_size();
+  }
+  return bytes;
+}
+
+Work parser(std::uint32_t destinations) {
+  return {kFramesPerTurn, [bytes = frames_to(destinations)] {
+            const std::byte* at = bytes.data();
+            const std::byte* const end = at + bytes.size();
+            while (at != end) {
+              const proto::NextRun next = proto::next_run(at, end, proto::kFrameLengthDefault);
+              const auto error = proto::check_header_from_node(proto::load_header(next.run.bytes));
+              if (next.found != proto::Found::run || error != proto::FrameError::none) std::abort();
+              at += next.run.size;
+            }
+          }};
+}
+
+/// A shard's routing side with recipients that take everything at once.
+struct Routing {
+  testing::RouteRig rig;
+  benchmarks::NullTransport transport;
+  std::vector<GatherWriter> writers = std::vector<GatherWriter>(kFirstNode + kFanOut);
+  std::vector<hub::Run> runs;
+
+  explicit Routing(std::uint32_t nodes) {
+    for (std::uint32_t i = 0; i < nodes; ++i) rig.add_here(kFirstNode + i);
+  }
+  void flush() {
+    for (Recipient* recipient : rig.recipients.dirty()) {
+      recipient->dirty = false;
+      GatherWriter& writer = writers[recipient->slot.value()];
+      static_cast<void>(writer.flush(recipient->outbox, nullptr, transport, rig.egress.context));
+      recipient->outbox.on_emptied(rig.egress.context);
+    }
+    rig.recipients.dirty().clear();
+  }
+};
+
+Work router() {
+  auto routing = std::make_shared<Routing>(kDestinations);
+  for (std::uint32_t i = 0; i < kDestinations; ++i) {
+    routing->runs.push_back(routing->rig.make_run(node_id(kFirstNode + i), {kPayload}));
+  }
+  return {kFramesPerTurn, [routing] {
+            for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
+              const hub::Run& run = routing->runs[i % kDestinations];
+              routing->rig.router.route(run, run.header());
+            }
+            routing->flush();
+          }};
+}
+
+Work outbox() {
+  auto routing = std::make_shared<Routing>(1);
+  routing->runs.push_back(routing->rig.make_run(node_id(kFirstNode), {kPayload}));
+  return {kFramesPerTurn, [routing] {
+            Outbox& outbox = routing->rig.recipients_made.front()->outbox;
+            const hub::Run& run = routing->runs.front();
+            const proto::FrameHeader header = run.header();
+            for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
+              outbox.push(run, header, {}, routing->rig.egress.context);
+              static_cast<void>(
+                  routing->writers.front().flush(outbox, nullptr, routing->transport, routing->rig.egress.context));
+              outbox.on_emptied(routing->rig.egress.context);
+            }
+          }};
+}
+
+Work fan_out() {
+  auto routing = std::make_shared<Routing>(kFanOut);
+  routing->runs.push_back(routing->rig.make_run(node_id(1), {kPayload}, {.kind = proto::Kind::group}));
+  constexpr std::uint32_t kFrames = 8;
+  return {kFrames * kFanOut, [routing] {
+            const hub::Run& run = routing->runs.front();
+            const proto::FrameHeader header = run.header();
+            for (std::uint32_t i = 0; i < kFrames; ++i) {
+              for (const auto& recipient : routing->rig.recipients_made) {
+                routing->rig.fanout.deliver(*recipient, run, header, Handover{true});
+              }
+            }
+            routing->flush();
+          }};
+}
+
+Work mailbox() {
+  struct Doors {
+    Waker waker;
+    Mailbox mailbox{2, {.entries = 8'192, .bytes = 16u << 20}, waker};
+  };
+  return {kFramesPerTurn, [doors = std::make_shared<Doors>()] {
+            Mail mail;
+            mail.size = 32;
+            mail.frames = 1;
+            std::uint64_t frames = 0;
+            for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) doors->mailbox.post(ShardIndex{1}, mail);
+            doors->mailbox.drain(10'000, [] {}, [&](const Mail& taken) { frames += taken.frames; });
+            if (frames != kFramesPerTurn) std::abort();
+          }};
+}
+
+/// One turn of a whole shard: from a connection's bytes in memory to other connections' bytes in memory.
+Work hub_turn(std::uint32_t destinations) {
+  auto rig = std::make_shared<testing::HubRig>();
+  testing::FakeNode& sender = rig->join(0);
+  for (std::uint32_t i = 0; i < destinations; ++i) rig->join(0);
+  rig->settle();
+  std::vector<std::byte> bytes;
+  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
+    const auto frame = testing::HubRig::frame(sender, sender.id.value() + 1 + i % destinations, kPayload);
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  }
+  return {kFramesPerTurn, [rig, &sender, bytes] {
+            rig->write(sender, bytes);
+            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
+          }};
+}
+
+Work hub_turn_fan_out() {
+  auto rig = std::make_shared<testing::HubRig>();
+  testing::FakeNode& provider = rig->join(0);
+  std::vector<testing::FakeNode*> members;
+  for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
+  rig->publish_group(1, provider.id, members);
+  rig->settle();
+  constexpr std::uint32_t kFrames = 32;
+  std::vector<std::byte> bytes;
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    const auto frame =
+        testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload, {.kind = proto::Kind::group});
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  }
+  return {kFrames * kFanOut, [rig, &provider, bytes] {
+            rig->write(provider, bytes);
+            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
+          }};
+}
+
+struct Script {
+  const char* name;
+  Work (*make)();
+};
+
+constexpr Script kScripts[] = {
+    {"parser_run", [] { return parser(1); }},
+    {"parser_in_turns", [] { return parser(kDestinations); }},
+    {"router_in_turns", router},
+    {"outbox", outbox},
+    {"fan_out_100", fan_out},
+    {"mailbox", mailbox},
+    {"hub_turn_one_to_one", [] { return hub_turn(1); }},
+    {"hub_turn_in_turns", [] { return hub_turn(kDestinations); }},
+    {"hub_turn_fan_out_100", hub_turn_fan_out},
+};
+
+}  // namespace
+}  // namespace gimnet::hub
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+#if defined(__OPTIMIZE__) && defined(NDEBUG)
+    const char* const build = "release";
+#else
+    const char* const build = "other";
+#endif
+    std::printf("%s %s %s\n", __VERSION__, GIMNET_PROCESSOR, build);
+    for (const auto& script : gimnet::hub::kScripts) std::puts(script.name);
+    return 0;
+  }
+  for (const auto& script : gimnet::hub::kScripts) {
+    if (std::strcmp(argv[1], script.name) != 0) continue;
+    const auto work = script.make();
+    work.run();
+    counted(work.run);
+    std::printf("%llu\n", static_cast<unsigned long long>(work.frames));
+    return 0;
+  }
+  std::fprintf(stderr, "instruction_scripts: there is no script '%s'\n", argv[1]);
+  return 1;
+}

@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+"""The gate on instructions finds a planted slow-down of a twentieth, and nothing where nothing is: planted_slow_down_test.py
+BUILD_FOLDER. Ends with 77 where instructions cannot be counted."""
+
+import pathlib
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "perf"))
+
+from driver import instructions  # noqa: E402
+
+LIST = ROOT / "perf" / "instructions" / "planted_bugs.txt"
+
+
+def scripts_with_bug() -> list[str]:
+    lines = [line.split() for line in LIST.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    return [words[1] for words in lines]
+
+
+def main() -> int:
+    folder = pathlib.Path(sys.argv[1]).resolve() / "bin"
+    scripts = scripts_with_bug()
+    assert scripts, f"{LIST} lists nothing"
+    try:
+        made_by, _ = instructions.describe(folder / "instruction_scripts")
+        if made_by["build"] != "release":
+            raise instructions.CountingError("a build without optimisation says nothing of a twentieth")
+        clean = {script: instructions.count(folder / "instruction_scripts", script)[0] for script in scripts}
+        budget = {"instructions_per_frame": clean}
+        planted = instructions.measure(folder / "instruction_scripts_planted", scripts, budget)
+        again = instructions.measure(folder / "instruction_scripts", scripts, budget)
+    except instructions.CountingError as error:
+        print(f"SKIPPED: {error}")
+        return 77
+    for verdict in planted + again:
+        print(verdict)
+    assert all(verdict.is_slower and verdict.change < 0.10 for verdict in planted), "the slow-down was not found"
+    assert not any(verdict.is_slower or verdict.is_faster for verdict in again), "the same program counted differently"
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
