@@ -1,13 +1,11 @@
 #include "hub/hub.hpp"
 
-#include <sys/random.h>
-
 #include <algorithm>
 #include <vector>
 
-#include "base/check.hpp"
 #include "base/clock.hpp"
 #include "hub/config/folders.hpp"
+#include "hub/config/start_state.hpp"
 #include "hub/control/conductor.hpp"
 #include "hub/control/conductor_loop.hpp"
 #include "hub/shard/io_shard.hpp"
@@ -26,12 +24,6 @@ Result<std::vector<ListenUrl>> addresses_for(const HubOptions& options) {
     urls.push_back(*url);
   }
   return urls;
-}
-
-Secret fresh_secret() {
-  Secret secret{};
-  GIMNET_CHECK(::getrandom(secret.data(), secret.size(), 0) == static_cast<ssize_t>(secret.size()));
-  return secret;
 }
 
 /// The conductor's door to the real shards.
@@ -128,8 +120,9 @@ HubFacts facts_of(const HubOptions& options) {
 
 /// In the order in which they need each other: shards end before the conductor frees what they look at.
 struct Hub::Parts {
-  Parts(const HubOptions& given, std::vector<std::unique_ptr<Listener>> listeners)
+  Parts(const HubOptions& given, StartState from, std::vector<std::unique_ptr<Listener>> listeners)
       : options(given),
+        state_folder(std::move(from.folder)),
         ground(options),
         shared(ground.shared(options)),
         shards(shared, {.spin = options.spin}),
@@ -137,7 +130,8 @@ struct Hub::Parts {
                   Conductor::Wiring{shards,
                                     {ground.nodes, ground.groups, ground.quiescence},
                                     ground.readable,
-                                    fresh_secret,
+                                    from.start,
+                                    keep_state(),
                                     ground.readable_queues,
                                     &ground.refusals}) {
     for (const auto& listener : listeners) {
@@ -147,7 +141,13 @@ struct Hub::Parts {
         ConductorLoop::Wiring{conductor, ground.inbox, options.limits, ground.refusals}, std::move(listeners));
   }
 
+  Conductor::KeepState keep_state() {
+    if (state_folder == nullptr) return {};
+    return [this](const HubState& state) { return state_folder->write(state); };
+  }
+
   const HubOptions options;
+  const std::unique_ptr<StateFolder> state_folder;
   Ground ground;
   const HubShared shared;
   Shards shards;
@@ -161,9 +161,6 @@ Hub::Hub(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Hub::~Hub() { parts_->shards.stop(); }
 
 Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options) {
-  if (!options.state_dir.empty()) {
-    if (const std::string error = prepare_state_folder(options.state_dir); !error.empty()) return Error{error};
-  }
   const Result<std::vector<ListenUrl>> urls = addresses_for(options);
   if (!urls) return urls.error();
   std::vector<std::unique_ptr<Listener>> listeners;
@@ -172,7 +169,11 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options) {
     if (!listener) return listener.error();
     listeners.push_back(std::move(*listener));
   }
-  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, std::move(listeners))));
+  // After the addresses: a second hub by mistake is told that they are in use, which says more.
+  const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
+  Result<StartState> state = start_state({options.state_dir, options.id, urls->front(), wall});
+  if (!state) return state.error();
+  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }

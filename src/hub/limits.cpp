@@ -16,6 +16,7 @@ constexpr std::uint64_t kKiB = 1024;
 constexpr std::uint64_t kMiB = 1024 * kKiB;
 constexpr std::uint64_t kGiB = 1024 * kMiB;
 constexpr std::uint64_t kHour = 3'600'000;
+constexpr std::uint64_t kYear = 365 * 24 * kHour;
 constexpr std::size_t kQuotedMax = 60;
 
 constexpr std::array kTable{
@@ -35,6 +36,10 @@ constexpr std::array kTable{
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000, "sessions, those within their grace time included", true},
     LimitInfo{"grace_ms", "ms", &Limits::grace_ms, 0, 24 * kHour,
               "time within which a node that lost its connection gets its id and name back"},
+    LimitInfo{"token_ms", "ms", &Limits::token_ms, 1'000, 10 * kYear,
+              "time from its last connection for which a node's token is honoured while its id is free", true},
+    LimitInfo{"kicked_tokens", "nodes", &Limits::kicked_tokens, 0, 65'536,
+              "kicked nodes whose tokens a restarted hub still refuses; one more lets the oldest go", true},
     LimitInfo{"keep_alive_ms", "ms", &Limits::keep_alive_ms, 10, kHour, "a silent end says PING after this time"},
     LimitInfo{"silent_ms", "ms", &Limits::silent_ms, 30, kHour, "a node that was not heard for this time is closed"},
     LimitInfo{"lane0_bytes", "bytes", &Limits::lane0_bytes, 16 * kKiB, kGiB, "waiting for one node, real-time lane",

@@ -25,6 +25,8 @@ struct Limits {
   std::uint64_t handshakes = 4'096;
   std::uint64_t nodes = 100'000;
   std::uint64_t grace_ms = 30'000;
+  std::uint64_t token_ms = 31'536'000'000;
+  std::uint64_t kicked_tokens = 4'096;
   // Keep-alive
   std::uint64_t keep_alive_ms = 1'000;
   std::uint64_t silent_ms = 3'000;

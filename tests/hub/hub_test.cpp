@@ -21,8 +21,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
-HubOptions options(const std::vector<std::string>& urls) {
+HubOptions options(const TestFolder& folder, const std::vector<std::string>& urls) {
   HubOptions result;
+  result.state_dir = folder.path("state");
   result.name = "test";
   result.shards = 2;
   for (const std::string& url : urls) result.listen.push_back(*parse_listen_url(url));
@@ -65,28 +66,28 @@ bool reads_goodbye(int descriptor) {
 
 TEST(Hub, SaysWhereItListens) {
   const TestFolder folder;
-  const auto hub = Hub::start(options({"tcp://127.0.0.1:0", "unix:" + folder.path("s")}));
+  const auto hub = Hub::start(options(folder, {"tcp://127.0.0.1:0", "unix:" + folder.path("s")}));
   ASSERT_TRUE(hub);
   EXPECT_THAT((*hub)->addresses(), MatchesRegex("tcp://127\\.0\\.0\\.1:[1-9][0-9]* unix:.*/s"));
 }
 
 TEST(Hub, DoesNotStartWhereItCannotListen) {
   const TestFolder folder;
-  const auto hub = Hub::start(options({"unix:" + folder.path("none/s")}));
+  const auto hub = Hub::start(options(folder, {"unix:" + folder.path("none/s")}));
   ASSERT_FALSE(hub);
   EXPECT_THAT(hub.error().sentence, HasSubstr("does not exist"));
 }
 
 TEST(Hub, DoesNotStartWithoutItsStateFolder) {
   const TestFolder folder;
-  HubOptions wanted = options({"unix:" + folder.path("s")});
+  HubOptions wanted = options(folder, {"unix:" + folder.path("s")});
   wanted.state_dir = folder.path("none/state");
   EXPECT_FALSE(Hub::start(wanted));
 }
 
 TEST(Hub, WelcomesNodesAndDrainsAtASignal) {
   const TestFolder folder;
-  auto hub = Hub::start(options({"unix:" + folder.path("s")}));
+  auto hub = Hub::start(options(folder, {"unix:" + folder.path("s")}));
   ASSERT_TRUE(hub);
   bool greeted = false;
   bool dismissed = false;

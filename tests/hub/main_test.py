@@ -11,6 +11,10 @@ import unittest
 
 TCPHUB = sys.argv.pop(1)
 PATIENCE_S = 20
+# What hubs keep belongs to the test, not to the user who runs it.
+STATE_HOME = tempfile.TemporaryDirectory(prefix="gimnet-test-state-")
+ENVIRONMENT = {**os.environ, "XDG_STATE_HOME": STATE_HOME.name}
+ENVIRONMENT.pop("STATE_DIRECTORY", None)
 
 
 class Hub:
@@ -18,7 +22,7 @@ class Hub:
 
     def __init__(self, *arguments, **environment):
         self.process = subprocess.Popen([TCPHUB, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                        text=True, env={**os.environ, **environment})
+                                        text=True, env={**ENVIRONMENT, **environment})
         self.ready = self.process.stdout.readline().strip()
 
     def __enter__(self):
@@ -37,7 +41,7 @@ class Hub:
 
 def run(*arguments, **environment):
     return subprocess.run([TCPHUB, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False,
-                          env={**os.environ, **environment})
+                          env={**ENVIRONMENT, **environment})
 
 
 class CommandLine(unittest.TestCase):

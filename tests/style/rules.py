@@ -19,7 +19,7 @@ _HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/queue_g
 _CONCURRENT = _PROTO + _HUB_PARTS + ("hub/concurrent",)
 _DATA = _CONCURRENT + ("hub/transport/transport.hpp", "hub/data")
 _SHARD = _DATA + ("hub/transport", "hub/shard")
-_CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/control")
+_CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/crypto", "hub/control")
 _NIF = _PROTO + ("client/nif",)
 _GIMI = _NIF + ("client/gimi",)
 MAY_INCLUDE = {
@@ -34,7 +34,8 @@ MAY_INCLUDE = {
     "hub/data": _DATA,
     "hub/transport": _CONCURRENT + ("hub/transport",),
     "hub/shard": _SHARD,
-    "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/control/state"),
+    "hub/crypto": _BASE + ("hub/crypto",),
+    "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/control/state"),
     "hub/control": _CONTROL,
     "hub/config": _CONTROL + ("hub/config",),
     "hub/observe": _CONCURRENT + ("hub/observe",),

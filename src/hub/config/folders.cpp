@@ -62,11 +62,41 @@ std::string prepare_state_folder(const std::string& path) {
   if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) {
     return "cannot use the folder " + path + ": " + system_text(errno);
   }
-  if (!S_ISDIR(info.st_mode)) return "cannot use " + path + " for --state-dir: it is not a folder";
-  if (::access(path.c_str(), W_OK | X_OK) != 0) {
-    return "cannot use the folder " + path + " for --state-dir: " + system_text(errno);
+  if (!S_ISDIR(info.st_mode)) return "cannot use " + path + " for state: it is not a folder";
+  if ((info.st_mode & 0022) != 0) {
+    return "cannot use the folder " + path + " for state: other users may write to it; chmod go-w " + path;
+  }
+  if (::access(path.c_str(), R_OK | W_OK | X_OK) != 0) {
+    return "cannot use the folder " + path + " for state: " + system_text(errno) +
+           "; run tcphub as the user that may write there, or give it another one with --state-dir";
   }
   return {};
+}
+
+Result<std::string> default_state_folder(const std::string& name) {
+  const auto absolute = [](const char* variable) {
+    const char* value = std::getenv(variable);
+    return std::string{value != nullptr && *value == '/' ? value : ""};
+  };
+  // Of systemd's list the first; it makes that one itself.
+  std::string path = absolute("STATE_DIRECTORY");
+  path = path.substr(0, path.find(':'));
+  if (!path.empty()) return path + "/" + name;
+  path = absolute("XDG_STATE_HOME");
+  if (path.empty()) {
+    path = absolute("HOME");
+    if (path.empty()) return Error{"neither XDG_STATE_HOME nor HOME is set"};
+    path += "/.local";
+    struct stat info{};
+    if (std::string error = make_folder(path, info); !error.empty()) return Error{std::move(error)};
+    path += "/state";
+  }
+  for (const char* part : {"", "/gimnet"}) {
+    struct stat info{};
+    path += part;
+    if (std::string error = make_folder(path, info); !error.empty()) return Error{std::move(error)};
+  }
+  return path + "/" + name;
 }
 
 }  // namespace gimnet::hub

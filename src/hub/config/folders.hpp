@@ -21,7 +21,13 @@ namespace gimnet::hub {
 /// Where a hub listens if nobody says: loopback, and a Unix socket in the runtime folder. Nothing is made.
 [[nodiscard]] std::vector<std::string> default_addresses();
 
-/// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used.
+/// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used: it is no folder, others may
+/// write to it, or this user may not.
 [[nodiscard]] std::string prepare_state_folder(const std::string& path);
+
+/// Where the state of the hub of that name belongs, if nobody says: `name` in STATE_DIRECTORY (systemd), else in
+/// gimnet in XDG_STATE_HOME, else in ~/.local/state/gimnet; what is above it is created. Errors: why there is no such
+/// place.
+[[nodiscard]] Result<std::string> default_state_folder(const std::string& name);
 
 }  // namespace gimnet::hub

@@ -18,7 +18,7 @@ struct HubOptions {
   std::size_t shards = 1;
   HubId id{1};
   std::string name;
-  std::string state_dir;  ///< "": none
+  std::string state_dir;  ///< "": the default one
   Placement placement = Placement::spread;
   bool insecure = false;
   bool spin = false;  ///< shards never sleep

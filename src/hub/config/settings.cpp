@@ -168,8 +168,8 @@ constexpr std::array kSettings{
             [](const HubOptions& options) { return std::to_string(options.id.value()); }},
     Setting{"hub_name", "its name for people", false, set_hub_name,
             [](const HubOptions& options) { return toml_quoted(options.name); }},
-    Setting{"state_dir", "folder of what the hub keeps; \"\" is none", false, set_state_dir,
-            [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
+    Setting{"state_dir", "folder of what the hub keeps over its restarts; \"\" is the default one", false,
+            set_state_dir, [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
     Setting{"placement", "where new nodes live: spread or hint", false, set_placement,
             [](const HubOptions& options) {
               return toml_quoted(kPlacements[options.placement == Placement::hint ? 1 : 0]);

@@ -69,14 +69,17 @@ Stranger Acceptor::stranger(int descriptor) const {
   Stranger result;
   if (listener_->url().scheme == ListenUrl::Scheme::tcp) {
     result.peer = PeerInfo{"tcp", tcp_peer(descriptor)};
+    result.identity = "open";
     result.transport = std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::tcp, limits_);
     return result;
   }
   ucred credentials{};
   socklen_t size = sizeof credentials;
   result.peer = PeerInfo{"unix", "unknown"};
+  result.identity = "unknown";
   if (::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
     result.peer.address = "pid " + std::to_string(credentials.pid) + " uid " + std::to_string(credentials.uid);
+    result.identity = "uid " + std::to_string(credentials.uid);
     result.may_administer = credentials.uid == 0 || credentials.uid == ::geteuid();
   }
   result.transport = std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::unix_socket, limits_);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "hub/control/listener.hpp"
 #include "hub/limits.hpp"
@@ -15,6 +16,7 @@ namespace gimnet::hub {
 struct Stranger {
   std::unique_ptr<Transport> transport;
   PeerInfo peer;
+  std::string identity;  ///< who it is, as far as the system tells: "uid 1000" over a Unix socket, "open" over TCP
   bool may_administer = false;  ///< root or the hub's own user, over a Unix socket
 };
 

@@ -15,8 +15,24 @@ using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
+/// How long after the state could not be kept it is tried again.
+constexpr milliseconds kKeepAgainAfter{1'000};
+
 std::string title(NodeId node, const Session& session) {
   return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
+}
+
+Sessions::Options sessions_options(const HubFacts& facts, Placement placement, const HubStart& start) {
+  Sessions::Options options;
+  options.hub = facts.id;
+  options.shards = facts.shards;
+  options.placement = placement;
+  options.secret = start.state.secret;
+  options.boot = start.state.boot;
+  options.nodes = start.nodes;
+  options.groups = start.groups;
+  options.kicked = start.state.kicked;
+  return options;
 }
 
 SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
@@ -27,8 +43,9 @@ Conductor::Conductor(HubFacts facts, Placement placement, const Limits& limits, 
     : facts_(std::move(facts)),
       limits_(limits),
       wiring_(std::move(wiring)),
-      membership_(Sessions::Options{facts_.id, facts_.shards, placement}, limits),
-      publisher_(facts_.id, facts_.shards, wiring_.tables) {
+      membership_(sessions_options(facts_, placement, wiring_.start), limits),
+      publisher_(facts_.id, facts_.shards, wiring_.tables),
+      state_(wiring_.start.state) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
 }
 
@@ -42,10 +59,11 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   request.shard_hint = hello.shard;
   request.origin = Origin{stranger.peer.transport, stranger.peer.address};
   request.may_administer = stranger.may_administer;
-  request.secret = wiring_.fresh_secret();
+  request.identity = stranger.identity;
+  request.wall = milliseconds{moment.wall_ns / 1'000'000};
   Effects effects;
   const auto joined = membership_.join(request, moment.now, effects);
-  carry_out(effects);
+  carry_out(effects, moment.now);
   if (!joined) return joined.error();
   attach(stranger, hello, *joined, moment);
   return std::nullopt;
@@ -71,7 +89,7 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   wiring_.shards.send(session.place.shard, std::move(command));
   session.close_code.reset();
   session.close_sentence.clear();
-  log_info(title(node_id(session), session) + (joined.new_session ? " joined over " : " came back over ") +
+  log_info(title(node_id(session), session) + (session.came_back ? " came back over " : " joined over ") +
            session.origin.transport + " from " + session.origin.address + ", shard " +
            std::to_string(session.place.shard.value()));
 }
@@ -79,7 +97,7 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
 proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& hello, Moment moment) const {
   proto::Welcome welcome;
   welcome.node = node_id(session);
-  welcome.token = Sessions::token_of(session);
+  welcome.token = membership_.sessions().token_of(session);
   welcome.hub = facts_.id;
   welcome.hub_name = facts_.name;
   welcome.frame_length_max = static_cast<std::uint32_t>(limits_.frame_bytes);
@@ -123,7 +141,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Handler handle = handler_for(session->role, kind, view->header.operation);
   const proto::Payload answer = handle(context, request);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
-  carry_out(effects);
+  carry_out(effects, now);
   SendControlCommand command;
   command.session = event.session;
   command.attachment = event.attachment;
@@ -149,7 +167,7 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   log_info(line);
   Effects effects;
   membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
-  carry_out(effects);
+  carry_out(effects, now);
 }
 
 void Conductor::close(const Session& session, GoodbyeCode code, std::string sentence) {
@@ -159,11 +177,16 @@ void Conductor::close(const Session& session, GoodbyeCode code, std::string sent
 void Conductor::tick(milliseconds now) {
   Effects effects;
   membership_.tick(now, effects);
-  carry_out(effects);
+  if (keep_again_at_ && *keep_again_at_ <= now) effects.emplace_back(StateDue{});
+  carry_out(effects, now);
   publisher_.collect();
 }
 
-std::optional<milliseconds> Conductor::next_deadline() const { return membership_.next_deadline(); }
+std::optional<milliseconds> Conductor::next_deadline() const {
+  const std::optional<milliseconds> deadline = membership_.next_deadline();
+  if (!keep_again_at_ || (deadline && *deadline < *keep_again_at_)) return deadline;
+  return keep_again_at_;
+}
 
 void Conductor::drain() {
   if (draining_) return;
@@ -182,10 +205,39 @@ Session* Conductor::find(const SessionRef& ref, NodeId node) {
 
 NodeId Conductor::node_id(const Session& session) const { return membership_.sessions().node_id(session); }
 
-void Conductor::carry_out(const Effects& effects) {
+void Conductor::carry_out(const Effects& effects, milliseconds now) {
+  // First what has to outlive a crash, and once for all of them: what follows is seen by others.
+  for (const Effect& effect : effects) {
+    if (!std::holds_alternative<StateDue>(effect)) continue;
+    keep_state(now);
+    break;
+  }
   for (const Effect& effect : effects) {
     std::visit([this](const auto& one) { carry_out_one(one); }, effect);
   }
+}
+
+void Conductor::carry_out_one(const StateDue&) {}  // carry_out() has seen to it
+
+void Conductor::keep_state(milliseconds now) {
+  if (!wiring_.keep_state || (keep_again_at_ && *keep_again_at_ > now)) return;
+  const Durable durable = membership_.durable();
+  HubState state = state_;
+  state.node_mark = durable.node_mark;
+  state.group_mark = durable.group_mark;
+  state.kicked = durable.kicked;
+  if (const std::string error = wiring_.keep_state(state); !error.empty()) {
+    log_error(error + "; the hub goes on, but soon gives no ids to newcomers, and forgets at a restart whom it kicked");
+    keep_again_at_ = now + kKeepAgainAfter;
+    return;
+  }
+  keep_again_at_.reset();
+  state_ = std::move(state);
+  membership_.state_kept(durable);
+}
+
+void Conductor::carry_out_one(const CloseDue& effect) {
+  wiring_.shards.send(effect.place.shard, CloseCommand{ref_of(effect.place), effect.code, effect.sentence});
 }
 
 void Conductor::carry_out_one(const NodeChanged& effect) { publisher_.publish_node(effect.index, membership_); }

@@ -10,6 +10,7 @@
 #include "hub/control/acceptor.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/shard_proxy.hpp"
+#include "hub/control/state/hub_state.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
@@ -26,11 +27,14 @@ namespace gimnet::hub {
 /// Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters outlive it.
 class Conductor {
  public:
+  /// Keeps the state where it outlives the hub. "" when it is safe there, or why it is not.
+  using KeepState = std::function<std::string(const HubState&)>;
   struct Wiring {
     ShardProxy& shards;
     TablePublisher::Tables tables;
     std::span<const ShardCounters* const> counters;  ///< one per shard
-    std::function<Secret()> fresh_secret;            ///< 32 unpredictable bytes each time
+    HubStart start{};                                ///< its state was kept already
+    KeepState keep_state{};                          ///< or none: in memory only
     std::span<const QueueGauges* const> queues{};    ///< one per shard, or none
     const RefusalCounters* refusals = nullptr;       ///< or none
   };
@@ -69,12 +73,15 @@ class Conductor {
   [[nodiscard]] Session* find(const SessionRef& ref, NodeId node);
   [[nodiscard]] NodeId node_id(const Session& session) const;
 
-  void carry_out(const Effects& effects);
+  void carry_out(const Effects& effects, std::chrono::milliseconds now);
   void carry_out_one(const NodeChanged& effect);
   void carry_out_one(const GroupChanged& effect);
   void carry_out_one(const SessionEnded& effect);
   void carry_out_one(const ServiceMovedDue& effect);
   void carry_out_one(const SubscriberDue& effect);
+  void carry_out_one(const CloseDue& effect);
+  void carry_out_one(const StateDue& effect);
+  void keep_state(std::chrono::milliseconds now);
   void send_event(const Session& session, const proto::Payload& payload);
 
   // Immutable after construction
@@ -85,6 +92,8 @@ class Conductor {
   Membership membership_;
   TablePublisher publisher_;
   NameCounters name_counters_;
+  HubState state_;                                          ///< as it was kept last
+  std::optional<std::chrono::milliseconds> keep_again_at_;  ///< it could not be kept
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;
 };

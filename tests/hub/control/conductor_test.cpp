@@ -235,5 +235,74 @@ TEST_F(ConductorTest, ThousandsComeAndGoAndNothingStays) {
   EXPECT_FALSE(conductor.has_garbage());
 }
 
+class RestartedConductorTest : public ::testing::Test, protected TestConductor {
+ protected:
+  RestartedConductorTest() : TestConductor(Placement::spread, {{}, {1, IndexPool::kBlock}, {1, IndexPool::kBlock}}) {
+    set_log_level(LogLevel::off);
+  }
+  ~RestartedConductorTest() override { set_log_level(LogLevel::info); }
+  void join_half_a_block() {
+    for (std::uint32_t i = 0; i < IndexPool::kBlock / 2; ++i) join("");
+  }
+};
+
+TEST_F(RestartedConductorTest, KeepsTheMarkBeforeAnIdOfTheNextBlockIsUsed) {
+  join_half_a_block();
+  EXPECT_TRUE(kept.empty());
+  std::size_t kept_at_attach = 0;
+  shards.on_send = [&](const ShardCommand&) { kept_at_attach = kept.size(); };
+  join("");
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept_at_attach, 1u);
+  EXPECT_EQ(kept[0].node_mark, 1 + 2 * IndexPool::kBlock);
+}
+
+TEST_F(RestartedConductorTest, GoesOnWithinItsBlockWhileStateCannotBeKeptAndTriesAgain) {
+  keep_error = "no space";
+  join_half_a_block();
+  join("");
+  EXPECT_EQ(kept.size(), 1u);
+  join("");
+  EXPECT_EQ(kept.size(), 1u) << "not again at once";
+  EXPECT_EQ(conductor.next_deadline(), now + 1s);
+  now += 1s;
+  keep_error.clear();
+  conductor.tick(now);
+  EXPECT_EQ(kept.size(), 2u);
+  EXPECT_EQ(conductor.next_deadline(), std::nullopt);
+  for (std::uint32_t i = 0; i < IndexPool::kBlock / 2; ++i) join("");
+  EXPECT_EQ(kept.size(), 2u);
+}
+
+TEST_F(ConductorTest, ATokenIsForItsIdentityOnly) {
+  const Node robot = join("robot");
+  detach(robot);
+  proto::Hello hello;
+  hello.name = "robot";
+  hello.token = robot.welcome.token;
+  identity = "uid 7";
+  EXPECT_NE(join(hello).id, robot.id);
+}
+
+TEST_F(ConductorTest, AServiceGetsItsFormerGroupWhereItsProviderCameBack) {
+  const Node robot = join("robot");
+  ns::Advertise odom{.service = "odom"};
+  odom.former_group = make_id<GroupId>(kHub, 900);
+  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(robot, odom)->group), 1u) << "a newcomer had none";
+  detach(robot);
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  const Node back = join(hello);
+  ns::Advertise scan{.service = "scan"};
+  scan.former_group = make_id<GroupId>(kHub, 901);
+  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, scan)->group), 901u);
+  ns::Advertise camera{.service = "camera"};
+  camera.former_group = make_id<GroupId>(kHub, 901);
+  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, camera)->group), 2u) << "held by another service";
+  ns::Advertise foreign{.service = "foreign"};
+  foreign.former_group = make_id<GroupId>(HubId{8}, 902);
+  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, foreign)->group), 3u) << "another hub's";
+}
+
 }  // namespace
 }  // namespace gimnet::hub

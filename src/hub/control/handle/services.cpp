@@ -33,8 +33,10 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   terms.delivery = static_cast<std::uint8_t>(offer.delivery);
   terms.metadata = offer.metadata;
   const std::string full_name = proto::join_service_name(session.name, offer.service);
+  // Only a session that came back had a group before; to anybody else it would be a way to pick one.
+  const std::uint32_t former = session.came_back ? own_index(context.facts, offer.former_group).value_or(0) : 0;
   const auto done =
-      context.membership.services().advertise(session.index, full_name, terms, context.now, context.effects);
+      context.membership.services().advertise(session.index, full_name, terms, context.now, context.effects, former);
   if (!done) return done.error();
   return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
 }

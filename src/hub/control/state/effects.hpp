@@ -7,6 +7,7 @@
 
 #include "base/ids.hpp"
 #include "hub/control/state/place.hpp"
+#include "proto/control/link.hpp"
 
 // What the state machines want done, to be carried out in this order: tables first or messages first is part of the
 // meaning (docs/protocol.md, section 8).
@@ -24,6 +25,12 @@ struct GroupChanged {
 /// Tell the shard that the session is over.
 struct SessionEnded {
   Place place;
+};
+/// Say GOODBYE to the session's connection and close it.
+struct CloseDue {
+  Place place;
+  proto::GoodbyeCode code{};
+  std::string sentence;
 };
 /// Tell a subscriber that a service has another group id. Groups and nodes are named by index here; 0: none.
 struct ServiceMovedDue {
@@ -43,8 +50,11 @@ struct SubscriberDue {
   std::uint32_t subscribers_now = 0;
   bool joined = false;
 };
+/// Keep what Membership::durable() says where it outlives the hub, then call state_kept().
+struct StateDue {};
 
-using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue>;
+using Effect =
+    std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue, CloseDue, StateDue>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

@@ -19,42 +19,55 @@ bool is_misconduct(const Membership::Ending& ending) {
 }  // namespace
 
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
-    : limits_(limits), sessions_(options, limits), services_(options.hub, limits) {}
+    : limits_(limits), sessions_(options, limits), services_(options.hub, limits, options.groups) {}
 
 Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request, milliseconds now, Effects& effects) {
   if (std::optional<Refusal> refusal = check(request)) return std::move(*refusal);
-  Session* session = sessions_.claim(request.token);
+  const Sessions::Claim claim = sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<Refusal> refusal = directory_.refusal(request.name, session, sessions_, now)) {
+    if (std::optional<Refusal> refusal = directory_.refusal(request.name, claim.session, sessions_, now)) {
       return std::move(*refusal);
     }
-    end_absent_holder(request.name, session, now, effects);
+    end_absent_holder(request.name, claim.session, now, effects);
   }
-  const bool fresh = session == nullptr;
-  if (fresh) {
-    make_room(now, effects);
-    Result<Session*, Refusal> created = sessions_.create(request.secret, request.shard_hint, now);
-    if (!created) return created.error();
-    session = *created;
-  } else {
-    services_.node_returned(session->index);
-  }
-  if (!request.name.empty() && request.name != session->name) take_name(*session, request.name, now, effects);
-  session->role = request.role;
-  session->description = request.description;
-  session->origin = request.origin;
-  sessions_.attach(*session, now);
-  if (!fresh) {
+  const Result<Joined, Refusal> found = session_for(request, claim, now, effects);
+  if (!found) return found.error();
+  Session& session = *found->session;
+  if (!request.name.empty() && request.name != session.name) take_name(session, request.name, now, effects);
+  session.role = request.role;
+  session.description = request.description;
+  session.identity = request.identity;
+  session.origin = request.origin;
+  sessions_.renew_token(session, request.wall);
+  sessions_.attach(session, now);
+  if (!found->new_session) {
     redeclaring_.push_back(
-        {now + milliseconds{limits_.grace_ms}, session->index, session->place.generation, session->attachment});
+        {now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment});
   }
-  return Joined{session, fresh};
+  return *found;
+}
+
+Result<Membership::Joined, Refusal> Membership::session_for(const JoinRequest& request, const Sessions::Claim& claim,
+                                                            milliseconds now, Effects& effects) {
+  if (claim.session != nullptr) {
+    services_.node_returned(claim.session->index);
+    claim.session->came_back = true;
+    return Joined{claim.session, false};
+  }
+  make_room(now, effects);
+  const Result<Session*, Refusal> created = claim.token ? sessions_.restore(*claim.token, request.shard_hint, now)
+                                                        : sessions_.create(request.shard_hint, now);
+  if (!created) return created.error();
+  (*created)->came_back = claim.token.has_value();
+  if (sessions_.indices().runs_short()) effects.emplace_back(StateDue{});
+  return Joined{*created, true};
 }
 
 void Membership::connection_ended(Session& session, const Ending& ending, milliseconds now, Effects& effects) {
   const bool left = ending.said_by_peer && ending.code == GoodbyeCode::done;
   // Nobody knows a nameless node but by its id, and sessions kept for those who send rubbish would fill the hub.
   if (left || (session.name.empty() && is_misconduct(ending))) {
+    sessions_.spend_token(session);
     end(session, now, effects);
     return;
   }
@@ -63,6 +76,29 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
     session.close_sentence = ending.sentence;
   }
   sessions_.begin_grace(session, now);
+}
+
+void Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects) {
+  sessions_.remember_kicked(session);
+  effects.emplace_back(StateDue{});
+  effects.emplace_back(CloseDue{session.place, GoodbyeCode::kicked, sentence});
+  end(session, now, effects);
+}
+
+Durable Membership::durable() const {
+  const auto count = [](const IndexPool& pool) { return pool.runs_short() ? pool.next_count() : pool.count(); };
+  Durable durable;
+  durable.node_count = count(sessions_.indices());
+  durable.group_count = count(services_.group_indices());
+  durable.node_mark = sessions_.indices().mark(durable.node_count);
+  durable.group_mark = services_.group_indices().mark(durable.group_count);
+  durable.kicked = sessions_.kicked();
+  return durable;
+}
+
+void Membership::state_kept(const Durable& durable) {
+  sessions_.indices().grant(durable.node_count);
+  services_.group_indices().grant(durable.group_count);
 }
 
 void Membership::tick(milliseconds now, Effects& effects) {

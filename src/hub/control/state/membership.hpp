@@ -19,11 +19,12 @@ struct JoinRequest {
   proto::Role role{};
   std::string name;                  ///< "": none, or the one that the session has
   std::span<const std::byte> token;  ///< empty: none
+  std::string identity;              ///< who the peer is, as its connection tells: "uid 1000", "open"
   std::string description;
   std::optional<std::uint16_t> shard_hint;
   Origin origin;
-  bool may_administer = false;  ///< the peer is root or the hub's own user, told by the kernel
-  Secret secret{};              ///< fresh randomness, for a new session
+  bool may_administer = false;       ///< the peer is root or the hub's own user, told by the kernel
+  std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
 };
 
 /// Who belongs to this hub, under which name, with which services: the state of one hub without its neighbours. Makes
@@ -35,7 +36,7 @@ class Membership {
 
   struct Joined {
     Session* session = nullptr;
-    bool new_session = false;
+    bool new_session = false;  ///< for the shards; also one that a token brought back under its former id
   };
   /// Admits a connection, for a new session or for the one whose token it shows. The caller attaches it at its shard
   /// and publishes its place after the effects were carried out. Errors: what GOODBYE says.
@@ -51,6 +52,16 @@ class Membership {
   /// A connection of the session ended: for good if the node said so or has no name and was closed
   /// for what it sent, else its grace time begins. REQUIRES: connected.
   void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now, Effects& effects);
+
+  /// Ends the session for good: its id and name are free, its token counts as none, also after a restart. `sentence`
+  /// tells its node who did it and what to do.
+  void kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects);
+
+  /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
+  /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
+  [[nodiscard]] Durable durable() const;
+  /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and none later was given here before.
+  void state_kept(const Durable& durable);
 
   /// Ends what is overdue.
   void tick(std::chrono::milliseconds now, Effects& effects);
@@ -71,6 +82,9 @@ class Membership {
     std::uint32_t attachment;
   };
   [[nodiscard]] std::optional<Refusal> check(const JoinRequest& request) const;
+  /// The session that the request is for: the one whose token it shows, or a new one.
+  [[nodiscard]] Result<Joined, Refusal> session_for(const JoinRequest& request, const Sessions::Claim& claim,
+                                                    std::chrono::milliseconds now, Effects& effects);
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
   void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
                          Effects& effects);

@@ -56,12 +56,12 @@ Failure limit_reached(std::string_view what, std::uint64_t limit, std::string_vi
 
 }  // namespace
 
-Services::Services(HubId hub, const Limits& limits)
-    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits)) {}
+Services::Services(HubId hub, const Limits& limits, const IndexRange& groups)
+    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits), groups) {}
 
 Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider, std::string_view full_name,
-                                                          const ServiceTerms& terms, milliseconds now,
-                                                          Effects& effects) {
+                                                          const ServiceTerms& terms, milliseconds now, Effects& effects,
+                                                          std::uint32_t former_group) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   const auto known = topics_.find(full_name);
   const bool provided = known != topics_.end() && known->second.service.has_value();
@@ -78,7 +78,9 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
   Topic& entry = topic(full_name);
   if (provided) find_topic(node.provides, entry)->life = node.life;
   if (!provided || !same_stream(entry.service->terms, terms)) {
-    const std::optional<std::uint32_t> group = group_indices_.take(now);
+    const bool former = !provided && group_indices_.take_free(former_group, now);
+    const std::optional<std::uint32_t> group = former ? former_group : group_indices_.take(now);
+    if (group_indices_.runs_short()) effects.emplace_back(StateDue{});
     if (!group) {
       forget_if_unused(entry);
       forget_if_idle(provider);

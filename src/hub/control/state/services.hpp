@@ -48,17 +48,19 @@ struct Topic {
 /// Thread safety: none. Limits: services_per_node, subscriptions_per_node.
 class Services {
  public:
-  Services(HubId hub, const Limits& limits);
+  Services(HubId hub, const Limits& limits, const IndexRange& groups = {});
 
   struct Advertised {
     std::uint32_t group = 0;
     std::uint32_t subscribers = 0;
   };
   /// A provider that advertises again what it provides keeps the group; if more than the metadata differs it gets a
-  /// new one, which its subscribers are told before it is published. Errors: bad_request, taken, limit.
+  /// new one, which its subscribers are told before it is published. `former_group`: the one that the service had
+  /// before the hub or the session came back, 0: none; it gets that if nobody has or had it since. Errors: bad_request,
+  /// taken, limit.
   [[nodiscard]] Result<Advertised, Failure> advertise(std::uint32_t provider, std::string_view full_name,
                                                       const ServiceTerms& terms, std::chrono::milliseconds now,
-                                                      Effects& effects);
+                                                      Effects& effects, std::uint32_t former_group = 0);
   /// Errors: not_found, denied. nullopt: done.
   [[nodiscard]] std::optional<Failure> withdraw(std::uint32_t provider, std::uint32_t group,
                                                 std::chrono::milliseconds now, Effects& effects);
@@ -83,6 +85,8 @@ class Services {
   [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
+  [[nodiscard]] IndexPool& group_indices() { return group_indices_; }
+  [[nodiscard]] const IndexPool& group_indices() const { return group_indices_; }
 
  private:
   struct Hash {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/check.hpp"
-#include "base/endian.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -11,20 +10,10 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
-constexpr std::size_t kIndexBytes = sizeof(std::uint32_t);
 
 /// An id that was given back rests for as long as its node might come back and a frame for it might still wait.
 milliseconds resting_time(const Limits& limits) {
   return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
-}
-
-/// Looks at every byte whatever it finds, so that the time says nothing about how much of a guess was right.
-bool same_secret(std::span<const std::byte> a, const Secret& b) {
-  if (a.size() != b.size()) return false;
-  std::byte difference{};
-  for (std::size_t i = 0; i < b.size(); ++i) difference |= a[i] ^ b[i];
-  const volatile std::byte result = difference;
-  return result == std::byte{};
 }
 
 }  // namespace
@@ -33,42 +22,82 @@ Sessions::Sessions(const Options& options, const Limits& limits)
     : limits_(limits),
       hub_(options.hub),
       placement_(options.placement),
-      indices_(kIndexMost, resting_time(limits)),
-      slots_(options.shards) {}
-
-std::vector<std::byte> Sessions::token_of(const Session& session) {
-  std::vector<std::byte> token(kIndexBytes + session.secret.size());
-  store_le(token.data(), session.index);
-  std::copy(session.secret.begin(), session.secret.end(), token.begin() + kIndexBytes);
-  return token;
+      secret_(options.secret),
+      last_number_(first_number(options.boot)),
+      indices_(kIndexMost, resting_time(limits), options.nodes),
+      kicked_(options.kicked),
+      slots_(options.shards) {
+  for (const SessionToken& token : kicked_) floor_.raise(token.index, token.number + 1);
 }
 
-Session* Sessions::claim(std::span<const std::byte> token) {
-  if (token.size() != kIndexBytes + std::tuple_size_v<Secret>) return nullptr;
-  Session* session = find(load_le<std::uint32_t>(token.data()));
-  if (session == nullptr || !same_secret(token.subspan(kIndexBytes), session->secret)) return nullptr;
+std::vector<std::byte> Sessions::token_of(const Session& session) const {
+  return write_token({session.index, session.number, session.token_expiry},
+                     {hub_, session.token_name, session.identity}, secret_);
+}
+
+void Sessions::renew_token(Session& session, milliseconds wall) const {
+  session.token_name = session.name;
+  session.token_expiry = wall + milliseconds{limits_.token_ms};
+}
+
+Sessions::Claim Sessions::claim(const Presented& presented) {
+  const std::optional<SessionToken> token = read_token(presented.token);
+  if (!token) return {};
+  Session* holder = find(token->index);
+  const bool holds = holder != nullptr && holder->number == token->number;
+  const std::string_view name = holds ? std::string_view{holder->token_name} : presented.name;
+  // The proof comes first: what else is wrong with a token is nobody's business who cannot show one.
+  if (!is_genuine(presented.token, {hub_, name, presented.identity}, secret_)) return {};
+  if (token->expiry <= presented.wall || token->number < floor_.at(token->index)) return {};
+  if (holds) return {holder, std::nullopt};
+  if (holder != nullptr) return {};
+  return {nullptr, token};
+}
+
+Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now) {
+  if (std::optional<Refusal> refusal = full_refusal()) return std::move(*refusal);
+  const std::optional<std::uint32_t> index = indices_.take(now);
+  if (!index) {
+    return Refusal{
+        proto::GoodbyeCode::hub_full,
+        "all node ids that this hub may hand out are in use or resting; try again in a minute, or connect to "
+        "another hub"};
+  }
+  return &put(*index, ++last_number_, shard_hint, now);
+}
+
+Result<Session*, Refusal> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
+                                            milliseconds now) {
+  if (std::optional<Refusal> refusal = full_refusal()) return std::move(*refusal);
+  const bool taken = indices_.take_back(token.index);
+  GIMNET_CHECK(taken);
+  return &put(token.index, token.number, shard_hint, now);
+}
+
+std::optional<Refusal> Sessions::full_refusal() const {
+  if (!full()) return std::nullopt;
+  return Refusal{proto::GoodbyeCode::hub_full, "this hub takes " + std::to_string(limits_.nodes) +
+                                                   " nodes and has them; connect to another one, or start it with a "
+                                                   "larger --limit nodes"};
+}
+
+Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
+                       milliseconds now) {
+  const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
+  Session& session = sessions_[index];
+  session.index = index;
+  session.number = number;
+  session.place = hinted ? slots_.take_on(ShardIndex{static_cast<std::uint8_t>(*shard_hint)}) : slots_.take();
+  session.joined = now;
+  floor_.raise(index, number);
   return session;
 }
 
-Result<Session*, Refusal> Sessions::create(const Secret& secret, std::optional<std::uint16_t> shard_hint,
-                                           milliseconds now) {
-  if (full()) {
-    return Refusal{proto::GoodbyeCode::hub_full, "this hub takes " + std::to_string(limits_.nodes) +
-                                                     " nodes and has them; connect to another one, or start it with a "
-                                                     "larger --limit nodes"};
-  }
-  const std::optional<std::uint32_t> index = indices_.take(now);
-  if (!index) {
-    return Refusal{proto::GoodbyeCode::hub_full,
-                   "all node ids of this hub are in use or resting; try again in a minute, or connect to another hub"};
-  }
-  const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
-  Session& session = sessions_[*index];
-  session.index = *index;
-  session.place = hinted ? slots_.take_on(ShardIndex{static_cast<std::uint8_t>(*shard_hint)}) : slots_.take();
-  session.secret = secret;
-  session.joined = now;
-  return &session;
+void Sessions::remember_kicked(const Session& session) {
+  spend_token(session);
+  if (limits_.kicked_tokens == 0) return;
+  while (kicked_.size() >= limits_.kicked_tokens) kicked_.erase(kicked_.begin());
+  kicked_.push_back({session.index, session.number, session.token_expiry});
 }
 
 void Sessions::attach(Session& session, milliseconds now) {

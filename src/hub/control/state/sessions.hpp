@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -9,20 +8,21 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/ids.hpp"
 #include "base/result.hpp"
+#include "hub/control/state/durable.hpp"
 #include "hub/control/state/index_pool.hpp"
+#include "hub/control/state/number_floor.hpp"
 #include "hub/control/state/place.hpp"
+#include "hub/control/state/session_token.hpp"
 #include "hub/control/state/slot_pool.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/link.hpp"
 
 namespace gimnet::hub {
-
-/// 32 random bytes that only the session's node knows.
-using Secret = std::array<std::byte, 32>;
 
 /// Where a connection came from, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid 77 uid 1000".
 struct Origin {
@@ -33,13 +33,17 @@ struct Origin {
 /// A node's membership of this hub: outlives its connections by the grace time.
 struct Session {
   std::uint32_t index = 0;  ///< of its node id
+  SessionNumber number = 0;
   Place place;
-  Secret secret{};
   proto::Role role{};
   bool connected = false;
   std::uint32_t attachment = 0;  ///< of the latest connection, counted from 1
   std::string name;              ///< "" for a node without one
   std::string description;
+  std::string identity;                      ///< who its peer is; nobody else can claim it
+  std::string token_name;                    ///< for which its latest token was written
+  bool came_back = false;                    ///< with a token, to this hub or to this hub before its restart
+  std::chrono::milliseconds token_expiry{};  ///< since 1970
   Origin origin;                             ///< of the latest connection
   std::chrono::milliseconds joined{};        ///< when the session began
   std::chrono::milliseconds connected_at{};  ///< when its latest connection was admitted
@@ -61,23 +65,51 @@ class Sessions {
     HubId hub{1};
     std::size_t shards = 1;
     Placement placement = Placement::spread;
+    Secret secret{};                     ///< proves tokens; the hub keeps it over its restarts
+    std::uint64_t boot = 0;              ///< which start of the hub this is
+    IndexRange nodes{};                  ///< indices for newcomers
+    IndexRange groups{};                 ///< the same for services
+    std::vector<SessionToken> kicked{};  ///< not honoured any more
   };
   Sessions(const Options& options, const Limits& limits);
 
   [[nodiscard]] NodeId node_id(const Session& session) const { return make_id<NodeId>(hub_, session.index); }
 
-  /// What a node shows to get its session back: its index and its secret.
-  [[nodiscard]] static std::vector<std::byte> token_of(const Session& session);
-  /// The session whose token this is, or nullptr. Takes as long for a wrong secret as for the right one.
-  [[nodiscard]] Session* claim(std::span<const std::byte> token);
+  /// What a node shows to get its session back. REQUIRES: renew_token() was called for the session.
+  [[nodiscard]] std::vector<std::byte> token_of(const Session& session) const;
+  /// The session's next token is for its present name and good for limits.token_ms from `wall` (since 1970) on.
+  void renew_token(Session& session, std::chrono::milliseconds wall) const;
 
-  /// A new session without a connection or a name. `secret` is fresh randomness. Errors: hub_full.
-  [[nodiscard]] Result<Session*, Refusal> create(const Secret& secret, std::optional<std::uint16_t> shard_hint,
+  /// A token as it was presented, and by whom.
+  struct Presented {
+    std::span<const std::byte> token;
+    std::string_view name;             ///< that HELLO asks for
+    std::string_view identity;         ///< as the connection tells it
+    std::chrono::milliseconds wall{};  ///< since 1970
+  };
+  /// What a token is good for. Neither member set: it counts as none.
+  struct Claim {
+    Session* session = nullptr;         ///< that it is for
+    std::optional<SessionToken> token;  ///< its session is not there, but its index is free: restore()
+  };
+  /// Takes as long for a wrong token as for the right one.
+  [[nodiscard]] Claim claim(const Presented& presented);
+
+  /// A new session without a connection or a name. Errors: hub_full.
+  [[nodiscard]] Result<Session*, Refusal> create(std::optional<std::uint16_t> shard_hint,
                                                  std::chrono::milliseconds now);
+  /// The session of a token whose index is free, under its former id. Errors: hub_full.
+  [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
+                                                  std::chrono::milliseconds now);
   /// A connection was admitted for the session.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
   void begin_grace(Session& session, std::chrono::milliseconds now);
+  /// Tokens of the session count as none from now on.
+  void spend_token(const Session& session) { floor_.raise(session.index, session.number + 1); }
+  /// The same, also after a restart, for as long as limits.kicked_tokens allows.
+  void remember_kicked(const Session& session);
+  [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
   /// The session is over: its slot is free at once, its index after it has rested.
   void end(Session& session, std::chrono::milliseconds now);
 
@@ -95,6 +127,8 @@ class Sessions {
   /// By ascending index.
   [[nodiscard]] const std::map<std::uint32_t, Session>& all() const { return sessions_; }
   [[nodiscard]] std::size_t connected() const { return connected_; }
+  [[nodiscard]] IndexPool& indices() { return indices_; }
+  [[nodiscard]] const IndexPool& indices() const { return indices_; }
 
  private:
   struct Away {
@@ -105,13 +139,20 @@ class Sessions {
   };
   /// The next of `away` that is due at `now`, taken off the list, or nullptr.
   [[nodiscard]] Session* take_due(std::deque<Away>& away, std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<Refusal> full_refusal() const;
+  Session& put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
+               std::chrono::milliseconds now);
   /// Is it still the absence that was noted?
   [[nodiscard]] bool still_away(const Away& away) const;
 
   const Limits& limits_;
   const HubId hub_;
   const Placement placement_;
+  const Secret secret_;
+  SessionNumber last_number_;
   IndexPool indices_;
+  NumberFloor floor_;
+  std::vector<SessionToken> kicked_;  ///< the latest last
   SlotPool slots_;
   std::map<std::uint32_t, Session> sessions_;
   // Both in the order of `until`, since all grace times are equal. Apart, so that a nameless one is found at once.

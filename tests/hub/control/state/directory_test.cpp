@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 class DirectoryTest : public ::testing::Test {
  protected:
   Session& hold(const std::string& name) {
-    const auto created = sessions_.create(Secret{}, std::nullopt, 0ms);
+    const auto created = sessions_.create(std::nullopt, 0ms);
     EXPECT_TRUE(created);
     Session& session = **created;
     session.name = name;

@@ -19,13 +19,14 @@ class MembershipTest : public ::testing::Test {
     JoinRequest result;
     result.name = name;
     result.origin = Origin{"tcp", "127.0.0.1:1"};
-    result.secret.fill(static_cast<std::byte>(++secrets_));
+    result.identity = "open";
     return result;
   }
   Session* join(const std::string& name, std::chrono::milliseconds now = 0ms) {
     const auto joined = membership_.join(request(name), now, effects_);
     return joined ? joined->session : nullptr;
   }
+  std::vector<std::byte> token_of(const Session& session) { return membership_.sessions().token_of(session); }
   GoodbyeCode refused(const JoinRequest& wanted, std::chrono::milliseconds now = 0ms) {
     const auto joined = membership_.join(wanted, now, effects_);
     return joined ? GoodbyeCode::done : joined.error().code;
@@ -42,7 +43,6 @@ class MembershipTest : public ::testing::Test {
   Limits limits_;
   Membership membership_{Sessions::Options{HubId{7}, 2, Placement::spread}, limits_};
   Effects effects_;
-  int secrets_ = 0;
 };
 
 TEST_F(MembershipTest, JoiningTakesANameAndAnId) {
@@ -70,7 +70,7 @@ TEST_F(MembershipTest, ATokenBringsIdAndNameBackWithinTheGraceTime) {
   Session* robot = join("robot");
   const std::uint32_t index = robot->index;
   lose(*robot, 1s);
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   JoinRequest again = request("");
   again.token = token;
   const auto joined = membership_.join(again, 1s + kGrace - 1ms, effects_);
@@ -81,27 +81,56 @@ TEST_F(MembershipTest, ATokenBringsIdAndNameBackWithinTheGraceTime) {
   EXPECT_EQ(joined->session->attachment, 2u);
 }
 
-TEST_F(MembershipTest, AfterTheGraceTimeATokenCountsAsNone) {
+TEST_F(MembershipTest, AfterTheGraceTimeATokenBringsTheIdBackWhileItIsFree) {
   Session* robot = join("robot");
   const std::uint32_t index = robot->index;
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   lose(*robot, 1s);
   EXPECT_EQ(membership_.next_deadline(), 1s + kGrace);
   membership_.tick(1s + kGrace, effects_);
+  EXPECT_EQ(membership_.directory().find("robot"), std::nullopt);
   EXPECT_EQ(count<SessionEnded>(), 1u);
-  EXPECT_EQ(count<NodeChanged>(), 1u);
-  EXPECT_EQ(membership_.next_deadline(), std::nullopt);
   JoinRequest again = request("robot");
   again.token = token;
-  const auto joined = membership_.join(again, 40s, effects_);
+  const auto joined = membership_.join(again, 2s + kGrace, effects_);
   ASSERT_TRUE(joined);
   EXPECT_TRUE(joined->new_session);
+  EXPECT_EQ(joined->session->index, index);
+  EXPECT_EQ(membership_.directory().find("robot"), index);
+}
+
+TEST_F(MembershipTest, AfterGoodbyeATokenCountsAsNone) {
+  Session* robot = join("robot");
+  const std::uint32_t index = robot->index;
+  const std::vector<std::byte> token = token_of(*robot);
+  membership_.connection_ended(*robot, {true, GoodbyeCode::done, ""}, 1s, effects_);
+  JoinRequest again = request("robot");
+  again.token = token;
+  const auto joined = membership_.join(again, 2s, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_NE(joined->session->index, index);
+}
+
+TEST_F(MembershipTest, AKickedNodesTokenCountsAsNoneAndIsRemembered) {
+  Session* robot = join("robot");
+  const std::uint32_t index = robot->index;
+  const std::vector<std::byte> token = token_of(*robot);
+  membership_.kick(*robot, "kicked by an administrator", 1s, effects_);
+  EXPECT_EQ(count<StateDue>(), 1u);
+  EXPECT_EQ(count<CloseDue>(), 1u);
+  EXPECT_EQ(count<SessionEnded>(), 1u);
+  ASSERT_EQ(membership_.durable().kicked.size(), 1u);
+  EXPECT_EQ(membership_.durable().kicked[0].index, index);
+  JoinRequest again = request("robot");
+  again.token = token;
+  const auto joined = membership_.join(again, 2s, effects_);
+  ASSERT_TRUE(joined);
   EXPECT_NE(joined->session->index, index);
 }
 
 TEST_F(MembershipTest, ALiveSessionMovesToItsNewerConnection) {
   Session* robot = join("robot");
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   JoinRequest again = request("robot");
   again.token = token;
   const auto joined = membership_.join(again, 1s, effects_);
@@ -114,7 +143,7 @@ TEST_F(MembershipTest, ALiveSessionMovesToItsNewerConnection) {
 TEST_F(MembershipTest, ANewcomerTakesTheNameOfSomebodyAway) {
   Session* robot = join("robot");
   const std::uint32_t index = robot->index;
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   lose(*robot, 1s);
   const Session* newcomer = join("robot", 2s);
   ASSERT_NE(newcomer, nullptr);
@@ -160,7 +189,7 @@ TEST_F(MembershipTest, HowTheHubClosedIsRemembered) {
 TEST_F(MembershipTest, AReturningNodeMayTakeAnotherName) {
   Session* robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   JoinRequest again = request("lifter");
   again.token = token;
   ASSERT_TRUE(membership_.join(again, 1s, effects_));
@@ -172,7 +201,7 @@ TEST_F(MembershipTest, AReturningNodeMayTakeAnotherName) {
 TEST_F(MembershipTest, AReturningNodeCannotTakeALiveNodesName) {
   join("viewer");
   Session* robot = join("robot");
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   JoinRequest again = request("viewer");
   again.token = token;
   EXPECT_EQ(refused(again), GoodbyeCode::name_taken);
@@ -198,7 +227,7 @@ TEST_F(MembershipTest, WhatAReturnedNodeDoesNotDeclareAgainIsDropped) {
   Session* robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/scan", {}, 0ms, effects_));
-  const std::vector<std::byte> token = Sessions::token_of(*robot);
+  const std::vector<std::byte> token = token_of(*robot);
   lose(*robot, 1s);
   JoinRequest again = request("robot");
   again.token = token;
@@ -274,7 +303,7 @@ TEST_F(MembershipTest, ANamelessNodeThatCameBackDoesNotMakeWay) {
   Session* viewer = join("");
   for (int i = 0; i < 3; ++i) ASSERT_NE(join(""), nullptr);
   lose(*viewer, 1s);
-  const std::vector<std::byte> token = Sessions::token_of(*viewer);
+  const std::vector<std::byte> token = token_of(*viewer);
   JoinRequest again = request("");
   again.token = token;
   ASSERT_TRUE(membership_.join(again, 2s, effects_));

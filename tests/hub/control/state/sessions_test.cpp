@@ -9,12 +9,6 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
-Secret secret_of(int value) {
-  Secret secret{};
-  secret.fill(static_cast<std::byte>(value));
-  return secret;
-}
-
 class SessionsTest : public ::testing::Test {
  protected:
   SessionsTest() {
@@ -22,15 +16,21 @@ class SessionsTest : public ::testing::Test {
     limits_.grace_ms = 30'000;
   }
   Session& create(std::chrono::milliseconds now = 0ms) {
-    const auto created = sessions_.create(secret_of(++secrets_), std::nullopt, now);
+    const auto created = sessions_.create(std::nullopt, now);
     EXPECT_TRUE(created);
+    (*created)->identity = "open";
+    sessions_.renew_token(**created, 0ms);
     sessions_.attach(**created, now);
     return **created;
   }
 
+  Session* claim(std::span<const std::byte> token, std::string_view identity = "open",
+                 std::chrono::milliseconds wall = 0ms) {
+    return sessions_.claim({token, "", identity, wall}).session;
+  }
+
   Limits limits_;
   Sessions sessions_{Sessions::Options{HubId{7}, 2, Placement::spread}, limits_};
-  int secrets_ = 0;
 };
 
 TEST_F(SessionsTest, NewOnesGetIdsAndAlternatingShards) {
@@ -48,42 +48,97 @@ TEST_F(SessionsTest, TakesAsManyAsTheLimitAndNotOneMore) {
   create();
   create();
   Session& last = create();
-  const auto refused = sessions_.create(secret_of(9), std::nullopt, 0ms);
+  const auto refused = sessions_.create(std::nullopt, 0ms);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, proto::GoodbyeCode::hub_full);
   EXPECT_THAT(refused.error().sentence, HasSubstr("takes 3 nodes"));
   sessions_.end(last, 0ms);
-  EXPECT_TRUE(sessions_.create(secret_of(9), std::nullopt, 0ms));
+  EXPECT_TRUE(sessions_.create(std::nullopt, 0ms));
 }
 
 TEST_F(SessionsTest, ATokenClaimsItsOwnSessionOnly) {
   Session& a = create();
   Session& b = create();
-  EXPECT_EQ(sessions_.claim(Sessions::token_of(a)), &a);
-  EXPECT_EQ(sessions_.claim(Sessions::token_of(b)), &b);
-  EXPECT_LE(Sessions::token_of(a).size(), proto::kTokenBytesMax);
+  EXPECT_EQ(claim(sessions_.token_of(a)), &a);
+  EXPECT_EQ(claim(sessions_.token_of(b)), &b);
+  EXPECT_LE(sessions_.token_of(a).size(), proto::kTokenBytesMax);
 }
 
 TEST_F(SessionsTest, AForgedTokenClaimsNothing) {
   Session& session = create();
-  const std::vector<std::byte> token = Sessions::token_of(session);
+  const std::vector<std::byte> token = sessions_.token_of(session);
   for (std::size_t i = 0; i < token.size(); ++i) {
     std::vector<std::byte> forged = token;
     forged[i] ^= std::byte{1};
-    EXPECT_EQ(sessions_.claim(forged), nullptr) << "byte " << i;
+    EXPECT_EQ(claim(forged), nullptr) << "byte " << i;
   }
-  EXPECT_EQ(sessions_.claim({}), nullptr);
-  EXPECT_EQ(sessions_.claim(std::span{token}.first(token.size() - 1)), nullptr);
+  EXPECT_EQ(claim({}), nullptr);
+  EXPECT_EQ(claim(std::span{token}.first(token.size() - 1)), nullptr);
   std::vector<std::byte> longer = token;
   longer.push_back(std::byte{0});
-  EXPECT_EQ(sessions_.claim(longer), nullptr);
+  EXPECT_EQ(claim(longer), nullptr);
 }
 
-TEST_F(SessionsTest, AnEndedSessionsTokenClaimsNothing) {
+TEST_F(SessionsTest, AnotherIdentityClaimsNothing) {
   Session& session = create();
-  const std::vector<std::byte> token = Sessions::token_of(session);
+  EXPECT_EQ(claim(sessions_.token_of(session), "uid 1000"), nullptr);
+  EXPECT_EQ(claim(sessions_.token_of(session), ""), nullptr);
+}
+
+TEST_F(SessionsTest, ATokenIsGoodUntilItsTimeExactly) {
+  Session& session = create();
+  const std::vector<std::byte> token = sessions_.token_of(session);
+  const std::chrono::milliseconds lifetime{limits_.token_ms};
+  EXPECT_EQ(claim(token, "open", lifetime - 1ms), &session);
+  EXPECT_EQ(claim(token, "open", lifetime), nullptr);
+}
+
+TEST_F(SessionsTest, ATokenOutlivesARenamingAndIsForTheNewNameOnceRenewed) {
+  Session& session = create();
+  const std::vector<std::byte> token = sessions_.token_of(session);
+  session.name = "robot";
+  EXPECT_EQ(claim(token), &session);
+  sessions_.renew_token(session, 0ms);
+  EXPECT_NE(sessions_.token_of(session), token);
+  EXPECT_EQ(claim(sessions_.token_of(session)), &session);
+}
+
+TEST_F(SessionsTest, AnEndedSessionsTokenBringsItBackUntilItIsSpent) {
+  Session& session = create();
+  const std::vector<std::byte> token = sessions_.token_of(session);
+  const std::uint32_t index = session.index;
   sessions_.end(session, 0ms);
-  EXPECT_EQ(sessions_.claim(token), nullptr);
+  const auto claim_again = sessions_.claim({token, "", "open", 0ms});
+  EXPECT_EQ(claim_again.session, nullptr);
+  ASSERT_TRUE(claim_again.token);
+  const auto restored = sessions_.restore(*claim_again.token, std::nullopt, 0ms);
+  ASSERT_TRUE(restored);
+  EXPECT_EQ((*restored)->index, index);
+  EXPECT_EQ((*restored)->number, claim_again.token->number);
+  sessions_.spend_token(**restored);
+  sessions_.end(**restored, 0ms);
+  EXPECT_FALSE(sessions_.claim({token, "", "open", 0ms}).token);
+}
+
+TEST_F(SessionsTest, RemembersAsManyKickedOnesAsTheLimitAllows) {
+  limits_.kicked_tokens = 2;
+  const std::uint32_t first = create().index;
+  for (std::uint32_t index = first; index < first + 3; ++index) {
+    if (index > first) create();
+    sessions_.remember_kicked(*sessions_.find(index));
+    sessions_.end(*sessions_.find(index), 0ms);
+  }
+  ASSERT_EQ(sessions_.kicked().size(), 2u);
+  EXPECT_EQ(sessions_.kicked()[0].index, first + 1);
+  EXPECT_EQ(sessions_.kicked()[1].index, first + 2);
+}
+
+TEST_F(SessionsTest, ASpentTokenClaimsNothing) {
+  Session& session = create();
+  const std::vector<std::byte> token = sessions_.token_of(session);
+  sessions_.spend_token(session);
+  sessions_.end(session, 0ms);
+  EXPECT_EQ(claim(token), nullptr);
   EXPECT_EQ(sessions_.find(1), nullptr);
   EXPECT_EQ(sessions_.connected(), 0u);
 }
@@ -118,11 +173,11 @@ TEST_F(SessionsTest, AnIndexRestsForGraceAndTheLongestWait) {
   limits_.block_ms = 5'000;
   limits_.slow_consumer_ms = 10'000;
   Sessions sessions{Sessions::Options{HubId{7}, 1, Placement::spread}, limits_};
-  const auto first = sessions.create(secret_of(1), std::nullopt, 0ms);
+  const auto first = sessions.create(std::nullopt, 0ms);
   ASSERT_TRUE(first);
   const Place place = (*first)->place;
   sessions.end(**first, 0ms);
-  const auto second = sessions.create(secret_of(2), std::nullopt, 1ms);
+  const auto second = sessions.create(std::nullopt, 1ms);
   ASSERT_TRUE(second);
   EXPECT_EQ((*second)->index, 2u);
   EXPECT_EQ((*second)->place.slot, place.slot);  // slots are free at once, told apart by their generation
@@ -132,14 +187,14 @@ TEST_F(SessionsTest, AnIndexRestsForGraceAndTheLongestWait) {
 TEST_F(SessionsTest, AHintIsHonouredOnlyWherePlacementSaysSo) {
   Sessions hinted{Sessions::Options{HubId{7}, 2, Placement::hint}, limits_};
   for (int i = 0; i < 2; ++i) {
-    const auto session = hinted.create(secret_of(i), std::uint16_t{1}, 0ms);
+    const auto session = hinted.create(std::uint16_t{1}, 0ms);
     ASSERT_TRUE(session);
     EXPECT_EQ((*session)->place.shard, ShardIndex{1});
   }
-  const auto beyond = hinted.create(secret_of(3), std::uint16_t{2}, 0ms);
+  const auto beyond = hinted.create(std::uint16_t{2}, 0ms);
   ASSERT_TRUE(beyond);
   EXPECT_EQ((*beyond)->place.shard, ShardIndex{0});
-  const auto spread = sessions_.create(secret_of(4), std::uint16_t{1}, 0ms);
+  const auto spread = sessions_.create(std::uint16_t{1}, 0ms);
   ASSERT_TRUE(spread);
   EXPECT_EQ((*spread)->place.shard, ShardIndex{0});
 }

@@ -41,15 +41,15 @@ class TestConductor {
     proto::Welcome welcome;
   };
 
-  explicit TestConductor(Placement placement = Placement::spread)
+  explicit TestConductor(Placement placement = Placement::spread, const HubStart& start = {})
       : conductor(facts(), placement, limits,
                   Conductor::Wiring{shards,
                                     {nodes, groups, quiescence},
                                     readable,
-                                    [this] {
-                                      Secret secret{};
-                                      secret.fill(static_cast<std::byte>(++secrets));
-                                      return secret;
+                                    start,
+                                    [this](const HubState& state) {
+                                      kept.push_back(state);
+                                      return keep_error;
                                     },
                                     {},
                                     &refusals}) {}
@@ -58,6 +58,7 @@ class TestConductor {
     Stranger stranger;
     stranger.transport = std::make_unique<NoTransport>();
     stranger.peer = PeerInfo{"tcp", "127.0.0.1:5000"};
+    stranger.identity = identity;
     return conductor.admit(stranger, hello, {now, 1'000'000'000});
   }
   Node join(const proto::Hello& hello) {
@@ -128,7 +129,9 @@ class TestConductor {
   const ShardCounters* readable[2] = {&counters[0], &counters[1]};
   RefusalCounters refusals;
   FakeShards shards{2};
-  int secrets = 0;
+  std::string identity = "open";  ///< of those who join
+  std::vector<HubState> kept;     ///< what the hub had to keep, in order
+  std::string keep_error;         ///< why it cannot
   std::uint16_t requests = 0;
   std::chrono::milliseconds now{1'000};
   Conductor conductor;

@@ -1,0 +1,167 @@
+#include "hub/config/state_folder.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <span>
+#include <system_error>
+#include <vector>
+
+#include "hub/config/folders.hpp"
+#include "hub/control/port_owner.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+constexpr mode_t kPrivate = 0600;
+constexpr const char* kState = "state";
+constexpr const char* kFresh = "state.new";
+constexpr const char* kLock = "lock";
+
+std::string system_text(int error) { return std::generic_category().message(error); }
+
+/// Closes on the way out unless it was released.
+class File {
+ public:
+  explicit File(int descriptor) : descriptor_(descriptor) {}
+  ~File() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  [[nodiscard]] int get() const { return descriptor_; }
+  [[nodiscard]] bool open() const { return descriptor_ >= 0; }
+  int release() { return std::exchange(descriptor_, -1); }
+
+ private:
+  int descriptor_;
+};
+
+/// "" for a regular file of this user that nobody else may look into, or why it is none.
+std::string private_file_fault(int descriptor, const std::string& path) {
+  struct stat info{};
+  if (::fstat(descriptor, &info) != 0) return system_text(errno);
+  if (!S_ISREG(info.st_mode)) return "it is not a file; remove it";
+  if (info.st_uid != ::geteuid()) return "it belongs to another user; run tcphub as that user, or give it --state-dir";
+  if ((info.st_mode & 0077) != 0) return "other users have rights in it; chmod 600 " + path;
+  return {};
+}
+
+/// The process that wrote its number into the lock file; 0: none did.
+pid_t holder_of(int lock) {
+  std::array<char, 16> text{};
+  const ssize_t size = ::pread(lock, text.data(), text.size(), 0);
+  pid_t process = 0;
+  if (size > 0) static_cast<void>(std::from_chars(text.data(), text.data() + size, process));
+  return process;
+}
+
+void write_holder(int lock) {
+  const std::string text = std::to_string(::getpid()) + "\n";
+  // For the words of the one who finds the lock held; it holds without them.
+  if (::ftruncate(lock, 0) == 0) static_cast<void>(!::pwrite(lock, text.data(), text.size(), 0));
+}
+
+/// At most one byte more than is legal, so that longer ones show. Nothing: `error` says why.
+std::optional<std::vector<std::byte>> read_all(int descriptor, int& error) {
+  std::vector<std::byte> bytes(kHubStateBytesMax + 1);
+  std::size_t size = 0;
+  while (size < bytes.size()) {
+    const ssize_t count = ::read(descriptor, bytes.data() + size, bytes.size() - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      error = errno;
+      return std::nullopt;
+    }
+    if (count == 0) break;
+    size += static_cast<std::size_t>(count);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+bool write_all(int descriptor, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(descriptor, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return true;
+}
+
+Error in_use(const std::string& path, int lock) {
+  const pid_t holder = holder_of(lock);
+  return Error{"the state folder " + path + " is in use by " + (holder > 0 ? process_text(holder) : "another hub") +
+               "; end that, or give this hub a folder of its own with --state-dir"};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) {
+  if (std::string error = prepare_state_folder(path); !error.empty()) return Error{std::move(error)};
+  File folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder.open()) return Error{"cannot use the folder " + path + " for state: " + system_text(errno)};
+  const std::string name = path + "/" + kLock;
+  const bool was_used = ::faccessat(folder.get(), kLock, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
+  File lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  if (!lock.open()) return Error{"cannot use the state folder: " + name + ": " + system_text(errno)};
+  if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
+    return Error{"cannot use " + name + ": " + fault};
+  }
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno == EWOULDBLOCK) return in_use(path, lock.get());
+    return Error{"cannot lock " + name + ": " + system_text(errno)};
+  }
+  write_holder(lock.get());
+  return std::unique_ptr<StateFolder>(new StateFolder(path, folder.release(), lock.release(), was_used));
+}
+
+StateFolder::~StateFolder() {
+  ::close(lock_);
+  ::close(folder_);
+}
+
+Result<std::optional<HubState>> StateFolder::read() const {
+  const std::string name = path_ + "/" + kState;
+  const File file(::openat(folder_, kState, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!file.open()) {
+    if (errno == ENOENT) return std::optional<HubState>{};
+    return Error{"cannot read " + name + ": " + system_text(errno)};
+  }
+  if (const std::string fault = private_file_fault(file.get(), name); !fault.empty()) {
+    return Error{"cannot use " + name + ": " + fault};
+  }
+  int error = 0;
+  const std::optional<std::vector<std::byte>> bytes = read_all(file.get(), error);
+  if (!bytes) return Error{"cannot read " + name + ": " + system_text(error)};
+  Result<HubState> state = read_hub_state(*bytes);
+  if (!state) {
+    return Error{"cannot use " + name + ": " + state.error().sentence +
+                 "; put a copy of it back, or move it away: the hub then begins anew, and nodes get new ids"};
+  }
+  return std::optional{std::move(*state)};
+}
+
+std::string StateFolder::write(const HubState& state) {
+  const auto failed = [this](const char* what) {
+    return std::string{"cannot write the hub's state to "} + path_ + "/" + kState + " (" + what +
+           "): " + system_text(errno) + (errno == ENOSPC ? "; free space there" : "");
+  };
+  // A file left over by a crash, or a link that somebody put there: never written through.
+  if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) return failed("remove the old one");
+  const File file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  if (!file.open()) return failed("create");
+  if (!write_all(file.get(), write_hub_state(state))) return failed("write");
+  if (::fsync(file.get()) != 0) return failed("fsync");
+  if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");
+  if (::fsync(folder_) != 0) return failed("fsync the folder");
+  return {};
+}
+
+}  // namespace gimnet::hub

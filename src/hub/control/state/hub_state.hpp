@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hub/control/state/index_pool.hpp"
+#include "hub/control/state/session_token.hpp"
+
+// What a hub keeps over its restarts, and the bytes of the file that it is kept in: docs/operations.md, "State".
+// Thread safety: value types and pure functions.
+
+namespace gimnet::hub {
+
+struct HubState {
+  Secret secret{};                        ///< proves tokens
+  std::array<std::byte, 16> unique_id{};  ///< random, of this hub alone
+  std::uint64_t boot = 0;                 ///< counts the starts, from 1
+  std::uint32_t node_mark = 1;            ///< the next start hands out node indices from here
+  std::uint32_t group_mark = 1;           ///< the same for groups
+  std::vector<SessionToken> kicked;       ///< not honoured any more
+  friend bool operator==(const HubState&, const HubState&) = default;
+};
+
+inline constexpr std::size_t kKickedMax = 65'536;
+/// The longest legal file.
+inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 32;
+
+[[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
+/// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is wrong with it, as
+/// the end of a sentence about the file.
+[[nodiscard]] Result<HubState> read_hub_state(std::span<const std::byte> bytes);
+
+/// A start of the hub: what has to be kept before it begins, and what newcomers may be given.
+struct HubStart {
+  HubState state;
+  IndexRange nodes{};
+  IndexRange groups{};
+};
+/// How the hub goes on from what it found: the next boot number, indices from the marks on, marks beyond those, without
+/// the kicked ones whose tokens have expired by `wall` (since 1970). Errors: the boot number is at its end.
+[[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
+
+}  // namespace gimnet::hub

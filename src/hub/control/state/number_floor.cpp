@@ -1,0 +1,21 @@
+#include "hub/control/state/number_floor.hpp"
+
+#include <algorithm>
+
+namespace gimnet::hub {
+
+SessionNumber NumberFloor::at(std::uint32_t index) const {
+  const std::size_t page = index / kPage;
+  if (page >= pages_.size() || pages_[page] == nullptr) return 0;
+  return (*pages_[page])[index % kPage];
+}
+
+void NumberFloor::raise(std::uint32_t index, SessionNumber number) {
+  const std::size_t page = index / kPage;
+  if (page >= pages_.size()) pages_.resize(page + 1);
+  if (pages_[page] == nullptr) pages_[page] = std::make_unique<Page>();
+  SessionNumber& floor = (*pages_[page])[index % kPage];
+  floor = std::max(floor, number);
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,137 @@
+#include "hub/config/state_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/hub/control/support/folder.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::HasSubstr;
+
+HubState some_state(std::uint64_t boot = 3) {
+  HubState state;
+  state.secret.fill(std::byte{0x5a});
+  state.boot = boot;
+  return state;
+}
+
+class StateFolderTest : public ::testing::Test {
+ protected:
+  std::string path() const { return folder_.path("state-folder"); }
+  std::string file(const std::string& name) const { return path() + "/" + name; }
+  /// Keeps something and lets the folder go again.
+  void keep() {
+    const auto folder = StateFolder::open(path());
+    ASSERT_TRUE(folder);
+    ASSERT_EQ((*folder)->write(some_state()), "");
+  }
+  std::string read_fault() const {
+    const auto folder = StateFolder::open(path());
+    if (!folder) return folder.error().sentence;
+    const auto found = (*folder)->read();
+    return found ? "" : found.error().sentence;
+  }
+  static mode_t mode_of(const std::string& name) {
+    struct stat info{};
+    EXPECT_EQ(::stat(name.c_str(), &info), 0) << name;
+    return info.st_mode & 0777;
+  }
+
+  TestFolder folder_;
+};
+
+TEST_F(StateFolderTest, KeepsStateInFilesOfOneUser) {
+  {
+    const auto folder = StateFolder::open(path());
+    ASSERT_TRUE(folder);
+    EXPECT_FALSE((*folder)->was_used());
+    EXPECT_FALSE((*folder)->read()->has_value());
+    EXPECT_EQ((*folder)->write(some_state(3)), "");
+    EXPECT_EQ((*folder)->write(some_state(4)), "");
+  }
+  EXPECT_EQ(mode_of(path()), 0700u);
+  EXPECT_EQ(mode_of(file("state")), 0600u);
+  EXPECT_EQ(mode_of(file("lock")), 0600u);
+  EXPECT_FALSE(std::filesystem::exists(file("state.new")));
+  const auto again = StateFolder::open(path());
+  ASSERT_TRUE(again);
+  EXPECT_TRUE((*again)->was_used());
+  EXPECT_EQ(**(*again)->read(), some_state(4));
+}
+
+TEST_F(StateFolderTest, ASecondHubIsToldWhoHasIt) {
+  const auto first = StateFolder::open(path());
+  ASSERT_TRUE(first);
+  const auto second = StateFolder::open(path());
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().sentence, HasSubstr("in use by"));
+  EXPECT_THAT(second.error().sentence, HasSubstr("process " + std::to_string(::getpid())));
+  EXPECT_THAT(second.error().sentence, HasSubstr("--state-dir"));
+}
+
+TEST_F(StateFolderTest, DamageIsToldWithTheRemedy) {
+  keep();
+  std::ofstream(file("state"), std::ios::binary | std::ios::in).write("X", 1);
+  EXPECT_THAT(read_fault(), HasSubstr(file("state")));
+  EXPECT_THAT(read_fault(), HasSubstr("move it away"));
+  std::filesystem::resize_file(file("state"), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("too short"));
+  std::filesystem::resize_file(file("state"), std::uintmax_t{1} << 40);
+  EXPECT_THAT(read_fault(), HasSubstr("too long"));
+}
+
+TEST_F(StateFolderTest, FilesThatOthersMayReadOrThatAreNoneAreRefused) {
+  keep();
+  ASSERT_EQ(::chmod(file("state").c_str(), 0640), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("chmod 600"));
+  ASSERT_EQ(::unlink(file("state").c_str()), 0);
+  ASSERT_EQ(::symlink("/etc/passwd", file("state").c_str()), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("cannot read"));
+  ASSERT_EQ(::unlink(file("state").c_str()), 0);
+  ASSERT_EQ(::mkfifo(file("state").c_str(), 0600), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("not a file"));
+}
+
+TEST_F(StateFolderTest, ALinkIsNotWrittenThrough) {
+  keep();
+  std::ofstream(folder_.path("precious")) << "precious";
+  ASSERT_EQ(::symlink(folder_.path("precious").c_str(), file("state.new").c_str()), 0);
+  keep();
+  std::string content;
+  std::ifstream(folder_.path("precious")) >> content;
+  EXPECT_EQ(content, "precious");
+  EXPECT_TRUE(std::filesystem::is_regular_file(std::filesystem::symlink_status(file("state"))));
+}
+
+TEST_F(StateFolderTest, ALinkIsNoLock) {
+  ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
+  ASSERT_EQ(::symlink(folder_.path("elsewhere").c_str(), file("lock").c_str()), 0);
+  EXPECT_THAT(read_fault(), HasSubstr(file("lock")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("elsewhere")));
+}
+
+TEST_F(StateFolderTest, AFolderThatOthersMayWriteToIsRefused) {
+  keep();
+  ASSERT_EQ(::chmod(path().c_str(), 0770), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("chmod go-w"));
+}
+
+TEST_F(StateFolderTest, WhatCannotBeWrittenLeavesWhatWasThere) {
+  keep();
+  const auto folder = StateFolder::open(path());
+  ASSERT_TRUE(folder);
+  ASSERT_EQ(::mkdir(file("state.new").c_str(), 0700), 0);  // in the way, whoever runs the test
+  const std::string error = (*folder)->write(some_state(9));
+  EXPECT_THAT(error, HasSubstr("cannot write the hub's state to " + file("state")));
+  EXPECT_EQ((*(*folder)->read())->boot, 3u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,121 @@
+#include "hub/control/state/hub_state.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/endian.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+HubState some_state() {
+  HubState state;
+  state.secret.fill(std::byte{0x11});
+  state.unique_id.fill(std::byte{0x22});
+  state.boot = 9;
+  state.node_mark = 8'193;
+  state.group_mark = 4'097;
+  state.kicked = {{3, 77, 5s}, {1'048'574, 78, 6s}};
+  return state;
+}
+
+/// With the digest that belongs to the changed bytes.
+std::vector<std::byte> sealed(std::vector<std::byte> bytes) {
+  bytes.resize(bytes.size() - std::tuple_size_v<Digest>);
+  const Digest digest = sha256(bytes);
+  bytes.insert(bytes.end(), digest.begin(), digest.end());
+  return bytes;
+}
+
+std::string fault_of(std::span<const std::byte> bytes) {
+  const auto state = read_hub_state(bytes);
+  return state ? "" : state.error().sentence;
+}
+
+TEST(HubState, IsReadAsItWasWritten) {
+  const auto state = read_hub_state(write_hub_state(some_state()));
+  ASSERT_TRUE(state);
+  EXPECT_EQ(*state, some_state());
+  HubState full = some_state();
+  full.kicked.assign(kKickedMax, {1, 2, 3s});
+  EXPECT_EQ(write_hub_state(full).size(), kHubStateBytesMax);
+  EXPECT_EQ(*read_hub_state(write_hub_state(full)), full);
+}
+
+TEST(HubState, AnyChangedByteIsSeen) {
+  const std::vector<std::byte> bytes = write_hub_state(some_state());
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    std::vector<std::byte> changed = bytes;
+    changed[i] ^= std::byte{1};
+    EXPECT_NE(fault_of(changed), "") << "byte " << i;
+  }
+}
+
+TEST(HubState, AnyOtherLengthIsRefused) {
+  const std::vector<std::byte> bytes = write_hub_state(some_state());
+  for (std::size_t size = 0; size < bytes.size(); ++size) EXPECT_NE(fault_of(std::span{bytes}.first(size)), "") << size;
+  std::vector<std::byte> longer = bytes;
+  longer.push_back(std::byte{});
+  EXPECT_THAT(fault_of(longer), HasSubstr("length"));
+  EXPECT_THAT(fault_of(std::vector<std::byte>(kHubStateBytesMax + 1)), HasSubstr("too long"));
+}
+
+TEST(HubState, SaysWhatIsWrong) {
+  const std::vector<std::byte> bytes = write_hub_state(some_state());
+  std::vector<std::byte> wrong = bytes;
+  wrong[0] = std::byte{'X'};
+  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("does not hold"));
+  wrong = bytes;
+  wrong[8] = std::byte{2};
+  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("version"));
+  wrong = bytes;
+  wrong.back() ^= std::byte{1};
+  EXPECT_THAT(fault_of(wrong), HasSubstr("damaged"));
+  for (const std::size_t offset : {72u, 76u, 88u}) {  // node mark, group mark, a kicked index
+    for (const std::uint32_t index : {0u, 1'048'575u}) {
+      wrong = bytes;
+      store_le(wrong.data() + offset, index);
+      EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << offset << " " << index;
+    }
+  }
+  wrong = bytes;
+  store_le(wrong.data() + 64, kBootMax + 1);
+  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
+}
+
+TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
+  const auto start = next_start(some_state(), 5s);
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->state.boot, 10u);
+  EXPECT_EQ(start->nodes.first, 8'193u);
+  EXPECT_EQ(start->nodes.count, IndexPool::kBlock);
+  EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock);
+  EXPECT_EQ(start->groups.first, 4'097u);
+  EXPECT_EQ(start->state.group_mark, 4'097u + IndexPool::kBlock);
+  EXPECT_EQ(start->state.secret, some_state().secret);
+  EXPECT_EQ(start->state.unique_id, some_state().unique_id);
+  ASSERT_EQ(start->state.kicked.size(), 1u) << "the other one's token has expired";
+  EXPECT_EQ(start->state.kicked[0].index, 1'048'574u);
+}
+
+TEST(HubState, MarksComeRound) {
+  HubState state;
+  state.node_mark = 1'048'574;
+  const auto start = next_start(state, 0s);
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->state.node_mark, IndexPool::kBlock);
+}
+
+TEST(HubState, StartsAreCountedToTheEndAndNoFurther) {
+  HubState state;
+  state.boot = kBootMax - 1;
+  EXPECT_TRUE(next_start(state, 0s));
+  state.boot = kBootMax;
+  EXPECT_FALSE(next_start(state, 0s));
+}
+
+}  // namespace
+}  // namespace gimnet::hub

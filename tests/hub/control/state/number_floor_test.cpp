@@ -1,0 +1,27 @@
+#include "hub/control/state/number_floor.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+TEST(NumberFloor, IsZeroWhereNothingWasRaised) {
+  NumberFloor floor;
+  EXPECT_EQ(floor.at(1), 0u);
+  floor.raise(1'048'574, 7);
+  EXPECT_EQ(floor.at(1'048'574), 7u);
+  EXPECT_EQ(floor.at(1'048'573), 0u);
+  EXPECT_EQ(floor.at(5), 0u);
+}
+
+TEST(NumberFloor, NeverFalls) {
+  NumberFloor floor;
+  floor.raise(9, 7);
+  floor.raise(9, 3);
+  EXPECT_EQ(floor.at(9), 7u);
+  floor.raise(9, 8);
+  EXPECT_EQ(floor.at(9), 8u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

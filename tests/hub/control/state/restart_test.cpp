@@ -1,0 +1,125 @@
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <utility>
+
+#include "hub/control/state/membership.hpp"
+
+// What the state machines promise to nodes that come back to a hub which was killed.
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::GoodbyeCode;
+
+/// A hub that was killed, and starts again with what it had kept.
+class RestartTest : public ::testing::Test {
+ protected:
+  using Node = std::pair<std::uint32_t, std::vector<std::byte>>;  ///< index, token
+
+  std::unique_ptr<Membership> start(std::uint32_t mark, std::uint64_t boot, std::vector<SessionToken> kicked = {}) {
+    Sessions::Options options;
+    options.hub = HubId{7};
+    options.boot = boot;
+    options.nodes = options.groups = {mark, IndexPool::kBlock};
+    options.kicked = std::move(kicked);
+    return std::make_unique<Membership>(options, limits_);
+  }
+  static Node join(Membership& hub, const std::string& name, std::span<const std::byte> token = {}) {
+    JoinRequest request;
+    request.name = name;
+    request.identity = "open";
+    request.token = token;
+    Effects effects;
+    const auto joined = hub.join(request, 0ms, effects);
+    EXPECT_TRUE(joined);
+    if (!joined) return {};
+    return {joined->session->index, hub.sessions().token_of(*joined->session)};
+  }
+
+  Limits limits_;
+};
+
+TEST_F(RestartTest, NodesComeBackUnderTheirIdsAndNewcomersGetOthers) {
+  const auto before = start(1, 1);
+  const Node j = join(*before, "J");
+  const Node k = join(*before, "K");
+  const auto after = start(before->durable().node_mark, 2);
+  const Node z = join(*after, "Z");
+  EXPECT_NE(z.first, j.first);
+  EXPECT_NE(z.first, k.first);
+  EXPECT_EQ(join(*after, "K", k.second).first, k.first);
+  EXPECT_EQ(after->directory().find("K"), k.first);
+  EXPECT_TRUE(after->sessions().find(k.first)->came_back);
+}
+
+TEST_F(RestartTest, AnIdThatSomebodyElseHoldsIsNotGivenBack) {
+  const auto before = start(1, 1);
+  const Node old = join(*before, "old");
+  const auto after = start(1, 2);  // as if the mark had come round
+  ASSERT_EQ(join(*after, "Z").first, old.first);
+  EXPECT_NE(join(*after, "old", old.second).first, old.first);
+}
+
+TEST_F(RestartTest, ATokenOfAnEarlierHolderDoesNotClaimAnIdThatWasGivenOn) {
+  const auto before = start(1, 1);
+  const Node old = join(*before, "old");
+  const auto after = start(1, 2);
+  Effects effects;
+  ASSERT_EQ(join(*after, "Z").first, old.first);
+  after->connection_ended(*after->sessions().find(old.first), {false, GoodbyeCode::silent, ""}, 0ms, effects);
+  after->tick(std::chrono::milliseconds{limits_.grace_ms}, effects);
+  ASSERT_EQ(after->sessions().find(old.first), nullptr);
+  EXPECT_NE(join(*after, "old", old.second).first, old.first);
+}
+
+TEST_F(RestartTest, AKickedNodeStaysKicked) {
+  const auto before = start(1, 1);
+  const Node bad = join(*before, "bad");
+  Effects effects;
+  before->kick(*before->sessions().find(bad.first), "why", 0ms, effects);
+  const auto after = start(before->durable().node_mark, 2, before->durable().kicked);
+  EXPECT_NE(join(*after, "bad", bad.second).first, bad.first);
+}
+
+TEST_F(RestartTest, AnotherNameAnotherIdentityOrAnotherHubIsNotHonoured) {
+  const auto before = start(1, 1);
+  const Node k = join(*before, "K");
+  const auto after = start(before->durable().node_mark, 2);
+  EXPECT_NE(join(*after, "L", k.second).first, k.first);
+  JoinRequest request;
+  request.name = "K";
+  request.identity = "uid 1000";
+  request.token = k.second;
+  Effects effects;
+  EXPECT_NE((*after->join(request, 0ms, effects)).session->index, k.first);
+  Sessions::Options other;
+  other.hub = HubId{8};
+  other.nodes = {4'097, IndexPool::kBlock};
+  Membership hub_8(other, limits_);
+  EXPECT_NE(join(hub_8, "K", k.second).first, k.first);
+}
+
+TEST_F(RestartTest, StateIsDueBeforeTheBlockIsUsedUpAndNothingIsHandedOutBeyondIt) {
+  limits_.nodes = 10'000;
+  const auto hub = start(1, 1);
+  Effects effects;
+  JoinRequest request;
+  std::uint32_t joined = 0;
+  while (effects.empty() && ++joined < IndexPool::kBlock) ASSERT_TRUE(hub->join(request, 0ms, effects));
+  ASSERT_TRUE(std::holds_alternative<StateDue>(effects.front()));
+  EXPECT_EQ(joined, IndexPool::kBlock / 2 + 1);
+  EXPECT_EQ(hub->durable().node_mark, 1 + 2 * IndexPool::kBlock);
+  for (; joined < IndexPool::kBlock; ++joined) ASSERT_TRUE(hub->join(request, 0ms, effects));
+  const auto beyond = hub->join(request, 0ms, effects);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().code, GoodbyeCode::hub_full);
+  hub->state_kept(hub->durable());
+  const auto next = hub->join(request, 0ms, effects);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->session->index, IndexPool::kBlock + 1);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

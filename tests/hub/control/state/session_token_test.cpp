@@ -1,0 +1,67 @@
+#include "hub/control/state/session_token.hpp"
+
+#include <gtest/gtest.h>
+
+#include "proto/control/link.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr TokenHolder kHolder{HubId{7}, "robot1/base", "uid 1000"};
+
+Secret secret_of(int value) {
+  Secret secret{};
+  secret.fill(static_cast<std::byte>(value));
+  return secret;
+}
+
+TEST(SessionToken, SaysWhatWasWritten) {
+  const SessionToken token{17, first_number(3) + 5, 1'700'000'000'000ms};
+  const std::vector<std::byte> bytes = write_token(token, kHolder, secret_of(1));
+  EXPECT_EQ(bytes.size(), kSessionTokenBytes);
+  EXPECT_LE(bytes.size(), proto::kTokenBytesMax);
+  EXPECT_EQ(read_token(bytes), token);
+  EXPECT_TRUE(is_genuine(bytes, kHolder, secret_of(1)));
+}
+
+TEST(SessionToken, OneBitChangedIsNotGenuine) {
+  const std::vector<std::byte> token = write_token({17, 5, 1s}, kHolder, secret_of(1));
+  for (std::size_t bit = 0; bit < token.size() * 8; ++bit) {
+    std::vector<std::byte> forged = token;
+    forged[bit / 8] ^= static_cast<std::byte>(1u << (bit % 8));
+    EXPECT_FALSE(is_genuine(forged, kHolder, secret_of(1))) << "bit " << bit;
+  }
+}
+
+TEST(SessionToken, IsForItsHolderAndItsHubOnly) {
+  const std::vector<std::byte> token = write_token({17, 5, 1s}, kHolder, secret_of(1));
+  EXPECT_FALSE(is_genuine(token, kHolder, secret_of(2)));
+  EXPECT_FALSE(is_genuine(token, {HubId{8}, "robot1/base", "uid 1000"}, secret_of(1)));
+  EXPECT_FALSE(is_genuine(token, {HubId{7}, "robot1", "uid 1000"}, secret_of(1)));
+  EXPECT_FALSE(is_genuine(token, {HubId{7}, "robot1/base", "uid 100"}, secret_of(1)));
+  // The same letters, divided in another way.
+  EXPECT_FALSE(is_genuine(token, {HubId{7}, "robot1/bas", "euid 1000"}, secret_of(1)));
+}
+
+TEST(SessionToken, OtherLengthsAndVersionsAreNone) {
+  std::vector<std::byte> token = write_token({17, 5, 1s}, kHolder, secret_of(1));
+  EXPECT_FALSE(read_token(std::span{token}.first(token.size() - 1)));
+  EXPECT_FALSE(is_genuine(std::span{token}.first(token.size() - 1), kHolder, secret_of(1)));
+  token.push_back(std::byte{});
+  EXPECT_FALSE(read_token(token));
+  EXPECT_FALSE(is_genuine(token, kHolder, secret_of(1)));
+  token.pop_back();
+  token[0] = std::byte{2};
+  EXPECT_FALSE(read_token(token));
+  EXPECT_FALSE(read_token({}));
+}
+
+TEST(SessionToken, NumbersOfALaterStartAreHigher) {
+  EXPECT_GT(first_number(2), first_number(1) + 1'000'000'000);
+  EXPECT_GT(first_number(kBootMax), first_number(kBootMax - 1));
+}
+
+}  // namespace
+}  // namespace gimnet::hub
