@@ -15,10 +15,10 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver import catalogue, instructions, suite  # noqa: E402
+from driver import against, catalogue, instructions, suite  # noqa: E402
 from driver.document import make_document  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
-from driver.subjects import allowed_cpus  # noqa: E402
+from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -37,6 +37,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--report", action="store_true", help="write docs/performance.md")
     parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
                         metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; all")
+    parser.add_argument("--against", metavar="REV", help="build that version too, and say which is faster; --runs are pairs")
     parser.add_argument("--instructions", nargs="?", const="", metavar="SCRIPT",
                         help="instructions per frame against the budget; of one script: where they go")
     parser.add_argument("--update", action="store_true", help="with --instructions: make what is counted the budget")
@@ -69,6 +70,8 @@ def chosen_subjects(arguments: argparse.Namespace) -> tuple[str, ...]:
 def needed_packages(arguments: argparse.Namespace) -> list[str]:
     if arguments.instructions is not None:
         return ["valgrind"]
+    if arguments.against is not None:
+        return []
     packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
@@ -77,7 +80,8 @@ def make_settings(arguments: argparse.Namespace) -> Settings:
     usual = SMOKE_SECONDS if arguments.smoke else QUICK_SECONDS if arguments.quick else WHOLE_SECONDS
     return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
                     runs=arguments.runs or (1 if arguments.smoke else 3),
-                    clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument)
+                    clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument,
+                    tries_max=1 if arguments.smoke else 2)
 
 
 def processor_name() -> str:
@@ -183,6 +187,22 @@ def count_instructions(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def compare_versions(arguments: argparse.Namespace) -> int:
+    settings = make_settings(arguments)
+    settings.seconds = arguments.seconds or against.PAIR_SECONDS
+    cases = list(against.CASES)
+    if arguments.scenario or arguments.size or arguments.transport:
+        cases = list(suite.chosen_plan(arguments.scenario, arguments.size, arguments.transport, ()))
+    try:
+        document = against.compare_versions(ROOT, arguments.against, cases, arguments.runs or against.PAIRS, settings)
+    except (against.BuildError, SubjectError) as error:
+        say(f"error: {error}")
+        return 1
+    if arguments.json:
+        print(json.dumps(document, indent=1))
+    return 0
+
+
 def main() -> int:
     arguments = parse_arguments()
     if arguments.packages:
@@ -190,6 +210,8 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
+    if arguments.against is not None:
+        return compare_versions(arguments)
     return measure(arguments)
 
 

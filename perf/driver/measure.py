@@ -21,6 +21,7 @@ class Settings:
     runs: int = 3
     clients: int | None = None  # of idle_10000, connect_10000 and join_under_load
     hub_arguments: list[str] = field(default_factory=list)
+    tries_max: int = 2  # of each run
 
 
 @dataclass
@@ -60,6 +61,19 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         return json.loads(done.stdout)
 
 
+def run_patiently(outcome: Outcome, settings: Settings) -> dict[str, float]:
+    """A second try where the first failed, since a machine that stands still for seconds says nothing of a subject."""
+    for tries_left in range(settings.tries_max - 1, -1, -1):
+        subject = make_subject(outcome.subject, outcome.case, settings.build, settings.hub_arguments)
+        try:
+            return run_once(subject, outcome.case, settings)
+        except SubjectError as error:
+            if tries_left == 0:
+                raise
+            say(f"warning: {outcome.case}: {error}; once more")
+    raise AssertionError("not reached")
+
+
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
     for run in range(settings.runs):
         for outcome in outcomes:
@@ -67,8 +81,7 @@ def run_group(outcomes: list[Outcome], settings: Settings) -> None:
                 continue
             say(f"  {outcome.subject}: {outcome.case} ({run + 1}/{settings.runs})")
             try:
-                subject = make_subject(outcome.subject, outcome.case, settings.build, settings.hub_arguments)
-                outcome.findings.append(run_once(subject, outcome.case, settings))
+                outcome.findings.append(run_patiently(outcome, settings))
             except SubjectError as error:
                 outcome.error = str(error)
                 say(f"error: {outcome.case}: {outcome.error}")
