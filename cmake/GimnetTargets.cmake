@@ -18,7 +18,8 @@ function(gimnet_test source)
   add_executable(${_name} ${source})
   target_link_libraries(${_name} PRIVATE ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
   target_include_directories(${_name} PRIVATE ${CMAKE_SOURCE_DIR})
-  gtest_discover_tests(${_name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 120)
+  gtest_discover_tests(${_name} DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT 120 ENVIRONMENT "XDG_RUNTIME_DIR=${GIMNET_TEST_RUNTIME}")
 endfunction()
 
 # gimnet_bench(FILE_bench.cpp DEPENDS lib ...): a Google Benchmark binary; ctest runs it once, briefly, so that it cannot rot.
@@ -72,4 +73,7 @@ endfunction()
 
 if(GIMNET_TESTS)
   include(GoogleTest)
+  # What nodes and hubs leave for their next life belongs to the tests, not to the user who runs them.
+  set(GIMNET_TEST_RUNTIME ${CMAKE_BINARY_DIR}/run)
+  file(MAKE_DIRECTORY ${GIMNET_TEST_RUNTIME})
 endif()

@@ -107,8 +107,8 @@ typedef struct nif_options {
   uint8_t shard_plus_one;
   /** Bytes of messages that may wait to be written (in addition to what the kernel holds), default 256 KiB. */
   uint32_t send_queue_bytes;
-  /** Bytes of written but unconfirmed frames kept for resume, default 512 KiB: as much as a hub's reserve takes from two
-   *  senders after it said PAUSE, so that it need not stop reading this node. */
+  /** Bytes of written but unconfirmed frames kept for resume, default 512 KiB: as much as a hub's reserve takes from
+   * two senders after it said PAUSE, so that it need not stop reading this node. */
   uint32_t resume_bytes;
   /** Bytes of received messages that may wait for the program, default 16 MiB. When it is full the library stops
    * reading from the hub and overwrites nothing; keep-alive goes on. One message always fits, whatever its size. */
@@ -124,6 +124,10 @@ typedef struct nif_options {
   /** If set, everything received is given to it instead of waiting for nif_receive(). */
   nif_callback callback;
   void* user; /**< Given to the callback unchanged. */
+  /** Not 0: keep the session token in memory only. Otherwise the token of a node with a name stands in a file of the
+   *  user's runtime folder while the node lives, so that the program has its id and name again at once when it crashed
+   *  and is started anew (docs/nif.md, "Tokens"). Where the file cannot be had the node is connected all the same. */
+  uint8_t no_token_file;
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.
@@ -152,6 +156,7 @@ typedef struct nif_info {
   uint32_t frame_bytes_max;          /**< Largest frame length in use. */
   char name[NIF_NAME_BYTES_MAX + 1]; /**< As registered. */
   char hub_name[NIF_NAME_BYTES_MAX + 1];
+  uint8_t token_kept; /**< 1: the session token is in a file, see nif_options.no_token_file. */
 } nif_info;
 
 /** Fills *info. */

@@ -67,10 +67,11 @@ std::optional<Failure> await_answer(Socket& socket, Handshake& handshake, const 
   }
 }
 
-Result<Admitted, Failure> admit_at(const Endpoint& endpoint, const SocketOptions& options, const proto::Hello& hello,
-                                   Deadline deadline, const WakeSignal& cancel) {
+Result<Admitted, Failure> admit_at(const Endpoint& endpoint, const SocketOptions& options, proto::Hello hello,
+                                   Deadline deadline, const WakeSignal& cancel, const TokenFor& token_for) {
   auto dialed = dial(endpoint, options, deadline, cancel);
   if (!dialed) return dialed.error();
+  if (hello.token.empty() && token_for) hello.token = token_for(endpoint.url());
   const std::vector<std::byte> opening = encode_hello(hello);
   // A hub that refuses may close before it has read everything: what it said is still there to read.
   const auto unwritten = write_all(*dialed, opening, endpoint, deadline, cancel);
@@ -78,16 +79,17 @@ Result<Admitted, Failure> admit_at(const Endpoint& endpoint, const SocketOptions
   Handshake handshake(hello.resume, hello.resume_epoch);
   if (auto failure = await_answer(*dialed, handshake, endpoint, deadline, cancel)) return std::move(*failure);
   const auto rest = handshake.rest();
-  return Admitted{std::move(*dialed), handshake.session(), {rest.begin(), rest.end()}};
+  return Admitted{std::move(*dialed), endpoint.url(), handshake.session(), {rest.begin(), rest.end()}};
 }
 
 }  // namespace
 
 Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
-                                const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel) {
+                                const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel,
+                                const TokenFor& token_for) {
   Failure last{NIF_NO_HUB, "no address to connect to"};
   for (const Endpoint& endpoint : endpoints) {
-    auto admitted = admit_at(endpoint, options, hello, deadline, cancel);
+    auto admitted = admit_at(endpoint, options, hello, deadline, cancel, token_for);
     if (admitted || admitted.error().status != NIF_NO_HUB) return admitted;
     last = admitted.error();
   }

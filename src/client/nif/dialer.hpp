@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/result.hpp"
@@ -17,15 +19,19 @@ namespace gimnet::nif {
 /// An admitted connection.
 struct Admitted {
   Socket socket;
+  std::string address;  ///< of the hub, as a URL
   Session session;
   std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
 };
 
 /// What nif_connect() and the library's thread do to get one: dials each address in turn and shakes hands, until one
 /// hub admits the node, one refuses it, or the time is up. Where several fail, the last hub-less failure is told.
+/// `token_for` gives the token to show at an address where `hello` has none; it may be empty.
 /// Errors: those of dial() and of the hub's GOODBYE; NIF_CLOSED when `cancel` was raised.
+using TokenFor = std::function<std::vector<std::byte>(const std::string& address)>;
 [[nodiscard]] Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
-                                              const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel);
+                                              const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel,
+                                              const TokenFor& token_for = {});
 
 /// How long to wait before dialing again: full jitter, a random time below 50 ms, 100 ms, 200 ms ... 1 s.
 class Backoff {

@@ -37,6 +37,7 @@ Node::Node(Options options)
       requests_(outbound_),
       declarations_(requests_, outbound_),
       inbound_(options_.reassembly, *this),
+      tokens_(options_.name, options_.keep_token),
       epoch_(random_bits() | 1) {}
 
 Node::~Node() = default;
@@ -63,8 +64,10 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
   }
   const Deadline deadline = deadline_after(node->options_.connect_timeout_ms);
   Backoff backoff;
+  const auto token_for = [&node](const std::string& address) { return node->tokens_.find(address); };
   for (;;) {
-    auto admitted = admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline, node->stop_);
+    auto admitted =
+        admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline, node->stop_, token_for);
     if (admitted) {
       if (!node->take_over(std::move(*admitted), true)) {
         return Failure{NIF_PROTOCOL, "the hub resumes a connection that never was"};
@@ -93,6 +96,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
   last_heard_ns_ = last_tick_ns_ = steady_now_ns();
+  tokens_.keep(admitted.address, session_.token);
   {
     const MutexLock lock(mutex_);
     info_.id = session_.id;
@@ -103,6 +107,8 @@ bool Node::take_over(Admitted admitted, bool first) {
     info_.frame_bytes_max = session_.frame_bytes_max;
     copy_text(info_.name, sizeof info_.name, session_.name);
     copy_text(info_.hub_name, sizeof info_.hub_name, session_.hub_name);
+    info_.token_kept = tokens_.kept() ? 1 : 0;
+    if (!tokens_.fault().empty()) last_error_ = tokens_.fault();
     if (!session_.earlier_goodbye.empty()) last_error_ = session_.earlier_goodbye;
   }
   if (!first) {

@@ -17,6 +17,7 @@
 #include "client/nif/outbound.hpp"
 #include "client/nif/receive_queue.hpp"
 #include "client/nif/request_table.hpp"
+#include "client/nif/token_store.hpp"
 
 namespace gimnet::nif {
 
@@ -110,6 +111,7 @@ class Node final : private InboundHost {
 
   // The library's thread (before it starts: the connecting one).
   Inbound inbound_;
+  TokenStore tokens_;
   Socket socket_;
   Session session_;
   Backoff backoff_;

@@ -212,8 +212,10 @@ void Node::disconnect(std::string why, proto::GoodbyeCode code) {
 
 void Node::end(nif_status status) {
   ended_ = true;
+  tokens_.release();
   {
     const MutexLock lock(mutex_);
+    info_.token_kept = 0;
     info_.replaced = status == NIF_REPLACED ? 1 : 0;
   }
   outbound_.end(status);
@@ -227,10 +229,12 @@ void Node::leave() {
   const Deadline deadline = steady_now_ns() + kLeaveNs;
   const auto goodbye = encode_goodbye(proto::GoodbyeCode::done, "");
   outbound_.begin_leaving(session_.resume ? inbound_.taken() : 0, goodbye);
-  while (outbound_.write_last() && steady_now_ns() < deadline) {
+  bool unsaid = true;
+  while ((unsaid = outbound_.write_last()) && steady_now_ns() < deadline) {
     static_cast<void>(wait_for(socket_, false, true, wake_, deadline));
     wake_.clear();
   }
+  if (!unsaid && !outbound_.wants().broken) tokens_.forget();  // GOODBYE makes it worthless
   socket_.shutdown_write();
   std::byte memory[4096];
   for (;;) {

@@ -75,6 +75,7 @@ Result<Options, Failure> read_options(const nif_options* options) {
   if (given.connect_timeout_ms != 0) checked.connect_timeout_ms = given.connect_timeout_ms;
   checked.wait_for_hub = given.wait_for_hub != 0;
   checked.reconnect = given.no_reconnect == 0;
+  checked.keep_token = given.no_token_file == 0;
   checked.callback = given.callback;
   checked.user = given.user;
   auto endpoints = endpoints_for(given.url != nullptr ? given.url : "");

@@ -25,6 +25,7 @@ struct Options {
   bool wait_for_hub = false;
   bool reconnect = true;
   bool resume = false;
+  bool keep_token = true;  ///< over a crash; of nodes with a name only
   std::optional<std::uint16_t> shard;
   SendQueue::Limits send;
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;

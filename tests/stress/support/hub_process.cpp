@@ -68,9 +68,22 @@ HubProcess::HubProcess(const std::vector<std::string>& arguments) {
   std::string pattern = (std::filesystem::temp_directory_path() / "gimnet-stress-XXXXXX").string();
   if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp");
   folder_ = pattern;
-  std::vector<std::string> all{"--listen",    "tcp://127.0.0.1:0", "--listen",    "unix:" + folder_ + "/hub",
-                               "--state-dir", folder_ + "/state",  "--log-level", "error"};
-  all.insert(all.end(), arguments.begin(), arguments.end());
+  tcp_url_ = "tcp://127.0.0.1:0";
+  unix_url_ = "unix:" + folder_ + "/hub";
+  arguments_ = arguments;
+  launch();
+}
+
+void HubProcess::kill_and_restart() {
+  ::kill(pid_, SIGKILL);
+  ::waitpid(pid_, nullptr, 0);
+  launch();
+}
+
+void HubProcess::launch() {
+  std::vector<std::string> all{"--listen",    tcp_url_,           "--listen",    unix_url_,
+                               "--state-dir", folder_ + "/state", "--log-level", "error"};
+  all.insert(all.end(), arguments_.begin(), arguments_.end());
   Started started = start(all);
   pid_ = started.pid;
   output_ = std::move(started.output);

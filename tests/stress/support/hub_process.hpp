@@ -25,12 +25,17 @@ class HubProcess {
   [[nodiscard]] const std::string& tcp_url() const { return tcp_url_; }
   [[nodiscard]] const std::string& unix_url() const { return unix_url_; }
   [[nodiscard]] pid_t pid() const { return pid_; }
+  /// Ends the hub as `kill -9` does and starts it anew on the same addresses, with the same state.
+  void kill_and_restart();
   [[nodiscard]] bool is_running();
   /// Resident memory now.
   [[nodiscard]] std::int64_t resident_bytes() const;
 
  private:
+  void launch();
+
   std::string folder_;
+  std::vector<std::string> arguments_;
   std::string tcp_url_;
   std::string unix_url_;
   pid_t pid_ = -1;

@@ -92,6 +92,8 @@ class RawNode {
   void leave();
   /// No more bytes from here: the hub sees the end of the stream, and what it wrote can still be read.
   void shut_down();
+  /// The connection alone, for who holds many and says nothing more on them.
+  [[nodiscard]] Descriptor release() { return std::move(socket_); }
   /// Gone without a word.
   void close() { socket_.reset(); }
 

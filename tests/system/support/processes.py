@@ -12,6 +12,8 @@ from support.waiting import PATIENCE_S, wait_until
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 BIN = pathlib.Path(os.environ.get("GIMNET_BIN", ROOT / "build" / "release" / "bin"))
+# What hubs and nodes leave for their next life belongs to the test, not to the user who runs it.
+HOME = tempfile.TemporaryDirectory(prefix="gimnet-test-home-")
 TCPHUB = str(BIN / "tcphub")
 GIMNET = str(BIN / "gimnet")
 
@@ -22,7 +24,8 @@ class Process:
     def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None):
         environment = dict(os.environ)
         environment.pop("GIMNET_HUB", None)
-        environment.update(env or {})
+        environment.pop("STATE_DIRECTORY", None)
+        environment.update({"XDG_RUNTIME_DIR": HOME.name, "XDG_STATE_HOME": HOME.name}, **(env or {}))
         self.popen = subprocess.Popen(arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                       env=environment)
         self._out, self._err = bytearray(), bytearray()
@@ -93,13 +96,16 @@ class Process:
 class Hub:
     """A tcphub of its own, on a free port and a Unix socket in a folder of its own. Ends with the test."""
 
-    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None):
+    def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None):
+        self._how = {"shards": shards, "hub_id": hub_id}
+        self._arguments = arguments
         self._folder = tempfile.TemporaryDirectory(prefix="gimnet-test-")
         test.addCleanup(self._folder.cleanup)
         self.socket_path = os.path.join(self._folder.name, "hub.sock")
+        self.state = state or os.path.join(self._folder.name, "state")
         listen = listen or ["tcp://127.0.0.1:0", f"unix:{self.socket_path}"]
         words = [TCPHUB, "--shards", str(shards), "--hub-id", str(hub_id), "--placement", "hint",
-                 "--state-dir", os.path.join(self._folder.name, "state")]
+                 "--state-dir", self.state]
         for address in listen:
             words += ["--listen", address]
         self.process = Process(words + list(arguments))
@@ -107,6 +113,11 @@ class Hub:
         line = wait_until(lambda: self._ready_line(), f"ready line of tcphub; it said: {self.process.err}")
         self.addresses = line.split()[1:]
         self.url = self.addresses[0]
+        self.socket_path = next((url[5:] for url in self.addresses if url.startswith("unix:")), None)
+
+    def again(self, test):
+        """The hub started anew: same arguments, addresses and state. Its process has ended."""
+        return Hub(test, *self._arguments, **self._how, listen=self.addresses, state=self.state)
 
     def _ready_line(self):
         line, newline, _ = self.process.out.partition(b"\n")

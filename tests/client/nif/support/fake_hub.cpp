@@ -207,6 +207,7 @@ nif_options default_options(const char* name) {
   options.struct_size = sizeof options;
   options.name = name;
   options.connect_timeout_ms = 20'000;
+  options.no_token_file = 1;  // tests of one name run side by side
   return options;
 }
 

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/nif/locked_file.hpp"
+
+namespace gimnet::nif {
+
+/// Keeps one node's session token where the node's next life finds it, and where a second program of the same name sees
+/// that this one lives. What fails here costs the node nothing but its id after a crash.
+/// Thread safety: none; one thread at a time. Ownership: of a locked file.
+class TokenStore {
+ public:
+  /// `name` "": a node without one, which keeps nothing. `enabled` false: the program does not want it.
+  TokenStore(std::string name, bool enabled);
+  ~TokenStore();
+  TokenStore(const TokenStore&) = delete;
+  TokenStore& operator=(const TokenStore&) = delete;
+
+  /// The token that an earlier life left for the hub at `address`; empty if there is none, or if the node that has it
+  /// still lives. The file stays locked.
+  [[nodiscard]] std::vector<std::byte> find(const std::string& address);
+  /// The hub at `address` gave this one. A file for another address goes.
+  void keep(const std::string& address, const std::vector<std::byte>& token);
+  /// The session is over: nobody is to find the token.
+  void forget();
+  /// Others may have the token from now on.
+  void release();
+
+  /// The latest token is in its file.
+  [[nodiscard]] bool kept() const { return kept_; }
+  /// "" or why it is not.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+
+ private:
+  /// Opens the file for that address, unless it is open. `made`: makes it if there is none.
+  [[nodiscard]] bool open(const std::string& address, bool made);
+
+  const std::string name_;
+  const bool enabled_;
+  std::unique_ptr<PrivateFolder> folder_;  ///< opened when it is first needed
+  LockedFile file_;
+  std::string address_;  ///< for which it is open
+  bool kept_ = false;
+  std::string fault_;
+};
+
+}  // namespace gimnet::nif

@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+"""Ids and names over crashes: tokens, restarts of the hub, programs that were killed, connections that drop."""
+
+import json
+import os
+import signal
+import socket
+import struct
+import unittest
+
+from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.proxy import Proxy
+from support.waiting import wait_until
+from support.wire import FLAG_KEYED, GOODBYE, LINK, NS, OPENING, WELCOME, Client, control, frame, hello, number, text
+
+RESOLVE = 3
+
+
+def resolve(client, name):
+    return client.ask(NS, RESOLVE, text(3, name))[3]
+
+
+def resolved(hub):
+    """How often the hub was asked for a name's id."""
+    return hub.status()["counters"].get("names.resolve", 0)
+
+
+def node_id(text_form):
+    hub, index = text_form.split(".")
+    return int(hub) << 20 | int(index)
+
+
+def id_of(hub, name):
+    return node_id(hub.wait_for_node(name)["id"])
+
+
+def message(client, target, sequence, data):
+    """A GIMI message without an ACK, as `gimnet recv` takes it."""
+    return client.frame(target, struct.pack("<IIIBBH", 0, 0, sequence, 0, 0, 0) + data, flags=FLAG_KEYED)
+
+
+class UnixClient(Client):
+    """The same over the hub's Unix socket."""
+
+    def __init__(self, test, hub):  # pylint: disable=super-init-not-called
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        test.addCleanup(self.socket.close)
+        self.socket.settimeout(20.0)
+        self.socket.connect(hub.socket_path)
+        self.id, self.welcome, self.pinged = 0, {}, 0
+        self._bytes = bytearray()
+
+
+class Restart(unittest.TestCase):
+    def kill(self, hub):
+        hub.process.signal(signal.SIGKILL)
+        hub.process.wait()
+
+    def test_nodes_come_back_under_their_ids_and_newcomers_get_others(self):
+        hub = Hub(self)
+        j = start_recv(self, hub, "J")
+        k = start_recv(self, hub, "K")
+        peer = Client(self, hub).join("peer")
+        j_id, k_id = resolve(peer, "J"), resolve(peer, "K")
+        k.signal(signal.SIGSTOP)  # so that Z is first
+        j.signal(signal.SIGKILL)
+        self.kill(hub)
+        hub = hub.again(self)
+        z = Client(self, hub).join("Z")
+        k.signal(signal.SIGCONT)
+        self.assertEqual(id_of(hub, "K"), k_id)
+        self.assertNotIn(z.id, (j_id, k_id))
+        # Who knew K's id sends at once.
+        again = Client(self, hub).join("peer", token=peer.welcome[2])
+        self.assertEqual(again.id, peer.id)
+        again.send(message(again, k_id, 1, b"still you"))
+        wait_until(lambda: k.out == b"still you\n", "the message at K")
+        self.assertEqual(resolved(hub), 0)
+        # J was killed with the hub; started again, it has its id and name, too.
+        start_recv(self, hub, "J")
+        self.assertEqual(id_of(hub, "J"), j_id)
+
+    def test_restarts_do_not_use_up_what_was_handed_out(self):
+        hub = Hub(self)
+        first = Client(self, hub).join()
+        ids = {first.id}
+        for _ in range(3):
+            self.kill(hub)
+            hub = hub.again(self)
+            newcomer = Client(self, hub).join()
+            self.assertNotIn(newcomer.id, ids)
+            ids.add(newcomer.id)
+        self.assertEqual(Client(self, hub).join(token=first.welcome[2]).id, first.id)
+
+    def test_services_keep_their_groups(self):
+        hub = Hub(self)
+        provider = start_gimnet(self, hub, "pub", "A/odom", stdin=-1)
+        watcher = start_gimnet(self, hub, "echo", "A/odom", "--raw")
+
+        def service():
+            found = json.loads(run_gimnet(hub, "services", "--json").out)
+            return found[0] if found and found[0]["subscribers"] == 1 else None
+        before = wait_until(service, "the service and its subscriber")
+        self.kill(hub)
+        hub = hub.again(self)
+        newcomer = Client(self, hub).join("first")
+        newcomer.ask(NS, 7, text(3, "other"))
+        after = wait_until(lambda: next((s for s in json.loads(run_gimnet(hub, "services", "--json").out)
+                                         if s["name"] == "A/odom" and s["subscribers"] == 1), None), "A/odom again")
+        self.assertEqual(after["group"], before["group"])
+        provider.popen.stdin.write(b"go on\n")
+        provider.popen.stdin.flush()
+        wait_until(lambda: watcher.out.endswith(b"go on\n"), "the message at the subscriber")
+
+
+class Programs(unittest.TestCase):
+    def test_one_that_was_killed_has_its_id_and_name_at_once(self):
+        hub = Hub(self)
+        for url in hub.addresses:
+            receiver = start_recv(self, url_hub(hub, url), "B")
+            before = id_of(hub, "B")
+            receiver.signal(signal.SIGKILL)
+            receiver.wait()
+            again = start_recv(self, url_hub(hub, url), "B")
+            self.assertEqual(id_of(hub, "B"), before)
+            again.signal(signal.SIGTERM)
+            again.wait()
+
+    def test_a_second_one_beside_it_is_refused_with_holder_place_and_age(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B")
+        before = id_of(hub, "B")
+        rival = run_gimnet(hub, "recv", "--name", "B")
+        self.assertNotEqual(rival.code, 0)
+        holder = f"held by node 7.{before & 0xFFFFF}"
+        for part in (holder, "connected over tcp from 127.0.0.1:", "since "):
+            self.assertIn(part, rival.err)
+        self.assertEqual(id_of(hub, "B"), before)
+        self.assertIsNone(receiver.popen.poll())
+
+    def test_a_hundred_dropped_connections_cost_no_id_no_message_and_no_lookup(self):
+        hub = Hub(self, "--limit", "silent_ms=60000")
+        proxy = Proxy(self, hub.port)
+        names = [f"r{number}" for number in range(10)]
+        receivers = [start_gimnet(self, proxy, "recv", "--name", name, "--raw") for name in names]
+        ids = [id_of(hub, name) for name in names]
+        peer = Client(self, hub).join("peer")
+        for turn in range(10):
+            proxy.drop_all()
+            for target in ids:
+                peer.send(message(peer, target, turn + 1, b"%d" % turn))
+            peer.ping()
+            expected = b"".join(b"%d\n" % number for number in range(turn + 1))
+            for receiver in receivers:
+                wait_until(lambda r=receiver: r.out == expected, f"{expected} at every receiver")
+        self.assertGreaterEqual(proxy.dropped, 100)
+        self.assertEqual([id_of(hub, name) for name in names], ids)
+        self.assertEqual(resolved(hub), 0)
+
+
+class Tokens(unittest.TestCase):
+    def test_one_bit_changed_counts_as_none(self):
+        hub = Hub(self)
+        first = Client(self, hub).join("B")
+        token = first.welcome[2]
+        first.socket.close()
+        wait_until(lambda: any(not node["connected"] for node in hub.nodes()), "B away")
+        for bit in (0, 40, 100, 150, 8 * len(token) - 1):
+            forged = bytearray(token)
+            forged[bit // 8] ^= 1 << bit % 8
+            other = Client(self, hub).join(token=bytes(forged))
+            self.assertNotEqual(other.id, first.id, f"bit {bit}")
+        self.assertEqual(Client(self, hub).join("B", token=token).id, first.id)
+
+    def test_junk_counts_as_none(self):
+        hub = Hub(self)
+        for junk in (b"\x00", bytes(56), os.urandom(56), os.urandom(128)):
+            self.assertEqual(Client(self, hub).join(token=junk).welcome.get(16), None)
+
+    def test_an_expired_one_counts_as_none(self):
+        hub = Hub(self, "--limit", "token_ms=1000")
+        first = Client(self, hub).join()
+        # Each try takes the session over; only the first token's time decides.
+        wait_until(lambda: Client(self, hub).join(token=first.welcome[2]).id != first.id, "the token expired")
+
+    def test_one_of_another_identity_counts_as_none(self):
+        hub = Hub(self)
+        over_tcp = Client(self, hub).join()
+        over_unix = UnixClient(self, hub).join()
+        self.assertNotEqual(UnixClient(self, hub).join(token=over_tcp.welcome[2]).id, over_tcp.id)
+        self.assertNotEqual(Client(self, hub).join(token=over_unix.welcome[2]).id, over_unix.id)
+        self.assertEqual(UnixClient(self, hub).join(token=over_unix.welcome[2]).id, over_unix.id)
+
+    def test_goodbye_frees_id_and_name_at_once(self):
+        hub = Hub(self)
+        first = Client(self, hub).join("B")
+        first.send(frame(0, first.id, control(GOODBYE, number(1, 3, 0)), kind=LINK))
+        first.until_closed()
+        second = Client(self, hub).join("B", token=first.welcome[2])
+        self.assertNotEqual(second.id, first.id)
+        self.assertEqual([node["name"] for node in hub.nodes() if node["name"]], ["B"])
+
+    def test_the_name_of_a_live_node_is_not_given_to_a_token_of_another(self):
+        hub = Hub(self)
+        first = Client(self, hub).join("A")
+        Client(self, hub).join("B")
+        client = Client(self, hub)
+        client.send(OPENING + hello("B", token=first.welcome[2]))
+        answer = client.first_answer()
+        self.assertNotEqual(answer.operation, WELCOME)
+        self.assertEqual(answer.goodbye, "name_taken")
+
+
+def url_hub(hub, url):
+    """The hub as one of its addresses."""
+    class At:
+        def __init__(self):
+            self.url = url
+
+        def __getattr__(self, name):
+            return getattr(hub, name)
+    return At()
+
+
+if __name__ == "__main__":
+    unittest.main()
