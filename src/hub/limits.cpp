@@ -77,6 +77,14 @@ constexpr std::array kTable{
     LimitInfo{"subscriptions_per_node", "subscriptions", &Limits::subscriptions_per_node, 0, 1'000'000,
               "of one node, names without a service included", true},
     LimitInfo{"page_records", "records", &Limits::page_records, 1, 1'000, "in one answer to LIST and the like", true},
+    LimitInfo{"scan_records", "records", &Limits::scan_records, 64, 1'000'000,
+              "looked at for one page or one piece of watching, before others have their turn", true},
+    LimitInfo{"watches_per_node", "watches", &Limits::watches_per_node, 0, 65'536, "of names and services, by one node",
+              true},
+    LimitInfo{"watches", "watches", &Limits::watches, 0, 1'000'000, "of all nodes together", true},
+    LimitInfo{"watch_changes", "changes", &Limits::watch_changes, 1, 10'000'000,
+              "kept for watches that are behind; one that is further behind gets a new snapshot", true},
+    LimitInfo{"watch_bytes", "bytes", &Limits::watch_bytes, 64 * kKiB, 16 * kGiB, "memory of watch_changes", true},
     LimitInfo{"drain_ms", "ms", &Limits::drain_ms, 0, kHour, "time for what waits to be written at the end", true},
 };
 

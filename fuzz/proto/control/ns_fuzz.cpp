@@ -7,7 +7,8 @@
 #include "fuzz/support/control_round_trip.hpp"
 #include "proto/bitestream/reader.hpp"
 #include "proto/control/ctrl.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
 
 namespace {
 
@@ -27,6 +28,14 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ns::ServiceMoved>(payload);
   fuzz::check_message<ns::SubscriberJoined>(payload);
   fuzz::check_message<ns::SubscriberLeft>(payload);
+  fuzz::check_message<ns::RegisterName>(payload);
+  fuzz::check_message<ns::UnregisterName>(payload);
+  fuzz::check_message<ns::NameConfirmed>(payload);
+  fuzz::check_message<ns::NameLost>(payload);
+  fuzz::check_message<ns::Watch>(payload);
+  fuzz::check_message<ns::Unwatch>(payload);
+  fuzz::check_message<ns::WatchTaken>(payload);
+  fuzz::check_message<ns::WatchEvents>(payload);
   fuzz::check_message<ctrl::HubInfo>(payload);
   fuzz::check_message<ctrl::Statistics>(payload);
   fuzz::check_message<ctrl::Connections>(payload);
@@ -51,6 +60,11 @@ void check_answers(Bytes payload) {
   fuzz::check_answer<ns::WithdrawAnswer>(payload);
   fuzz::check_answer<ns::SubscribeAnswer>(payload);
   fuzz::check_answer<ns::UnsubscribeAnswer>(payload);
+  fuzz::check_answer<ns::RegisterNameAnswer>(payload);
+  fuzz::check_answer<ns::UnregisterNameAnswer>(payload);
+  fuzz::check_answer<ns::WatchAnswer>(payload);
+  fuzz::check_answer<ns::UnwatchAnswer>(payload);
+  fuzz::check_answer<ns::WatchTakenAnswer>(payload);
   fuzz::check_answer<ctrl::HubInfoAnswer>(payload);
   if (fuzz::check_answer<ns::ListAnswer>(payload)) check_records(payload);
   if (fuzz::check_answer<ns::ServicesAnswer>(payload)) check_records(payload);

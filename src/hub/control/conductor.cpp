@@ -1,11 +1,13 @@
 #include "hub/control/conductor.hpp"
 
 #include "base/check.hpp"
+#include "base/endian.hpp"
 #include "base/id_text.hpp"
 #include "base/log.hpp"
 #include "hub/control/dispatch.hpp"
 #include "hub/shard/control_frame.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -35,6 +37,12 @@ Sessions::Options sessions_options(const HubFacts& facts, Placement placement, c
   return options;
 }
 
+/// Never 0, and another one at each start, also of a hub that keeps nothing.
+std::uint64_t epoch_of(const HubStart& start) {
+  const std::uint64_t epoch = load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
+  return epoch != 0 ? epoch : 1;
+}
+
 SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
 
 }  // namespace
@@ -44,6 +52,7 @@ Conductor::Conductor(HubFacts facts, Placement placement, const Limits& limits, 
       limits_(limits),
       wiring_(std::move(wiring)),
       membership_(sessions_options(facts_, placement, wiring_.start), limits),
+      watches_(HubTitle{facts_.id, facts_.name}, epoch_of(wiring_.start), limits),
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       state_(wiring_.start.state) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
@@ -71,6 +80,7 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
 
 void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment) {
   Session& session = *joined.session;
+  watches_.connection_ended(session.index);  // of one that this one replaces
   AttachCommand command;
   command.session = ref_of(session.place);
   command.attachment = session.attachment;
@@ -107,6 +117,7 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
   welcome.resume_buffer_bytes = hello.resume ? static_cast<std::uint32_t>(limits_.resume_bytes) : 0;
   welcome.grace_ms = static_cast<std::uint32_t>(limits_.grace_ms);
   welcome.name = session.name;
+  welcome.name_provisional = membership_.directory().is_provisional(session.name);
   if (session.close_code) {
     welcome.last_goodbye_code = static_cast<std::uint16_t>(*session.close_code);
     welcome.last_goodbye_sentence = session.close_sentence.substr(0, proto::kSentenceBytesMax);
@@ -135,8 +146,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_,  limits_,        membership_,      wiring_.counters, now,
-                         effects, wiring_.queues, wiring_.refusals, &name_counters_};
+  HandlerContext context{facts_, limits_, membership_,    watches_,         wiring_.counters,
+                         now,    effects, wiring_.queues, wiring_.refusals, &name_counters_};
   const Request request{*session, view->header, payload};
   const Handler handle = handler_for(session->role, kind, view->header.operation);
   const proto::Payload answer = handle(context, request);
@@ -166,6 +177,7 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   }
   log_info(line);
   Effects effects;
+  watches_.connection_ended(session->index);
   membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
   carry_out(effects, now);
 }
@@ -213,7 +225,16 @@ void Conductor::carry_out(const Effects& effects, milliseconds now) {
     break;
   }
   for (const Effect& effect : effects) {
-    std::visit([this](const auto& one) { carry_out_one(one); }, effect);
+    std::visit(
+        [&](const auto& one) {
+          using One = std::remove_cvref_t<decltype(one)>;
+          if constexpr (std::is_same_v<One, NodeNoted> || std::is_same_v<One, ServiceNoted>) {
+            watches_.note(one, membership_, now);
+          } else {
+            carry_out_one(one);
+          }
+        },
+        effect);
   }
 }
 
@@ -271,6 +292,23 @@ void Conductor::carry_out_one(const SubscriberDue& effect) {
     return proto::encode(event);
   };
   send_event(*session, effect.joined ? fill(ns::SubscriberJoined{}) : fill(ns::SubscriberLeft{}));
+}
+
+void Conductor::carry_out_one(const NameDecided& effect) {
+  const Session* session = membership_.sessions().find(effect.node);
+  if (session == nullptr) return;
+  send_event(*session, effect.confirmed ? proto::encode(ns::NameConfirmed{effect.name})
+                                        : proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
+}
+
+bool Conductor::serve_watches(milliseconds now) {
+  const std::uint64_t resyncs = watches_.resyncs();
+  const bool more = watches_.serve(membership_, now, [this](std::uint32_t node, const proto::Payload& events) {
+    const Session* session = membership_.sessions().find(node);
+    if (session != nullptr) send_event(*session, events);
+  });
+  name_counters_.resyncs.add(watches_.resyncs() - resyncs);
+  return more;
 }
 
 void Conductor::send_event(const Session& session, const proto::Payload& payload) {

@@ -12,6 +12,7 @@
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/hub_state.hpp"
 #include "hub/control/state/membership.hpp"
+#include "hub/control/state/watches.hpp"
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
@@ -57,11 +58,16 @@ class Conductor {
   /// Do lists wait to be freed? Then tick() wants to be called from time to time.
   [[nodiscard]] bool has_garbage() const { return publisher_.garbage() > 0; }
 
+  /// Tells those who watch names and services what they have not heard yet, a bounded piece of it. True: there is more.
+  /// To be called after events were taken, and again as long as there is more.
+  [[nodiscard]] bool serve_watches(std::chrono::milliseconds now);
+
   /// Nobody new is admitted, and the shards say GOODBYE to everybody once what waits is written.
   void drain();
   [[nodiscard]] bool drained() const { return draining_ && shards_to_drain_ == 0; }
 
   [[nodiscard]] const Membership& membership() const { return membership_; }
+  [[nodiscard]] const Watches& watches() const { return watches_; }
 
  private:
   void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment);
@@ -81,6 +87,7 @@ class Conductor {
   void carry_out_one(const SubscriberDue& effect);
   void carry_out_one(const CloseDue& effect);
   void carry_out_one(const StateDue& effect);
+  void carry_out_one(const NameDecided& effect);
   void keep_state(std::chrono::milliseconds now);
   void send_event(const Session& session, const proto::Payload& payload);
 
@@ -90,6 +97,7 @@ class Conductor {
   const Wiring wiring_;
   // The conductor's thread only
   Membership membership_;
+  Watches watches_;
   TablePublisher publisher_;
   NameCounters name_counters_;
   HubState state_;                                          ///< as it was kept last

@@ -98,6 +98,7 @@ struct ConductorLoop::Impl {
     strangers_watch.wait([this] {
       while (strangers.serve(now())) {
       }
+      serve_watches();
       arm_timer();
       watch_strangers();
     });
@@ -106,6 +107,7 @@ struct ConductorLoop::Impl {
   void take_events() {
     wiring.inbox.waker().awake();
     wiring.inbox.drain(kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
+    serve_watches();
     arm_timer();
     if (wiring.conductor.drained()) context.stop();
     if (wiring.inbox.empty()) {
@@ -120,6 +122,16 @@ struct ConductorLoop::Impl {
     }
     // Let strangers and timers have a turn before the next batch.
     asio::post(context, [this] { take_events(); });
+  }
+
+  /// What is left waits behind strangers, timers and events.
+  void serve_watches() {
+    if (serving_watches || !wiring.conductor.serve_watches(now())) return;
+    serving_watches = true;
+    asio::post(context, [this] {
+      serving_watches = false;
+      serve_watches();
+    });
   }
 
   void take_event(ShardEvent event) {
@@ -145,6 +157,7 @@ struct ConductorLoop::Impl {
       armed.reset();
       wiring.conductor.tick(now());
       strangers.tick(now());
+      serve_watches();
       arm_timer();
     });
   }
@@ -187,6 +200,7 @@ struct ConductorLoop::Impl {
   asio::signal_set signals;
   std::vector<std::unique_ptr<Door>> doors;
   bool stopping = false;
+  bool serving_watches = false;  ///< a piece of it is posted
 };
 
 ConductorLoop::ConductorLoop(const Wiring& wiring, std::vector<std::unique_ptr<Listener>> listeners)

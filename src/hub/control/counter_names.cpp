@@ -84,6 +84,7 @@ void for_each_counter(const NameCounters& counters,
     if (name != nullptr) take(std::string{"names."} + name, counters.by_operation[operation].value());
   }
   take("names.unknown", counters.unknown.value());
+  take("names.resyncs", counters.resyncs.value());
   for (std::size_t status = 1; status < counters.refused.size(); ++status) {
     const auto* name = proto::status_name(static_cast<proto::Status>(status));
     take(std::string{"names.refused."} + name, counters.refused[status].value());

@@ -5,8 +5,10 @@
 #include "hub/control/handle/admin.hpp"
 #include "hub/control/handle/names.hpp"
 #include "hub/control/handle/services.hpp"
+#include "hub/control/handle/watch.hpp"
 #include "proto/control/ctrl.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -26,6 +28,8 @@ struct Entry {
 };
 
 constexpr std::array kTable{
+    Entry{Kind::ns, ns::RegisterName::kOperation, everybody, handle_register},
+    Entry{Kind::ns, ns::UnregisterName::kOperation, everybody, handle_unregister},
     Entry{Kind::ns, ns::Resolve::kOperation, everybody, handle_resolve},
     Entry{Kind::ns, ns::Reverse::kOperation, everybody, handle_reverse},
     Entry{Kind::ns, ns::List::kOperation, everybody, handle_list},
@@ -34,6 +38,9 @@ constexpr std::array kTable{
     Entry{Kind::ns, ns::Services::kOperation, everybody, handle_services},
     Entry{Kind::ns, ns::Subscribe::kOperation, everybody, handle_subscribe},
     Entry{Kind::ns, ns::Unsubscribe::kOperation, everybody, handle_unsubscribe},
+    Entry{Kind::ns, ns::Watch::kOperation, everybody, handle_watch},
+    Entry{Kind::ns, ns::Unwatch::kOperation, everybody, handle_unwatch},
+    Entry{Kind::ns, ns::WatchTaken::kOperation, everybody, handle_watch_taken},
     Entry{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
     Entry{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
     Entry{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},

@@ -15,6 +15,7 @@ struct NameCounters {
   std::array<Counter, proto::ns::kRequestsEnd> by_operation;  ///< refused ones included
   Counter unknown;                                            ///< operations that this hub does not have
   std::array<Counter, proto::kStatusCount> refused;
+  Counter resyncs;  ///< watches that were too far behind and began again
 
   void count(std::uint16_t operation, proto::Status status) {
     (proto::ns::operation_name(operation) != nullptr ? by_operation[operation] : unknown).add(1);

@@ -1,8 +1,9 @@
 #include "proto/control/names.hpp"
 
 #include <array>
-#include <cstdint>
 #include <optional>
+
+#include "proto/control/pattern.hpp"
 
 namespace gimnet::proto {
 namespace {
@@ -52,34 +53,6 @@ const char* fault(std::string_view text, Wildcards wildcards) {
   return nullptr;
 }
 
-/// Bit i: the name's parts so far fit the pattern's first i parts.
-using States = std::uint32_t;
-
-/// Where `**` is next, it may also stand for no part at all.
-States skip_stars(States states, const Parts& pattern) {
-  for (std::size_t i = 0; i < pattern.count; ++i) {
-    if (((states >> i) & 1u) != 0 && pattern.part[i] == "**") states |= 1u << (i + 1);
-  }
-  return states;
-}
-
-States step(States states, const Parts& pattern, std::string_view part) {
-  States next = 0;
-  for (std::size_t i = 0; i < pattern.count; ++i) {
-    if (((states >> i) & 1u) == 0) continue;
-    if (pattern.part[i] == "**") {
-      next |= 1u << i;
-    } else if (pattern.part[i] == "*" || pattern.part[i] == part) {
-      next |= 1u << (i + 1);
-    }
-  }
-#if defined(GIMNET_BUG_STARS_NEED_A_PART)
-  return next;
-#else
-  return skip_stars(next, pattern);
-#endif
-}
-
 }  // namespace
 
 const char* name_fault(std::string_view name) { return fault(name, Wildcards::refused); }
@@ -87,14 +60,8 @@ const char* name_fault(std::string_view name) { return fault(name, Wildcards::re
 bool valid_pattern(std::string_view pattern) { return fault(pattern, Wildcards::allowed) == nullptr; }
 
 bool matches(std::string_view pattern, std::string_view name) {
-  if (!valid_pattern(pattern) || !valid_name(name)) return false;
-  const Parts pattern_parts = *split(pattern);
-  const Parts name_parts = *split(name);
-  States states = skip_stars(1u, pattern_parts);
-  for (std::size_t i = 0; i < name_parts.count && states != 0; ++i) {
-    states = step(states, pattern_parts, name_parts.part[i]);
-  }
-  return ((states >> pattern_parts.count) & 1u) != 0;
+  const std::optional<Pattern> parsed = Pattern::parse(pattern);
+  return parsed && valid_name(name) && parsed->matches(name);
 }
 
 ServiceName split_service_name(std::string_view full_name) {

@@ -55,6 +55,10 @@ void write_page_request(bitestream::Writer& writer, const std::string& pattern, 
 
 const char* operation_name(std::uint16_t operation) {
   switch (static_cast<Operation>(operation)) {
+    case Operation::register_name:
+      return "register";
+    case Operation::unregister_name:
+      return "unregister";
     case Operation::resolve:
       return "resolve";
     case Operation::reverse:
@@ -71,6 +75,12 @@ const char* operation_name(std::uint16_t operation) {
       return "subscribe";
     case Operation::unsubscribe:
       return "unsubscribe";
+    case Operation::watch:
+      return "watch";
+    case Operation::unwatch:
+      return "unwatch";
+    case Operation::watch_taken:
+      return "watch_taken";
     default:
       return nullptr;
   }
@@ -110,37 +120,42 @@ std::size_t page_bytes_max(const NodeRecord& record) {
          record.place.size();
 }
 
+void write_record(bitestream::Writer& writer, const NodeRecord& record) {
+  writer.put_u32(1, record.node.value());
+  put_clean_text(writer, 2, record.name, kNameBytesMax);
+  writer.put_u16(3, record.hub.value());
+  put_clean_text(writer, 4, record.hub_name, kNameBytesMax);
+  writer.put_bool(5, record.connected);
+  put_clean_text(writer, 6, record.description, kDescriptionBytesMax);
+  put_clean_text(writer, 7, record.place, kRemarkBytesMax);
+  writer.put_u64(8, record.joined_ms);
+  writer.put_u32(9, record.services);
+}
+NodeRecord read_node_record(Fields& fields) {
+  NodeRecord node;
+  node.node = read_required_id<NodeId>(fields, 1, "node id");
+  node.name = fields.text(2, "name", kNameBytesMax);
+  node.hub = HubId{fields.number<std::uint16_t>(3, "hub id", 0)};
+  node.hub_name = fields.text(4, "hub name", kNameBytesMax);
+  node.connected = fields.flag(5, "connected", false);
+  node.description = fields.text(6, "description", kDescriptionBytesMax);
+  node.place = fields.text(7, "place", kRemarkBytesMax);
+  node.joined_ms = fields.number<std::uint64_t>(8, "time since it joined", 0);
+  node.services = fields.number<std::uint32_t>(9, "number of services", 0);
+  return node;
+}
+
 void ListAnswer::write(bitestream::Writer& writer) const {
   for (const NodeRecord& record : nodes) {
     writer.begin_nested(3);
-    writer.put_u32(1, record.node.value());
-    put_clean_text(writer, 2, record.name, kNameBytesMax);
-    writer.put_u16(3, record.hub.value());
-    put_clean_text(writer, 4, record.hub_name, kNameBytesMax);
-    writer.put_bool(5, record.connected);
-    put_clean_text(writer, 6, record.description, kDescriptionBytesMax);
-    put_clean_text(writer, 7, record.place, kRemarkBytesMax);
-    writer.put_u64(8, record.joined_ms);
-    writer.put_u32(9, record.services);
+    write_record(writer, record);
     writer.end_nested();
   }
   writer.put_bool(4, more);
 }
 ListAnswer ListAnswer::read(Fields& fields) {
   ListAnswer answer;
-  answer.nodes = fields.records<NodeRecord>(3, "record", [](Fields& record) {
-    NodeRecord node;
-    node.node = read_required_id<NodeId>(record, 1, "node id");
-    node.name = record.text(2, "name", kNameBytesMax);
-    node.hub = HubId{record.number<std::uint16_t>(3, "hub id", 0)};
-    node.hub_name = record.text(4, "hub name", kNameBytesMax);
-    node.connected = record.flag(5, "connected", false);
-    node.description = record.text(6, "description", kDescriptionBytesMax);
-    node.place = record.text(7, "place", kRemarkBytesMax);
-    node.joined_ms = record.number<std::uint64_t>(8, "time since it joined", 0);
-    node.services = record.number<std::uint32_t>(9, "number of services", 0);
-    return node;
-  });
+  answer.nodes = fields.records<NodeRecord>(3, "record", read_node_record);
   answer.more = fields.flag(4, "more", false);
   return answer;
 }
@@ -195,39 +210,44 @@ std::size_t page_bytes_max(const ServiceRecord& record) {
   return kRecordOverhead + record.name.size() + record.metadata.size() + record.hub_name.size();
 }
 
+void write_record(bitestream::Writer& writer, const ServiceRecord& record) {
+  writer.put_u32(1, record.group.value());
+  put_clean_text(writer, 2, record.name, kNameBytesMax);
+  writer.put_u32(3, record.node.value());
+  writer.put_u32(4, record.message_type);
+  writer.put_u32(5, record.instance);
+  put_choice(writer, 6, record.direction);
+  put_choice(writer, 7, record.delivery);
+  put_clean_text(writer, 8, record.metadata, kMetadataBytesMax);
+  writer.put_u32(9, record.subscribers);
+  put_clean_text(writer, 10, record.hub_name, kNameBytesMax);
+}
+ServiceRecord read_service_record(Fields& fields) {
+  ServiceRecord service;
+  service.group = read_required_id<GroupId>(fields, 1, "group id");
+  service.name = fields.text(2, "name", kNameBytesMax);
+  service.node = read_id<NodeId>(fields, 3, "node id");
+  service.message_type = fields.number<std::uint32_t>(4, "message type", 0);
+  service.instance = fields.number<std::uint32_t>(5, "instance", 0);
+  service.direction = read_choice<Direction>(fields, 6, "direction");
+  service.delivery = read_choice<Delivery>(fields, 7, "delivery");
+  service.metadata = fields.text(8, "metadata", kMetadataBytesMax);
+  service.subscribers = fields.number<std::uint32_t>(9, "number of subscribers", 0);
+  service.hub_name = fields.text(10, "hub name", kNameBytesMax);
+  return service;
+}
+
 void ServicesAnswer::write(bitestream::Writer& writer) const {
   for (const ServiceRecord& record : services) {
     writer.begin_nested(3);
-    writer.put_u32(1, record.group.value());
-    put_clean_text(writer, 2, record.name, kNameBytesMax);
-    writer.put_u32(3, record.node.value());
-    writer.put_u32(4, record.message_type);
-    writer.put_u32(5, record.instance);
-    put_choice(writer, 6, record.direction);
-    put_choice(writer, 7, record.delivery);
-    put_clean_text(writer, 8, record.metadata, kMetadataBytesMax);
-    writer.put_u32(9, record.subscribers);
-    put_clean_text(writer, 10, record.hub_name, kNameBytesMax);
+    write_record(writer, record);
     writer.end_nested();
   }
   writer.put_bool(4, more);
 }
 ServicesAnswer ServicesAnswer::read(Fields& fields) {
   ServicesAnswer answer;
-  answer.services = fields.records<ServiceRecord>(3, "record", [](Fields& record) {
-    ServiceRecord service;
-    service.group = read_required_id<GroupId>(record, 1, "group id");
-    service.name = record.text(2, "name", kNameBytesMax);
-    service.node = read_id<NodeId>(record, 3, "node id");
-    service.message_type = record.number<std::uint32_t>(4, "message type", 0);
-    service.instance = record.number<std::uint32_t>(5, "instance", 0);
-    service.direction = read_choice<Direction>(record, 6, "direction");
-    service.delivery = read_choice<Delivery>(record, 7, "delivery");
-    service.metadata = record.text(8, "metadata", kMetadataBytesMax);
-    service.subscribers = record.number<std::uint32_t>(9, "number of subscribers", 0);
-    service.hub_name = record.text(10, "hub name", kNameBytesMax);
-    return service;
-  });
+  answer.services = fields.records<ServiceRecord>(3, "record", read_service_record);
   answer.more = fields.flag(4, "more", false);
   return answer;
 }

@@ -9,23 +9,32 @@
 #include "proto/control/control_message.hpp"
 
 // HubNS, names and services: the payloads of NS frames (docs/protocol.md, section 8), one struct for each request,
-// answer and event. Encode and decode with the templates of control_message.hpp.
-// Thread safety: value types. Limits: names 255 bytes, metadata 4,096, descriptions and places 256.
+// answer and event; those of names of one's own are in ns_register.hpp, those of watching in ns_watch.hpp. Encode and
+// decode with the templates of control_message.hpp. Thread safety: value types. Limits: names 255 bytes, metadata
+// 4,096, descriptions and places 256.
 
 namespace gimnet::proto::ns {
 
 enum class Operation : std::uint16_t {
+  register_name = 1,
+  unregister_name = 2,
   resolve = 3,
   reverse = 4,
   list = 5,
+  watch = 6,
   advertise = 7,
   withdraw = 8,
   services = 9,
   subscribe = 10,
   unsubscribe = 11,
+  unwatch = 12,
+  watch_taken = 13,
   service_moved = 32,
   subscriber_joined = 33,
   subscriber_left = 34,
+  name_confirmed = 35,
+  name_lost = 36,
+  watch_events = 37,
 };
 
 [[nodiscard]] constexpr std::uint16_t request_of(Operation operation) { return static_cast<std::uint16_t>(operation); }
@@ -112,6 +121,9 @@ struct NodeRecord {
 };
 /// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.
 [[nodiscard]] std::size_t page_bytes_max(const NodeRecord& record);
+/// The record's values; the caller begins and ends what they are nested in.
+void write_record(bitestream::Writer& writer, const NodeRecord& record);
+[[nodiscard]] NodeRecord read_node_record(Fields& fields);
 
 struct ListAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::list);
@@ -195,6 +207,8 @@ struct ServiceRecord {
 };
 /// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.
 [[nodiscard]] std::size_t page_bytes_max(const ServiceRecord& record);
+void write_record(bitestream::Writer& writer, const ServiceRecord& record);
+[[nodiscard]] ServiceRecord read_service_record(Fields& fields);
 
 struct ServicesAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::services);

@@ -5,40 +5,16 @@
 #include <string>
 
 #include "proto/control/names.hpp"
-#include "proto/frame/frame_parser.hpp"
-#include "tests/vectors/vector_file.hpp"
+#include "tests/proto/control/support/ns_vectors.hpp"
 
 namespace gimnet::proto::ns {
 namespace {
 
-using test::Bytes;
-using test::load_vector;
+using test::expect_answer;
+using test::expect_request;
 
 constexpr NodeId kNode{0x00700012};
 constexpr GroupId kGroup{0x00700005};
-
-Bytes payload_of(const std::string& vector) {
-  const auto bytes = load_vector(vector);
-  return test::to_bytes(parse_frame(bytes, Origin::hub)->payload);
-}
-
-template <class Message>
-void expect_request(const std::string& vector, std::uint16_t request, const Message& message) {
-  const auto payload = payload_of(vector);
-  const auto decoded = decode<Message>(payload);
-  ASSERT_TRUE(decoded) << decoded.error().sentence;
-  EXPECT_EQ(*decoded, message) << vector;
-  EXPECT_EQ(encode(message, request), payload) << vector;
-}
-
-template <class Answer>
-void expect_answer(const std::string& vector, std::uint16_t request, const Answer& answer) {
-  const auto payload = payload_of(vector);
-  const auto decoded = decode_answer<Answer>(payload);
-  ASSERT_TRUE(decoded) << decoded.error().sentence;
-  EXPECT_EQ(*decoded, answer) << vector;
-  EXPECT_EQ(encode_answer(answer, request), payload) << vector;
-}
 
 TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/resolve", 1, Resolve{"robot/base"});

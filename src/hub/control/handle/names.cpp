@@ -1,8 +1,9 @@
 #include "hub/control/handle/names.hpp"
 
 #include "base/log.hpp"
+#include "hub/control/state/records.hpp"
 #include "proto/control/names.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -12,20 +13,6 @@ namespace ns = proto::ns;
 
 constexpr std::size_t kQuotedMax = 60;
 
-ns::NodeRecord record_of(const HandlerContext& context, const Session& session) {
-  ns::NodeRecord record;
-  record.node = make_id<NodeId>(context.facts.id, session.index);
-  record.name = session.name;
-  record.hub = context.facts.id;
-  record.hub_name = context.facts.name;
-  record.connected = session.connected;
-  record.description = session.description;
-  record.place = session.origin.address;
-  record.joined_ms = static_cast<std::uint64_t>((context.now - session.joined).count());
-  record.services = static_cast<std::uint32_t>(context.membership.services().services_of(session.index));
-  return record;
-}
-
 Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const ns::List& wanted) {
   if (!wanted.pattern.empty() && !proto::valid_pattern(wanted.pattern)) {
     return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
@@ -33,11 +20,12 @@ Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const
   }
   ns::ListAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
+  const HubTitle title{context.facts.id, context.facts.name};
   const auto& all = context.membership.sessions().all();
   for (auto entry = all.upper_bound(index_of(wanted.after)); entry != all.end(); ++entry) {
     const Session& session = entry->second;
     if (!wanted.pattern.empty() && !proto::matches(wanted.pattern, session.name)) continue;
-    ns::NodeRecord record = record_of(context, session);
+    ns::NodeRecord record = record_of(title, session, context.membership.services(), context.now);
     if (!budget.take(ns::page_bytes_max(record))) {
       answer.more = true;
       break;
@@ -48,6 +36,29 @@ Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const
 }
 
 }  // namespace
+
+proto::Payload handle_register(HandlerContext& context, const Request& request) {
+  return answer_to<ns::RegisterName>(
+      request, [&](const ns::RegisterName& wanted) -> Result<ns::RegisterNameAnswer, proto::Refusal> {
+        if (wanted.name.empty()) return proto::Refusal{Status::bad_request, "REGISTER needs a name"};
+        Session& session = *context.membership.sessions().find(request.session.index);
+        const auto failed = context.membership.rename(session, wanted.name, context.now, context.effects);
+        if (failed) return *failed;
+        return ns::RegisterNameAnswer{session.name, context.membership.directory().is_provisional(session.name),
+                                      context.membership.sessions().token_of(session)};
+      });
+}
+
+proto::Payload handle_unregister(HandlerContext& context, const Request& request) {
+  return answer_to<ns::UnregisterName>(
+      request, [&](const ns::UnregisterName&) -> Result<ns::UnregisterNameAnswer, proto::Refusal> {
+        if (request.session.name.empty()) return proto::Refusal{Status::not_found, "this node has no name"};
+        Session& session = *context.membership.sessions().find(request.session.index);
+        const auto failed = context.membership.rename(session, "", context.now, context.effects);
+        if (failed) return *failed;
+        return ns::UnregisterNameAnswer{context.membership.sessions().token_of(session)};
+      });
+}
 
 proto::Payload handle_resolve(HandlerContext& context, const Request& request) {
   return answer_to<ns::Resolve>(

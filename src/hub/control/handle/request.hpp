@@ -6,6 +6,7 @@
 
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/state/membership.hpp"
+#include "hub/control/state/watches.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
 #include "hub/observe/name_counters.hpp"
@@ -20,6 +21,7 @@ struct HandlerContext {
   const HubFacts& facts;
   const Limits& limits;
   Membership& membership;
+  Watches& watches;
   std::span<const ShardCounters* const> counters;  ///< one per shard
   std::chrono::milliseconds now;
   Effects& effects;                              ///< carried out before the answer leaves

@@ -1,6 +1,7 @@
 #include "hub/control/handle/services.hpp"
 
 #include "base/log.hpp"
+#include "hub/control/state/records.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
 
@@ -41,22 +42,6 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
 }
 
-ns::ServiceRecord record_of(const HandlerContext& context, const Topic& topic) {
-  const Service& service = *topic.service;
-  ns::ServiceRecord record;
-  record.group = group_id(context, service.group);
-  record.name = std::string{topic.full_name};
-  record.node = make_id<NodeId>(context.facts.id, service.provider);
-  record.message_type = service.terms.message_type;
-  record.instance = service.terms.instance;
-  record.direction = static_cast<ns::Direction>(service.terms.direction);
-  record.delivery = static_cast<ns::Delivery>(service.terms.delivery);
-  record.metadata = service.terms.metadata;
-  record.subscribers = static_cast<std::uint32_t>(topic.subscribers.size());
-  record.hub_name = context.facts.name;
-  return record;
-}
-
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {
   if (!wanted.pattern.empty() && !proto::valid_pattern(wanted.pattern)) {
     return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
@@ -64,11 +49,12 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
   }
   ns::ServicesAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
+  const HubTitle title{context.facts.id, context.facts.name};
   const auto& groups = context.membership.services().groups();
   for (auto entry = groups.upper_bound(index_of(wanted.after)); entry != groups.end(); ++entry) {
     const Topic& topic = *entry->second;
     if (!wanted.pattern.empty() && !proto::matches(wanted.pattern, topic.full_name)) continue;
-    ns::ServiceRecord record = record_of(context, topic);
+    ns::ServiceRecord record = record_of(title, topic);
     if (!budget.take(ns::page_bytes_max(record))) {
       answer.more = true;
       break;

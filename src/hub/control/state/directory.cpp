@@ -20,8 +20,13 @@ std::string age_text(std::chrono::milliseconds age) {
 }  // namespace
 
 std::optional<std::uint32_t> Directory::find(std::string_view name) const {
-  const auto found = holders_.find(name);
-  return found == holders_.end() ? std::nullopt : std::optional{found->second};
+  const auto found = names_.find(name);
+  return found == names_.end() ? std::nullopt : std::optional{found->second.index};
+}
+
+bool Directory::is_provisional(std::string_view name) const {
+  const auto found = names_.find(name);
+  return found != names_.end() && found->second.standing == NameStanding::provisional;
 }
 
 std::optional<Refusal> Directory::refusal(std::string_view name, const Session* claimant, const Sessions& sessions,
@@ -41,14 +46,19 @@ std::optional<Refusal> Directory::refusal(std::string_view name, const Session* 
                      age_text(now - holder->connected_at) + "; end that one, or choose another name"};
 }
 
-void Directory::put(std::string_view name, std::uint32_t index) {
-  const bool added = holders_.emplace(std::string{name}, index).second;
+void Directory::put(std::string_view name, std::uint32_t index, NameStanding standing) {
+  const bool added = names_.emplace(std::string{name}, Holder{index, standing}).second;
   GIMNET_CHECK(added);
 }
 
+void Directory::confirm(std::string_view name) {
+  const auto found = names_.find(name);
+  if (found != names_.end()) found->second.standing = NameStanding::final;
+}
+
 void Directory::remove(std::string_view name) {
-  const auto found = holders_.find(name);
-  if (found != holders_.end()) holders_.erase(found);
+  const auto found = names_.find(name);
+  if (found != names_.end()) names_.erase(found);
 }
 
 }  // namespace gimnet::hub

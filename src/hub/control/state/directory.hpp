@@ -3,21 +3,32 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 
 #include "hub/control/state/sessions.hpp"
 
 namespace gimnet::hub {
 
+/// Is a name its holder's for good, or until all hubs have agreed?
+enum class NameStanding : std::uint8_t { final, provisional };
+
 /// Names of nodes: each has one holder. A live holder keeps it against everybody; one within its grace time keeps it
-/// against nobody but gets it back if nobody took it. Thread safety: none. Limits: one name a session.
+/// against nobody but gets it back if nobody took it. In the order of names, which no choice of names can make slow,
+/// and which finds at once all that begin alike. Thread safety: none. Limits: one name a session.
 class Directory {
  public:
+  struct Holder {
+    std::uint32_t index = 0;  ///< of the node
+    NameStanding standing = NameStanding::final;
+  };
+  using Names = std::map<std::string, Holder, std::less<>>;
+
   /// The index of the node that holds the name.
   [[nodiscard]] std::optional<std::uint32_t> find(std::string_view name) const;
+  [[nodiscard]] bool is_provisional(std::string_view name) const;
 
   /// Why `claimant` (nullptr: somebody new) cannot have the name; nothing if it can, perhaps from a holder who is away
   /// and whom the caller then has to end.
@@ -25,17 +36,16 @@ class Directory {
                                                std::chrono::milliseconds now) const;
 
   /// REQUIRES: nobody holds the name.
-  void put(std::string_view name, std::uint32_t index);
+  void put(std::string_view name, std::uint32_t index, NameStanding standing = NameStanding::final);
+  /// The name is its holder's for good. Nothing happens for a name that nobody holds.
+  void confirm(std::string_view name);
   /// Nothing happens for a name that nobody holds, the empty one included.
   void remove(std::string_view name);
-  [[nodiscard]] std::size_t size() const { return holders_.size(); }
+  [[nodiscard]] const Names& names() const { return names_; }
+  [[nodiscard]] std::size_t size() const { return names_.size(); }
 
  private:
-  struct Hash {
-    using is_transparent = void;
-    std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-  };
-  std::unordered_map<std::string, std::uint32_t, Hash, std::equal_to<>> holders_;
+  Names names_;
 };
 
 }  // namespace gimnet::hub

@@ -8,6 +8,7 @@
 #include "base/ids.hpp"
 #include "hub/control/state/place.hpp"
 #include "proto/control/link.hpp"
+#include "proto/control/ns_watch.hpp"
 
 // What the state machines want done, to be carried out in this order: tables first or messages first is part of the
 // meaning (docs/protocol.md, section 8).
@@ -53,8 +54,31 @@ struct SubscriberDue {
 /// Keep what Membership::durable() says where it outlives the hub, then call state_kept().
 struct StateDue {};
 
-using Effect =
-    std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue, CloseDue, StateDue>;
+/// Tell a node what became of its claim to a name.
+struct NameDecided {
+  std::uint32_t node = 0;
+  std::string name;
+  bool confirmed = false;
+  NodeId holder{};  ///< who has it, if it is not confirmed
+  std::string sentence;
+};
+/// Those who watch are to hear of a node. Its record is looked up; the name is that of a node which has left.
+struct NodeNoted {
+  proto::ns::ChangeKind kind{};
+  std::uint32_t index = 0;
+  std::string name;
+  std::string former_name;
+};
+/// Those who watch are to hear of a service.
+struct ServiceNoted {
+  proto::ns::ChangeKind kind{};
+  std::uint32_t group = 0;
+  std::uint32_t provider = 0;
+  std::string full_name;
+};
+
+using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue, CloseDue, StateDue,
+                            NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

@@ -7,6 +7,7 @@
 namespace gimnet::hub {
 namespace {
 using proto::GoodbyeCode;
+using proto::ns::ChangeKind;
 using std::chrono::milliseconds;
 
 /// Did the hub close the connection for what the node sent?
@@ -40,6 +41,7 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
   session.origin = request.origin;
   sessions_.renew_token(session, request.wall);
   sessions_.attach(session, now);
+  effects.emplace_back(NodeNoted{found->new_session ? ChangeKind::joined : ChangeKind::back, session.index, {}, {}});
   if (!found->new_session) {
     redeclaring_.push_back(
         {now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment});
@@ -76,6 +78,33 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
     session.close_sentence = ending.sentence;
   }
   sessions_.begin_grace(session, now);
+  effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
+}
+
+std::optional<Failure> Membership::rename(Session& session, const std::string& name, milliseconds now,
+                                          Effects& effects) {
+  if (name == session.name) return std::nullopt;
+  if (!name.empty()) {
+    if (const std::optional<Refusal> refusal = directory_.refusal(name, &session, sessions_, now)) {
+      const bool taken = refusal->code == GoodbyeCode::name_taken;
+      return Failure{taken ? proto::Status::taken : proto::Status::bad_request, refusal->sentence};
+    }
+    end_absent_holder(name, &session, now, effects);
+  }
+  take_name(session, name, now, effects);
+  session.token_name = name;
+  return std::nullopt;
+}
+
+void Membership::name_decided(Session& session, const NameDecision& decision, milliseconds now, Effects& effects) {
+  const std::string name = session.name;
+  if (!directory_.is_provisional(name)) return;
+  if (decision.confirmed) {
+    directory_.confirm(name);
+  } else {
+    take_name(session, "", now, effects);
+  }
+  effects.emplace_back(NameDecided{session.index, name, decision.confirmed, decision.holder, decision.sentence});
 }
 
 void Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects) {
@@ -149,12 +178,14 @@ void Membership::make_room(milliseconds now, Effects& effects) {
 }
 
 void Membership::take_name(Session& session, const std::string& name, milliseconds now, Effects& effects) {
-  if (!session.name.empty()) {
+  const std::string former = std::exchange(session.name, name);
+  if (!former.empty()) {
     services_.node_renamed(session.index, now, effects);
-    directory_.remove(session.name);
+    directory_.remove(former);
   }
-  session.name = name;
-  directory_.put(name, session.index);
+  if (!name.empty()) directory_.put(name, session.index, standing_);
+  // A node that has not been attached yet has nothing to change: it will be told of as one that joined.
+  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::renamed, session.index, {}, former});
 }
 
 void Membership::end(Session& session, milliseconds now, Effects& effects) {
@@ -162,6 +193,7 @@ void Membership::end(Session& session, milliseconds now, Effects& effects) {
   directory_.remove(session.name);
   effects.emplace_back(NodeChanged{session.index});
   effects.emplace_back(SessionEnded{session.place});
+  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name, {}});
   sessions_.end(session, now);
 }
 

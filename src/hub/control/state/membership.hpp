@@ -62,6 +62,22 @@ class Membership {
   [[nodiscard]] Durable durable() const;
   /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and none later was given here before.
   void state_kept(const Durable& durable);
+  /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival is judged as when
+  /// it joins. What the node provides is withdrawn, as its full names were the old one's: it advertises anew.
+  /// Errors: taken, bad_request. nullopt: done.
+  [[nodiscard]] std::optional<Failure> rename(Session& session, const std::string& name, std::chrono::milliseconds now,
+                                              Effects& effects);
+
+  /// What became of a claim to a name.
+  struct NameDecision {
+    bool confirmed = true;
+    NodeId holder{};       ///< not confirmed: who has the name now
+    std::string sentence;  ///< not confirmed: why
+  };
+  /// The network decided on the session's name: it is final, or a rival's. A name that is final already stays so.
+  void name_decided(Session& session, const NameDecision& decision, std::chrono::milliseconds now, Effects& effects);
+  /// Names taken from now on are final at once, as on a hub that is the whole network, or wait for name_decided().
+  void decide_names(NameStanding standing) { standing_ = standing; }
 
   /// Ends what is overdue.
   void tick(std::chrono::milliseconds now, Effects& effects);
@@ -97,6 +113,7 @@ class Membership {
   Sessions sessions_;
   Directory directory_;
   Services services_;
+  NameStanding standing_ = NameStanding::final;
   std::deque<Redeclaring> redeclaring_;  ///< in the order of `until`
 };
 

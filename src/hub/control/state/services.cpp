@@ -10,6 +10,7 @@ namespace gimnet::hub {
 namespace {
 
 using proto::Status;
+using proto::ns::ChangeKind;
 using std::chrono::milliseconds;
 
 milliseconds resting_time(const Limits& limits) {
@@ -37,6 +38,10 @@ void tell_subscribers(const Topic& topic, ServiceMovedDue event, Effects& effect
     event.subscriber = subscriber;
     effects.emplace_back(event);
   }
+}
+
+void note(ChangeKind kind, std::string_view full_name, const Service& service, Effects& effects) {
+  effects.emplace_back(ServiceNoted{kind, service.group, service.provider, std::string{full_name}});
 }
 
 /// Do subscribers that know the one understand the other?
@@ -95,7 +100,10 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
     }
     open_group(entry, Service{*group, provider, terms}, old_group, effects);
   }
-  entry.service->terms.metadata = terms.metadata;
+  if (entry.service->terms.metadata != terms.metadata) {
+    entry.service->terms.metadata = terms.metadata;
+    note(ChangeKind::changed, full_name, *entry.service, effects);
+  }
   return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
 }
 
@@ -234,9 +242,14 @@ void Services::forget_if_idle(std::uint32_t node) {
 void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects) {
   topic.service = service;
   groups_[service.group] = &topic;
-  if (old_group != 0) effects.emplace_back(GroupChanged{old_group});
+  if (old_group != 0) {
+    effects.emplace_back(GroupChanged{old_group});
+    effects.emplace_back(
+        ServiceNoted{ChangeKind::withdrawn, old_group, service.provider, std::string{topic.full_name}});
+  }
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
   effects.emplace_back(GroupChanged{service.group});
+  note(ChangeKind::advertised, topic.full_name, service, effects);
 }
 
 void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
@@ -246,6 +259,7 @@ void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
   group_indices_.give_back(service.group, now);
   effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
+  note(ChangeKind::withdrawn, topic.full_name, service, effects);
 }
 
 void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects) {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/log.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
 namespace gimnet::hub {
@@ -118,6 +118,33 @@ TEST_F(NamesTest, PagesOfLongRecordsFitInAFrame) {
     after = answer->nodes.back().node;
   }
   EXPECT_EQ(seen, 251u);
+}
+
+TEST_F(NamesTest, ANodeTakesAnotherNameAndGivesItBack) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  const auto renamed = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"forklift"});
+  ASSERT_TRUE(renamed);
+  EXPECT_EQ(renamed->name, "forklift");
+  EXPECT_FALSE(renamed->provisional);
+  EXPECT_FALSE(renamed->token.empty());
+  EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"forklift"})->node, robot.id);
+  EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"robot"}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"viewer"}).error().status, Status::taken);
+  ASSERT_TRUE(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}));
+  EXPECT_EQ(ask<ns::ReverseAnswer>(viewer, ns::Reverse{robot.id})->name, "");
+  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status, Status::not_found);
+}
+
+TEST_F(NamesTest, TheTokenOfANewNameBringsThatNameBack) {
+  const Node robot = join("robot");
+  const auto renamed = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"forklift"});
+  ASSERT_TRUE(renamed);
+  detach(robot);
+  proto::Hello hello;
+  hello.name = "forklift";
+  hello.token = renamed->token;
+  EXPECT_EQ(join(hello).id, robot.id);
 }
 
 TEST_F(NamesTest, AnUnreadableRequestIsABadOne) {

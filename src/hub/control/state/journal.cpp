@@ -1,0 +1,31 @@
+#include "hub/control/state/journal.hpp"
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+
+void Journal::add(proto::ns::Change change) {
+  GIMNET_CHECK(change.node.has_value() != change.service.has_value());
+  change.version = ++version_;
+  proto::bitestream::Writer writer;
+  proto::ns::write_change(writer, change);
+  GIMNET_CHECK(writer.finish() == BITESTREAM_OK);
+  Note note;
+  note.of_service = change.service.has_value();
+  note.index = note.of_service ? index_of(change.service->group) : index_of(change.node->node);
+  note.name = note.of_service ? change.service->name : change.node->name;
+  note.former_name = change.former_name;
+  note.bytes.assign(writer.bytes().begin(), writer.bytes().end());
+  bytes_ += size_of(note);
+  notes_.push_back(std::move(note));
+  while (notes_.size() > limits_.watch_changes || bytes_ > limits_.watch_bytes) {
+    bytes_ -= size_of(notes_.front());
+    notes_.pop_front();
+  }
+}
+
+std::size_t Journal::size_of(const Note& note) {
+  return sizeof(Note) + note.name.size() + note.former_name.size() + note.bytes.size();
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,38 @@
+#include "hub/control/state/records.hpp"
+
+namespace gimnet::hub {
+
+namespace ns = proto::ns;
+
+ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Services& services,
+                         std::chrono::milliseconds now) {
+  ns::NodeRecord record;
+  record.node = make_id<NodeId>(hub.id, session.index);
+  record.name = session.name;
+  record.hub = hub.id;
+  record.hub_name = hub.name;
+  record.connected = session.connected;
+  record.description = session.description;
+  record.place = session.origin.address;
+  record.joined_ms = static_cast<std::uint64_t>((now - session.joined).count());
+  record.services = static_cast<std::uint32_t>(services.services_of(session.index));
+  return record;
+}
+
+ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
+  const Service& service = *topic.service;
+  ns::ServiceRecord record;
+  record.group = make_id<GroupId>(hub.id, service.group);
+  record.name = std::string{topic.full_name};
+  record.node = make_id<NodeId>(hub.id, service.provider);
+  record.message_type = service.terms.message_type;
+  record.instance = service.terms.instance;
+  record.direction = static_cast<ns::Direction>(service.terms.direction);
+  record.delivery = static_cast<ns::Delivery>(service.terms.delivery);
+  record.metadata = service.terms.metadata;
+  record.subscribers = static_cast<std::uint32_t>(topic.subscribers.size());
+  record.hub_name = hub.name;
+  return record;
+}
+
+}  // namespace gimnet::hub

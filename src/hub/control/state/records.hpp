@@ -1,0 +1,24 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "hub/control/state/membership.hpp"
+#include "proto/control/ns.hpp"
+
+// Nodes and services as listings and watches tell of them. Thread safety: pure functions.
+
+namespace gimnet::hub {
+
+/// The hub as its records name it.
+struct HubTitle {
+  HubId id{1};
+  std::string name;
+};
+
+[[nodiscard]] proto::ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Services& services,
+                                              std::chrono::milliseconds now);
+/// REQUIRES: the topic has a service.
+[[nodiscard]] proto::ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic);
+
+}  // namespace gimnet::hub

@@ -1,0 +1,266 @@
+#include "hub/control/state/watches.hpp"
+
+#include <algorithm>
+
+#include "base/log.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Status;
+using std::chrono::milliseconds;
+namespace ns = proto::ns;
+
+constexpr std::size_t kQuotedMax = 60;
+/// A page is full at this size. The longest change has about 5 KiB, so that no frame has more than 13.
+constexpr std::size_t kPageBytes = 8 * 1024;
+constexpr std::size_t kFrameBytesMost = 16 * 1024;
+constexpr std::size_t kUnderWayMost = 8;
+
+/// What watching may put into a node's control queue leaves the other half to answers.
+std::size_t under_way_most(const Limits& limits) {
+  return std::clamp<std::size_t>(limits.control_bytes / 2 / kFrameBytesMost, 1, kUnderWayMost);
+}
+
+}  // namespace
+
+Watches::Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits)
+    : hub_(std::move(hub)), limits_(limits), under_way_most_(under_way_most(limits)), journal_(epoch, limits) {}
+
+void Watches::note(const NodeNoted& noted, const Membership& membership, milliseconds now) {
+  ns::Change change;
+  change.kind = noted.kind;
+  change.former_name = noted.former_name;
+  const Session* session = noted.kind == ns::ChangeKind::left ? nullptr : membership.sessions().find(noted.index);
+  if (session != nullptr) {
+    change.node = record_of(hub_, *session, membership.services(), now);
+  } else {
+    change.node.emplace();
+    change.node->node = make_id<NodeId>(hub_.id, noted.index);
+    change.node->hub = hub_.id;
+    change.node->name = noted.name;
+  }
+  journal_.add(std::move(change));
+}
+
+void Watches::note(const ServiceNoted& noted, const Membership& membership, milliseconds /*now*/) {
+  ns::Change change;
+  change.kind = noted.kind;
+  const Topic* topic =
+      noted.kind == ns::ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
+  if (topic != nullptr) {
+    change.service = record_of(hub_, *topic);
+  } else {
+    change.service.emplace();
+    change.service->group = make_id<GroupId>(hub_.id, noted.group);
+    change.service->node = make_id<NodeId>(hub_.id, noted.provider);
+    change.service->name = noted.full_name;
+  }
+  journal_.add(std::move(change));
+}
+
+Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Watch& wanted) {
+  if (wanted.watch == 0) return Failure{Status::bad_request, "a watch has a number other than 0"};
+  Watch watch;
+  watch.number = wanted.watch;
+  watch.subjects = wanted.subjects;
+  if (!wanted.pattern.empty()) watch.pattern = proto::Pattern::parse(wanted.pattern);
+  if (!wanted.pattern.empty() && !watch.pattern) {
+    return Failure{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
+                                            "' is no pattern: write a name in which a part may be * or **"};
+  }
+  Watcher& watcher = watchers_[node];
+  const auto old = std::ranges::find(watcher.watches, wanted.watch, &Watch::number);
+  if (old == watcher.watches.end() &&
+      (watcher.watches.size() >= limits_.watches_per_node || watches_ >= limits_.watches)) {
+    const bool own = watcher.watches.size() >= limits_.watches_per_node;
+    if (watcher.watches.empty() && watcher.under_way == 0) watchers_.erase(node);
+    const std::string limit = own ? "watches_per_node" : "watches";
+    return Failure{Status::limit, (own ? "a node may have " + std::to_string(limits_.watches_per_node)
+                                       : "this hub takes " + std::to_string(limits_.watches)) +
+                                      " watches; end one first, or start the hub with a larger --limit " + limit};
+  }
+  const bool goes_on = wanted.epoch == journal_.epoch() && journal_.reaches(wanted.version);
+  if (goes_on) {
+    watch.phase = Phase::live;
+    watch.seen = watch.told = wanted.version;
+  }
+  if (old != watcher.watches.end()) {
+    *old = std::move(watch);
+  } else {
+    watcher.watches.push_back(std::move(watch));
+    ++watches_;
+  }
+  return ns::WatchAnswer{!goes_on};
+}
+
+std::optional<Failure> Watches::unwatch(std::uint32_t node, std::uint32_t number) {
+  const auto found = watchers_.find(node);
+  const bool known = found != watchers_.end() && std::erase_if(found->second.watches, [number](const Watch& watch) {
+                                                   return watch.number == number;
+                                                 }) > 0;
+  if (!known) return Failure{Status::not_found, "this node has no watch " + std::to_string(number)};
+  --watches_;
+  return std::nullopt;
+}
+
+void Watches::taken(std::uint32_t node, std::uint32_t frames) {
+  const auto found = watchers_.find(node);
+  if (found == watchers_.end()) return;
+  found->second.under_way -= std::min<std::size_t>(frames, found->second.under_way);
+}
+
+void Watches::connection_ended(std::uint32_t node) {
+  const auto found = watchers_.find(node);
+  if (found == watchers_.end()) return;
+  watches_ -= found->second.watches.size();
+  watchers_.erase(found);
+}
+
+bool Watches::serve(const Membership& membership, milliseconds now, const Send& send) {
+  Turn turn{membership, now, limits_.scan_records};
+  for (std::size_t left = watchers_.size(); left > 0; --left) {
+    auto next = watchers_.upper_bound(last_served_);
+    if (next == watchers_.end()) next = watchers_.begin();
+    last_served_ = next->first;
+    if (serve_one(next->first, next->second, turn, send)) return true;
+  }
+  return false;
+}
+
+/// True: the work for this turn is done, and this node has more.
+bool Watches::serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send) {
+  for (std::size_t idle = 0; idle < watcher.watches.size();) {
+    if (watcher.under_way >= under_way_most_) return false;
+    watcher.next = (watcher.next + 1) % watcher.watches.size();
+    Watch& watch = watcher.watches[watcher.next];
+    if (is_idle(watch)) {
+      ++idle;
+      continue;
+    }
+    if (turn.work == 0) return true;
+    idle = 0;
+    Page page = next_page(watch, turn);
+    if (page.empty()) continue;
+    ++watcher.under_way;
+    send(node, finish(watch, std::move(page)));
+  }
+  return false;
+}
+
+bool Watches::is_idle(const Watch& watch) const {
+  return watch.phase == Phase::live && watch.seen == journal_.version();
+}
+
+void Watches::begin(Watch& watch) {
+  watch.phase = Phase::nodes;
+  watch.cursor = 0;
+  watch.seen = watch.told = journal_.version();
+}
+
+/// The changes of what the snapshot has shown come before more of it is shown: so what is shown is true at once, and
+/// what was not shown yet need not be told of.
+Watches::Page Watches::next_page(Watch& watch, Turn& turn) {
+  Page page;
+  if (watch.phase != Phase::begin && !journal_.reaches(watch.seen)) {
+    ++resyncs_;
+    watch.phase = Phase::begin;
+  }
+  if (watch.phase == Phase::begin) {
+    begin(watch);
+    add_mark(ns::ChangeKind::begin, page);
+  }
+  add_changes(watch, page, turn);
+  if (watch.seen != journal_.version()) return page;
+  if (watch.phase == Phase::nodes) add_nodes(watch, page, turn);
+  if (watch.phase == Phase::services) add_services(watch, page, turn);
+  if (watch.phase == Phase::end && !page.full) {
+    add_mark(ns::ChangeKind::end, page);
+    watch.phase = Phase::live;
+  }
+  return page;
+}
+
+void Watches::add_changes(Watch& watch, Page& page, Turn& turn) const {
+  for (; watch.seen != journal_.version() && turn.work > 0 && !page.full; --turn.work) {
+    const Journal::Note& note = journal_.at(++watch.seen);
+    if (!wants(watch, note)) continue;
+    page.bytes.insert(page.bytes.end(), note.bytes.begin(), note.bytes.end());
+    page.full = page.bytes.size() >= kPageBytes;
+  }
+}
+
+void Watches::add_nodes(Watch& watch, Page& page, Turn& turn) const {
+  const auto& all = turn.membership.sessions().all();
+  auto entry = (watch.subjects & ns::kWatchNodes) != 0 ? all.upper_bound(watch.cursor) : all.end();
+  for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
+    watch.cursor = entry->first;
+    if (!fits(watch, entry->second.name)) continue;
+    ns::Change change;
+    change.kind = ns::ChangeKind::present;
+    change.version = journal_.version();
+    change.node = record_of(hub_, entry->second, turn.membership.services(), turn.now);
+    add(change, page);
+  }
+  if (entry != all.end()) return;
+  watch.phase = Phase::services;
+  watch.cursor = 0;
+}
+
+void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
+  const auto& all = turn.membership.services().groups();
+  auto entry = (watch.subjects & ns::kWatchServices) != 0 ? all.upper_bound(watch.cursor) : all.end();
+  for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
+    watch.cursor = entry->first;
+    if (!fits(watch, entry->second->full_name)) continue;
+    ns::Change change;
+    change.kind = ns::ChangeKind::present;
+    change.version = journal_.version();
+    change.service = record_of(hub_, *entry->second);
+    add(change, page);
+  }
+  if (entry == all.end()) watch.phase = Phase::end;
+}
+
+void Watches::add_mark(ns::ChangeKind kind, Page& page) const {
+  ns::Change change;
+  change.kind = kind;
+  change.version = journal_.version();
+  add(change, page);
+}
+
+void Watches::add(const ns::Change& change, Page& page) const {
+  proto::bitestream::Writer writer;
+  ns::write_change(writer, change);
+  page.bytes.insert(page.bytes.end(), writer.bytes().begin(), writer.bytes().end());
+  page.full = page.bytes.size() >= kPageBytes;
+}
+
+proto::Payload Watches::finish(Watch& watch, Page page) const {
+  ns::WatchEvents head;
+  head.watch = watch.number;
+  head.hub = hub_.id;
+  head.epoch = journal_.epoch();
+  head.after = watch.told;
+  head.version = watch.told = watch.seen;
+  proto::bitestream::Writer writer;
+  head.write_head(writer);
+  proto::Payload payload = proto::assemble_control({ns::WatchEvents::kOperation, proto::kNoRequest}, writer);
+  // A Bitestream is a row of values: the changes go before the head, as WatchEvents::write() has them.
+  payload.insert(payload.begin() + proto::kControlHeaderSize, page.bytes.begin(), page.bytes.end());
+  return payload;
+}
+
+bool Watches::wants(const Watch& watch, const Journal::Note& note) {
+  if ((watch.subjects & (note.of_service ? ns::kWatchServices : ns::kWatchNodes)) == 0) return false;
+  // What the snapshot has yet to look at, it will show as it is then.
+  if (watch.phase == Phase::nodes && (note.of_service || note.index > watch.cursor)) return false;
+  if (watch.phase == Phase::services && note.of_service && note.index > watch.cursor) return false;
+  return fits(watch, note.name) || (!note.former_name.empty() && fits(watch, note.former_name));
+}
+
+bool Watches::fits(const Watch& watch, std::string_view name) {
+  return !watch.pattern || (!name.empty() && watch.pattern->matches(name));
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "hub/control/state/journal.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/control/state/records.hpp"
+#include "proto/control/pattern.hpp"
+
+namespace gimnet::hub {
+
+/// Who watches which names and services, and how much of it each has been told. A watch is a place in the journal: one
+/// that fell off its end is told the present state from the start again. Each serve() does a bounded piece of work,
+/// and each node takes part in it in turn.
+/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records, control_bytes.
+class Watches {
+ public:
+  Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits);
+
+  /// Keeps what the effect says for those who watch. REQUIRES: the effects before it were noted.
+  void note(const NodeNoted& noted, const Membership& membership, std::chrono::milliseconds now);
+  void note(const ServiceNoted& noted, const Membership& membership, std::chrono::milliseconds now);
+
+  /// Begins a watch, or one of that number anew. Errors: bad_request, limit.
+  [[nodiscard]] Result<proto::ns::WatchAnswer, Failure> watch(std::uint32_t node, const proto::ns::Watch& wanted);
+  /// Errors: not_found. nullopt: done.
+  [[nodiscard]] std::optional<Failure> unwatch(std::uint32_t node, std::uint32_t watch);
+  /// The node took so many WATCH_EVENTS: it may have as many more.
+  void taken(std::uint32_t node, std::uint32_t frames);
+  /// The node's connection ended, and its watches with it.
+  void connection_ended(std::uint32_t node);
+
+  /// Gives `send` what is due, a piece of it. True: there is more to do at once.
+  using Send = std::function<void(std::uint32_t node, proto::Payload events)>;
+  [[nodiscard]] bool serve(const Membership& membership, std::chrono::milliseconds now, const Send& send);
+
+  [[nodiscard]] const Journal& journal() const { return journal_; }
+  [[nodiscard]] std::size_t size() const { return watches_; }
+  /// How often a watch was so far behind that it had to begin again.
+  [[nodiscard]] std::uint64_t resyncs() const { return resyncs_; }
+
+ private:
+  /// What a watch is told at the moment: the snapshot's nodes, its services, or changes alone.
+  enum class Phase : std::uint8_t { begin, nodes, services, end, live };
+  struct Watch {
+    std::uint32_t number = 0;
+    std::uint8_t subjects = proto::ns::kWatchAll;
+    std::optional<proto::Pattern> pattern;  ///< nothing: all
+    Phase phase = Phase::begin;
+    std::uint32_t cursor = 0;  ///< index of the last node or group that the snapshot looked at
+    std::uint64_t seen = 0;    ///< version up to which changes were looked at
+    std::uint64_t told = 0;    ///< version of the last events
+  };
+  struct Watcher {
+    std::vector<Watch> watches;
+    std::size_t next = 0;       ///< whose turn it is
+    std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
+  };
+  /// One WATCH_EVENTS that is being written.
+  struct Page {
+    std::vector<std::byte> bytes;
+    bool full = false;
+    [[nodiscard]] bool empty() const { return bytes.empty(); }
+  };
+  struct Turn {
+    const Membership& membership;
+    std::chrono::milliseconds now;
+    std::size_t work;  ///< records and changes that may yet be looked at
+  };
+
+  [[nodiscard]] bool serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send);
+  [[nodiscard]] bool is_idle(const Watch& watch) const;
+  void begin(Watch& watch);
+  [[nodiscard]] Page next_page(Watch& watch, Turn& turn);
+  void add_changes(Watch& watch, Page& page, Turn& turn) const;
+  void add_nodes(Watch& watch, Page& page, Turn& turn) const;
+  void add_services(Watch& watch, Page& page, Turn& turn) const;
+  void add_mark(proto::ns::ChangeKind kind, Page& page) const;
+  void add(const proto::ns::Change& change, Page& page) const;
+  [[nodiscard]] proto::Payload finish(Watch& watch, Page page) const;
+  [[nodiscard]] static bool wants(const Watch& watch, const Journal::Note& note);
+  [[nodiscard]] static bool fits(const Watch& watch, std::string_view name);
+
+  const HubTitle hub_;
+  const Limits& limits_;
+  const std::size_t under_way_most_;
+  Journal journal_;
+  std::map<std::uint32_t, Watcher> watchers_;
+  std::uint32_t last_served_ = 0;
+  std::size_t watches_ = 0;
+  std::uint64_t resyncs_ = 0;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,42 @@
+#include "proto/control/ns_register.hpp"
+
+#include "proto/control/names.hpp"
+
+namespace gimnet::proto::ns {
+
+void RegisterName::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+RegisterName RegisterName::read(Fields& fields) { return {fields.required_text(3, "name", kNameBytesMax)}; }
+
+void RegisterNameAnswer::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kNameBytesMax);
+  writer.put_bool(4, provisional);
+  writer.put_opaque(5, token);
+}
+RegisterNameAnswer RegisterNameAnswer::read(Fields& fields) {
+  RegisterNameAnswer answer;
+  answer.name = fields.required_text(3, "name", kNameBytesMax);
+  answer.provisional = fields.flag(4, "provisional", false);
+  answer.token = fields.opaque(5, "token", kTokenBytesMax);
+  return answer;
+}
+
+void UnregisterNameAnswer::write(bitestream::Writer& writer) const { writer.put_opaque(5, token); }
+UnregisterNameAnswer UnregisterNameAnswer::read(Fields& fields) { return {fields.opaque(5, "token", kTokenBytesMax)}; }
+
+void NameConfirmed::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kNameBytesMax); }
+NameConfirmed NameConfirmed::read(Fields& fields) { return {fields.required_text(3, "name", kNameBytesMax)}; }
+
+void NameLost::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kNameBytesMax);
+  writer.put_u32(4, holder.value());
+  put_clean_text(writer, 5, sentence, kSentenceBytesMax);
+}
+NameLost NameLost::read(Fields& fields) {
+  NameLost lost;
+  lost.name = fields.required_text(3, "name", kNameBytesMax);
+  lost.holder = NodeId{fields.number<std::uint32_t>(4, "node id", 0)};
+  lost.sentence = fields.text(5, "sentence", kSentenceBytesMax);
+  return lost;
+}
+
+}  // namespace gimnet::proto::ns

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "proto/control/ns.hpp"
+
+// The own name of a node, after it has joined (docs/protocol.md, section 8). As ns.hpp.
+
+namespace gimnet::proto::ns {
+
+// REGISTER: take that name, in place of the one that this node has
+
+struct RegisterName {
+  static constexpr std::uint16_t kOperation = request_of(Operation::register_name);
+  static constexpr const char* kName = "REGISTER";
+  std::string name;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static RegisterName read(Fields& fields);
+  friend bool operator==(const RegisterName&, const RegisterName&) = default;
+};
+
+struct RegisterNameAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::register_name);
+  static constexpr const char* kName = "answer to REGISTER";
+  std::string name;              ///< as registered
+  bool provisional = false;      ///< NAME_CONFIRMED or NAME_LOST will tell
+  std::vector<std::byte> token;  ///< of the session, in place of the one of WELCOME
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static RegisterNameAnswer read(Fields& fields);
+  friend bool operator==(const RegisterNameAnswer&, const RegisterNameAnswer&) = default;
+};
+
+// UNREGISTER: give the own name back, go on without one
+
+struct UnregisterName {
+  static constexpr std::uint16_t kOperation = request_of(Operation::unregister_name);
+  static constexpr const char* kName = "UNREGISTER";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static UnregisterName read(Fields&) { return {}; }
+  friend bool operator==(const UnregisterName&, const UnregisterName&) = default;
+};
+
+struct UnregisterNameAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::unregister_name);
+  static constexpr const char* kName = "answer to UNREGISTER";
+  std::vector<std::byte> token;  ///< of the session, in place of the one before
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static UnregisterNameAnswer read(Fields& fields);
+  friend bool operator==(const UnregisterNameAnswer&, const UnregisterNameAnswer&) = default;
+};
+
+// Events
+
+/// A provisional name is final now.
+struct NameConfirmed {
+  static constexpr std::uint16_t kOperation = request_of(Operation::name_confirmed);
+  static constexpr const char* kName = "NAME_CONFIRMED";
+  std::string name;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static NameConfirmed read(Fields& fields);
+  friend bool operator==(const NameConfirmed&, const NameConfirmed&) = default;
+};
+
+/// The name went to a rival; the node goes on without one.
+struct NameLost {
+  static constexpr std::uint16_t kOperation = request_of(Operation::name_lost);
+  static constexpr const char* kName = "NAME_LOST";
+  std::string name;
+  NodeId holder;         ///< who has it now
+  std::string sentence;  ///< why, for people
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static NameLost read(Fields& fields);
+  friend bool operator==(const NameLost&, const NameLost&) = default;
+};
+
+}  // namespace gimnet::proto::ns

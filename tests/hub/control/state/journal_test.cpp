@@ -1,0 +1,68 @@
+#include "hub/control/state/journal.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::hub {
+namespace {
+
+namespace ns = proto::ns;
+
+ns::Change node_change(std::uint32_t index, std::size_t name_bytes = 5) {
+  ns::Change change;
+  change.kind = ns::ChangeKind::joined;
+  change.node.emplace();
+  change.node->node = make_id<NodeId>(HubId{7}, index);
+  change.node->name = std::string(name_bytes, 'n');
+  return change;
+}
+
+TEST(Journal, NumbersChangesWithoutGaps) {
+  const Limits limits;
+  Journal journal(9, limits);
+  EXPECT_EQ(journal.version(), 0u);
+  EXPECT_TRUE(journal.reaches(0));
+  for (std::uint32_t i = 1; i <= 5; ++i) journal.add(node_change(i));
+  EXPECT_EQ(journal.version(), 5u);
+  EXPECT_EQ(journal.epoch(), 9u);
+  for (std::uint32_t i = 1; i <= 5; ++i) EXPECT_EQ(journal.at(i).index, i);
+  EXPECT_FALSE(journal.reaches(6)) << "the future";
+}
+
+TEST(Journal, KeepsSoManyChanges) {
+  Limits limits;
+  limits.watch_changes = 3;
+  Journal journal(9, limits);
+  for (std::uint32_t i = 1; i <= 3; ++i) journal.add(node_change(i));
+  EXPECT_TRUE(journal.reaches(0));
+  journal.add(node_change(4));
+  EXPECT_FALSE(journal.reaches(0));
+  EXPECT_TRUE(journal.reaches(1));
+  EXPECT_EQ(journal.at(2).index, 2u);
+  EXPECT_EQ(journal.at(4).index, 4u);
+}
+
+TEST(Journal, KeepsSoManyBytes) {
+  Limits limits;
+  limits.watch_bytes = 64 * 1024;
+  Journal journal(9, limits);
+  for (std::uint32_t i = 1; i <= 1'000; ++i) journal.add(node_change(i, 255));
+  EXPECT_TRUE(journal.reaches(1'000 - 64));
+  EXPECT_FALSE(journal.reaches(1'000 - 256));
+}
+
+TEST(Journal, TellsServicesFromNodes) {
+  const Limits limits;
+  Journal journal(9, limits);
+  ns::Change change;
+  change.kind = ns::ChangeKind::advertised;
+  change.service.emplace();
+  change.service->group = make_id<GroupId>(HubId{7}, 3);
+  change.service->name = "robot/odom";
+  journal.add(std::move(change));
+  EXPECT_TRUE(journal.at(1).of_service);
+  EXPECT_EQ(journal.at(1).index, 3u);
+  EXPECT_EQ(journal.at(1).name, "robot/odom");
+}
+
+}  // namespace
+}  // namespace gimnet::hub

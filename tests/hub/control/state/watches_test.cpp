@@ -1,0 +1,317 @@
+#include "hub/control/state/watches.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <map>
+#include <set>
+
+// Tests name the members that matter and leave the others at their defaults, on purpose.
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace std::chrono_literals;
+using proto::Status;
+using proto::ns::Change;
+using proto::ns::ChangeKind;
+namespace ns = proto::ns;
+
+constexpr std::uint64_t kEpoch = 77;
+constexpr HubId kHub{7};
+
+/// A hub's state and those who watch it, who take what they are told when the test says so.
+class WatchesTest : public ::testing::Test {
+ protected:
+  Session& join(const std::string& name) {
+    JoinRequest request;
+    request.name = name;
+    request.origin = Origin{"tcp", "127.0.0.1:5000"};
+    Effects effects;
+    Session& session = *membership.join(request, now, effects)->session;
+    note(effects);
+    return session;
+  }
+  void end(Session& session, bool for_good) {
+    Effects effects;
+    membership.connection_ended(session, {for_good, proto::GoodbyeCode::done, ""}, now, effects);
+    note(effects);
+  }
+  std::uint32_t advertise(const Session& session, const std::string& service, const std::string& metadata = {}) {
+    Effects effects;
+    ServiceTerms terms;
+    terms.metadata = metadata;
+    const auto done = membership.services().advertise(session.index, session.name + "/" + service, terms, now, effects);
+    EXPECT_TRUE(done);
+    note(effects);
+    return done->group;
+  }
+  void note(const Effects& effects) {
+    for (const Effect& effect : effects) {
+      if (const auto* node = std::get_if<NodeNoted>(&effect)) watches.note(*node, membership, now);
+      if (const auto* service = std::get_if<ServiceNoted>(&effect)) watches.note(*service, membership, now);
+    }
+  }
+  Status watch(const Session& session, const ns::Watch& wanted) {
+    const auto answer = watches.watch(session.index, wanted);
+    return answer ? Status::done : answer.error().status;
+  }
+  void serve() {
+    while (watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
+      EXPECT_LE(payload.size(), 16u * 1024);
+      const auto events = proto::decode<ns::WatchEvents>(payload);
+      ASSERT_TRUE(events) << events.error().sentence;
+      waiting[node].push_back(*events);
+    })) {
+    }
+  }
+  /// What a node was told and has not taken yet, as "kind name"; it takes all of it.
+  std::vector<std::string> take(const Session& session) {
+    std::vector<std::string> told;
+    for (serve(); !waiting[session.index].empty(); serve()) {
+      const ns::WatchEvents events = waiting[session.index].front();
+      waiting[session.index].pop_front();
+      watches.taken(session.index, 1);
+      for (const Change& change : events.changes) told.push_back(text_of(change));
+    }
+    return told;
+  }
+  static std::string text_of(const Change& change) {
+    static const std::map<ChangeKind, std::string> kKinds{{ChangeKind::begin, "begin"},
+                                                          {ChangeKind::present, "present"},
+                                                          {ChangeKind::end, "end"},
+                                                          {ChangeKind::joined, "joined"},
+                                                          {ChangeKind::left, "left"},
+                                                          {ChangeKind::away, "away"},
+                                                          {ChangeKind::back, "back"},
+                                                          {ChangeKind::renamed, "renamed"},
+                                                          {ChangeKind::changed, "changed"},
+                                                          {ChangeKind::advertised, "advertised"},
+                                                          {ChangeKind::withdrawn, "withdrawn"}};
+    std::string text = kKinds.at(change.kind);
+    if (change.node) text += " " + change.node->name;
+    if (change.service) text += " " + change.service->name;
+    if (!change.former_name.empty()) text += " from " + change.former_name;
+    return text;
+  }
+
+  using Texts = std::vector<std::string>;
+  Limits limits;
+  std::chrono::milliseconds now{1'000};
+  Membership membership{Sessions::Options{kHub, 2, Placement::spread}, limits};
+  Watches watches{HubTitle{kHub, "hub-7"}, kEpoch, limits};
+  std::map<std::uint32_t, std::deque<ns::WatchEvents>> waiting;
+};
+
+TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
+  Session& viewer = join("viewer");
+  Session& robot = join("hall/robot");
+  advertise(robot, "odom");
+  ASSERT_EQ(watch(viewer, {.watch = 3}), Status::done);
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present hall/robot", "present hall/robot/odom", "end"}));
+  EXPECT_EQ(take(viewer), Texts{});
+  const std::uint32_t group = advertise(robot, "pose", "x y");
+  advertise(robot, "pose", "x y theta");
+  end(robot, false);
+  Effects effects;
+  ASSERT_FALSE(membership.services().withdraw(robot.index, group, now, effects));
+  note(effects);
+  end(join("late"), true);
+  EXPECT_EQ(take(viewer), (Texts{"advertised hall/robot/pose", "changed hall/robot/pose", "away hall/robot",
+                                 "withdrawn hall/robot/pose", "joined late", "left late"}));
+}
+
+TEST_F(WatchesTest, TellOnlyWhatThePatternAndTheSubjectsSay) {
+  Session& viewer = join("viewer");
+  Session& robot = join("hall/robot");
+  advertise(robot, "odom");
+  join("");
+  ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "hall/*"}), Status::done);
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present hall/robot", "end"}));
+  ASSERT_EQ(watch(viewer, {.watch = 2, .pattern = "**", .subjects = ns::kWatchServices}), Status::done);
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present hall/robot/odom", "end"}));
+  join("yard/robot");
+  advertise(robot, "pose");
+  EXPECT_EQ(take(viewer), Texts{"advertised hall/robot/pose"});
+}
+
+TEST_F(WatchesTest, TellOfANewNameWhoeverWatchesTheOldOneOrTheNewOne) {
+  Session& viewer = join("viewer");
+  Session& robot = join("a/robot");
+  ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "a/*"}), Status::done);
+  ASSERT_EQ(watch(viewer, {.watch = 2, .pattern = "b/*"}), Status::done);
+  take(viewer);
+  Effects effects;
+  ASSERT_FALSE(membership.rename(robot, "b/robot", now, effects));
+  note(effects);
+  EXPECT_EQ(take(viewer), (Texts{"renamed b/robot from a/robot", "renamed b/robot from a/robot"}));
+}
+
+TEST_F(WatchesTest, FollowEachOtherWithoutAGap) {
+  Session& viewer = join("viewer");
+  ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "robot/*"}), Status::done);
+  std::uint64_t version = 0;
+  for (int round = 0; round < 20; ++round) {
+    join("other/" + std::to_string(round));
+    join("robot/" + std::to_string(round));
+    serve();
+    for (; !waiting[viewer.index].empty(); waiting[viewer.index].pop_front()) {
+      const ns::WatchEvents& events = waiting[viewer.index].front();
+      EXPECT_EQ(events.epoch, kEpoch);
+      EXPECT_EQ(events.hub, kHub);
+      const bool first = events.changes.front().kind == ChangeKind::begin;
+      EXPECT_TRUE(first || events.after == version);
+      for (const Change& change : events.changes) EXPECT_LE(change.version, events.version);
+      version = events.version;
+      watches.taken(viewer.index, 1);
+    }
+  }
+  EXPECT_EQ(version, watches.journal().version());
+}
+
+/// What the changes say is there, whatever came between the pages of the snapshot.
+TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
+  Session& viewer = join("viewer");
+  limits.scan_records = 64;
+  std::vector<Session*> robots;
+  for (int i = 0; i < 400; ++i) robots.push_back(&join("robot-" + std::to_string(i)));
+  for (int i = 0; i < 300; ++i) advertise(*robots[static_cast<std::size_t>(i)], "odom");
+  ASSERT_EQ(watch(viewer, {.watch = 1}), Status::done);
+  std::set<std::string> known;
+  bool complete = false;
+  for (int step = 0; !complete; ++step) {
+    ASSERT_LT(step, 1'000);
+    static_cast<void>(watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
+      const auto events = proto::decode<ns::WatchEvents>(payload);
+      ASSERT_TRUE(events);
+      for (const Change& change : events->changes) {
+        complete |= change.kind == ChangeKind::end;
+        const std::string name = change.node ? change.node->name : change.service ? change.service->name : "";
+        if (name.empty()) continue;
+        const bool gone = change.kind == ChangeKind::left || change.kind == ChangeKind::withdrawn;
+        if (gone) {
+          EXPECT_EQ(known.erase(name), 1u) << name << " left, and was never shown";
+        } else if (change.kind == ChangeKind::present || change.kind == ChangeKind::joined ||
+                   change.kind == ChangeKind::advertised) {
+          EXPECT_TRUE(known.insert(name).second) << name << " was shown twice";
+        }
+      }
+    }));
+    watches.taken(viewer.index, 1);
+    if (!robots.empty()) {
+      end(*robots[(static_cast<std::size_t>(step) * 7919) % robots.size()], true);
+      robots.erase(robots.begin() +
+                   static_cast<std::ptrdiff_t>((static_cast<std::size_t>(step) * 7919) % robots.size()));
+    }
+    advertise(join("new-" + std::to_string(step)), "pose");
+  }
+  for (const std::string& text : take(viewer)) {
+    const std::string name = text.substr(text.find(' ') + 1);
+    if (text.starts_with("left") || text.starts_with("withdrawn")) known.erase(name);
+    if (text.starts_with("joined") || text.starts_with("advertised")) known.insert(name);
+  }
+  std::set<std::string> expected;
+  for (const auto& [index, session] : membership.sessions().all()) expected.insert(session.name);
+  for (const auto& [group, topic] : membership.services().groups()) expected.insert(std::string{topic->full_name});
+  EXPECT_EQ(known, expected);
+}
+
+TEST_F(WatchesTest, ASlowWatcherIsSentLittleAndCostsNobodyElse) {
+  Session& slow = join("slow");
+  Session& fast = join("fast");
+  ASSERT_EQ(watch(slow, {.watch = 1}), Status::done);
+  ASSERT_EQ(watch(fast, {.watch = 1}), Status::done);
+  take(fast);
+  for (int i = 0; i < 1'000; ++i) {
+    join("robot-" + std::to_string(i));
+    EXPECT_EQ(take(fast), Texts{"joined robot-" + std::to_string(i)});
+  }
+  EXPECT_EQ(waiting[slow.index].size(), 8u);
+  // What was kept for it comes when it takes.
+  const Texts late = take(slow);
+  EXPECT_EQ(late.back(), "joined robot-999");
+  EXPECT_EQ(watches.resyncs(), 0u);
+}
+
+TEST_F(WatchesTest, WhoIsTooFarBehindBeginsAgain) {
+  limits.watch_changes = 100;
+  Session& slow = join("slow");
+  ASSERT_EQ(watch(slow, {.watch = 1, .pattern = "*"}), Status::done);
+  take(slow);
+  for (int i = 0; i < 200; ++i) {
+    end(join("robot-" + std::to_string(i)), i % 50 != 0);
+    serve();
+  }
+  const Texts told = take(slow);
+  const auto again = std::find(told.begin() + 1, told.end(), "begin");
+  ASSERT_NE(again, told.end());
+  EXPECT_EQ(watches.resyncs(), 1u);
+  const Texts rest(again, told.end());
+  EXPECT_EQ(std::count(rest.begin(), rest.end(), "end"), 1);
+  EXPECT_EQ(std::count(rest.begin(), rest.end(), "present robot-150") +
+                std::count(rest.begin(), rest.end(), "joined robot-150"),
+            1);
+}
+
+TEST_F(WatchesTest, GoOnWhereTheWatcherWasIfTheChangesAreStillThere) {
+  Session& viewer = join("viewer");
+  const std::uint64_t before = watches.journal().version();
+  join("robot");
+  ASSERT_EQ(watch(viewer, {.watch = 1, .epoch = kEpoch, .version = before}), Status::done);
+  EXPECT_EQ(take(viewer), Texts{"joined robot"});
+  const auto other_life = watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch + 1, .version = before});
+  EXPECT_TRUE(other_life->snapshot);
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present robot", "end"}));
+  const auto future = watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch, .version = before + 1'000});
+  EXPECT_TRUE(future->snapshot);
+}
+
+TEST_F(WatchesTest, EndWhenTheyAreToldToAndWithTheConnection) {
+  Session& viewer = join("viewer");
+  ASSERT_EQ(watch(viewer, {.watch = 1}), Status::done);
+  ASSERT_EQ(watch(viewer, {.watch = 2}), Status::done);
+  take(viewer);
+  EXPECT_FALSE(watches.unwatch(viewer.index, 1));
+  EXPECT_EQ(watches.unwatch(viewer.index, 1)->status, Status::not_found);
+  EXPECT_EQ(watches.size(), 1u);
+  join("robot");
+  EXPECT_EQ(take(viewer), Texts{"joined robot"});
+  watches.connection_ended(viewer.index);
+  EXPECT_EQ(watches.size(), 0u);
+  EXPECT_EQ(watches.unwatch(viewer.index, 2)->status, Status::not_found);
+  join("robot-2");
+  EXPECT_EQ(take(viewer), Texts{});
+}
+
+TEST_F(WatchesTest, AreLimited) {
+  limits.watches_per_node = 2;
+  limits.watches = 3;
+  Session& a = join("a");
+  Session& b = join("b");
+  EXPECT_EQ(watch(a, {.watch = 1}), Status::done);
+  EXPECT_EQ(watch(a, {.watch = 2}), Status::done);
+  const auto one_more = watches.watch(a.index, {.watch = 3});
+  EXPECT_EQ(one_more.error().status, Status::limit);
+  EXPECT_NE(one_more.error().sentence.find("watches_per_node"), std::string::npos);
+  EXPECT_EQ(watch(a, {.watch = 2}), Status::done) << "the same one anew";
+  EXPECT_EQ(watch(b, {.watch = 1}), Status::done);
+  EXPECT_EQ(watches.watch(b.index, {.watch = 2}).error().status, Status::limit);
+  EXPECT_EQ(watch(b, {.watch = 0}), Status::bad_request);
+  EXPECT_EQ(watch(b, {.watch = 1, .pattern = "a//b"}), Status::bad_request);
+  EXPECT_EQ(watches.size(), 3u);
+}
+
+TEST_F(WatchesTest, OneServingIsABoundedPieceOfWork) {
+  limits.scan_records = 64;
+  Session& viewer = join("viewer");
+  for (int i = 0; i < 1'000; ++i) join("robot-" + std::to_string(i));
+  ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "nobody/*"}), Status::done);
+  int pieces = 1;
+  const auto send = [](std::uint32_t, const proto::Payload&) {};
+  while (watches.serve(membership, now, send)) ++pieces;
+  EXPECT_GE(pieces, 1'000 / 64);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
