@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/performance.md from a JSON document of `./dev perf --json`: perf/report.py RESULT.json [DOCUMENT.md]"""
+"""Writes docs/performance.md and its pictures from a JSON document of `./dev perf --json`: perf/report.py RESULT.json [DOCUMENT.md]"""
 
 import json
 import pathlib
@@ -7,7 +7,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver.document import make_document  # noqa: E402
+from driver.report import write_report  # noqa: E402
 
 DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "performance.md"
 
@@ -18,7 +18,7 @@ def main() -> int:
         return 2
     result = json.loads(pathlib.Path(sys.argv[1]).read_text())
     target = pathlib.Path(sys.argv[2]) if len(sys.argv) == 3 else DOCUMENT
-    target.write_text(make_document(result))
+    write_report(result, target)
     return 0
 
 

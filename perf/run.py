@@ -16,8 +16,8 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 from driver import against, catalogue, instructions, suite  # noqa: E402
-from driver.document import make_document  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
+from driver.report import write_report  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
@@ -34,7 +34,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="the scenarios that decide, in a few minutes")
     parser.add_argument("--smoke", action="store_true", help="every scenario for a moment: nothing lost? not timed")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
-    parser.add_argument("--report", action="store_true", help="write docs/performance.md")
+    parser.add_argument("--report", action="store_true", help="write docs/performance.md and its pictures")
     parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
                         metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; all")
     parser.add_argument("--against", metavar="REV", help="build that version too, and say which is faster; --runs are pairs")
@@ -153,7 +153,7 @@ def measure(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:
-        (ROOT / "docs" / "performance.md").write_text(make_document(document))
+        write_report(document, ROOT / "docs" / "performance.md")
     return judge(outcomes, rows, arguments.smoke)
 
 

@@ -1,6 +1,6 @@
 """docs/performance.md from the JSON document of a run."""
 
-from driver.goals import FIELD_TITLES, GOALS, Goal
+from driver.goals import FIELD_TITLES, GOALS, RIVAL_FIELDS, Goal
 from driver.summary import COLUMNS, absence_lines, cells, shown
 
 INTRODUCTION = """# Performance
@@ -46,6 +46,32 @@ a second shard, on a processor of its own where the generator leaves one; `tcphu
 
 def with_derived(rows: list[dict]) -> list[dict]:
     """Adds the figures that need two rows."""
+    return with_rivals(with_idle_latency(with_null_seconds(rows)))
+
+
+def with_rivals(rows: list[dict]) -> list[dict]:
+    """How many times as much another hub takes for the same."""
+    costs = {(row["subject"], row["scenario"], row["size"], row["transport"]): row["cpu_ns_per_message"] for row in rows}
+    derived = []
+    for row in rows:
+        extra = {}
+        for rival in RIVAL_FIELDS:
+            cost = costs.get((rival, row["scenario"], row["size"], row["transport"]))
+            if cost and row["cpu_ns_per_message"]:
+                extra[RIVAL_FIELDS[rival]] = cost / row["cpu_ns_per_message"]
+        derived.append(row | extra)
+    return derived
+
+
+def with_idle_latency(rows: list[dict]) -> list[dict]:
+    """The 99th percentile of a ping under load, in that of the same subject without."""
+    idle = {(row["subject"], row["transport"]): row["p99_us"] for row in rows if row["scenario"] == "ping_two_cpus"}
+    return [row | ({"p99_over_idle": row["p99_us"] / idle[row["subject"], row["transport"]]}
+                   if row["scenario"].startswith("ping_under") and idle.get((row["subject"], row["transport"])) else {})
+            for row in rows]
+
+
+def with_null_seconds(rows: list[dict]) -> list[dict]:
     null_seconds = {(row["scenario"], row["transport"]): row["seconds"] for row in rows
                     if row["subject"] == "null" and "seconds" in row}
     derived = []
@@ -70,17 +96,17 @@ def verdict(goal: Goal, value: float) -> str:
 
 
 def goal_table(rows: list[dict]) -> str:
-    measured = {(row["scenario"], row["size"], row["transport"]): row for row in rows if row["subject"] == "tcphub"}
+    measured = {(row["subject"], row["scenario"], row["size"], row["transport"]): row for row in rows}
     lines = []
     for goal in GOALS:
-        row = measured.get((goal.scenario, goal.size, goal.transport))
+        row = measured.get((goal.subject, goal.scenario, goal.size, goal.transport))
         value = row.get(goal.field) if row is not None else None
         sign = ">=" if goal.at_least else "<="
-        lines.append([goal.scenario, str(goal.size), goal.transport, FIELD_TITLES[goal.field],
+        lines.append([goal.subject, goal.scenario, str(goal.size), goal.transport, FIELD_TITLES[goal.field],
                       f"{sign} {shown(goal.bound)}" if goal.bound is not None else "", f"{sign} {shown(goal.goal)}",
                       shown(value) if value is not None else "not measured",
                       verdict(goal, value) if value is not None else ""])
-    return table(["scenario", "bytes", "transport", "figure", "bound", "goal", "measured", ""], lines)
+    return table(["subject", "scenario", "bytes", "transport", "figure", "bound", "goal", "measured", ""], lines)
 
 
 def other_figures(rows: list[dict]) -> str:
@@ -93,7 +119,8 @@ def other_figures(rows: list[dict]) -> str:
     return table(["subject", "transport", "scenario", "figure", "median"], lines)
 
 
-def make_document(result: dict) -> str:
+def make_document(result: dict, pictures: list[str] | None = None) -> str:
+    """`pictures`: links in Markdown."""
     rows = with_derived(result["results"])
     machine = result["machine"]
     hub = " ".join(result["hub_arguments"]) or "none"
@@ -107,6 +134,7 @@ def make_document(result: dict) -> str:
         "## Bounds and goals", "",
         "A bound must hold; a goal is where the hub is to get.", "",
         goal_table(rows), "",
+        *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         "## All figures", "",
         "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
         "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000.", "",

@@ -14,6 +14,7 @@ class Goal:
     bound: float | None
     goal: float
     at_least: bool = False  # the figure shall not be below; otherwise not above
+    subject: str = "tcphub"
 
     def holds(self, value: float, limit: float) -> bool:
         return value >= limit if self.at_least else value <= limit
@@ -21,6 +22,8 @@ class Goal:
 
 NULL = "ratio_to_null"
 NULL_TCP = "ratio_to_null_tcp"
+# Another hub's cost in that of the row.
+RIVAL_FIELDS = {"nats": "times_nats", "mosquitto": "times_mosquitto", "redis": "times_redis", "zeromq": "times_zeromq"}
 
 GOALS = (
     Goal("one_to_one", 16, "tcp", NULL, 2.0, 1.25),
@@ -36,6 +39,15 @@ GOALS = (
     Goal("fan_out_1000", 16, "tcp", NULL, None, 1.2),
     Goal("fan_out_1000", 1024, "tcp", NULL, None, 1.2),
     Goal("ping_one_cpu", 16, "tcp", NULL, 1.2, 1.0),
+    Goal("one_to_one", 16, "tcp", RIVAL_FIELDS["nats"], None, 15, at_least=True),
+    Goal("one_to_one", 16, "tcp", RIVAL_FIELDS["redis"], None, 35, at_least=True),
+    Goal("one_to_one", 16, "tcp", RIVAL_FIELDS["zeromq"], None, 20, at_least=True),
+    Goal("one_to_one", 65536, "tcp", RIVAL_FIELDS["nats"], None, 3, at_least=True),
+    Goal("in_turns", 16, "tcp", RIVAL_FIELDS["nats"], None, 10, at_least=True),
+    Goal("fan_out_100", 16, "tcp", RIVAL_FIELDS["nats"], None, 8, at_least=True),
+    Goal("ping_two_cpus", 16, "tcp", NULL, None, 0.35, subject="tcphub_spinning"),
+    Goal("ping_paced", 16, "tcp", "p999_us", None, 250, subject="tcphub_spinning"),
+    Goal("ping_under_bulk", 16, "tcp", "p99_over_idle", None, 1.5),
     Goal("stalled_subscriber", 1024, "tcp", "rate_kept", None, 0.95, at_least=True),
     Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 2048, 1024),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
@@ -44,6 +56,9 @@ GOALS = (
 FIELD_TITLES = {
     NULL: "times the null relay",
     NULL_TCP: "times the null relay on TCP",
+    **{field: f"times cheaper than {name}" for name, field in RIVAL_FIELDS.items()},
+    "p999_us": "99.9th percentile, us",
+    "p99_over_idle": "99th percentile, times that of ping_two_cpus",
     "rate_kept": "of the healthy subscriber's rate kept",
     "rss_bytes_per_connection": "resident bytes a connection",
     "seconds_over_null": "seconds longer than the null relay",

@@ -78,20 +78,26 @@ def whole_plan(subjects: tuple[str, ...]) -> Plan:
 
 
 # What every subject is measured in, also in a quick run.
-QUICK_OF_ALL = frozenset({Case("one_to_one", 16, "tcp"), Case("one_to_one", 65536, "tcp"), Case("fan_out_100", 16, "tcp")})
+QUICK_OF_ALL = frozenset({Case("one_to_one", 16, "tcp"), Case("one_to_one", 65536, "tcp"), Case("in_turns", 16, "tcp"),
+                          Case("fan_out_100", 16, "tcp")})
+# Where spinning is for.
+QUICK_OF_SPINNING = frozenset({Case("ping_two_cpus", 16, "tcp"), Case("ping_paced", 16, "tcp")})
 
 
 def quick_plan(subjects: tuple[str, ...]) -> Plan:
     """All subjects in the cases that compare them; the others in the cases that goals are set for."""
-    few = tuple(name for name in subjects if name in OURS)
-    return {case: subjects if case in QUICK_OF_ALL else few for case in quick_cases()}
+    def among(case: Case, name: str) -> bool:
+        return name in OURS or case in QUICK_OF_ALL or (name == "tcphub_spinning" and case in QUICK_OF_SPINNING)
+
+    return {case: tuple(name for name in subjects if among(case, name)) for case in quick_cases()}
 
 
 def quick_cases() -> list[Case]:
     over_tcp = [("one_to_one", 16), ("one_to_one", 256), ("one_to_one", 4096), ("one_to_one", 65536),
                 ("one_to_one_unbatched", 16), ("four_to_four", 16), ("in_turns", 16), ("fan_out_10", 16),
                 ("fan_out_100", 16), ("fan_out_1000", 16), ("fan_out_1000", 1024), ("list_100", 16),
-                ("broadcast_100", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16), ("ping_under_bulk", 16),
+                ("broadcast_100", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16), ("ping_paced", 16),
+                ("ping_under_bulk", 16),
                 ("stalled_subscriber", 1024), ("idle_10000", 16), ("connect_10000", 16)]
     over_unix = [("one_to_one", 16), ("one_to_one", 65536), ("one_to_one_unbatched", 16), ("ping_one_cpu", 16)]
     return [Case(*case, "tcp") for case in over_tcp] + [Case(*case, "unix") for case in over_unix]

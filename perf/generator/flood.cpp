@@ -27,7 +27,8 @@ Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t reci
       begin_(Clock::now()) {}
 
 std::uint64_t Flood::deliveries_allowed() const {
-  // Not more than has arrived so far: what a slow subject still has to do when time is up would take longer than the run.
+  // Not more than has arrived so far: what a slow subject still has to do when time is up would take longer than the
+  // run.
   std::uint64_t window = std::min<std::uint64_t>(window_bytes_ / message_bytes_, settled_ + missing_);
   if (is_unbatched_) window = std::min<std::uint64_t>(window, kUnbatchedMessagesARecipient * recipients_a_message_);
   const std::uint64_t under_way = expected_ - settled_ - missing_;

@@ -11,9 +11,9 @@
 namespace gimnet::perf {
 
 /// Publishes in a window, so that nobody is measured while it drops: at most 2 MiB are under way, or 128 KiB a
-/// recipient where that is more, and at first not more than has arrived. Of unbatched messages at most 64 a recipient are: where a subject that was not
-/// scheduled for a moment finds many of them at once, its cost says nothing about one. Counts what was sent to how
-/// many, and what became of it.
+/// recipient where that is more, and at first not more than has arrived. Of unbatched messages at most 64 a recipient
+/// are: where a subject that was not scheduled for a moment finds many of them at once, its cost says nothing about
+/// one. Counts what was sent to how many, and what became of it.
 class Flood {
  public:
   /// `recipients_a_message`: copies that the subject makes of each message. `bytes_a_second` 0: no pace.

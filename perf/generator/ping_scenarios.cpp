@@ -143,9 +143,14 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair, std:
   const auto count = static_cast<double>(round_trips_ns.size());
 
   Findings findings;
+  findings.add("p10_us", percentile_us(round_trips_ns, 0.1));
+  findings.add("p25_us", percentile_us(round_trips_ns, 0.25));
   findings.add("p50_us", percentile_us(round_trips_ns, 0.5));
+  findings.add("p75_us", percentile_us(round_trips_ns, 0.75));
+  findings.add("p90_us", percentile_us(round_trips_ns, 0.9));
   findings.add("p99_us", percentile_us(round_trips_ns, 0.99));
   findings.add("p999_us", percentile_us(round_trips_ns, 0.999));
+  findings.add("max_us", percentile_us(round_trips_ns, 1));
   findings.add("messages_per_second", 2 * count / seconds);
   findings.add("messages", 2 * count);
   findings.add("cpu_ns_per_message", cpu_ns / (2 * count));

@@ -10,7 +10,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "perf"))
 
 import run  # noqa: E402
-from driver import against, catalogue, suite  # noqa: E402
+from driver import against, catalogue, plots, suite  # noqa: E402
 from driver.document import make_document, with_derived  # noqa: E402
 from driver.goals import GOALS, Goal  # noqa: E402
 from driver.measure import Outcome, make_group  # noqa: E402
@@ -47,7 +47,8 @@ class Suite(unittest.TestCase):
         for case in (suite.Case("one_to_one", 16, "tcp"), suite.Case("one_to_one", 65536, "tcp"),
                      suite.Case("fan_out_100", 16, "tcp")):
             self.assertEqual(plan[case], catalogue.SUBJECTS)
-        self.assertEqual(plan[suite.Case("in_turns", 16, "tcp")], ("null", "tcphub"))
+        self.assertEqual(plan[suite.Case("fan_out_10", 16, "tcp")], ("null", "tcphub"))
+        self.assertIn("tcphub_spinning", plan[suite.Case("ping_two_cpus", 16, "tcp")])
 
     def test_smoke_runs_the_hub_in_every_case_and_each_subject_in_some(self):
         plan = suite.smoke_plan(catalogue.SUBJECTS)
@@ -136,6 +137,32 @@ class Rows(unittest.TestCase):
         self.assertIsNone(make_rows([outcome("tcphub", case, [300])])[0]["ratio_to_null"])
 
 
+class Pictures(unittest.TestCase):
+    ROWS = [{"subject": "tcphub", "scenario": scenario, "transport": transport, "size": size, "cpu_ns_per_message": cost}
+            for scenario, transport, size, cost in (("one_to_one", "tcp", 256, 80), ("one_to_one", "tcp", 16, 12),
+                                                    ("one_to_one", "unix", 16, 9), ("fan_out_10", "tcp", 16, 7))]
+
+    def test_lines_are_of_one_scenario_over_tcp_in_order(self):
+        self.assertEqual(plots.series_by_size(self.ROWS, "one_to_one"), {"tcphub": [(16, 12), (256, 80)]})
+        self.assertEqual(plots.series_by_subscribers(self.ROWS, 16), {"tcphub": [(1, 12), (10, 7)]})
+
+    def test_latency_is_the_share_that_takes_longer(self):
+        rows = [{"subject": "null", "scenario": "ping_paced", "transport": "tcp", "p50_us": 30, "p99_us": 90}]
+        (points,) = plots.series_of_latency(rows, "ping_paced").values()
+        self.assertEqual([(x, round(y, 9)) for x, y in points], [(30, 0.5), (90, 0.01)])
+
+    def test_draws_what_there_are_rows_for(self):
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("matplotlib is not installed")
+        with tempfile.TemporaryDirectory() as folder:
+            drawn = plots.draw_all(self.ROWS, pathlib.Path(folder))
+            self.assertEqual([name for name, _ in drawn], ["cost_by_size.png", "cost_by_subscribers.png"])
+            for name, _ in drawn:
+                self.assertTrue(pathlib.Path(folder, name).read_bytes().startswith(b"\x89PNG"))
+
+
 class Pairs(unittest.TestCase):
     OLD = [100.0, 104.0, 98.0, 101.0, 99.0, 130.0, 100.5, 102.0, 97.0, 100.0, 103.0, 99.5]
 
@@ -179,9 +206,27 @@ class Document(unittest.TestCase):
         document = make_document({"results": rows, "machine": {"processor": "p", "cpus_allowed": 2, "system": "s",
                                                                "kernel": "k"}, "date": "d", "version": "v",
                                   "seconds": 1, "hub_arguments": []})
-        self.assertIn("| one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | bound met, goal open |",
+        self.assertIn("| tcphub | one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | bound met, goal open |",
                       document)
         self.assertIn("not measured", document)
+
+    def test_pictures_are_linked(self):
+        document = make_document({"results": [], "machine": {"processor": "p", "cpus_allowed": 2, "system": "s",
+                                                             "kernel": "k"}, "date": "d", "version": "v",
+                                  "seconds": 1, "hub_arguments": []}, ["![a](performance/a.png)"])
+        self.assertIn("![a](performance/a.png)", document)
+
+    def test_derives_how_much_cheaper_than_another_hub(self):
+        case = suite.Case("one_to_one", 16, "tcp")
+        rows = with_derived(make_rows([outcome("null", case, [10]), outcome("tcphub", case, [20]),
+                                       outcome("nats", case, [300])]))
+        self.assertEqual(rows[1]["times_nats"], 15)
+        self.assertNotIn("times_redis", rows[1])
+
+    def test_derives_what_load_does_to_a_ping(self):
+        rows = [{"subject": "tcphub", "scenario": scenario, "transport": "tcp", "size": 16, "p99_us": p99,
+                 "cpu_ns_per_message": 1} for scenario, p99 in (("ping_two_cpus", 100), ("ping_under_bulk", 150))]
+        self.assertEqual(with_derived(rows)[1]["p99_over_idle"], 1.5)
 
     def test_derives_the_time_beyond_the_null_relay(self):
         case = suite.Case("connect_10000", 16, "tcp")
