@@ -72,7 +72,7 @@ class WrongForGimnet(unittest.TestCase):
             (["odom", "NODE/SERVICE"], ["pub", "odom"]),
             (["robot/odom", "other"], ["pub", "robot/odom", "--name", "other"]),
             (["--delivery"], ["pub", "robot/odom", "--delivery", "sometimes"]),
-            (["-c", "0"], ["ping", "B", "-c", "0"]),
+            (["-c,--count", "0"], ["ping", "B", "-c", "0"]),
             (["--lane"], ["send", "B", "--lane", "fast"]),
             (["--nonsense"], ["nodes", "--nonsense"]),
         ):
@@ -85,11 +85,12 @@ class WrongForGimnet(unittest.TestCase):
         self.assertIn("Examples:", tool.err)
 
     def test_help_begins_with_examples(self):
-        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["ping"], ["nodes"], ["services"], ["status"]):
+        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["hz"], ["bw"], ["ping"], ["nodes"], ["services"], ["status"]):
             tool = run(GIMNET, *command, "--help")
             self.assertEqual((tool.code, tool.err), (0, ""), command)
             text = tool.out.decode()
             self.assertLess(text.index("Examples:"), text.index("--help"), command)
+            self.assertIn(" ".join(["Usage: gimnet", *command]), text)
         version = run(GIMNET, "--version")
         self.assertEqual(version.code, 0)
         self.assertRegex(version.out.decode(), r"^gimnet \d+\.\d+\.\d+\n$")
@@ -122,15 +123,22 @@ class WrongForGimnet(unittest.TestCase):
         self.assertEqual(tool.code, 2)
         self.assertIn("no spaces", tool.err)
 
-    def test_output_that_nobody_reads(self):
+    def test_a_reader_of_the_output_that_went_away_had_enough(self):
         hub = Hub(self)
         reader, writer = os.pipe()
         os.close(reader)
         with subprocess.Popen([GIMNET, "--hub", hub.url, "status"], stdout=writer, stderr=subprocess.PIPE) as tool:
             os.close(writer)
             _, words = tool.communicate(timeout=PATIENCE_S)
-        self.assertEqual(tool.returncode, 1)
-        self.assertIn(b"standard output", words)
+        self.assertEqual((tool.returncode, words), (0, b""))
+
+    def test_an_output_that_is_full(self):
+        hub = Hub(self)
+        for words in (["status"], ["--help"]):
+            with open("/dev/full", "wb") as full, subprocess.Popen([GIMNET, "--hub", hub.url, *words], stdout=full,
+                                                                   stderr=subprocess.PIPE) as tool:
+                _, said = tool.communicate(timeout=PATIENCE_S)
+            self.assertEqual((tool.returncode, said), (1, b"gimnet: cannot write to standard output: No space left on device\n"))
 
     def test_another_version(self):
         listener = socket.create_server(("127.0.0.1", 0))

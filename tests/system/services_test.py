@@ -86,6 +86,77 @@ class Services(unittest.TestCase):
         self.assertEqual((ledger["accepted"], ledger["copies"], ledger["delivered"]), (100, 300, 400))
 
 
+class Measures(unittest.TestCase):
+    def start_pub(self, hub, service, lines):
+        pub = start_gimnet(self, hub, "pub", service, "--wait", "1", "--rate", "1000", stdin=subprocess.PIPE)
+        hub.wait_for_node(service.partition("/")[0])
+        return pub.feed(b"12345\n" * lines)
+
+    def test_rate_and_bytes_of_a_service(self):
+        hub = Hub(self)
+        for command in ("hz", "bw"):
+            with self.subTest(command=command):
+                tool = start_gimnet(self, hub, command, "robot/odom", "-n", "200", "--json")
+                pub = self.start_pub(hub, "robot/odom", 200)
+                self.assertEqual((tool.wait(), pub.wait()), (0, 0), tool.err)
+                said = [json.loads(line) for line in tool.out.splitlines()][-1]
+                self.assertEqual((said["service"], said["whole"], said["messages"], said["missed"]),
+                                 ("robot/odom", True, 200, 0))
+                if command == "hz":
+                    self.assertLessEqual(said["gap_min_ms"], said["gap_mean_ms"])
+                    self.assertLessEqual(said["gap_mean_ms"], said["gap_max_ms"])
+                    self.assertAlmostEqual(said["rate_hz"] * said["gap_mean_ms"], 1000, delta=5)
+                else:
+                    self.assertEqual((said["bytes"], said["size_min"], said["size_max"]), (1000, 5, 5))
+
+    def test_a_pattern_takes_in_what_comes_later(self):
+        hub = Hub(self)
+        hz = start_gimnet(self, hub, "hz", "robot/*", "--json")
+        wait_until(lambda: "no service matches robot/* yet" in hz.err, "the words that it waits")
+        pub = self.start_pub(hub, "robot/odom", 100)
+        wait_until(lambda: pub.popen.poll() is not None, "all published to the one that waited")
+        hz.signal(2)
+        self.assertEqual(hz.wait(), 130, hz.err)
+        said = [json.loads(line) for line in hz.out.splitlines()][-1]
+        self.assertEqual((said["service"], said["whole"], said["missed"]), ("robot/odom", True, 0))
+
+    def test_echo_of_a_pattern(self):
+        hub = Hub(self)
+        pubs = [self.start_pub(hub, service, 10) for service in ("robot/odom", "robot2/odom", "robot/scan2")[:2]]
+        echo = start_gimnet(self, hub, "echo", "*/odom", "-n", "20", "--json")
+        self.assertEqual([echo.wait(), *(pub.wait() for pub in pubs)], [0, 0, 0], echo.err)
+        counts = {}
+        for line in echo.out.splitlines():
+            service = json.loads(line)["service"]
+            counts[service] = counts.get(service, 0) + 1
+        self.assertEqual(counts, {"robot/odom": 10, "robot2/odom": 10})
+
+    def test_nothing_came_in_time(self):
+        hub = Hub(self)
+        for words in (["echo", "a/b"], ["hz", "a/b"], ["bw", "**"], ["recv", "--name", "B"]):
+            tool = run_gimnet(hub, *words, "--seconds", "0.2")
+            self.assertEqual(tool.code, 5, tool.err)
+            self.assertIn("waited 0.2 s for a message", tool.err)
+
+
+class Lists(unittest.TestCase):
+    def test_what_matches_nothing_is_not_found(self):
+        hub = Hub(self)
+        start_recv(self, hub, "robot")
+        tool = run_gimnet(hub, "nodes", "robto", "--json")
+        self.assertEqual((tool.code, json.loads(tool.out)), (4, []))
+        self.assertIn("did you mean robot?", tool.err)
+        self.assertEqual(run_gimnet(hub, "services", "robot/*").code, 4)
+        self.assertEqual(run_gimnet(hub, "services").code, 0)
+
+    def test_looks_of_the_tool_are_listed_only_when_asked_for(self):
+        hub = Hub(self)
+        Client(self, hub).join()
+        self.assertEqual([node["description"] for node in json.loads(run_gimnet(hub, "nodes", "--json").out)], [""])
+        everybody = json.loads(run_gimnet(hub, "nodes", "--all", "--json").out)
+        self.assertIn("gimnet tool", [node["description"] for node in everybody])
+
+
 class Pings(unittest.TestCase):
     def test_every_node_answers(self):
         hub = Hub(self, shards=2)
@@ -148,8 +219,8 @@ class Names(unittest.TestCase):
         hub = Hub(self)
         start_recv(self, hub, "B")
         second = run_gimnet(hub, "recv", "--name", "B")
-        self.assertEqual(second.code, 1)
-        self.assertIn("B", second.err)
+        self.assertEqual(second.code, 6)
+        self.assertIn("'B' is held by node 7.1", second.err)
 
     def test_raw_resolve_and_subscribe(self):
         hub = Hub(self)

@@ -11,6 +11,8 @@ namespace gimnet::tool {
 [[nodiscard]] ExitCode run_recv(Session& session);
 [[nodiscard]] ExitCode run_pub(Session& session);
 [[nodiscard]] ExitCode run_echo(Session& session);
+[[nodiscard]] ExitCode run_hz(Session& session);
+[[nodiscard]] ExitCode run_bw(Session& session);
 [[nodiscard]] ExitCode run_ping(Session& session);
 [[nodiscard]] ExitCode run_nodes(Session& session);
 [[nodiscard]] ExitCode run_services(Session& session);

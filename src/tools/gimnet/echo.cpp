@@ -1,20 +1,15 @@
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/printer.hpp"
+#include "tools/gimnet/subscriptions.hpp"
 
 namespace gimnet::tool {
-namespace {
-
-constexpr std::size_t kQueueMessages = 4096;
-
-}  // namespace
 
 ExitCode run_echo(Session& session) {
-  const std::string& service = session.options().target;
   if (const auto ending = session.join({})) return *ending;
-  const auto subscription = session.node().subscribe(service, {kQueueMessages, AtFullQueue::stop_reading});
-  if (!subscription) return session.fail(subscription.failure());
-  if (!subscription->exists()) say("nobody provides " + service + " yet; waiting for it");
-  return print_messages(session, subscription->queue());
+  Subscriptions subscriptions(session.node(), session.options().target);
+  if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
+  if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
+  return print_messages(session, [&](Timeout timeout) { return subscriptions.receive(timeout); });
 }
 
 }  // namespace gimnet::tool

@@ -22,6 +22,9 @@ enum class ExitCode : std::uint8_t {
 
 [[nodiscard]] constexpr ExitCode exit_code_of(Status status) {
   switch (status) {
+    case Status::bad_argument:
+    case Status::bad_name:
+      return ExitCode::usage;
     case Status::no_hub:
     case Status::not_connected:
     case Status::refused:
@@ -31,6 +34,7 @@ enum class ExitCode : std::uint8_t {
     case Status::timeout:
       return ExitCode::timeout;
     case Status::denied:
+    case Status::name_taken:
       return ExitCode::denied;
     case Status::bad_version:
       return ExitCode::bad_version;

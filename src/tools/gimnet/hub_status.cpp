@@ -26,7 +26,9 @@ void write(JsonWriter& json, const Counters& counters) {
 
 void write(JsonWriter& json, const Ledger& ledger) {
   json.begin_object().member("accepted", ledger.accepted).member("copies", ledger.copies);
-  json.member("delivered", ledger.delivered).member("dropped", ledger.dropped).member("queued", static_cast<std::int64_t>(ledger.queued));
+  json.member("delivered", ledger.delivered)
+      .member("dropped", ledger.dropped)
+      .member("queued", static_cast<std::int64_t>(ledger.queued));
   json.member("exact", ledger.exact()).end_object();
 }
 
@@ -58,14 +60,15 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
   json.end_array();
 }
 
-std::string connections_table(const std::vector<ConnectionRecord>& connections) {
+std::string connections_table(const std::vector<ConnectionRecord>& connections, Paint paint) {
   Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "QUEUED", "PEER"});
   for (const ConnectionRecord& connection : connections) {
     table.add({connection.node.text(), connection.name.empty() ? "-" : connection.name,
                std::to_string(connection.shard), connection.transport, connection.connected ? "connected" : "away",
-               std::to_string(connection.queued_bytes), connection.peer});
+               std::to_string(connection.queued_bytes), connection.peer},
+              connection.connected ? Tone::plain : Tone::warning);
   }
-  return table.text();
+  return table.text(paint);
 }
 
 }  // namespace
@@ -106,7 +109,7 @@ std::string json_of(const HubStatus& status) {
   return json.end_object().str() + "\n";
 }
 
-std::string text_of(const HubStatus& status) {
+std::string text_of(const HubStatus& status, Paint paint) {
   const Counters counters = summed(status.shards);
   const Ledger ledger = ledger_of(counters);
   std::string text = "hub " + std::to_string(status.hub.hub_id) + " " + status.hub.name + ", version " +
@@ -118,14 +121,15 @@ std::string text_of(const HubStatus& status) {
           " dropped + " + std::to_string(ledger.queued) + " queued" +
           (ledger.exact() ? "\n" : " (not balanced: frames are on their way)\n");
   for (const auto& [name, value] : counters) {
-    if (name.starts_with(kDropped) && value != 0) text += "  " + name + ": " + std::to_string(value) + "\n";
+    if (name.starts_with(kDropped) && value != 0)
+      text += paint("  " + name + ": " + std::to_string(value), Tone::bad) + "\n";
   }
   text += "mailbox: " + std::to_string(value_of(counters, "mailbox_entries")) + " entries, " +
           std::to_string(value_of(counters, "mailbox_wakeups")) + " wake-ups\n";
   for (const auto& [name, value] : counters) {
     if (name.starts_with(kRefused) && value != 0) text += name + ": " + std::to_string(value) + "\n";
   }
-  return text + "\n" + connections_table(status.connections);
+  return text + "\n" + connections_table(status.connections, paint);
 }
 
 }  // namespace gimnet::tool

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gimnet/gimi/records.hpp"
+#include "tools/gimnet/paint.hpp"
 
 namespace gimnet::tool {
 
@@ -36,6 +37,6 @@ struct Ledger {
 
 /// One object and a newline.
 [[nodiscard]] std::string json_of(const HubStatus& status);
-[[nodiscard]] std::string text_of(const HubStatus& status);
+[[nodiscard]] std::string text_of(const HubStatus& status, Paint paint = Paint{});
 
 }  // namespace gimnet::tool

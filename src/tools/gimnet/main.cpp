@@ -21,6 +21,10 @@ ExitCode run(const Options& options) {
       return run_pub(session);
     case Command::echo:
       return run_echo(session);
+    case Command::hz:
+      return run_hz(session);
+    case Command::bw:
+      return run_bw(session);
     case Command::ping:
       return run_ping(session);
     case Command::nodes:
@@ -33,14 +37,24 @@ ExitCode run(const Options& options) {
   return ExitCode::usage;
 }
 
+/// Help goes to standard output, what is wrong to standard error.
+ExitCode show(const CommandLineEnding& ending) {
+  if (ending.code != ExitCode::done) {
+    std::fputs(ending.text.c_str(), stderr);
+    return ending.code;
+  }
+  Output output;
+  output.write(ending.text);
+  return output.finish() ? ExitCode::done : ExitCode::failed;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
     const auto parsed = parse_command_line(argc, argv);
     if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {
-      std::fputs(ending->text.c_str(), ending->code == ExitCode::done ? stdout : stderr);
-      return static_cast<int>(ending->code);
+      return static_cast<int>(show(*ending));
     }
     return static_cast<int>(run(std::get<Options>(parsed)));
   } catch (const std::exception& error) {

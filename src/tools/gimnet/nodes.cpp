@@ -17,23 +17,30 @@ std::string json_of(const std::vector<NodeRecord>& nodes) {
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<NodeRecord>& nodes) {
+std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
   Table table({"ID", "NAME", "HUB", "STATE", "SERVICES", "SINCE", "PLACE", "DESCRIPTION"});
   for (const NodeRecord& node : nodes) {
-    table.add({node.node.text(), node.name.empty() ? "-" : node.name, node.hub_name,
-               node.connected ? "connected" : "away", std::to_string(node.services),
-               std::to_string(node.joined_ms / 1000) + " s", node.place, node.description});
+    table.add(
+        {node.node.text(), node.name.empty() ? "-" : node.name, node.hub_name, node.connected ? "connected" : "away",
+         std::to_string(node.services), std::to_string(node.joined_ms / 1000) + " s", node.place, node.description},
+        node.connected ? Tone::plain : Tone::warning);
   }
-  return table.text();
+  return table.text(paint);
 }
+
+/// A look by this tool, which nobody looks for.
+bool is_tool(const NodeRecord& node) { return node.name.empty() && node.description == kToolDescription; }
 
 }  // namespace
 
 ExitCode run_nodes(Session& session) {
   if (const auto ending = session.join({})) return *ending;
-  const auto nodes = session.node().nodes(session.options().target);
+  const Options& options = session.options();
+  auto nodes = session.node().nodes(options.target);
   if (!nodes) return session.fail(nodes.failure());
-  session.output().write(session.options().json ? json_of(*nodes) : table_of(*nodes));
+  if (!options.all) std::erase_if(*nodes, is_tool);
+  session.output().write(options.json ? json_of(*nodes) : table_of(*nodes, session.paint()));
+  if (nodes->empty() && !options.target.empty()) return session.fail_unmatched("node");
   return session.finish();
 }
 

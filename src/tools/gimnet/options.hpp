@@ -9,20 +9,27 @@
 
 namespace gimnet::tool {
 
-enum class Command : std::uint8_t { send, recv, pub, echo, ping, nodes, services, status };
+enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, status };
+
+/// When to print colours: on a terminal, unless NO_COLOR says no.
+enum class Colour : std::uint8_t { automatic, always, never };
 
 /// What the command line asks for. Thread safety: immutable once read.
 struct Options {
   Command command = Command::status;
   std::string hub;  ///< "": the environment's GIMNET_HUB, else the hub of this machine
   bool json = false;
+  Colour colour = Colour::automatic;
   std::optional<std::uint8_t> shard;
 
-  std::string target;  ///< send, ping: name or id; pub, echo: service; nodes, services: pattern
+  std::string target;  ///< send, ping: name or id; pub: service; others: service or pattern
   std::string name;    ///< of this node
   std::string file;
   bool raw = false;
+  bool all = false;
   std::uint64_t count = 0;  ///< 0: no end
+  double seconds = 0.0;     ///< 0: no end
+  double window_s = 5.0;
   std::uint64_t pings = 10;
   double interval_s = 0.1;
   double timeout_s = 1.0;

@@ -3,6 +3,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
+#include <cstring>
 
 namespace gimnet::tool {
 namespace {
@@ -23,6 +25,13 @@ void Output::write(std::string_view text) {
 void Output::flush() {
   write_all(waiting_);
   waiting_.clear();
+}
+
+bool Output::finish() {
+  flush();
+  if (ok() || error_ == EPIPE) return true;
+  std::fprintf(stderr, "gimnet: cannot write to standard output: %s\n", std::strerror(error_));
+  return false;
 }
 
 void Output::write_all(std::string_view text) {

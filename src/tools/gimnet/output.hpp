@@ -20,6 +20,9 @@ class Output {
     write(std::string_view{reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
   void flush();
+  /// Writes what waits. False: it could not be written, and the words are printed. A reader that went away had enough:
+  /// that is no failure.
+  [[nodiscard]] bool finish();
   [[nodiscard]] bool ok() const { return error_ == 0; }
   /// The errno.
   [[nodiscard]] int error() const { return error_; }

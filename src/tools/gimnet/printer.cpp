@@ -2,22 +2,14 @@
 
 #include <string>
 
+#include "tools/gimnet/bounds.hpp"
+#include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/json_writer.hpp"
 
 namespace gimnet::tool {
 namespace {
 
 constexpr Timeout kLookAtConnection{500};
-
-/// Control characters would let a message write over the terminal.
-std::string printable(std::string_view text) {
-  std::string shown;
-  for (const char letter : text) {
-    const auto code = static_cast<unsigned char>(letter);
-    shown += code < 0x20 || code == 0x7F ? '.' : letter;
-  }
-  return shown;
-}
 
 void print(Session& session, const Message& message) {
   Output& output = session.output();
@@ -28,23 +20,6 @@ void print(Session& session, const Message& message) {
     output.write(session.options().json ? json_line(message) : text_line(message));
   }
 }
-
-/// Tells breaks of the connection to the user, once each.
-class ConnectionWatch {
- public:
-  explicit ConnectionWatch(Node& node) : node_(node) {}
-  void look() {
-    const NodeState state = node_.state();
-    if (state.connected == connected_ || !state.peer) return;
-    connected_ = state.connected;
-    say(connected_ ? "connected again as " + state.peer.text()
-                   : "the connection broke (" + state.trouble + "); trying to connect again");
-  }
-
- private:
-  Node& node_;
-  bool connected_ = true;
-};
 
 }  // namespace
 
@@ -70,27 +45,27 @@ std::string json_line(const Message& message) {
   return json.str() + "\n";
 }
 
-ExitCode print_messages(Session& session, const Queue& queue) {
-  const std::uint64_t count = session.options().count;
+ExitCode print_messages(Session& session, const Receive& receive) {
+  const Bounds bounds(session.options());
   ConnectionWatch watch(session.node());
-  for (std::uint64_t printed = 0; count == 0 || printed < count;) {
-    auto waiting = queue.try_receive();
-    if (!waiting) {
+  std::uint64_t printed = 0;
+  while (!bounds.enough(printed) && !bounds.late() && !session.stopped()) {
+    auto message = receive(kNoWait);
+    if (!message && message.is(Status::timeout)) {
       session.output().flush();
       if (!session.output().ok()) break;
-      auto received = queue.receive(kLookAtConnection);
-      if (!received && !received.is(Status::timeout)) return session.fail(received.failure());
-      if (!received) {
-        watch.look();
-        continue;
-      }
-      waiting = std::move(*received);
+      message = receive(bounds.wait(kLookAtConnection));
     }
-    print(session, *waiting);
+    if (!message && message.is(Status::timeout)) {
+      watch.look();
+      continue;
+    }
+    if (!message) return session.fail(message.failure());
+    print(session, *message);
     ++printed;
-    if (!session.output().ok() || session.stopped()) break;
+    if (!session.output().ok()) break;
   }
-  return session.finish();
+  return session.finish_stream(bounds, printed);
 }
 
 }  // namespace gimnet::tool

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <cstdint>
+#include <functional>
+#include <string>
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/exit_code.hpp"
@@ -8,12 +9,15 @@
 
 namespace gimnet::tool {
 
-/// A message as a line: `raw` the payload alone, `json` an object, else for people.
+/// A message as a line, for people and as an object.
 [[nodiscard]] std::string text_line(const Message& message);
 [[nodiscard]] std::string json_line(const Message& message);
 
-/// Prints what comes into a queue, until as many have come as the options say. Writes at the latest when nothing more
-/// is there at once. Says so when the connection breaks and when it is back.
-[[nodiscard]] ExitCode print_messages(Session& session, const Queue& queue);
+/// Takes the next message; waits for it at most so long.
+using Receive = std::function<Outcome<Message>(Timeout)>;
+
+/// Prints what comes, until as many have come or as much time has passed as the options say. Writes at the latest when
+/// nothing more is there at once. Says so when the connection breaks and when it is back.
+[[nodiscard]] ExitCode print_messages(Session& session, const Receive& receive);
 
 }  // namespace gimnet::tool

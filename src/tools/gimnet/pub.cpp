@@ -6,6 +6,7 @@
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/line_input.hpp"
+#include "tools/gimnet/progress.hpp"
 
 namespace gimnet::tool {
 namespace {
@@ -18,6 +19,9 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
   LineInput input(STDIN_FILENO, session.stop().descriptor());
+  const Progress progress([&] {
+    return std::to_string(publisher.published()) + " published to " + std::to_string(publisher.subscribers());
+  });
   std::string_view line;
   for (;;) {
     switch (input.next(line)) {
@@ -52,7 +56,8 @@ ExitCode run_pub(Session& session) {
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
   if (!publisher) return session.fail(publisher.failure());
   if (options.subscribers > publisher->subscribers()) {
-    say("waiting for " + std::to_string(options.subscribers) + " subscribers of " + options.target);
+    say("waiting for " + std::to_string(options.subscribers) +
+        (options.subscribers == 1 ? " subscriber of " : " subscribers of ") + options.target);
     if (auto waited = publisher->wait_for_subscribers(options.subscribers); !waited) {
       return session.fail(waited.failure());
     }

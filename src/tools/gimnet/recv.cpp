@@ -17,7 +17,7 @@ ExitCode run_recv(Session& session) {
   if (const auto ending = session.join(how)) return *ending;
   const Queue queue = session.node().queue(options.key, {kQueueMessages, AtFullQueue::stop_reading});
   say("receiving as " + options.name + " (" + session.node().peer().text() + ")");
-  return print_messages(session, queue);
+  return print_messages(session, [&](Timeout timeout) { return queue.receive(timeout); });
 }
 
 }  // namespace gimnet::tool

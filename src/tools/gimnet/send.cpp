@@ -1,51 +1,53 @@
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <string>
-#include <vector>
 
+#include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/decimal.hpp"
+#include "tools/gimnet/file_content.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/line_input.hpp"
+#include "tools/gimnet/progress.hpp"
 
 namespace gimnet::tool {
 namespace {
 
 /// Messages of one call that may wait for their ACK.
 constexpr std::size_t kWindow = 64;
+/// The largest message that any node can take.
+constexpr std::size_t kMessageBytesMax = std::size_t{1} << 30;
 
 Failure cannot_read(const std::string& what, int error) {
   return {Status::system, "cannot read " + what + ": " + std::strerror(error)};
 }
 
-Outcome<std::vector<char>> read_file(const std::string& path) {
-  constexpr std::size_t kReadBytes = std::size_t{1} << 20;
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return cannot_read(path, errno);
-  std::vector<char> content;
-  for (;;) {
-    const std::size_t size = content.size();
-    content.resize(size + kReadBytes);
-    const ssize_t count = ::read(file, content.data() + size, kReadBytes);
-    const int error = errno;
-    content.resize(size + static_cast<std::size_t>(count > 0 ? count : 0));
-    if (count > 0 || (count < 0 && error == EINTR)) continue;
-    ::close(file);
-    if (count < 0) return cannot_read(path, error);
-    return content;
-  }
+/// So that a wrong name is known before anything else is done.
+Outcome<void> check_readable(const std::string& path) {
+  if (path.empty() || ::access(path.c_str(), R_OK) == 0) return {};
+  return cannot_read(path, errno);
 }
 
 Outcome<void> send_file(const Sender& sender, const std::string& path) {
-  const auto content = read_file(path);
+  const auto content = FileContent::read(path, kMessageBytesMax);
   if (!content) return content.failure();
-  return sender.send(std::string_view{content->data(), content->size()});
+  const std::int64_t begin_ns = steady_now_ns();
+  const Progress progress([&] {
+    return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) + ": " +
+           std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
+  });
+  if (auto sent = sender.send(content->bytes()); !sent) return sent;
+  return sender.settle();
 }
 
 Outcome<void> send_lines(Session& session, const Sender& sender) {
   LineInput input(STDIN_FILENO, session.stop().descriptor());
+  const Progress progress([&] {
+    const SendCounts counts = sender.counts();
+    return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) + " acknowledged";
+  });
   std::string_view line;
   for (;;) {
     switch (input.next(line)) {
@@ -80,6 +82,7 @@ Failure reason(const SendCounts& counts, Failure failure) {
 
 ExitCode run_send(Session& session) {
   const Options& options = session.options();
+  if (const auto readable = check_readable(options.file); !readable) return session.fail(readable.failure());
   NodeOptions how;
   how.name = options.name;
   how.reconnect = false;  // a message whose fate is not known counts as lost

@@ -21,7 +21,7 @@ std::string json_of(const std::vector<ServiceRecord>& services) {
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<ServiceRecord>& services) {
+std::string table_of(const std::vector<ServiceRecord>& services, Paint paint) {
   Table table({"NAME", "NODE", "TYPE", "DIRECTION", "DELIVERY", "SUBSCRIBERS", "METADATA"});
   for (const ServiceRecord& service : services) {
     table.add({service.name, service.node.text(),
@@ -29,7 +29,7 @@ std::string table_of(const std::vector<ServiceRecord>& services) {
                text_of(service.direction), text_of(service.delivery), std::to_string(service.subscribers),
                service.metadata});
   }
-  return table.text();
+  return table.text(paint);
 }
 
 }  // namespace
@@ -38,7 +38,8 @@ ExitCode run_services(Session& session) {
   if (const auto ending = session.join({})) return *ending;
   const auto services = session.node().services(session.options().target);
   if (!services) return session.fail(services.failure());
-  session.output().write(session.options().json ? json_of(*services) : table_of(*services));
+  session.output().write(session.options().json ? json_of(*services) : table_of(*services, session.paint()));
+  if (services->empty() && !session.options().target.empty()) return session.fail_unmatched("service");
   return session.finish();
 }
 

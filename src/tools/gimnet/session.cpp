@@ -2,10 +2,10 @@
 
 #include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <vector>
 
 #include "base/suggest.hpp"
+#include "tools/gimnet/decimal.hpp"
 
 namespace gimnet::tool {
 
@@ -14,14 +14,11 @@ void say(const std::string& sentence) { std::fprintf(stderr, "gimnet: %s\n", sen
 std::optional<ExitCode> Session::join(NodeOptions how) {
   how.hub = options_.hub;
   how.shard = options_.shard;
-  if (how.description.empty()) how.description = "gimnet tool";
+  if (how.description.empty()) how.description = kToolDescription;
   auto joined = Node::join(how);
   if (!joined) {
-    const Status status = joined.failure().status;
-    code_ = fail(joined.failure());
-    if (status == Status::bad_argument || status == Status::bad_name) return ExitCode::usage;
-    if (status == Status::timeout) return ExitCode::no_connection;
-    return code_;
+    const ExitCode code = fail(joined.failure());
+    return code == ExitCode::timeout ? ExitCode::no_connection : code;
   }
   node_ = std::move(*joined);
   stop_.on_stop([this] { node_->close(); });
@@ -33,17 +30,30 @@ std::optional<Peer> Session::find(std::string_view name) {
   if (peer) return *peer;
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
-    failure.sentence = "there is no node '" + std::string(name) + "'";
-    const auto nodes = node_->nodes("**");
-    std::vector<std::string_view> names;
-    if (nodes) {
-      for (const NodeRecord& node : *nodes) names.push_back(node.name);
-    }
-    const std::string suggestion = did_you_mean(name, names);
-    failure.sentence += suggestion.empty() ? "; `gimnet nodes` lists those that are there" : suggestion;
+    failure.sentence = "there is no node '" + std::string(name) + "'" + nearest_name("node", name);
   }
   code_ = fail(failure);
   return std::nullopt;
+}
+
+std::string Session::nearest_name(const std::string& kind, std::string_view word) {
+  std::vector<std::string> names;
+  if (kind == "node") {
+    if (const auto nodes = node_->nodes("**")) {
+      for (const NodeRecord& node : *nodes) names.push_back(node.name);
+    }
+  } else if (const auto services = node_->services("**")) {
+    for (const ServiceRecord& service : *services) names.push_back(service.name);
+  }
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  const std::string suggestion = did_you_mean(word, views);
+  return suggestion.empty() ? "; `gimnet " + kind + "s` lists those that are there" : suggestion;
+}
+
+ExitCode Session::fail_unmatched(const std::string& kind) {
+  output_.flush();
+  const std::string& target = options_.target;
+  return fail({Status::not_found, "no " + kind + " matches '" + target + "'" + nearest_name(kind, target)});
 }
 
 ExitCode Session::fail(const Failure& failure) {
@@ -53,12 +63,17 @@ ExitCode Session::fail(const Failure& failure) {
 }
 
 ExitCode Session::finish() {
-  output_.flush();
-  if (!output_.ok()) {
-    return fail({Status::system, std::string("cannot write to standard output: ") + std::strerror(output_.error())});
-  }
-  if (stopped()) return fail({});
-  return ExitCode::done;
+  if (!output_.finish()) return ExitCode::failed;
+  return stopped() ? fail({}) : ExitCode::done;
+}
+
+ExitCode Session::finish_stream(const Bounds& bounds, std::uint64_t messages) {
+  const ExitCode code = finish();
+  if (code != ExitCode::done || !output_.ok() || !bounds.late() || !bounds.missed(messages)) return code;
+  const std::string wanted = options_.count == 0 ? "a message" : std::to_string(options_.count) + " messages";
+  return fail({Status::timeout, "waited " + decimal(options_.seconds) + " s for " + wanted + " of " +
+                                    (options_.target.empty() ? "others" : options_.target) + ": " +
+                                    (messages == 0 ? "none" : "only " + std::to_string(messages)) + " came"});
 }
 
 }  // namespace gimnet::tool

@@ -1,16 +1,24 @@
 #pragma once
 
+#include <unistd.h>
+
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "gimnet/gimi.hpp"
+#include "tools/gimnet/bounds.hpp"
 #include "tools/gimnet/exit_code.hpp"
 #include "tools/gimnet/options.hpp"
 #include "tools/gimnet/output.hpp"
+#include "tools/gimnet/paint.hpp"
 #include "tools/gimnet/stop_signal.hpp"
 
 namespace gimnet::tool {
+
+/// How nodes of this tool describe themselves.
+inline constexpr const char* kToolDescription = "gimnet tool";
 
 /// What a command works with. Thread safety: one thread.
 class Session {
@@ -23,6 +31,7 @@ class Session {
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] StopSignal& stop() { return stop_; }
   [[nodiscard]] Output& output() { return output_; }
+  [[nodiscard]] Paint paint() const { return Paint::of(options_.colour, STDOUT_FILENO); }
 
   /// Joins as the options say. Errors: the code to end with; the words are printed.
   [[nodiscard]] std::optional<ExitCode> join(NodeOptions how);
@@ -32,14 +41,21 @@ class Session {
   /// A node by name or id. Nothing: the words are printed, code() says how to end.
   [[nodiscard]] std::optional<Peer> find(std::string_view name);
 
+  /// No node or service (`kind`) matches the target: says so, with the nearest name.
+  [[nodiscard]] ExitCode fail_unmatched(const std::string& kind);
+
   /// Prints why something did not work, and gives the code to end with: the signal's, if there was one.
   [[nodiscard]] ExitCode fail(const Failure& failure);
   /// Ends well, unless the output could not be written or a signal came.
   [[nodiscard]] ExitCode finish();
+  /// finish(), and timeout if time was up before there was what was asked for.
+  [[nodiscard]] ExitCode finish_stream(const Bounds& bounds, std::uint64_t messages);
   [[nodiscard]] ExitCode code() const { return code_; }
   [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
 
  private:
+  [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
+
   const Options& options_;
   StopSignal& stop_;
   Output output_;

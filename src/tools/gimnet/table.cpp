@@ -5,21 +5,25 @@
 
 namespace gimnet::tool {
 
-void Table::add(std::vector<std::string> cells) {
+void Table::add(std::vector<std::string> cells, Tone tone) {
   widths_.resize(std::max(widths_.size(), cells.size()));
-  for (std::size_t i = 0; i < cells.size(); ++i) widths_[i] = std::max(widths_[i], cells[i].size());
-  rows_.push_back(std::move(cells));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    cells[i] = printable(cells[i]);
+    widths_[i] = std::max(widths_[i], cells[i].size());
+  }
+  rows_.push_back({std::move(cells), tone});
 }
 
-std::string Table::text() const {
+std::string Table::text(Paint paint) const {
   std::string text;
-  for (const auto& row : rows_) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      text += row[i];
-      const bool last = i + 1 == row.size();
-      text.append(last ? 0 : widths_[i] - row[i].size() + 2, ' ');
+  for (const Row& row : rows_) {
+    std::string line;
+    for (std::size_t i = 0; i < row.cells.size(); ++i) {
+      line += row.cells[i];
+      const bool last = i + 1 == row.cells.size();
+      line.append(last ? 0 : widths_[i] - row.cells[i].size() + 2, ' ');
     }
-    text += '\n';
+    text += paint(line, row.tone) + '\n';
   }
   return text;
 }

@@ -4,18 +4,24 @@
 #include <string>
 #include <vector>
 
+#include "tools/gimnet/paint.hpp"
+
 namespace gimnet::tool {
 
-/// Rows of text in columns as wide as they need. Thread safety: one thread.
+/// Rows of text in columns as wide as they need. Control characters are shown as '.'. Thread safety: one thread.
 class Table {
  public:
-  explicit Table(std::vector<std::string> titles) { add(std::move(titles)); }
+  explicit Table(std::vector<std::string> titles) { add(std::move(titles), Tone::heading); }
   /// REQUIRES: as many cells as titles.
-  void add(std::vector<std::string> cells);
-  [[nodiscard]] std::string text() const;
+  void add(std::vector<std::string> cells, Tone tone = Tone::plain);
+  [[nodiscard]] std::string text(Paint paint = Paint{}) const;
 
  private:
-  std::vector<std::vector<std::string>> rows_;
+  struct Row {
+    std::vector<std::string> cells;
+    Tone tone = Tone::plain;
+  };
+  std::vector<Row> rows_;
   std::vector<std::size_t> widths_;
 };
 

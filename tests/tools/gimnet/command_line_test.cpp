@@ -55,6 +55,39 @@ TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
   EXPECT_NE(refusal({"--hub", "tcp://h:1", "ehco"}).find("did you mean echo?"), std::string::npos);
 }
 
+TEST(CommandLine, SuggestsTheOptionThatWasMeant) {
+  EXPECT_EQ(refusal({"nodes", "--al"}),
+            "gimnet: there is no option --al for gimnet nodes; did you mean --all?\n"
+            "`gimnet nodes --help` shows how it is called.\n");
+  EXPECT_NE(refusal({"recv", "--nmae=B"}).find("--nmae for gimnet recv; did you mean --name?"), std::string::npos);
+  EXPECT_NE(refusal({"status", "--jsn"}).find("did you mean --json?"), std::string::npos);
+  EXPECT_NE(refusal({"nodes", "a", "b"}).find("'b' is one word too many for gimnet nodes"), std::string::npos);
+}
+
+TEST(CommandLine, SaysWhatAnOptionTakes) {
+  EXPECT_NE(refusal({"pub", "a/b", "--rate", "10Hz"}).find("'10Hz' is no value for --rate: lines a second, 0.001 to"),
+            std::string::npos);
+  EXPECT_NE(refusal({"ping", "B", "-W", "10ms"}).find("'10ms' is no value for -W,--timeout: seconds"),
+            std::string::npos);
+  EXPECT_NE(refusal({"send", "B", "--file"}).find("--file needs a value: send this file"), std::string::npos);
+  EXPECT_NE(refusal({"send"}).find("node is missing: name or id"), std::string::npos);
+  EXPECT_NE(refusal({"recv"}).find("--name is missing: name of this node"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "-n", "0"}).find("'0' is no value for -n,--count"), std::string::npos);
+}
+
+TEST(CommandLine, ReadsTheBoundsOfWhatGoesOn) {
+  for (const char* command : {"echo", "hz", "bw"}) {
+    const Options read = options({command, "robot/*", "-n", "5", "--seconds", "2.5"});
+    EXPECT_EQ(read.count, 5u);
+    EXPECT_EQ(read.seconds, 2.5);
+    EXPECT_EQ(read.target, "robot/*");
+  }
+  EXPECT_EQ(options({"hz", "a/b", "--window", "0.5"}).window_s, 0.5);
+  EXPECT_NE(refusal({"bw", "a/b", "--seconds", "0"}), "not refused");
+  EXPECT_TRUE(options({"nodes", "--all"}).all);
+  EXPECT_EQ(options({"nodes", "--color", "never"}).colour, Colour::never);
+}
+
 TEST(CommandLine, RefusesContradictions) {
   EXPECT_NE(refusal({"recv", "--name", "B", "--json", "--raw"}).find("--raw"), std::string::npos);
   EXPECT_NE(refusal({"pub", "odom"}).find("NODE/SERVICE"), std::string::npos);
@@ -75,6 +108,7 @@ TEST(CommandLine, HelpEndsWell) {
   ASSERT_NE(ending, nullptr);
   EXPECT_EQ(ending->code, ExitCode::done);
   EXPECT_NE(ending->text.find("Examples:"), std::string::npos);
+  EXPECT_NE(ending->text.find("Usage: gimnet send"), std::string::npos) << ending->text;
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+#pragma once
+
+// What `gimnet --help` and `gimnet COMMAND --help` begin with: what it does, and examples.
+
+namespace gimnet::tool::help {
+
+inline constexpr const char* kAbout = R"(Talk to a GIMnet hub from the command line.
+
+Examples:
+  gimnet recv --name B --raw                print what is sent to B
+  gimnet send B < lines                     send each line to B, and wait until B has them all
+  gimnet pub robot/odom < lines             publish each line as robot/odom
+  gimnet echo robot/odom -n 10              print ten messages of robot/odom
+  gimnet hz 'robot/*'                       how often do its services send, and how evenly?
+  gimnet ping B                             how far away is B?
+  gimnet nodes; gimnet services; gimnet status --json
+
+Data goes to standard output, words to standard error. Ends with 0 done, 1 failed, 2 wrong arguments, 3 cannot connect,
+4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 130 and 143 by signal.
+)";
+
+inline constexpr const char* kSendAbout = R"(Send messages to a node, and wait until it has acknowledged them all.
+
+Examples:
+  gimnet send B < lines                     a message for each line
+  gimnet send 7.17 --file map.png           one message
+  echo stop | gimnet send B --lane real_time
+
+At most 64 messages wait for their acknowledgement. Ends with 0 when all are acknowledged, else with 1 and the reason.
+)";
+
+inline constexpr const char* kRecvAbout = R"(Print the messages that are sent to this node.
+
+Examples:
+  gimnet recv --name B                      one line a message, with its sender
+  gimnet recv --name B -n 1000 --raw        the payload and a newline each, and end after 1,000
+  gimnet recv --name B --json | jq .text
+
+Overwrites nothing: when the reader of its output is slow, it stops reading from the hub.
+)";
+
+inline constexpr const char* kPubAbout = R"(Publish each line of standard input as a service.
+
+Examples:
+  gimnet pub robot/odom < lines             the node robot provides the service odom
+  gimnet pub robot/odom --rate 40 --wait 1 < lines
+  gimnet pub robot/pose --delivery latest < lines
+)";
+
+inline constexpr const char* kEchoAbout = R"(Print the messages of services. A service need not exist yet.
+
+Examples:
+  gimnet echo robot/odom
+  gimnet echo 'robot/*' --seconds 10        all services of robot, those that come meanwhile too
+  gimnet echo robot/odom -n 10 --raw
+  gimnet echo robot/odom --json | jq .age_us
+)";
+
+inline constexpr const char* kHzAbout = R"(Measure how often services send, and how evenly.
+
+Examples:
+  gimnet hz robot/odom
+  gimnet hz '**' --seconds 10               all services, those that come meanwhile too
+  gimnet hz robot/odom --window 1 --json | jq .rate_hz
+
+Once a second: messages a second, the shortest, longest and mean gap between two and its standard deviation over the
+last --window seconds, and how many did not come. At the end the same over all of it.
+)";
+
+inline constexpr const char* kBwAbout = R"(Measure how many bytes services send, and how large their messages are.
+
+Examples:
+  gimnet bw robot/camera
+  gimnet bw '**' --seconds 10 --json
+
+Payload bytes, as the publisher gave them; once a second over the last --window seconds, at the end over all of it.
+)";
+
+inline constexpr const char* kPingAbout = R"(Measure the way to a node and back. Its library answers by itself.
+
+Examples:
+  gimnet ping B
+  gimnet ping 7.17 -c 1000 -i 0.001 --json
+)";
+
+inline constexpr const char* kNodesAbout = R"(List the nodes.
+
+Examples:
+  gimnet nodes
+  gimnet nodes 'robot/**'                   only those whose name matches
+  gimnet nodes --all                        those of gimnet, too
+  gimnet --json nodes | jq '.[].name'
+)";
+
+inline constexpr const char* kServicesAbout = R"(List the services.
+
+Examples:
+  gimnet services
+  gimnet services 'robot/*' --json
+)";
+
+inline constexpr const char* kStatusAbout = R"(Show what the hub counted.
+
+Examples:
+  gimnet status
+  gimnet status --json | jq .ledger
+)";
+
+}  // namespace gimnet::tool::help

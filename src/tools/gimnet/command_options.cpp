@@ -1,0 +1,127 @@
+#include "tools/gimnet/command_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <string>
+
+#include "tools/gimnet/command_help.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+void add_key(CLI::App& command, Options& options) {
+  command.add_option("--type", options.key.type, "message type, a whole number, default 0");
+  command.add_option("--instance", options.key.instance, "instance of the type, a whole number, default 0");
+}
+
+void add_lane(CLI::App& command, Options& options) {
+  static const std::map<std::string, Lane> kLanes{
+      {"real_time", Lane::real_time}, {"normal", Lane::normal}, {"bulk", Lane::bulk}, {"background", Lane::background}};
+  command.add_option("--lane", options.lane, "real_time, normal, bulk or background")
+      ->transform(CLI::CheckedTransformer(kLanes).description(""));
+}
+
+void add_bounds(CLI::App& command, Options& options) {
+  command.add_option("-n,--count", options.count, "end after that many messages, 1 or more")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62));
+  command.add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
+      ->check(CLI::Range(0.001, 1e9));
+}
+
+void add_printing(CLI::App& command, Options& options) {
+  add_bounds(command, options);
+  command.add_flag("--raw", options.raw, "print each payload as it is, and a newline");
+  add_key(command, options);
+}
+
+void add_send(CLI::App& app, Options& options) {
+  CLI::App& send = *app.add_subcommand("send", help::kSendAbout);
+  send.add_option("node", options.target, "name or id of the receiver")->required();
+  send.add_option("--file", options.file, "send this file as one message");
+  send.add_option("--name", options.name, "name of this node, default none");
+  add_lane(send, options);
+  add_key(send, options);
+}
+
+void add_recv(CLI::App& app, Options& options) {
+  CLI::App& recv = *app.add_subcommand("recv", help::kRecvAbout);
+  recv.add_option("--name", options.name, "name of this node, to which others send")->required();
+  recv.add_option("--max-size", options.bytes_max, "largest message taken, in bytes, 1 to 1073741824, default 67108864")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 30));
+  add_printing(recv, options);
+}
+
+void add_pub(CLI::App& app, Options& options) {
+  static const std::map<std::string, Delivery> kDeliveries{{"stream", Delivery::stream}, {"latest", Delivery::latest}};
+  CLI::App& pub = *app.add_subcommand("pub", help::kPubAbout);
+  pub.add_option("service", options.target, "full name: node/service")->required();
+  pub.add_option("--name", options.name, "name of this node, default: the service's name up to its last /");
+  pub.add_option("--delivery", options.delivery, "stream: all messages; latest: only the newest waits")
+      ->transform(CLI::CheckedTransformer(kDeliveries).description(""));
+  pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
+      ->check(CLI::Range(0.001, 1e6));
+  pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, a whole number");
+  add_lane(pub, options);
+  add_key(pub, options);
+}
+
+void add_echo(CLI::App& app, Options& options) {
+  CLI::App& echo = *app.add_subcommand("echo", help::kEchoAbout);
+  echo.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
+      ->required();
+  add_printing(echo, options);
+}
+
+void add_meter(CLI::App& app, const char* name, const char* about, Options& options) {
+  CLI::App& meter = *app.add_subcommand(name, about);
+  meter.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
+      ->required();
+  meter.add_option("--window", options.window_s, "seconds that a line speaks of, 0.001 to 3600, default 5")
+      ->check(CLI::Range(0.001, 3600.0));
+  add_bounds(meter, options);
+}
+
+void add_ping(CLI::App& app, Options& options) {
+  CLI::App& ping = *app.add_subcommand("ping", help::kPingAbout);
+  ping.add_option("node", options.target, "name or id")->required();
+  ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
+      ->check(CLI::Range(1, 1'000'000'000));
+  ping.add_option("-i,--interval", options.interval_s, "seconds between two, 0 to 3600, default 0.1")
+      ->check(CLI::Range(0.0, 3600.0));
+  ping.add_option("-W,--timeout", options.timeout_s, "seconds after which one is lost, 0.001 to 3600, default 1")
+      ->check(CLI::Range(0.001, 3600.0));
+  add_lane(ping, options);
+}
+
+void add_lists(CLI::App& app, Options& options) {
+  CLI::App& nodes = *app.add_subcommand("nodes", help::kNodesAbout);
+  nodes.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
+  nodes.add_flag("--all", options.all, "those of gimnet itself, too");
+  CLI::App& services = *app.add_subcommand("services", help::kServicesAbout);
+  services.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
+  app.add_subcommand("status", help::kStatusAbout);
+}
+
+}  // namespace
+
+void add_commands(CLI::App& app, Options& options) {
+  static const std::map<std::string, Colour> kColours{
+      {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
+  app.add_option("--hub", options.hub, "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub");
+  app.add_flag("--json", options.json, "print JSON");
+  app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
+      ->transform(CLI::CheckedTransformer(kColours).description(""));
+  app.add_option("--shard", options.shard, "")->group("");
+  app.set_version_flag("--version", "gimnet " GIMNET_VERSION);
+  add_send(app, options);
+  add_recv(app, options);
+  add_pub(app, options);
+  add_echo(app, options);
+  add_meter(app, "hz", help::kHzAbout, options);
+  add_meter(app, "bw", help::kBwAbout, options);
+  add_ping(app, options);
+  add_lists(app, options);
+  for (CLI::App* command : app.get_subcommands({})) command->fallthrough();
+}
+
+}  // namespace gimnet::tool

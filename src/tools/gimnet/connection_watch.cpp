@@ -1,0 +1,18 @@
+#include "tools/gimnet/connection_watch.hpp"
+
+#include "tools/gimnet/session.hpp"
+
+namespace gimnet::tool {
+
+void ConnectionWatch::look() {
+  const NodeState state = node_.state();
+  if (!state.peer) return;
+  // It may have come back already.
+  const bool broke = connected_ && (!state.connected || state.reconnects != reconnects_);
+  if (broke) say("the connection broke (" + state.trouble + "); trying to connect again");
+  if (state.connected && (broke || !connected_)) say("connected again as " + state.peer.text());
+  connected_ = state.connected;
+  reconnects_ = state.reconnects;
+}
+
+}  // namespace gimnet::tool

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "tools/gimnet/options.hpp"
+
+namespace gimnet::tool {
+
+/// What a text means, from which its colour follows.
+enum class Tone : std::uint8_t { plain, heading, warning, bad };
+
+/// Colours text, or leaves it as it is. Thread safety: immutable.
+class Paint {
+ public:
+  explicit Paint(bool on = false) : on_(on) {}
+  /// As the option says; automatic: `descriptor` is a terminal that knows colours, and NO_COLOR is not set or empty.
+  [[nodiscard]] static Paint of(Colour colour, int descriptor);
+
+  [[nodiscard]] bool on() const { return on_; }
+  [[nodiscard]] std::string operator()(std::string_view text, Tone tone) const;
+
+ private:
+  bool on_;
+};
+
+/// Text of others for people: control characters would let it write over the terminal.
+[[nodiscard]] std::string printable(std::string_view text);
+
+}  // namespace gimnet::tool

@@ -1,0 +1,67 @@
+#include "tools/gimnet/subscriptions.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "base/clock.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+/// Messages of one service that wait in this process; then it stops reading from the hub.
+constexpr std::size_t kQueueMessages = 4096;
+/// How often the hub is asked for services that are new.
+constexpr Timeout kLookAgain{1'000};
+
+}  // namespace
+
+Outcome<void> Subscriptions::open() { return is_pattern(word_) ? look_again() : subscribe(word_); }
+
+Outcome<void> Subscriptions::subscribe(const std::string& service) {
+  auto subscription = node_.subscribe(service, {kQueueMessages, AtFullQueue::stop_reading});
+  if (!subscription) return subscription.failure();
+  all_.insert_or_assign(service, std::move(*subscription));
+  return {};
+}
+
+Outcome<void> Subscriptions::look_again() {
+  looked_ns_ = steady_now_ns();
+  const auto services = node_.services(word_);
+  if (!services) return services.failure();
+  std::set<std::string_view> there;
+  for (const ServiceRecord& service : *services) {
+    if (service.direction != Direction::provides) continue;
+    there.insert(service.name);
+    if (all_.contains(service.name)) continue;
+    if (auto done = subscribe(service.name); !done) return done;
+  }
+  // What still waits of a service that is gone is taken before its subscription ends.
+  std::erase_if(all_, [&](const auto& one) { return !there.contains(one.first) && one.second.queue().size() == 0; });
+  return {};
+}
+
+Outcome<Message> Subscriptions::receive(Timeout timeout) {
+  const std::int64_t end_ns = steady_now_ns() + timeout.count() * 1'000'000;
+  for (;;) {
+    Timeout wait = timeout;
+    if (is_pattern(word_)) {
+      const std::int64_t next_ns = looked_ns_ + kLookAgain.count() * 1'000'000;
+      if (steady_now_ns() >= next_ns) {
+        if (auto done = look_again(); !done && !done.is(Status::not_connected)) return done.failure();
+      }
+      wait = std::min(timeout, kLookAgain);
+    }
+    auto message = node_.receive(wait);
+    if (message && message->service().empty()) continue;  // sent to this node by somebody who guessed its id
+    if (message || !message.is(Status::timeout)) return message;
+    if (steady_now_ns() >= end_ns) return message;
+  }
+}
+
+std::string Subscriptions::waits_for() const {
+  if (is_pattern(word_)) return all_.empty() ? "no service matches " + word_ + " yet; waiting for one" : "";
+  const auto found = all_.find(word_);
+  return found == all_.end() || found->second.exists() ? "" : "nobody provides " + word_ + " yet; waiting for it";
+}
+
+}  // namespace gimnet::tool
