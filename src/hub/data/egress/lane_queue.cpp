@@ -14,6 +14,28 @@ bool same_header(const std::byte* a, const std::byte* b) {
          load_le<std::uint32_t>(a + 12) == load_le<std::uint32_t>(b + 12);
 }
 
+/// Streams and messages that left may stay in their index until they are more than the others, and these.
+constexpr std::size_t kForgottenMin = 64;
+/// A larger index is freed when it is not needed, since clearing it takes time.
+constexpr std::size_t kKeptBuckets = 4'096;
+
+std::uint64_t message_key(std::uint32_t src, std::uint32_t number) { return std::uint64_t{src} << 32 | number; }
+
+/// The message is not whole yet.
+bool waits_for(const Entry& entry, NodeId src, std::uint32_t number) {
+  return entry.frames != 0 && entry.fragmented && entry.message_number == number && !entry.complete &&
+         entry.run.header().src == src.value();
+}
+
+template <class Index>
+void forget(std::unique_ptr<Index>& index) {
+  if (index->bucket_count() > kKeptBuckets) {
+    index.reset();
+  } else {
+    index->clear();
+  }
+}
+
 bool is_plain(const Entry& entry) { return !entry.fragmented && !entry.latest && !entry.extended && !entry.touched; }
 
 }  // namespace
@@ -64,6 +86,7 @@ void LaneQueue::push(Entry entry) {
   const bool index = indexed_ && entry.latest && !entry.touched;
   const Entry& placed = entries_.push_back(std::move(entry));
   if (index) (*streams_)[stream_of(placed)] = entries_.end_number() - 1;
+  note_message(placed, entries_.end_number() - 1);
 }
 
 bool LaneQueue::extend_last(const Run& run, const Buffer& buffer, const std::byte* place) {
@@ -83,14 +106,35 @@ bool LaneQueue::extend_last(const Run& run, const Buffer& buffer, const std::byt
 }
 
 Entry* LaneQueue::find_message(NodeId src, std::uint32_t message_number) {
+  if (entries_.size() <= kSearchMax) return search_message(src, message_number);
+  if (!messages_indexed_) index_messages();
+  const auto found = messages_->find(message_key(src.value(), message_number));
+  if (found == messages_->end() || found->second < entries_.first_number()) return nullptr;
+  Entry& entry = entries_.at(found->second);
+  return waits_for(entry, src, message_number) ? &entry : nullptr;
+}
+
+Entry* LaneQueue::search_message(NodeId src, std::uint32_t message_number) {
   for (std::uint64_t number = entries_.end_number(); number-- > entries_.first_number();) {
     Entry& entry = entries_.at(number);
-    if (entry.frames != 0 && entry.fragmented && entry.message_number == message_number && !entry.complete &&
-        entry.run.header().src == src.value()) {
-      return &entry;
-    }
+    if (waits_for(entry, src, message_number)) return &entry;
   }
   return nullptr;
+}
+
+void LaneQueue::index_messages() {
+  if (!messages_) messages_ = std::make_unique<MessageIndex>();
+  messages_indexed_ = true;
+  for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+    note_message(entries_.at(number), number);
+  }
+}
+
+void LaneQueue::note_message(const Entry& entry, std::uint64_t number) {
+  if (!messages_indexed_ || !entry.fragmented || entry.complete || entry.frames == 0) return;
+  // Messages that left are forgotten when there are more of them than of others.
+  if (messages_->size() > 2 * entries_.size() + kForgottenMin) return forget_messages();
+  (*messages_)[message_key(entry.run.header().src, entry.message_number)] = number;
 }
 
 void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last, PiecePool& pool) {
@@ -102,7 +146,6 @@ void LaneQueue::append_fragment(Entry& entry, Run fragment, bool last, PiecePool
 
 bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   // Streams that left are forgotten when there are more of them than of others.
-  constexpr std::size_t kForgottenMin = 64;
   if (streams() > 2 * entries_.size() + kForgottenMin) forget_streams();
   if (!indexed_) {
     if (!streams_) streams_ = std::make_unique<StreamIndex>();
@@ -119,6 +162,7 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   discount(waiting);
   count(entry);
   older = std::exchange(waiting, std::move(entry));
+  note_message(waiting, found->second);
   return true;
 }
 
@@ -165,19 +209,29 @@ void LaneQueue::pop_front() {
 
 void LaneQueue::skip_dead() {
   while (!entries_.empty() && entries_.front().frames == 0) entries_.pop_front();
-  if (entries_.empty()) forget_streams();
+  if (!entries_.empty()) return;
+  forget_streams();
+  forget_messages();
 }
 
 /// Keeps the memory: the next burst fills it again.
 void LaneQueue::forget_streams() {
   if (!indexed_) return;
   indexed_ = false;
-  streams_->clear();
+  forget(streams_);
+}
+
+void LaneQueue::forget_messages() {
+  if (!messages_indexed_) return;
+  messages_indexed_ = false;
+  forget(messages_);
 }
 
 void LaneQueue::trim() {
   entries_.trim();
-  if (entries_.empty()) streams_.reset();
+  if (!entries_.empty()) return;
+  streams_.reset();
+  messages_.reset();
 }
 
 }  // namespace gimnet::hub

@@ -20,7 +20,8 @@ struct LatestStream {
 [[nodiscard]] std::size_t hash_value(const LatestStream& stream);
 
 /// One lane of an outbox: entries in order, found again by stream (to replace an older LATEST message) and by message
-/// (to add a fragment). What leaves it by being dropped or replaced is handed to a `lose(Entry&, reason)`.
+/// (to add a fragment). Both are found in constant time, however many wait, through indexes that are made when they are
+/// needed. What leaves it by being dropped or replaced is handed to a `lose(Entry&, reason)`.
 /// Thread safety: one shard.
 class LaneQueue {
  public:
@@ -62,12 +63,19 @@ class LaneQueue {
 
  private:
   using StreamIndex = boost::unordered_flat_map<LatestStream, std::uint64_t>;
+  using MessageIndex = boost::unordered_flat_map<std::uint64_t, std::uint64_t>;  ///< sender and message to entry
+  /// A message among more entries than these is looked up; among fewer, looking through them is cheaper.
+  static constexpr std::size_t kSearchMax = 64;
 
   [[nodiscard]] static LatestStream stream_of(const Entry& entry);
   void count(const Entry& entry);
   void discount(const Entry& entry);
   void skip_dead();
   void forget_streams();
+  [[nodiscard]] Entry* search_message(NodeId src, std::uint32_t message_number);
+  void index_messages();
+  void note_message(const Entry& entry, std::uint64_t number);
+  void forget_messages();
 
   RingQueue<Entry> entries_;
   std::uint64_t bytes_ = 0;
@@ -76,6 +84,8 @@ class LaneQueue {
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
   bool indexed_ = false;           ///< streams_ names every LATEST entry that waits
   std::unique_ptr<StreamIndex> streams_;
+  bool messages_indexed_ = false;  ///< messages_ names every message that waits for more
+  std::unique_ptr<MessageIndex> messages_;
 };
 
 }  // namespace gimnet::hub

@@ -77,6 +77,46 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   EXPECT_EQ(lane.bytes(), 4u + 9u + 7u + 3 * proto::kHeaderSize);
 }
 
+// Among few entries it is searched for, among many looked up: the same is found.
+TEST_F(LaneQueueTest, FindsMessagesHoweverManyAreInterleaved) {
+  for (const std::uint32_t messages : {10u, 64u, 65u, 1'000u}) {
+    SCOPED_TRACE(messages);
+    const auto part = [&](std::uint32_t number, bool complete) {
+      Entry one = entry("part", {.src = 1 + number % 2});
+      one.fragmented = true;
+      one.complete = complete;
+      one.message_number = number;
+      return one;
+    };
+    const auto find = [&](std::uint32_t number) {
+      return lane.find_message(NodeId{7u << 20 | (1 + number % 2)}, number);
+    };
+    for (std::uint32_t number = 0; number < messages; ++number) {
+      lane.push(part(number, false));
+      ASSERT_NE(find(number / 2), nullptr) << number;
+    }
+    EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 2}, 0), nullptr) << "of another sender";
+    for (std::uint32_t number = 0; number < messages; ++number) {
+      Entry* found = find(number);
+      ASSERT_NE(found, nullptr) << number;
+      EXPECT_EQ(found->message_number, number);
+      lane.append_fragment(*found, rig.run({"the end"}, {.src = 1 + number % 2}), true, rig.pieces);
+      EXPECT_EQ(find(number), nullptr) << "complete";
+    }
+    // A number that is used again is the newer message's.
+    lane.push(part(5, false));
+    ASSERT_NE(find(5), nullptr);
+    EXPECT_EQ(find(5), &lane.entries().back());
+    while (!lane.empty()) {
+      Entry& front = lane.front();
+      lane.on_left(front, front.size);
+      front = Entry{};
+      lane.pop_front();
+    }
+    EXPECT_EQ(find(5), nullptr) << "it left";
+  }
+}
+
 TEST_F(LaneQueueTest, ReplacesTheLatestOfAStream) {
   const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
   Entry older;
