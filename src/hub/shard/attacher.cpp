@@ -39,6 +39,9 @@ void Attacher::attach(AttachCommand command) {
   connection.armed = Interest{.read = connection.holds == 0, .write = false};
   const int descriptor = connection.transport->descriptor();
   if (descriptor >= 0 && !state_.poller.add(descriptor, connection.token(), connection.armed)) {
+    // GOODBYE stands behind the opening, as WELCOME would.
+    const iovec opening{const_cast<std::byte*>(proto::kOpening.data()), proto::kOpening.size()};
+    static_cast<void>(connection.transport->send({&opening, 1}));
     closer_.close(connection, proto::GoodbyeCode::no_memory, "the hub cannot wait for another connection; try later");
     return;
   }
@@ -101,8 +104,7 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
 void Attacher::begin_anew(Connection& connection, const AttachCommand& command, const Run& partial) {
   std::uint64_t lost = partial.frames;
   if (connection.resume) lost += connection.resume->kept.clear();
-  RingQueue<Run>& waiting = connection.outbox.replay();
-  for (; !waiting.empty(); waiting.pop_front()) lost += waiting.front().frames;
+  connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
   state_.tally.drop(proto::DropReason::link_lost, lost);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
   connection.resume.reset();

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -281,6 +283,44 @@ TEST(Attacher, ABrokenTransportIsToldToTheConductor) {
   const auto detached = rig.take_detached();
   ASSERT_TRUE(detached);
   EXPECT_EQ(detached->session.generation, 9u);
+  EXPECT_EQ(rig.sum(&ShardCounters::connections), 0u);
+}
+
+/// A pipe whose descriptor no poller takes: epoll refuses regular files.
+class UnpollableTransport final : public Transport {
+ public:
+  explicit UnpollableTransport(std::unique_ptr<Transport> pipe) : pipe_(std::move(pipe)), file_(std::tmpfile()) {}
+  ~UnpollableTransport() override { std::fclose(file_); }
+  UnpollableTransport(const UnpollableTransport&) = delete;
+  UnpollableTransport& operator=(const UnpollableTransport&) = delete;
+  IoResult receive(std::span<std::byte> into) override { return pipe_->receive(into); }
+  IoResult send(std::span<const iovec> pieces) override { return pipe_->send(pieces); }
+  [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
+  void limit_unsent(std::uint32_t) override {}
+  [[nodiscard]] int descriptor() const override { return ::fileno(file_); }
+
+ private:
+  std::unique_ptr<Transport> pipe_;
+  std::FILE* file_;
+};
+
+TEST(Attacher, WhoCannotBePolledHearsWhyBehindTheOpening) {
+  HubRig rig;
+  auto [transport, peer] = make_memory_pipe();
+  AttachCommand command;
+  command.session = {ConnectionSlot{3}, 9};
+  command.attachment = 1;
+  command.node = make_id<NodeId>(rig.hub(), 3);
+  command.transport = std::make_unique<UnpollableTransport>(std::move(transport));
+  rig.command(0, std::move(command));
+  rig.turn();
+  FakeNode node;
+  node.pipe = std::move(peer);
+  node.read();
+  EXPECT_TRUE(node.opened);
+  ASSERT_TRUE(node.goodbye);
+  EXPECT_EQ(node.goodbye->code, proto::GoodbyeCode::no_memory);
+  EXPECT_EQ(rig.sum(&ShardCounters::no_memory), 1u);
   EXPECT_EQ(rig.sum(&ShardCounters::connections), 0u);
 }
 

@@ -14,6 +14,14 @@ void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t fr
   remember(last, frames, reason);
 }
 
+void DropBook::drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason) {
+  for (std::uint32_t done = 0; done < size;) {
+    const auto frame = static_cast<std::uint32_t>(proto::load_header(first + done).frame_size());
+    drop(first + done, frame, 1, reason);
+    done += frame;
+  }
+}
+
 void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason) {
   const proto::FrameHeader header = proto::load_header(frame);
   const NodeId sender{header.src};

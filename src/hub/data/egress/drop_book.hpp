@@ -18,8 +18,12 @@ class DropBook {
   /// interval_ms: the shortest time between two reports to one sender for one reason.
   DropBook(Tally& tally, std::uint64_t interval_ms) : tally_(tally), interval_ms_(interval_ms) {}
 
-  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes.
+  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one header but for the
+  /// length.
   void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
+
+  /// The same for frames with any headers.
+  void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);
 
   /// True while reports wait for their time, or senders are to be forgotten: flush() has something to do.
   [[nodiscard]] bool pending() const { return !notes_.empty(); }

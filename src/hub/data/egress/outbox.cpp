@@ -199,7 +199,22 @@ void Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
                   past_reserve, context.signals);
 }
 
+/// Policies count messages: the first ones of a run may still fit.
 void Outbox::admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  while (entry.run.frames > 1) {
+    Entry first;
+    first.run = entry.run.share();
+    first.run.size = first.size = entry.run.skip_frame();
+    first.run.frames = first.frames = 1;
+    first.shared = entry.shared;
+    entry.size -= first.size;
+    --entry.frames;
+    admit_message(std::move(first), header, context);
+  }
+  admit_message(std::move(entry), header, context);
+}
+
+void Outbox::admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
   const std::size_t index = header.lane & proto::kLaneMask;
   LaneQueue& lane = lanes_[index];
   if (header.policy() != proto::Policy::drop) {
@@ -298,11 +313,7 @@ void Outbox::time_out_block(EgressContext& context) {
 }
 
 void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
-  for (; !replay_.empty(); replay_.pop_front()) {
-    const Run& run = replay_.front();
-    context.tally.queued -= run.frames;
-    context.drops.drop(run.bytes, run.size, run.frames, reason);
-  }
+  drop_replay(reason, context);
   for (LaneQueue& lane : lanes_) {
     while (!lane.empty()) {
       Entry& entry = lane.entries().front();
@@ -315,6 +326,14 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
   cut_.clear();
   pauses_.release_all(context.signals);
   on_emptied(context);
+}
+
+void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
+  for (; !replay_.empty(); replay_.pop_front()) {
+    const Run& run = replay_.front();
+    context.tally.queued -= run.frames;
+    context.drops.drop_mixed(run.bytes, run.size, reason);
+  }
 }
 
 void Outbox::trim() {

@@ -34,6 +34,8 @@ class Outbox {
 
   /// Frames of an earlier connection, to be written again before all lanes.
   [[nodiscard]] RingQueue<Run>& replay() { return replay_; }
+  /// They will not be written again.
+  void drop_replay(proto::DropReason reason, EgressContext& context);
 
   [[nodiscard]] bool empty() const { return waiting_bytes() == 0; }
   [[nodiscard]] std::uint64_t waiting_bytes() const;
@@ -94,6 +96,7 @@ class Outbox {
 
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_block(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);

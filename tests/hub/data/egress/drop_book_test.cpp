@@ -45,6 +45,29 @@ TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
   EXPECT_EQ(report->following.size(), 4u);
 }
 
+// What is to be written again after a break may come from many senders, one behind the other.
+TEST(DropBook, ReportsEachOfFramesWithDifferentHeaders) {
+  Tally tally;
+  DropBook book(tally, 10);
+  std::vector<std::byte> all;
+  const auto add = [&all](const std::string& text, std::uint32_t src, std::uint8_t flags) {
+    const auto one = EgressRig::bytes(text, {.flags = flags, .src = src});
+    all.insert(all.end(), one.begin(), one.end());
+  };
+  add("quiet", 1, 0);
+  add("first", 2, proto::kFlagReport);
+  add("", 3, proto::kFlagReport);
+  add("second", 2, proto::kFlagReport);
+  book.drop_mixed(all.data(), static_cast<std::uint32_t>(all.size()), DropReason::link_lost);
+  EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::link_lost)], 4u);
+  const auto sent = flush(book, 1'000);
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(index_of(sent[0].sender), 2u);
+  EXPECT_EQ(proto::decode_report(sent[0].payload)->count, 2u);
+  EXPECT_EQ(index_of(sent[1].sender), 3u);
+  EXPECT_EQ(proto::decode_report(sent[1].payload)->count, 1u);
+}
+
 TEST(DropBook, MergesBySenderAndReasonAndKeepsTheLastFrame) {
   Tally tally;
   DropBook book(tally, 10);

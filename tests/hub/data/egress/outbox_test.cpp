@@ -52,59 +52,6 @@ TEST(Outbox, TakesAndGivesFramesInOrder) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-TEST(Outbox, DropRefusesTheNewMessageOneByteBeyondTheLimit) {
-  EgressRig rig(small_limits());
-  TestConnection connection(rig);
-  block(connection);
-  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB), {.flags = kDrop});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u) << "exactly the limit";
-  rig.push(connection.outbox, "", {.flags = kDrop});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u);
-  rig.push(connection.outbox, "another lane has room", {.flags = kDrop, .lane = 2});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u);
-  EXPECT_TRUE(rig.ledger_exact());
-}
-
-TEST(Outbox, GroupDropsTheOldestForTheNewest) {
-  EgressRig rig(small_limits());
-  TestConnection connection(rig);
-  block(connection);
-  for (char c = 'a'; c < 'a' + 16; ++c) rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
-  rig.push(connection.outbox, sized(2 * kKiB, 'z'), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "as many of the oldest as it takes";
-  connection.peer.set_room(MemoryPeer::kAll);
-  connection.flush();
-  const auto texts = connection.take();
-  ASSERT_THAT(texts, SizeIs(16));
-  EXPECT_EQ(texts[0][0], 'c');
-  EXPECT_EQ(texts[14][0], 'z');
-  EXPECT_TRUE(rig.ledger_exact());
-}
-
-TEST(Outbox, OldestNeverDropsBlock) {
-  EgressRig rig(small_limits());
-  TestConnection connection(rig);
-  block(connection);
-  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'b'), {.flags = kBlock});
-  rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the new one, since there is no older one to drop";
-  connection.peer.set_room(MemoryPeer::kAll);
-  connection.flush();
-  for (const std::string& text : connection.take()) EXPECT_NE(text[0], 'g');
-}
-
-TEST(Outbox, AMessageLargerThanItsLaneMayWaitAlone) {
-  EgressRig rig(small_limits());
-  TestConnection connection(rig);
-  block(connection);
-  rig.push(connection.outbox, sized(40 * kKiB), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
-  rig.push(connection.outbox, sized(40 * kKiB), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the older one";
-  EXPECT_TRUE(rig.ledger_exact());
-}
-
 TEST(Outbox, BlockPausesOnceHoldsPastTheReserveAndLetsGo) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);

@@ -1,0 +1,134 @@
+#include "hub/data/egress/outbox.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/frame/extensions.hpp"
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::Kind;
+using testing::EgressRig;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using testing::TestConnection;
+using testing::TestFrame;
+
+constexpr std::uint8_t kBlock = 1;
+constexpr std::uint8_t kDrop = 2;
+constexpr std::uint8_t kLatest = 3 | proto::kFlagKeyed;
+constexpr std::uint32_t kKiB = 1024;
+
+Limits small_limits() {
+  Limits limits;
+  limits.lane0_bytes = limits.lane1_bytes = limits.lane2_bytes = limits.lane3_bytes = 16 * kKiB;
+  limits.reserve_bytes = 16 * kKiB;
+  return limits;
+}
+
+/// A payload that makes a frame of exactly `size` bytes.
+std::string sized(std::uint32_t size, char fill = 'x') { return std::string(size - proto::kHeaderSize, fill); }
+
+/// The connection takes nothing, and what is in the outbox waits.
+void block(TestConnection& connection) {
+  connection.peer.set_room(0);
+  connection.rig.push(connection.outbox, "first", {.lane = 3});
+  EXPECT_EQ(connection.flush(), Flush::blocked);
+}
+
+TEST(FullOutbox, DropRefusesTheNewMessageOneByteBeyondTheLimit) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB), {.flags = kDrop});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u) << "exactly the limit";
+  rig.push(connection.outbox, "", {.flags = kDrop});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u);
+  rig.push(connection.outbox, "another lane has room", {.flags = kDrop, .lane = 2});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u);
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+// What arrives in one read is as many messages as it is.
+TEST(FullOutbox, DropTakesTheMessagesOfABurstThatFit) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  std::vector<std::string> burst;
+  for (char c = 'a'; c < 'a' + 20; ++c) burst.push_back(sized(kKiB, c));
+  const hub::Run run = rig.run(burst, {.flags = kDrop});
+  connection.outbox.push(run, run.header(), Handover{}, rig.context);
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 4u);
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  const auto texts = connection.take();
+  ASSERT_THAT(texts, SizeIs(17));
+  EXPECT_EQ(texts[0][0], 'a');
+  EXPECT_EQ(texts[15][0], 'p');
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, OfABurstToAGroupTheNewestStay) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  std::vector<std::string> burst;
+  for (char c = 'a'; c < 'a' + 20; ++c) burst.push_back(sized(kKiB, c));
+  const hub::Run run = rig.run(burst, {.kind = Kind::group});
+  connection.outbox.push(run, run.header(), Handover{.fan_out = true}, rig.context);
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 4u);
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  const auto texts = connection.take();
+  ASSERT_THAT(texts, SizeIs(17));
+  EXPECT_EQ(texts[0][0], 'e');
+  EXPECT_EQ(texts[15][0], 't');
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, GroupDropsTheOldestForTheNewest) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (char c = 'a'; c < 'a' + 16; ++c) rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
+  rig.push(connection.outbox, sized(2 * kKiB, 'z'), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "as many of the oldest as it takes";
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  const auto texts = connection.take();
+  ASSERT_THAT(texts, SizeIs(16));
+  EXPECT_EQ(texts[0][0], 'c');
+  EXPECT_EQ(texts[14][0], 'z');
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, OldestNeverDropsBlock) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'b'), {.flags = kBlock});
+  rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the new one, since there is no older one to drop";
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  for (const std::string& text : connection.take()) EXPECT_NE(text[0], 'g');
+}
+
+TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  rig.push(connection.outbox, sized(40 * kKiB), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
+  rig.push(connection.outbox, sized(40 * kKiB), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the older one";
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+}  // namespace
+}  // namespace gimnet::hub
