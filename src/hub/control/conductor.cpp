@@ -149,7 +149,9 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   HandlerContext context{facts_, limits_, membership_,    watches_,         wiring_.counters,
                          now,    effects, wiring_.queues, wiring_.refusals, &name_counters_};
   const Request request{*session, view->header, payload};
-  const Handler handle = handler_for(session->role, kind, view->header.operation);
+  const NodeId dst{proto::load_header(event.frame.data()).dst};
+  const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
+  const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
   const proto::Payload answer = handle(context, request);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
   carry_out(effects, now);

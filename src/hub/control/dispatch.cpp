@@ -63,4 +63,11 @@ Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
   return handle_unknown;
 }
 
+proto::Payload handle_for_another(HandlerContext& context, const Request& request) {
+  return proto::encode_refusal(
+      request.header,
+      {proto::Status::not_found, "no hub answers at that address: there is no route from hub " +
+                                     std::to_string(context.facts.id.value()) + " to it; ask the own hub with dst 0"});
+}
+
 }  // namespace gimnet::hub

@@ -9,4 +9,7 @@ namespace gimnet::hub {
 /// `not_supported`. Thread safety: any thread.
 [[nodiscard]] Handler handler_for(proto::Role role, proto::Kind kind, std::uint16_t operation);
 
+/// The answer to a request whose frame is not for this hub: `not_found`.
+[[nodiscard]] proto::Payload handle_for_another(HandlerContext& context, const Request& request);
+
 }  // namespace gimnet::hub

@@ -173,12 +173,6 @@ bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
 }
 
 bool Reader::handle_control(Connection& connection, const proto::RunView& view) {
-  const NodeId dst{proto::load_header(view.bytes).dst};
-  const NodeId own = make_id<NodeId>(state_.shared.hub, kHubIndex);
-  if (dst != NodeId{} && dst != own) {
-    return refuse(connection, view, proto::DropReason::no_route, proto::GoodbyeCode::not_allowed,
-                  "a request for another hub; this hub has no links: ask the own hub (dst 0)");
-  }
   if (++connection.requests > state_.limits.requests) {
     closer_.close(connection, proto::GoodbyeCode::too_many_requests,
                   "more than " + std::to_string(state_.limits.requests) +

@@ -25,8 +25,9 @@ enum class FrameError : std::uint8_t {
   key_too_short,        ///< key that does not fit
   fragment_empty,       ///< a fragment with no payload
   fragment_over_total,  ///< offset + payload > total
+  dst_not_zero,         ///< FLOW or LINK for somebody else than the other end of the connection
 };
-inline constexpr std::size_t kFrameErrorCount = 18;
+inline constexpr std::size_t kFrameErrorCount = 19;
 
 /// A clause for the sentence of GOODBYE `malformed`, for example "hops is not 0".
 [[nodiscard]] constexpr const char* frame_error_text(FrameError error) {
@@ -47,7 +48,8 @@ inline constexpr std::size_t kFrameErrorCount = 18;
                                                     "the fragment header does not fit in the frame",
                                                     "the key does not fit in the frame",
                                                     "a fragment without payload",
-                                                    "a fragment ends after the message's total"};
+                                                    "a fragment ends after the message's total",
+                                                    "FLOW and LINK are for this connection only: dst must be 0"};
   const auto index = static_cast<std::size_t>(error);
   return index < kFrameErrorCount ? kTexts[index] : "unknown error";
 }

@@ -95,7 +95,14 @@ enum class Origin : std::uint8_t { node, hub };
   if (header.has(kFlagReservedMask)) return FrameError::reserved_flag_bits;
   if (header.hops != 0) return FrameError::hops_not_zero;
   if (kind > static_cast<std::uint8_t>(Kind::route)) return FrameError::unknown_kind;
-  if (header.kind == Kind::report || header.kind == Kind::route) return FrameError::kind_not_allowed;
+  // Four kinds in one test: it is made for every frame that is not like the one before it.
+  constexpr auto bit = [](Kind each) { return std::uint32_t{1} << static_cast<std::uint8_t>(each); };
+  constexpr std::uint32_t kNotForNodes = bit(Kind::report) | bit(Kind::route);
+  constexpr std::uint32_t kForThisConnection = bit(Kind::flow) | bit(Kind::link);
+  if (((kNotForNodes | kForThisConnection) >> kind & 1) != 0) {
+    if ((kNotForNodes >> kind & 1) != 0) return FrameError::kind_not_allowed;
+    if (header.dst != 0) return FrameError::dst_not_zero;
+  }
   const bool to_many = header.kind == Kind::group || header.kind == Kind::list || header.kind == Kind::broadcast;
   if (header.policy() == Policy::block && to_many) return FrameError::block_not_allowed;
   const bool to_one = header.kind == Kind::unicast || header.kind == Kind::service;

@@ -133,6 +133,24 @@ TEST_F(ConductorTest, EventsOfAnEarlierSessionAreIgnored) {
   EXPECT_EQ(shards.sent.size(), sent);
 }
 
+TEST_F(ConductorTest, AnswersARequestForAnotherHub) {
+  const Node robot = join("robot");
+  const auto status = [&](NodeId dst) {
+    shards.sent.clear();
+    send_frame(robot, proto::Kind::ns, proto::encode(ns::Resolve{"robot"}, 5), dst);
+    EXPECT_EQ(shards.sent.size(), 1u);
+    const auto* answer = std::get_if<SendControlCommand>(&shards.sent.back().command);
+    EXPECT_EQ(answer->answers, 1u);
+    const auto read = proto::decode_answer<ns::ResolveAnswer>(payload_of(*answer));
+    return read ? proto::Status::done : read.error().status;
+  };
+  EXPECT_EQ(status(NodeId{}), proto::Status::done);
+  EXPECT_EQ(status(make_id<NodeId>(HubId{7}, 0)), proto::Status::done) << "this hub by its id";
+  EXPECT_EQ(status(make_id<NodeId>(HubId{8}, 0)), proto::Status::not_found);
+  EXPECT_EQ(status(robot.id), proto::Status::not_found) << "a node is no hub";
+  EXPECT_TRUE(conductor.membership().sessions().find(1)->connected);
+}
+
 TEST_F(ConductorTest, RefusesWithAReason) {
   join("robot");
   proto::Hello hello;

@@ -151,6 +151,8 @@ TEST(Reader, AnswersEachMalformedFrameWithGoodbye) {
       {"fragment that wraps", {.flags = 8}, 1, fragment(0xFFFFFFFF, 10, "abc")},
       {"FLOW of unknown operation", {.kind = Kind::flow}, 0, std::string(24, '\x63')},
       {"FLOW too short", {.kind = Kind::flow}, 0, "\x01"},
+      {"FLOW for somebody else", {.kind = Kind::flow}, 1, std::string("\x01\0\0\0", 4) + std::string(12, '\0')},
+      {"LINK for somebody else", {.kind = Kind::link}, 1, "junk"},
       {"LINK that is no GOODBYE", {.kind = Kind::link}, 0, "junk"},
   };
   for (const Malformed& each : cases) {
@@ -257,6 +259,25 @@ TEST(Reader, TakesAsManyUnansweredRequestsAsAllowedAndNotOneMore) {
   rig.settle();
   EXPECT_FALSE(a.goodbye) << "an answer made room for another request";
   rig.send(a, 0, "request", {.kind = Kind::ns});
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
+}
+
+TEST(Reader, CountsRequestsUpToTheLargestLimit) {
+  Limits limits;
+  limits.requests = 65'536;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  std::vector<std::byte> requests;
+  for (int i = 0; i < 1'024; ++i) {
+    const auto one = HubRig::frame(a, 0, "request", {.kind = Kind::ns});
+    requests.insert(requests.end(), one.begin(), one.end());
+  }
+  for (int i = 0; i < 64; ++i) rig.write(a, requests);
+  rig.settle();
+  EXPECT_FALSE(a.goodbye);
+  rig.send(a, 0, "one more", {.kind = Kind::ns});
   rig.settle();
   ASSERT_TRUE(a.goodbye);
   EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);

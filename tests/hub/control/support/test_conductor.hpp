@@ -79,9 +79,9 @@ class TestConductor {
         {node.shard, DetachedEvent{node.session, node.attachment, node.id, said_by_peer, code, std::move(sentence)}},
         now);
   }
-  void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload) {
+  void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload, NodeId dst = {}) {
     conductor.on_event({node.shard, ControlFrameEvent{node.session, node.attachment, node.id,
-                                                      control_frame(kind, NodeId{0}, kHub, payload)}},
+                                                      control_frame(kind, dst, kHub, payload)}},
                        now);
   }
 
