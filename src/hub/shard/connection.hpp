@@ -51,8 +51,8 @@ struct Connection : Recipient {
   bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
   bool draining = false;        ///< closes once everything is written
   std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
-  std::uint16_t holds = 0;                          ///< not read while it is not 0
-  std::uint16_t requests = 0;
+  std::uint32_t holds = 0;                          ///< by outboxes; not read while it is not 0
+  std::uint32_t requests = 0;                       ///< that are unanswered
   GatherWriter writer;
   FrameTail tail;
   IngressState ingress;

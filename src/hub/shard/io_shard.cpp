@@ -175,8 +175,7 @@ void IoShard::execute(ShardCommand& command) {
                    Connection* connection = state_.find(control.session);
                    if (connection == nullptr || !connection->connected) return;
                    if (control.attachment != 0 && control.attachment != connection->attachment) return;
-                   connection->requests -=
-                       static_cast<std::uint16_t>(std::min<std::uint32_t>(control.answers, connection->requests));
+                   connection->requests -= std::min(control.answers, connection->requests);
                    if (connection->outbox.push_control(control.frame, state_.egress)) {
                      state_.recipients.mark_dirty(*connection);
                      return;

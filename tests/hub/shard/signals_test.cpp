@@ -154,6 +154,19 @@ TEST(Signals, TwoNodesThatFloodEachOtherDoNotStandStill) {
 }
 
 // A peer that was told PAUSE and cannot be told RESUME starts anew: a connection begins with nothing paused.
+// One for each of its recipients that is full, and lane: more than 16 bits can count.
+TEST(Signals, CountsHoldsOfManyRecipients) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  constexpr std::uint32_t kHolds = 70'000;
+  for (std::uint32_t i = 0; i < kHolds; ++i) rig.state(0).signals.hold(a.id);
+  for (std::uint32_t i = 0; i + 1 < kHolds; ++i) rig.state(0).signals.release(a.id);
+  EXPECT_EQ(rig.connection(a)->holds, 1u);
+  EXPECT_FALSE(rig.connection(a)->armed.read);
+  rig.state(0).signals.release(a.id);
+  EXPECT_TRUE(rig.connection(a)->armed.read);
+}
+
 TEST(Signals, WhoHasNoRoomForResumeIsClosed) {
   HubRig rig;
   FakeNode& a = rig.join(0);

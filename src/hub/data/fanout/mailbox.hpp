@@ -103,10 +103,10 @@ std::size_t Mailbox::drain(std::size_t most, Before&& before_taking, Take&& take
 
 template <class Tell>
 void Mailbox::tell_room(Tell&& tell) {
+  // The fence's partner is the one in crowded(): either the sender saw the room, or this thread sees that it waits.
+  std::atomic_thread_fence(std::memory_order_seq_cst);
   for (std::size_t from = 0; from < shards_; ++from) {
     Pair& pair = pairs_[from];
-    // The fence's partner is the one in crowded(): either the sender saw the room, or this thread sees that it waits.
-    std::atomic_thread_fence(std::memory_order_seq_cst);
     // relaxed: ordered by the fence
     if (!pair.sender_waits.load(std::memory_order_relaxed)) continue;
     if (pair.sender_waits.exchange(false, std::memory_order_relaxed)) {  // relaxed: ordered by the fence
