@@ -22,7 +22,7 @@ from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-QUICK_SECONDS = 0.5
+QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 1.0
 SMOKE_SECONDS = 0.1
 SMOKE_CLIENTS = 200

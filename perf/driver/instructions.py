@@ -83,7 +83,7 @@ def run_program(command: list[str]) -> str:
 def describe(program: pathlib.Path) -> tuple[dict, list[str]]:
     """What the program was compiled by, and its scripts."""
     if not program.exists():
-        raise CountingError(f"{program} is not there: build it first (./dev build all_perf)")
+        raise CountingError(f"{program} is not there: build it first (./dev build instruction_scripts)")
     first, *scripts = run_program([str(program)]).splitlines()
     compiler, processor, build = first.rsplit(" ", 2)
     return {"compiler": compiler, "processor": processor, "build": build}, scripts

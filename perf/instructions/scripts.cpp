@@ -172,6 +172,22 @@ Work hub_turn(std::uint32_t destinations) {
           }};
 }
 
+/// Turns of one frame each: what a turn costs beside its frames, which is what a round trip feels.
+Work hub_turn_single() {
+  auto rig = std::make_shared<testing::HubRig>();
+  testing::FakeNode& sender = rig->join(0);
+  testing::FakeNode& receiver = rig->join(0);
+  rig->settle();
+  constexpr std::uint32_t kTurns = 64;
+  return {kTurns, [rig, &sender, bytes = testing::HubRig::frame(sender, receiver.id.value(), kPayload)] {
+            for (std::uint32_t i = 0; i < kTurns; ++i) {
+              rig->write(sender, bytes);
+              const Ready ready{.token = rig->connection(sender)->token(), .readable = true};
+              rig->shard(0).turn({&ready, 1}, rig->now_ms);
+            }
+          }};
+}
+
 Work hub_turn_fan_out() {
   auto rig = std::make_shared<testing::HubRig>();
   testing::FakeNode& provider = rig->join(0);
@@ -207,6 +223,7 @@ constexpr Script kScripts[] = {
     {"hub_turn_one_to_one", [] { return hub_turn(1); }},
     {"hub_turn_in_turns", [] { return hub_turn(kDestinations); }},
     {"hub_turn_fan_out_100", hub_turn_fan_out},
+    {"hub_turn_single", hub_turn_single},
 };
 
 }  // namespace
