@@ -8,7 +8,11 @@ namespace {
 
 constexpr std::size_t kWindowBytes = 2 * 1024 * 1024;
 constexpr std::size_t kWindowBytesARecipient = 128 * 1024;
-constexpr std::size_t kUnbatchedMessagesARecipient = 64;
+constexpr std::size_t kUnbatchedMessages = 64;
+constexpr std::uint64_t kFirstMessages = 16;
+constexpr std::uint64_t kGrowth = 4;
+/// A subject that takes longer for a round gets no larger ones, or it would be at them long after the run's end.
+constexpr std::chrono::milliseconds kSlowRound{400};
 /// Writes of a publisher in one turn where each is a single message.
 constexpr std::size_t kUnbatchedWrites = 8;
 constexpr std::chrono::seconds kDrainLimit{2};
@@ -26,13 +30,30 @@ Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t reci
       is_unbatched_(publishers_.front().is_unbatched()),
       begin_(Clock::now()) {}
 
-std::uint64_t Flood::deliveries_allowed() const {
-  // Not more than has arrived so far: what a slow subject still has to do when time is up would take longer than the
-  // run.
-  std::uint64_t window = std::min<std::uint64_t>(window_bytes_ / message_bytes_, settled_ + missing_);
-  if (is_unbatched_) window = std::min<std::uint64_t>(window, kUnbatchedMessagesARecipient * recipients_a_message_);
-  const std::uint64_t under_way = expected_ - settled_ - missing_;
-  return under_way >= window ? 0 : window - under_way;
+std::uint64_t Flood::window() const {
+  std::uint64_t deliveries = window_bytes_ / message_bytes_;
+  if (is_unbatched_) deliveries = std::min<std::uint64_t>(deliveries, kUnbatchedMessages * recipients_a_message_);
+  return std::max<std::uint64_t>(1, deliveries / recipients_a_message_);
+}
+
+std::uint64_t Flood::messages_allowed() const {
+  const std::uint64_t most = std::min(window(), messages_max_);
+  const std::uint64_t under_way = (expected_ - settled_ - missing_ + recipients_a_message_ - 1) / recipients_a_message_;
+  if (under_way == 0) return UINT64_MAX;  // a write larger than the window could not start otherwise
+  return under_way >= most ? 0 : most - under_way;
+}
+
+void Flood::warm_up(std::chrono::nanoseconds duration) {
+  for (messages_max_ = kFirstMessages; messages_max_ < window(); messages_max_ *= kGrowth) {
+    const auto begin = Clock::now();
+    const std::uint64_t before = expected_;
+    while (expected_ - before < messages_max_ * recipients_a_message_) turn(kPatience);
+    drain();
+    if (Clock::now() - begin > kSlowRound) break;
+  }
+  if (messages_max_ >= window()) messages_max_ = UINT64_MAX;
+  run_for(duration);
+  drain();
 }
 
 bool Flood::publish() {
@@ -44,10 +65,7 @@ bool Flood::publish() {
         const std::chrono::duration<double> elapsed = Clock::now() - begin_;
         if (static_cast<double>(begun_bytes_) > elapsed.count() * bytes_a_second_) break;
       }
-      // A message larger than the window could not start otherwise.
-      const std::uint64_t room = std::max<std::uint64_t>(deliveries_allowed() / recipients_a_message_,
-                                                         expected_ == settled_ + missing_ ? UINT64_MAX : 0);
-      const std::size_t count = publisher.publish(room);
+      const std::size_t count = publisher.publish(messages_allowed(), messages_max_);
       if (count == 0) break;
       begun_bytes_ += count * message_bytes_;
       expected_ += count * recipients_a_message_;

@@ -11,9 +11,9 @@
 namespace gimnet::perf {
 
 /// Publishes in a window, so that nobody is measured while it drops: at most 2 MiB are under way, or 128 KiB a
-/// recipient where that is more, and at first not more than has arrived. Of unbatched messages at most 64 a recipient
-/// are: where a subject that was not scheduled for a moment finds many of them at once, its cost says nothing about
-/// one. Counts what was sent to how many, and what became of it.
+/// recipient where that is more; less where warm_up() found the subject too slow for it. Of unbatched messages at most
+/// 64 a recipient are: where a subject that was not scheduled for a moment finds many of them at once, its cost says
+/// nothing about one. Counts what was sent to how many, and what became of it.
 class Flood {
  public:
   /// `recipients_a_message`: copies that the subject makes of each message. `bytes_a_second` 0: no pace.
@@ -22,6 +22,8 @@ class Flood {
   /// One turn: each publisher writes once if the window lets it, then every ready client is read once.
   /// Waits at most `patience` where nothing could be written. Returns messages settled.
   std::uint64_t turn(std::chrono::nanoseconds patience);
+  /// Rounds that grow as long as the subject is quick to deliver them, then turns for `duration`; reads the rest.
+  void warm_up(std::chrono::nanoseconds duration);
   /// Turns until `duration` is over.
   void run_for(std::chrono::nanoseconds duration);
   /// Reads until all is settled. What does not come within 2 s counts as lost.
@@ -36,7 +38,10 @@ class Flood {
 
  private:
   bool publish();
-  [[nodiscard]] std::uint64_t deliveries_allowed() const;
+  /// Messages that may be under way.
+  [[nodiscard]] std::uint64_t window() const;
+  /// For which it has room.
+  [[nodiscard]] std::uint64_t messages_allowed() const;
 
   Engine& engine_;
   std::vector<Publisher> publishers_;
@@ -45,6 +50,7 @@ class Flood {
   const std::size_t message_bytes_;
   std::size_t window_bytes_;
   const bool is_unbatched_;
+  std::uint64_t messages_max_ = UINT64_MAX;  ///< under way, and in one write
   Clock::time_point begin_;
   std::uint64_t begun_bytes_ = 0;  ///< for the pace
   std::uint64_t expected_ = 0;     ///< deliveries

@@ -22,14 +22,15 @@ Publisher::Publisher(Wire& wire, Client& from, const std::vector<Target>& target
   next_message_ = block_.message_count();
 }
 
-std::size_t Publisher::publish(std::uint64_t messages_max) {
+std::size_t Publisher::publish(std::uint64_t messages_max, std::uint64_t cut_to) {
   if (!from_.flush() || !from_.paused.empty()) return 0;
   if (next_message_ == block_.message_count()) {
     block_.renew();
     next_message_ = 0;
   }
-  const std::size_t count = std::min(messages_a_write_, block_.message_count() - next_message_);
-  if (count > messages_max) return 0;
+  const auto whole = std::min(messages_a_write_, block_.message_count() - next_message_);
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(whole, cut_to));
+  if (count > messages_max || count == 0) return 0;
   const std::size_t begin = next_message_ == 0 ? 0 : block_.message_end(next_message_ - 1);
   const std::size_t end = block_.message_end(next_message_ + count - 1);
   from_.write(std::span<const std::byte>(block_.bytes).subspan(begin, end - begin));

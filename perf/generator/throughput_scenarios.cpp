@@ -34,8 +34,7 @@ Counts count_inboxes(Engine& engine) {
 /// Warms up, then measures from rest to rest, so that the processor time belongs to exactly the messages counted.
 Findings measure(Engine& engine, const RunOptions& options, Traffic traffic) {
   Flood flood(engine, std::move(traffic.publishers), traffic.recipients_a_message);
-  flood.run_for(std::min<std::chrono::nanoseconds>(kWarmUp, options.duration));
-  flood.drain();
+  flood.warm_up(std::min<std::chrono::nanoseconds>(kWarmUp, options.duration));
   const Counts before = count_inboxes(engine);
   const auto begin = Clock::now();
   const auto cpu_begin_ns = cpu_time_ns(options.process);
