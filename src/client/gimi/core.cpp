@@ -10,6 +10,7 @@
 #include "base/endian.hpp"
 #include "client/gimi/deadline.hpp"
 #include "client/gimi/message_access.hpp"
+#include "client/gimi/report_words.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::gimi {
@@ -256,7 +257,7 @@ void Core::on_report(const nif_incoming& in) {
   StreamTable::Report report{stream_of(in, in.to), in.reason, in.count, 0, in.text};
   if (header && header->operation == proto::gimi::Operation::data) report.sequence = header->sequence;
   if (header && header->operation == proto::gimi::Operation::ping) {
-    pings_.on_lost(header->sequence, "the hub reports " + report.text);
+    pings_.on_lost(header->sequence, report_words(report.text));
   }
   streams_.on_report(report);
 }

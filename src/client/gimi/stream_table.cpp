@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "client/gimi/report_words.hpp"
 #include "proto/frame/report.hpp"
 
 namespace gimnet::gimi {
@@ -63,7 +64,7 @@ void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence, const p
 }
 
 void StreamTable::on_report(const Report& report) {
-  const std::string why = "the hub reports " + report.text;
+  const std::string why = report_words(report.text);
   if (is_route_gone(report.reason)) {
     for (SendStream* stream : all()) {
       if (stream->to() == report.name.peer) stream->on_broken(why);

@@ -61,8 +61,10 @@ Failure failure_of(nif_status status, std::string_view doing) {
   if (status == NIF_TIMEOUT) {
     sentence += "the time given was not enough";
   } else {
-    const char* words = nif_error_text();
-    sentence += *words != '\0' ? words : nif_status_text(status);
+    const std::string_view words = nif_error_text();
+    // NIF's sentences mostly begin so themselves, and name more.
+    if (words.starts_with("cannot ")) return {status_of(status), std::string(words)};
+    sentence += words.empty() ? std::string_view(nif_status_text(status)) : words;
   }
   return {status_of(status), std::move(sentence)};
 }

@@ -10,9 +10,18 @@ namespace {
 constexpr std::string_view kTcp = "tcp://";
 constexpr std::string_view kUnix = "unix:";
 
+/// What was probably meant by an address without its scheme.
+std::string advice_for(std::string_view url) {
+  if (url.find("://") == std::string_view::npos && url.find(':') != std::string_view::npos) {
+    const std::string meant = std::string(kTcp) + std::string(url);
+    if (parse_endpoint(meant)) return "did you mean " + meant + "?";
+  }
+  return "give tcp://host:port or unix:/path";
+}
+
 Failure not_understood(std::string_view url, std::string_view why) {
-  return {NIF_BAD_ARGUMENT, "cannot use the hub URL '" + std::string(url) + "': " + std::string(why) +
-                                "; give tcp://host:port or unix:/path"};
+  return {NIF_BAD_ARGUMENT,
+          "cannot use the hub URL '" + std::string(url) + "': " + std::string(why) + "; " + advice_for(url)};
 }
 
 }  // namespace
@@ -39,6 +48,9 @@ Result<Endpoint, Failure> parse_endpoint(std::string_view url) {
   std::string_view host = rest.substr(0, colon);
   if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   if (host.empty()) return not_understood(url, "the host is missing");
+  if (host.find_first_of("[]") != std::string_view::npos) {
+    return not_understood(url, "an IPv6 address stands between [ and ]");
+  }
   const std::string_view port = rest.substr(colon + 1);
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), endpoint.port);
   if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size() || endpoint.port == 0) {
@@ -53,7 +65,11 @@ Result<std::vector<Endpoint>, Failure> endpoints_for(std::string_view url) {
   std::vector<Endpoint> endpoints;
   if (!chosen.empty()) {
     auto parsed = parse_endpoint(chosen);
-    if (!parsed) return parsed.error();
+    if (!parsed) {
+      Failure failure = parsed.error();
+      if (url.empty()) failure.sentence += " (that is GIMNET_HUB)";
+      return failure;
+    }
     endpoints.push_back(std::move(*parsed));
     return endpoints;
   }

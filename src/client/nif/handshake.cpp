@@ -30,6 +30,11 @@ std::int64_t milliseconds(std::uint32_t value, std::uint32_t fallback) {
   return std::clamp(value == 0 ? fallback : value, kKeepAliveMsMin, kKeepAliveMsMax) * kNsPerMs;
 }
 
+/// REQUIRES: an opening at least up to its major version, the last byte but one.
+std::string major_of(std::span<const std::byte> opening) {
+  return std::to_string(std::to_integer<unsigned>(opening[proto::kOpeningSize - 2]));
+}
+
 }  // namespace
 
 std::vector<std::byte> encode_hello(const proto::Hello& hello) {
@@ -91,8 +96,9 @@ Handshake::State Handshake::take_opening() {
     case proto::Opening::other_protocol:
       return fail(NIF_PROTOCOL, "the peer does not speak GIMnet; is it a hub?");
     case proto::Opening::bad_version:
-      return fail(NIF_BAD_VERSION,
-                  "the hub speaks another major version of the protocol; use libraries of its version");
+      return fail(NIF_BAD_VERSION, "the hub speaks version " + major_of(bytes_) +
+                                       " of the protocol, this program version " + major_of(proto::kOpening) +
+                                       "; use a program of the hub's version");
     case proto::Opening::accepted:
       break;
   }

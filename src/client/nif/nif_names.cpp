@@ -56,7 +56,9 @@ nif_status check_name(const char* name, const char* what) {
 
 nif_status check_pattern(const char* pattern) {
   if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
-  return fail(NIF_BAD_NAME, std::string("cannot list '") + pattern + "': it is not a pattern");
+  return fail(NIF_BAD_NAME, std::string("cannot list '") + pattern +
+                                "': it is not a pattern: parts are separated by one /, and one is letters, digits, "
+                                "'.', '_', '-', or * for any one part, or ** for any number of them");
 }
 
 nif_status impossible_answer() { return fail(NIF_PROTOCOL, "the hub's answer is not in ascending order"); }

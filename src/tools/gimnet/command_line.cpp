@@ -41,6 +41,11 @@ std::variant<Options, CommandLineEnding> unknown_command(std::string_view word) 
 /// What CLI11 cannot know.
 std::string contradiction(const Options& options) {
   if (options.json && options.raw) return "--json and --raw contradict each other: give one of them";
+  const bool names_service = options.command == Command::pub || options.command == Command::echo ||
+                             options.command == Command::hz || options.command == Command::bw;
+  if (names_service && options.target.find_first_of("/*") == std::string::npos) {
+    return "'" + options.target + "' is no full name of a service: write NODE/SERVICE";
+  }
   if (options.command == Command::pub) {
     const auto slash = options.target.rfind('/');
     if (slash == std::string::npos || slash == 0 || slash + 1 == options.target.size()) {

@@ -9,6 +9,12 @@
 namespace gimnet::tool {
 namespace {
 
+/// An empty word is a mistake of a script, not a default.
+const CLI::Validator& not_empty() {
+  static const CLI::Validator kNotEmpty([](std::string& word) { return word.empty() ? "empty" : std::string(); }, "");
+  return kNotEmpty;
+}
+
 void add_key(CLI::App& command, Options& options) {
   command.add_option("--type", options.key.type, "message type, a whole number, default 0");
   command.add_option("--instance", options.key.instance, "instance of the type, a whole number, default 0");
@@ -36,16 +42,16 @@ void add_printing(CLI::App& command, Options& options) {
 
 void add_send(CLI::App& app, Options& options) {
   CLI::App& send = *app.add_subcommand("send", help::kSendAbout);
-  send.add_option("node", options.target, "name or id of the receiver")->required();
-  send.add_option("--file", options.file, "send this file as one message");
-  send.add_option("--name", options.name, "name of this node, default none");
+  send.add_option("node", options.target, "name or id of the receiver")->required()->check(not_empty());
+  send.add_option("--file", options.file, "send this file as one message")->check(not_empty());
+  send.add_option("--name", options.name, "name of this node, default none")->check(not_empty());
   add_lane(send, options);
   add_key(send, options);
 }
 
 void add_recv(CLI::App& app, Options& options) {
   CLI::App& recv = *app.add_subcommand("recv", help::kRecvAbout);
-  recv.add_option("--name", options.name, "name of this node, to which others send")->required();
+  recv.add_option("--name", options.name, "name of this node, to which others send")->required()->check(not_empty());
   recv.add_option("--max-size", options.bytes_max, "largest message taken, in bytes, 1 to 1073741824, default 67108864")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 30));
   add_printing(recv, options);
@@ -54,8 +60,9 @@ void add_recv(CLI::App& app, Options& options) {
 void add_pub(CLI::App& app, Options& options) {
   static const std::map<std::string, Delivery> kDeliveries{{"stream", Delivery::stream}, {"latest", Delivery::latest}};
   CLI::App& pub = *app.add_subcommand("pub", help::kPubAbout);
-  pub.add_option("service", options.target, "full name: node/service")->required();
-  pub.add_option("--name", options.name, "name of this node, default: the service's name up to its last /");
+  pub.add_option("service", options.target, "full name: node/service")->required()->check(not_empty());
+  pub.add_option("--name", options.name, "name of this node, default: the service's name up to its last /")
+      ->check(not_empty());
   pub.add_option("--delivery", options.delivery, "stream: all messages; latest: only the newest waits")
       ->transform(CLI::CheckedTransformer(kDeliveries).description(""));
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
@@ -68,14 +75,16 @@ void add_pub(CLI::App& app, Options& options) {
 void add_echo(CLI::App& app, Options& options) {
   CLI::App& echo = *app.add_subcommand("echo", help::kEchoAbout);
   echo.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
-      ->required();
+      ->required()
+      ->check(not_empty());
   add_printing(echo, options);
 }
 
 void add_meter(CLI::App& app, const char* name, const char* about, Options& options) {
   CLI::App& meter = *app.add_subcommand(name, about);
   meter.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
-      ->required();
+      ->required()
+      ->check(not_empty());
   meter.add_option("--window", options.window_s, "seconds that a line speaks of, 0.001 to 3600, default 5")
       ->check(CLI::Range(0.001, 3600.0));
   add_bounds(meter, options);
@@ -83,7 +92,7 @@ void add_meter(CLI::App& app, const char* name, const char* about, Options& opti
 
 void add_ping(CLI::App& app, Options& options) {
   CLI::App& ping = *app.add_subcommand("ping", help::kPingAbout);
-  ping.add_option("node", options.target, "name or id")->required();
+  ping.add_option("node", options.target, "name or id")->required()->check(not_empty());
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
       ->check(CLI::Range(1, 1'000'000'000));
   ping.add_option("-i,--interval", options.interval_s, "seconds between two, 0 to 3600, default 0.1")
@@ -107,7 +116,8 @@ void add_lists(CLI::App& app, Options& options) {
 void add_commands(CLI::App& app, Options& options) {
   static const std::map<std::string, Colour> kColours{
       {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
-  app.add_option("--hub", options.hub, "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub");
+  app.add_option("--hub", options.hub, "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
+      ->check(not_empty());
   app.add_flag("--json", options.json, "print JSON");
   app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
       ->transform(CLI::CheckedTransformer(kColours).description(""));

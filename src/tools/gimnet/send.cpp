@@ -72,10 +72,17 @@ void print(Session& session, const SendCounts& counts) {
 }
 
 /// Why not all arrived: what the stream knows says more than the call that failed after it.
-Failure reason(const SendCounts& counts, Failure failure) {
+Failure reason(const Session& session, const SendCounts& counts, Failure failure) {
   if (counts.lost == 0) return failure;
   return {Status::not_delivered, std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
-                                     " messages were not acknowledged: " + counts.loss};
+                                     " messages were not acknowledged by " + session.options().target + ": " +
+                                     counts.loss};
+}
+
+/// It was the id of nobody: as a name that nobody has.
+bool nobody_there(const SendCounts& counts) {
+  const auto reports = [&](const char* reason) { return counts.loss.find(reason) != std::string::npos; };
+  return counts.acknowledged == 0 && (reports("no_such_node") || reports("no_route"));
 }
 
 }  // namespace
@@ -102,8 +109,9 @@ ExitCode run_send(Session& session) {
   print(session, counts);
   if (sent) return session.finish();
   session.output().flush();
-  const ExitCode code = session.fail(reason(counts, sent.failure()));
-  return session.stopped() ? code : ExitCode::failed;
+  const ExitCode code = session.fail(reason(session, counts, sent.failure()));
+  if (session.stopped()) return code;
+  return nobody_there(counts) ? ExitCode::not_found : ExitCode::failed;
 }
 
 }  // namespace gimnet::tool

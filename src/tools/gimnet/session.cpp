@@ -2,6 +2,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 #include "base/suggest.hpp"
@@ -17,8 +18,12 @@ std::optional<ExitCode> Session::join(NodeOptions how) {
   if (how.description.empty()) how.description = kToolDescription;
   auto joined = Node::join(how);
   if (!joined) {
-    const ExitCode code = fail(joined.failure());
-    return code == ExitCode::timeout ? ExitCode::no_connection : code;
+    Failure failure = joined.failure();
+    if (failure.status == Status::no_hub) failure.sentence += advice();
+    const ExitCode code = fail(failure);
+    // Whoever answers there lets nobody in, or is no hub.
+    const bool no_hub = failure.status == Status::timeout || failure.status == Status::protocol;
+    return no_hub && code == exit_code_of(failure.status) ? ExitCode::no_connection : code;
   }
   node_ = std::move(*joined);
   stop_.on_stop([this] { node_->close(); });
@@ -34,6 +39,15 @@ std::optional<Peer> Session::find(std::string_view name) {
   }
   code_ = fail(failure);
   return std::nullopt;
+}
+
+/// What to do where no hub answers.
+std::string Session::advice() const {
+  const char* named = std::getenv("GIMNET_HUB");
+  if (!options_.hub.empty()) return " Start one there with `tcphub`, or name another with --hub";
+  if (named != nullptr && *named != '\0')
+    return " That address is GIMNET_HUB's: start one there with `tcphub`, or change it";
+  return " Start one with `tcphub`, or name yours with --hub";
 }
 
 std::string Session::nearest_name(const std::string& kind, std::string_view word) {
@@ -58,7 +72,8 @@ ExitCode Session::fail_unmatched(const std::string& kind) {
 
 ExitCode Session::fail(const Failure& failure) {
   if (stopped()) return stop_.signal() == SIGTERM ? ExitCode::terminated : ExitCode::interrupted;
-  say(failure.sentence);
+  const std::string trouble = failure.status == Status::not_connected && node_ ? node_->state().trouble : "";
+  say(trouble.empty() ? failure.sentence : "lost the connection to the hub: " + trouble);
   return exit_code_of(failure.status);
 }
 

@@ -54,6 +54,7 @@ class Session {
   [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
 
  private:
+  [[nodiscard]] std::string advice() const;
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
 
   const Options& options_;

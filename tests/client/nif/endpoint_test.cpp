@@ -23,8 +23,9 @@ TEST(Endpoint, ReadsUrlsAndWritesThemBack) {
 }
 
 TEST(Endpoint, RefusesWhatItDoesNotUnderstand) {
-  for (const char* const url : {"", "tcp:", "tcp://", "tcp://host", "tcp://host:", "tcp://host:0", "tcp://host:65536",
-                                "tcp://host:7x", "tcp://:7450", "unix:", "http://host:80", "host:7450"}) {
+  for (const char* const url :
+       {"", "tcp:", "tcp://", "tcp://host", "tcp://host:", "tcp://host:0", "tcp://host:65536", "tcp://host:7x",
+        "tcp://:7450", "unix:", "http://host:80", "host:7450", "tcp://[::1:7450", "tcp://::1]:7450"}) {
     const auto endpoint = parse_endpoint(url);
     ASSERT_FALSE(endpoint) << url;
     EXPECT_EQ(endpoint.error().status, NIF_BAD_ARGUMENT);
@@ -50,7 +51,15 @@ TEST(Endpoint, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
   EXPECT_EQ((*defaults)[0].url(), "unix:/run/user/7/gimnet/tcphub.sock");
   EXPECT_EQ((*defaults)[1].url(), "tcp://127.0.0.1:7450");
   const Environment wrong("GIMNET_HUB", "nonsense");
-  EXPECT_FALSE(endpoints_for(""));
+  const auto refused = endpoints_for("");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().sentence.find("GIMNET_HUB"), std::string::npos);
+}
+
+TEST(Endpoint, SuggestsTheSchemeThatIsMissing) {
+  EXPECT_NE(parse_endpoint("localhost:7450").error().sentence.find("did you mean tcp://localhost:7450?"),
+            std::string::npos);
+  EXPECT_NE(parse_endpoint("localhost").error().sentence.find("give tcp://host:port"), std::string::npos);
 }
 
 TEST(Endpoint, TrustsOnlyAFolderOfItsOwnUser) {
