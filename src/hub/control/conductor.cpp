@@ -137,7 +137,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
 
 void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Session* session = find(event.session, event.node);
-  if (session == nullptr || event.frame.size() < proto::kHeaderSize) return;
+  // What a replaced connection had asked would count as declared on the new one, by which the node never asks for it.
+  if (session == nullptr || event.attachment != session->attachment || event.frame.size() < proto::kHeaderSize) return;
   const proto::Kind kind = proto::load_header(event.frame.data()).kind;
   const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
   const auto view = proto::split_control(payload);
@@ -154,13 +155,20 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
   const proto::Payload answer = handle(context, request);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
+#ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
   carry_out(effects, now);
+#endif
   SendControlCommand command;
   command.session = event.session;
+#ifndef GIMNET_BUG_ANSWER_TO_ANY_CONNECTION
   command.attachment = event.attachment;
+#endif
   command.frame = control_frame(kind, node_id(*session), facts_.id, answer);
   command.answers = 1;
   wiring_.shards.send(session->place.shard, std::move(command));
+#ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
+  carry_out(effects, now);
+#endif
 }
 
 void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {

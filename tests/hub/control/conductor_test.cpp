@@ -124,6 +124,17 @@ TEST_F(ConductorTest, TheEndOfAReplacedConnectionIsNotTheEndOfTheNewOne) {
   EXPECT_FALSE(conductor.membership().sessions().find(1)->connected);
 }
 
+TEST_F(ConductorTest, RequestsOfAReplacedConnectionChangeNothing) {
+  const Node robot = join("robot");
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  join(hello);
+  const std::size_t sent = shards.sent.size();
+  send_frame(robot, proto::Kind::ns, proto::encode(ns::Subscribe{"camera/image"}, 1));
+  EXPECT_EQ(shards.sent.size(), sent);
+  EXPECT_EQ(conductor.membership().services().topics(), 0u);
+}
+
 TEST_F(ConductorTest, EventsOfAnEarlierSessionAreIgnored) {
   const Node robot = join("robot");
   detach(robot, true, GoodbyeCode::done);
