@@ -42,7 +42,11 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
 }
 
 bool TablePublisher::collect() {
+#ifdef GIMNET_BUG_LAST_LIST_IS_KEPT
+  while (garbage_.size() > 1 && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
+#else
   while (!garbage_.empty() && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
+#endif
   return !garbage_.empty();
 }
 

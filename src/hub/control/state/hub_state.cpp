@@ -105,7 +105,11 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
 Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall) {
   if (found.boot >= kBootMax) return Error{"the hub was started as often as it can be counted"};
   HubStart start;
+#ifdef GIMNET_BUG_NEWCOMERS_BEGIN_AT_ONE
+  start.nodes = {1, IndexPool::kBlock};
+#else
   start.nodes = {found.node_mark, IndexPool::kBlock};
+#endif
   start.groups = {found.group_mark, IndexPool::kBlock};
   start.state = found;
   ++start.state.boot;

@@ -181,7 +181,9 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
   const std::string former = std::exchange(session.name, name);
   if (!former.empty()) {
     services_.node_renamed(session.index, now, effects);
+#ifndef GIMNET_BUG_OLD_NAME_STAYS
     directory_.remove(former);
+#endif
   }
   if (!name.empty()) directory_.put(name, session.index, standing_);
   // A node that has not been attached yet has nothing to change: it will be told of as one that joined.
@@ -191,8 +193,12 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
 void Membership::end(Session& session, milliseconds now, Effects& effects) {
   services_.node_left(session.index, now, effects);
   directory_.remove(session.name);
+#ifndef GIMNET_BUG_LEFT_NODE_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{session.index});
+#endif
+#ifndef GIMNET_BUG_SLOT_NOT_RELEASED
   effects.emplace_back(SessionEnded{session.place});
+#endif
   if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name, {}});
   sessions_.end(session, now);
 }

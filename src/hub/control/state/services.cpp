@@ -76,7 +76,11 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
                                       "; choose another name"};
   }
   Node& node = nodes_[provider];
+#ifdef GIMNET_BUG_ONE_SERVICE_TOO_MANY
+  if (!provided && node.provides.size() > limits_.services_per_node) {
+#else
   if (!provided && node.provides.size() >= limits_.services_per_node) {
+#endif
     forget_if_idle(provider);
     return limit_reached("services", limits_.services_per_node, "services_per_node");
   }
@@ -266,11 +270,18 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
   auto& list = topic.subscribers;
   const auto place = std::lower_bound(list.begin(), list.end(), node);
   GIMNET_CHECK(place != list.end() && *place == node);
+#ifdef GIMNET_BUG_LEFT_COUNTS_ITSELF
+  const auto number = static_cast<std::uint32_t>(list.size());
   list.erase(place);
+#else
+  list.erase(place);
+  const auto number = static_cast<std::uint32_t>(list.size());
+#endif
   if (topic.service) {
+#ifndef GIMNET_BUG_LEFT_NOT_PUBLISHED
     effects.emplace_back(GroupChanged{topic.service->group});
-    effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node,
-                                       static_cast<std::uint32_t>(list.size()), false});
+#endif
+    effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node, number, false});
   }
   forget_if_unused(topic);
 }

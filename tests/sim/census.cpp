@@ -1,0 +1,92 @@
+#include "tests/sim/census.hpp"
+
+#include <cstdio>
+#include <string_view>
+
+namespace gimnet::sim {
+namespace {
+
+constexpr std::array<std::string_view, kHappenings> kNames = {"joined",
+                                                              "name collision",
+                                                              "name taken over",
+                                                              "name changed",
+                                                              "bad name",
+                                                              "wrong role",
+                                                              "came back",
+                                                              "came back replacing",
+                                                              "token altered",
+                                                              "token of the past",
+                                                              "token shown twice",
+                                                              "token expired",
+                                                              "token of another identity",
+                                                              "restored after grace",
+                                                              "restored after restart",
+                                                              "former group kept",
+                                                              "last goodbye told",
+                                                              "grace expired",
+                                                              "goodbye",
+                                                              "crash",
+                                                              "vanished",
+                                                              "short hang",
+                                                              "silent",
+                                                              "hello of the dead",
+                                                              "frames lost with connection",
+                                                              "misconduct named",
+                                                              "misconduct nameless",
+                                                              "hub full",
+                                                              "room made",
+                                                              "services limit",
+                                                              "subscriptions limit",
+                                                              "requests limit",
+                                                              "page continued",
+                                                              "refused request",
+                                                              "unknown operation",
+                                                              "garbled request",
+                                                              "slot reused",
+                                                              "index near the end",
+                                                              "state kept",
+                                                              "state not kept",
+                                                              "service moved",
+                                                              "service withdrawn",
+                                                              "subscribed before service",
+                                                              "undeclared dropped",
+                                                              "event skipped away",
+                                                              "request of replaced connection",
+                                                              "unicast delivered",
+                                                              "unicast across shards",
+                                                              "unicast to departed",
+                                                              "unicast waited for return",
+                                                              "unicast dropped away",
+                                                              "group delivered",
+                                                              "group of another",
+                                                              "service frame delivered",
+                                                              "shard paused",
+                                                              "conductor paused",
+                                                              "slow reader",
+                                                              "hub killed",
+                                                              "drained",
+                                                              "garbage freed"};
+
+}  // namespace
+
+std::string Census::table() const {
+  std::string text;
+  for (std::size_t i = 0; i < kHappenings; ++i) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%12llu  ", static_cast<unsigned long long>(counts_[i]));
+    text += number;
+    text += kNames[i];
+    text += '\n';
+  }
+  return text;
+}
+
+std::vector<std::string> Census::missing() const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < kHappenings; ++i) {
+    if (counts_[i] == 0) names.emplace_back(kNames[i]);
+  }
+  return names;
+}
+
+}  // namespace gimnet::sim

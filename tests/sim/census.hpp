@@ -1,0 +1,95 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace gimnet::sim {
+
+/// The faults and collisions that a world brings about. A run of many seeds in which one of them never came proves
+/// nothing about it, and fails.
+enum class Happening : std::uint8_t {
+  joined,
+  name_collision,
+  name_taken_over,
+  name_changed,
+  bad_name,
+  wrong_role,
+  came_back,
+  came_back_replacing,
+  token_altered,
+  token_of_the_past,
+  token_shown_twice,
+  token_expired,
+  token_of_another_identity,
+  restored_after_grace,
+  restored_after_restart,
+  former_group_kept,
+  last_goodbye_told,
+  grace_expired,
+  goodbye,
+  crash,
+  vanished,
+  short_hang,
+  silent,
+  hello_of_the_dead,
+  frames_lost_with_connection,
+  misconduct_named,
+  misconduct_nameless,
+  hub_full,
+  room_made,
+  services_limit,
+  subscriptions_limit,
+  requests_limit,
+  page_continued,
+  refused_request,
+  unknown_operation,
+  garbled_request,
+  slot_reused,
+  index_near_the_end,
+  state_kept,
+  state_not_kept,
+  service_moved,
+  service_withdrawn,
+  subscribed_before_service,
+  undeclared_dropped,
+  event_skipped_away,
+  request_of_replaced_connection,
+  unicast_delivered,
+  unicast_across_shards,
+  unicast_to_departed,
+  unicast_waited_for_return,
+  unicast_dropped_away,
+  group_delivered,
+  group_of_another,
+  service_frame_delivered,
+  shard_paused,
+  conductor_paused,
+  slow_reader,
+  hub_killed,
+  drained,
+  garbage_freed,
+  count
+};
+inline constexpr std::size_t kHappenings = static_cast<std::size_t>(Happening::count);
+
+/// How often each thing happened. Thread safety: none.
+class Census {
+ public:
+  void add(Happening happening) { ++counts_[static_cast<std::size_t>(happening)]; }
+  void add(const Census& other) {
+    for (std::size_t i = 0; i < kHappenings; ++i) counts_[i] += other.counts_[i];
+  }
+  [[nodiscard]] std::uint64_t of(Happening happening) const { return counts_[static_cast<std::size_t>(happening)]; }
+  /// One line each: the count and the name.
+  [[nodiscard]] std::string table() const;
+  /// The names of those that never happened.
+  [[nodiscard]] std::vector<std::string> missing() const;
+
+ private:
+  std::array<std::uint64_t, kHappenings> counts_{};
+};
+
+}  // namespace gimnet::sim

@@ -1,0 +1,265 @@
+#include "tests/sim/checks.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace gimnet::sim {
+
+namespace ns = proto::ns;
+using hub::NodePlace;
+
+namespace {
+
+/// A conductor that pauses may be so late.
+constexpr milliseconds kLate{3'000};
+
+template <class Event>
+DueEvent told_change(const proto::Payload& payload, std::uint32_t to) {
+  const auto event = proto::decode<Event>(payload);
+  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
+  DueEvent told;
+  told.to = to;
+  told.operation = Event::kOperation;
+  told.old_group = index_of(event->group);
+  told.node = index_of(event->node);
+  told.subscribers = event->subscribers;
+  return told;
+}
+
+DueEvent told_moved(const proto::Payload& payload, std::uint32_t to) {
+  const auto event = proto::decode<ns::ServiceMoved>(payload);
+  if (!event) broken(Checker::events, "an event cannot be read: " + event.error().sentence);
+  DueEvent told;
+  told.to = to;
+  told.operation = ns::ServiceMoved::kOperation;
+  told.name = event->name;
+  told.old_group = index_of(event->old_group);
+  told.new_group = index_of(event->new_group);
+  told.message_type = event->message_type;
+  return told;
+}
+
+bool changes_groups(std::uint16_t answer) {
+  return answer == ns::AdvertiseAnswer::kOperation || answer == ns::WithdrawAnswer::kOperation ||
+         answer == ns::SubscribeAnswer::kOperation || answer == ns::UnsubscribeAnswer::kOperation;
+}
+
+std::string text_of(const DueEvent& event) {
+  const bool moved = event.operation == ns::ServiceMoved::kOperation;
+  return "to node " + std::to_string(event.to) + ": " +
+         (moved ? "SERVICE_MOVED '" + event.name + "' from group " + std::to_string(event.old_group) + " to " +
+                      std::to_string(event.new_group)
+                : (event.operation == ns::SubscriberJoined::kOperation ? "SUBSCRIBER_JOINED " : "SUBSCRIBER_LEFT ") +
+                      std::to_string(event.node) + " of group " + std::to_string(event.old_group) + ", now " +
+                      std::to_string(event.subscribers));
+}
+
+}  // namespace
+
+void Checks::before_it_leaves(ShardIndex shard, const hub::ShardCommand& command) {
+  if (conductor_ == nullptr || !out_of_order_.empty()) return;
+  if (const auto* attach = std::get_if<hub::AttachCommand>(&command)) {
+    const NodePlace place = subject_.nodes.find(index_of(attach->node));
+    if (place.generation != attach->session.generation) out_of_order_ = "WELCOME leaves before its node is published";
+  } else if (const auto* control = std::get_if<hub::SendControlCommand>(&command)) {
+    const auto view = proto::split_control(std::span{control->frame}.subspan(proto::kHeaderSize));
+    if (control->answers != 0 && changes_groups(view->header.operation)) out_of_order_ = stale();
+  } else if (const auto* released = std::get_if<hub::ReleaseCommand>(&command)) {
+    for (const auto& [index, place] : places_) {
+      const bool same = place.shard == shard && place.generation == released->session.generation &&
+                        place.slot == released->session.slot;
+      if (same && subject_.nodes.find(index).generation == place.generation) {
+        out_of_order_ = "a session is released before its node is taken out of the table";
+      }
+    }
+  }
+}
+
+std::string Checks::stale() const {
+  for (const auto& [group, topic] : conductor_->membership().services().groups()) {
+    const hub::GroupMembers* members = subject_.groups.find(group);
+    std::size_t count = 0;
+    for (std::size_t i = 0; members != nullptr && i < members->by_shard.size(); ++i) {
+      count += members->by_shard[i].size();
+    }
+    if (members == nullptr || count != topic->subscribers.size()) {
+      return "an answer leaves before the table of groups is right";
+    }
+  }
+  return {};
+}
+
+void Checks::after_step(milliseconds now) {
+  sessions();
+  names();
+  node_table();
+  group_table();
+  if (!out_of_order_.empty()) broken(Checker::order, out_of_order_);
+  events();
+  commands();
+  deadline(now);
+}
+
+void Checks::events() {
+  std::vector<DueEvent> told;
+  for (const SimShards::Sent& sent : subject_.shards.sent()) {
+    const auto* control = std::get_if<hub::SendControlCommand>(sent.command);
+    if (control == nullptr || control->answers != 0) continue;
+    const proto::Payload payload(control->frame.begin() + proto::kHeaderSize, control->frame.end());
+    const std::uint32_t to = index_of(NodeId{proto::load_header(control->frame.data()).dst});
+    const std::uint16_t operation = proto::split_control(payload)->header.operation;
+    if (operation == ns::ServiceMoved::kOperation) {
+      told.push_back(told_moved(payload, to));
+    } else if (operation == ns::SubscriberJoined::kOperation) {
+      told.push_back(told_change<ns::SubscriberJoined>(payload, to));
+    } else if (operation == ns::SubscriberLeft::kOperation) {
+      told.push_back(told_change<ns::SubscriberLeft>(payload, to));
+    }
+  }
+  counts(told);
+  // Two who leave in one step may be told in any order: then the numbers are in the order of the telling.
+  const auto without_numbers = [](std::vector<DueEvent> list) {
+    for (DueEvent& event : list) event.subscribers = 0;
+    std::sort(list.begin(), list.end());
+    return list;
+  };
+  const std::vector<DueEvent> due = without_numbers(model_.take_due());
+  const std::vector<DueEvent> plain = without_numbers(told);
+  for (const DueEvent& event : due) {
+    if (!std::binary_search(plain.begin(), plain.end(), event)) broken(Checker::events, "not told " + text_of(event));
+  }
+  for (const DueEvent& event : plain) {
+    if (!std::binary_search(due.begin(), due.end(), event))
+      broken(Checker::events, "told for nothing " + text_of(event));
+  }
+  require(due.size() == plain.size(), Checker::events, "something is told twice");
+}
+
+void Checks::counts(const std::vector<DueEvent>& told) const {
+  // From the last one, which says how many there are, back to the first.
+  std::map<std::uint32_t, std::uint32_t> numbers;
+  for (auto event = told.rbegin(); event != told.rend(); ++event) {
+    if (event->operation == ns::ServiceMoved::kOperation) continue;
+    const auto group = model_.groups().find(event->old_group);
+    const std::size_t now =
+        group == model_.groups().end() ? event->subscribers : group->second->second.subscribers.size();
+    std::uint32_t& number = numbers.try_emplace(event->old_group, static_cast<std::uint32_t>(now)).first->second;
+    if (event->subscribers != number) broken(Checker::events, "a wrong number of subscribers " + text_of(*event));
+    number = event->operation == ns::SubscriberJoined::kOperation ? number - 1 : number + 1;
+  }
+}
+
+void Checks::sessions() const {
+  const auto& all = conductor_->membership().sessions().all();
+  require(all.size() <= subject_.limits.nodes, Checker::limits, "the hub has more nodes than its limit");
+  auto actual = all.begin();
+  for (const auto& [index, expected] : model_.sessions()) {
+    if (actual != all.end() && actual->first < index) break;
+    if (actual == all.end() || actual->first != index) {
+      broken(Checker::grace, "the session of node " + std::to_string(index) + " is gone too early");
+    }
+    if (actual->second.connected != expected.connected) {
+      broken(Checker::grace, "node " + std::to_string(index) + " counts as " +
+                                 (expected.connected ? "away, and is connected" : "connected, and is away"));
+    }
+    ++actual;
+  }
+  if (actual != all.end()) {
+    broken(Checker::grace, "the session of node " + std::to_string(actual->first) + " ought to be over");
+  }
+}
+
+void Checks::names() const {
+  const hub::Membership& membership = conductor_->membership();
+  std::size_t named = 0;
+  auto expected = model_.sessions().begin();
+  for (const auto& [index, session] : membership.sessions().all()) {
+    const std::string& name = (expected++)->second.name;
+    if (session.name != name) {
+      broken(Checker::names,
+             "node " + std::to_string(index) + " has the name '" + session.name + "', not '" + name + "'");
+    }
+    if (name.empty()) continue;
+    ++named;
+    if (membership.directory().find(name) != index) {
+      broken(Checker::names, "the directory says of '" + name + "' another owner than node " + std::to_string(index));
+    }
+  }
+  require(membership.directory().size() == named, Checker::names, "the directory has a name that nobody has");
+}
+
+void Checks::node_table() const {
+  const auto& all = conductor_->membership().sessions().all();
+  for (const auto& [index, session] : all) {
+    const NodePlace place = subject_.nodes.find(index);
+    const hub::Place& right = session.place;
+    if (!place.exists()) broken(Checker::node_table, "the table lacks node " + std::to_string(index));
+    require(place.shard == right.shard && place.slot == right.slot && place.generation == right.generation,
+            Checker::node_table, "the table has a node in another place than it is");
+  }
+  for (const std::uint32_t index : model_.nodes_given()) {
+    if (subject_.nodes.find(index).exists() && !all.contains(index)) {
+      broken(Checker::node_table, "the table has node " + std::to_string(index) + ", which is not there");
+    }
+  }
+}
+
+bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topic) const {
+  if (topic == nullptr || members == nullptr) return topic == nullptr && members == nullptr;
+  if (index_of(members->provider) != topic->service->provider) return false;
+  std::size_t count = 0;
+  for (const auto& list : members->by_shard) count += list.size();
+  if (count != topic->subscribers.size()) return false;
+  return std::all_of(topic->subscribers.begin(), topic->subscribers.end(), [&](std::uint32_t index) {
+    const NodePlace place = subject_.nodes.find(index);
+    const auto& list = members->by_shard[place.shard.value()];
+    return std::any_of(list.begin(), list.end(), [&place](const hub::GroupMember& member) {
+      return member.slot == place.slot && member.generation == place.generation;
+    });
+  });
+}
+
+void Checks::group_table() const {
+  for (const auto& [group, topic] : model_.groups()) {
+    if (!is_right(subject_.groups.find(group), &topic->second)) {
+      broken(Checker::group_table,
+             "the table is wrong about group " + std::to_string(group) + ", '" + topic->first + "'");
+    }
+  }
+  for (const std::uint32_t group : model_.groups_given()) {
+    if (subject_.groups.find(group) != nullptr && !model_.groups().contains(group)) {
+      broken(Checker::group_table, "the table has group " + std::to_string(group) + ", which nobody provides");
+    }
+  }
+}
+
+void Checks::commands() {
+  std::set<std::uint32_t> released;
+  for (const SimShards::Sent& sent : subject_.shards.sent()) {
+    if (const auto* attach = std::get_if<hub::AttachCommand>(sent.command)) {
+      places_[index_of(attach->node)] = {sent.shard, attach->session.slot, attach->session.generation};
+    } else if (const auto* release = std::get_if<hub::ReleaseCommand>(sent.command)) {
+      require(released.insert(release->session.generation).second, Checker::seam, "a session is released twice");
+    }
+  }
+  for (const std::uint32_t index : model_.take_ended()) {
+    const auto entry = places_.find(index);
+    if (released.erase(entry->second.generation) == 0) {
+      broken(Checker::seam, "the shard of node " + std::to_string(index) + " is not told that its session is over");
+    }
+    // It may have an heir in the same step.
+    if (!model_.sessions().contains(index)) places_.erase(entry);
+  }
+  require(released.empty(), Checker::seam, "a session is released that goes on, or that no shard was given");
+}
+
+void Checks::deadline(milliseconds now) const {
+  const std::optional<milliseconds> due = model_.next_deadline();
+  if (!due) return;
+  const std::optional<milliseconds> next = conductor_->next_deadline();
+  require(next.has_value() && *next <= *due, Checker::grace,
+          "the conductor does not want to wake when a time runs out");
+  require(*due + kLate > now, Checker::grace, "a time ran out long ago, and nothing came of it");
+}
+
+}  // namespace gimnet::sim

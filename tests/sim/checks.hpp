@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "hub/control/conductor.hpp"
+#include "tests/sim/model.hpp"
+
+namespace gimnet::sim {
+
+/// Compares a hub with the reference model after each of the conductor's steps. Thread safety: none. Errors: Broken.
+class Checks {
+ public:
+  struct Subject {
+    const hub::NodeTable& nodes;
+    const hub::GroupTable& groups;
+    const SimShards& shards;
+    HubId hub;
+    const hub::Limits& limits;
+  };
+  Checks(const Subject& subject, Model& model) : subject_(subject), model_(model) {}
+  /// The conductor, which sends commands while it is being made.
+  void watch(const hub::Conductor& conductor) { conductor_ = &conductor; }
+
+  void before_it_leaves(ShardIndex shard, const hub::ShardCommand& command);
+  void after_step(milliseconds now);
+
+ private:
+  void events();
+  /// The numbers in what providers were told.
+  void counts(const std::vector<DueEvent>& told) const;
+  void sessions() const;
+  void names() const;
+  void node_table() const;
+  void group_table() const;
+  void commands();
+  void deadline(milliseconds now) const;
+  /// "" or what a table says that the hub's own state does not.
+  [[nodiscard]] std::string stale() const;
+  [[nodiscard]] bool is_right(const hub::GroupMembers* members, const Model::Topic* topic) const;
+
+  const Subject subject_;
+  Model& model_;
+  const hub::Conductor* conductor_ = nullptr;
+  std::string out_of_order_;
+  std::map<std::uint32_t, hub::Place> places_;  ///< of the sessions that shards were given
+};
+
+}  // namespace gimnet::sim

@@ -1,0 +1,160 @@
+#include "tests/sim/hub_life.hpp"
+
+namespace gimnet::sim {
+
+namespace {
+
+hub::HubFacts facts(const Setting& setting) {
+  hub::HubFacts facts;
+  facts.id = HubLife::kHub;
+  facts.name = "simulated";
+  facts.version = "0";
+  facts.shards = setting.plan.shards;
+  facts.started = setting.agenda.now_ms();
+  return facts;
+}
+
+/// For the trace: what a command says, without places in memory.
+struct TraceCommand {
+  Trace& trace;
+  std::uint64_t shard;
+  void operator()(const hub::AttachCommand& command) const {
+    trace.note("conductor: shard {a}, attach node {b} by its connection {c}", shard, index_of(command.node),
+               command.attachment, command.welcome.name);
+    trace.mix(command.welcome.token);
+  }
+  void operator()(const hub::SendControlCommand& command) const {
+    const auto view = proto::split_control(std::span{command.frame}.subspan(proto::kHeaderSize));
+    trace.note("conductor: shard {a}, say operation {b} to node {c}", shard, view->header.operation & 0x7FFFu,
+               index_of(NodeId{proto::load_header(command.frame.data()).dst}));
+    trace.mix(command.frame);
+  }
+  void operator()(const hub::CloseCommand& command) const {
+    trace.note("conductor: shard {a}, close slot {b} with code {c}: {t}", shard, command.session.slot.value(),
+               static_cast<std::uint64_t>(command.code), command.sentence);
+  }
+  void operator()(const hub::ReleaseCommand& command) const {
+    trace.note("conductor: shard {a}, release slot {b} of generation {c}", shard, command.session.slot.value(),
+               command.session.generation);
+  }
+  void operator()(const hub::DrainCommand&) const { trace.note("conductor: shard {a}, drain", shard); }
+  template <class Other>
+  void operator()(const Other&) const {
+    trace.note("conductor: shard {a}, another command", shard);
+  }
+};
+
+}  // namespace
+
+HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& start, Past past)
+    : setting_(setting),
+      quiescence_(setting.plan.shards),
+      readable_([this, &setting] {
+        std::vector<const hub::ShardCounters*> list;
+        for (std::size_t i = 0; i < setting.plan.shards; ++i) list.push_back(&counters_[i]);
+        return list;
+      }()),
+      model_(setting.plan.limits, setting.census, kHub, std::move(past)),
+      shards_(setting,
+              {kHub, setting.plan.shards, nodes_, groups_, quiescence_, around.network, around.conductor_wanted,
+               [this](ShardIndex shard, const hub::ShardCommand& command) { checks_.before_it_leaves(shard, command); },
+               around.is_slow}),
+      checks_({nodes_, groups_, shards_, kHub, setting.plan.limits}, model_),
+      conductor_(facts(setting), hub::Placement::spread, setting.plan.limits,
+                 hub::Conductor::Wiring{shards_, {nodes_, groups_, quiescence_}, readable_, start, around.keep_state}) {
+  checks_.watch(conductor_);
+  shards_.believe(model_);
+}
+
+void HubLife::trace_sent() {
+  for (const SimShards::Sent& sent : shards_.sent()) {
+    std::visit(TraceCommand{setting_.trace, sent.shard.value()}, *sent.command);
+  }
+}
+
+std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint64_t number) {
+  hub::Stranger stranger;
+  stranger.transport = std::make_unique<WireTransport>(newcomer.wire);
+  stranger.peer = {"tcp", "10.0.0.1:" + std::to_string(newcomer.wire->number)};
+  const milliseconds now = setting_.agenda.now_ms();
+  shards_.forget_sent();
+  stranger.identity = newcomer.identity;
+  const std::int64_t wall = wall_ns(setting_);
+  const auto refusal = conductor_.admit(stranger, newcomer.hello, {now, wall});
+  const Model::Hello hello{
+      newcomer.hello, false, stranger.peer.address, newcomer.identity, milliseconds{wall / 1'000'000}, number};
+  trace_sent();
+  if (refusal) {
+    setting_.trace.note("conductor: refuses wire {a} with code {b}: {t}", newcomer.wire->number,
+                        static_cast<std::uint64_t>(refusal->code), 0, refusal->sentence);
+    model_.refused(hello, *refusal, now);
+  } else {
+    const hub::AttachCommand* attach = nullptr;
+    for (const SimShards::Sent& sent : shards_.sent()) {
+      if (const auto* found = std::get_if<hub::AttachCommand>(sent.command)) attach = found;
+    }
+    require(attach != nullptr, Checker::seam, "somebody is let in, and no shard is given the connection");
+    model_.admitted(hello, *attach, now);
+    newcomer.wire->session = model_.session_of(index_of(attach->node));
+  }
+  checks_.after_step(setting_.agenda.now_ms());
+  return refusal;
+}
+
+void HubLife::take_event(std::size_t shard) {
+  hub::ShardEvent event = shards_.take_event(shard);
+  const milliseconds now = setting_.agenda.now_ms();
+  shards_.forget_sent();
+  hub::ControlFrameEvent asked;
+  hub::DetachedEvent ended;
+  const auto* frame = std::get_if<hub::ControlFrameEvent>(&event.what);
+  const auto* detached = std::get_if<hub::DetachedEvent>(&event.what);
+  if (frame != nullptr) {
+    asked = *frame;
+    setting_.trace.note("conductor: shard {a} has {b} bytes from node {c}", shard, frame->frame.size(),
+                        index_of(frame->node));
+    setting_.trace.mix(frame->frame);
+  } else if (detached != nullptr) {
+    ended = *detached;
+    setting_.trace.note("conductor: shard {a} lost connection {b} of node {c}: {t}", shard, detached->attachment,
+                        index_of(detached->node), detached->sentence);
+  }
+  const bool is_frame = frame != nullptr;
+  const bool is_end = detached != nullptr;
+  conductor_.on_event(std::move(event), now);
+  trace_sent();
+  if (is_frame) {
+    const hub::SendControlCommand* answer = nullptr;
+    for (const SimShards::Sent& sent : shards_.sent()) {
+      const auto* control = std::get_if<hub::SendControlCommand>(sent.command);
+      if (control == nullptr || control->answers == 0) continue;
+      require(answer == nullptr, Checker::answers, "a request is answered twice");
+      answer = control;
+    }
+    model_.asked(asked, answer, now);
+  } else if (is_end) {
+    model_.detached(ended, now);
+  }
+  checks_.after_step(setting_.agenda.now_ms());
+}
+
+void HubLife::tick() {
+  const bool garbage = conductor_.has_garbage();
+  const milliseconds now = setting_.agenda.now_ms();
+  shards_.forget_sent();
+  setting_.trace.note("conductor: looks at its clock");
+  conductor_.tick(now);
+  trace_sent();
+  model_.ticked(now);
+  checks_.after_step(setting_.agenda.now_ms());
+  if (garbage && !conductor_.has_garbage()) setting_.census.add(Happening::garbage_freed);
+}
+
+void HubLife::drain() {
+  shards_.forget_sent();
+  conductor_.drain();
+  trace_sent();
+  checks_.after_step(setting_.agenda.now_ms());
+}
+
+}  // namespace gimnet::sim

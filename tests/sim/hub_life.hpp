@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+
+#include "hub/concurrent/quiescence.hpp"
+#include "hub/control/conductor.hpp"
+#include "tests/sim/checks.hpp"
+
+namespace gimnet::sim {
+
+/// One life of the hub, from its start to its end or to kill -9: the real conductor, between simulated shards and the
+/// checkers. Thread safety: none.
+class HubLife {
+ public:
+  static constexpr HubId kHub{7};
+  /// What it needs of the world.
+  struct Around {
+    Network& network;
+    std::function<void()> conductor_wanted;
+    std::function<bool(std::uint32_t node)> is_slow;
+    hub::Conductor::KeepState keep_state;
+  };
+  HubLife(Setting& setting, const Around& around, const hub::HubStart& start, Past past);
+
+  /// A HELLO that arrived, and the wire that it came by.
+  struct Newcomer {
+    WirePointer wire;
+    proto::Hello hello;
+    std::string identity;
+  };
+  /// Returns why it is refused. `number` is for the session, if it is a new one.
+  [[nodiscard]] std::optional<proto::Goodbye> admit(const Newcomer& newcomer, std::uint64_t number);
+  void take_event(std::size_t shard);
+  void tick();
+  void drain();
+
+  [[nodiscard]] hub::Conductor& conductor() { return conductor_; }
+  [[nodiscard]] SimShards& shards() { return shards_; }
+  [[nodiscard]] const Model& model() const { return model_; }
+  /// What all clocks of walls show.
+  [[nodiscard]] static std::int64_t wall_ns(const Setting& setting) {
+    return kWallNs + std::chrono::nanoseconds{setting.agenda.now()}.count();
+  }
+
+ private:
+  static constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
+  void trace_sent();
+
+  Setting& setting_;
+  hub::NodeTable nodes_;
+  hub::GroupTable groups_;
+  hub::Quiescence quiescence_;
+  std::array<hub::ShardCounters, 4> counters_;
+  std::vector<const hub::ShardCounters*> readable_;
+  Model model_;
+  SimShards shards_;
+  Checks checks_;
+  hub::Conductor conductor_;
+};
+
+}  // namespace gimnet::sim

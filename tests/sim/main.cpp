@@ -1,0 +1,151 @@
+#include <charconv>
+#include <chrono>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "base/log.hpp"
+#include "tests/sim/world.hpp"
+
+// ./dev sim: the deterministic simulation of the control plane. See README.md.
+
+namespace gimnet::sim {
+namespace {
+
+constexpr const char* kUsage =
+    "usage: gimnet-sim [--seeds N] [--from SEED] [--seed SEED] [--nodes N] [--trace] [--hashes]\n"
+    "                  [--every-fault] [--expect CHECKER] [--checkers]\n"
+    "  --seeds N         so many worlds (100), from seed 1 on\n"
+    "  --from SEED       from that seed on\n"
+    "  --seed SEED       that one world only\n"
+    "  --nodes N         nodes in a world (200)\n"
+    "  --trace           print every event of the world as it happens\n"
+    "  --hashes          print the hash of each world's trace, and nothing else\n"
+    "  --every-fault     fail if a fault or collision never came\n"
+    "  --expect CHECKER  succeed only if that checker finds something: for planted bugs\n"
+    "  --checkers        the names of the checkers\n";
+
+struct Arguments {
+  std::uint64_t from = 1;
+  std::uint64_t seeds = 100;
+  World::Options world;
+  bool hashes = false;
+  bool every_fault = false;
+  std::string_view expect;
+};
+
+[[noreturn]] void usage(const std::string& fault) {
+  std::fprintf(stderr, "gimnet-sim: %s\n%s", fault.c_str(), kUsage);
+  std::exit(2);
+}
+
+std::uint64_t number(std::string_view flag, const char* text) {
+  std::uint64_t value = 0;
+  const char* end = text + std::strlen(text);
+  const auto [stop, error] = std::from_chars(text, end, value);
+  if (error != std::errc{} || stop != end) {
+    usage("'" + std::string{text} + "' is not a whole number; write " + std::string{flag} + " N");
+  }
+  return value;
+}
+
+void print_checkers() {
+  for (const std::string_view name : kCheckerNames) std::printf("%.*s\n", static_cast<int>(name.size()), name.data());
+}
+
+void read_value(Arguments& arguments, std::string_view flag, const char* value) {
+  if (value == nullptr) usage(std::string{flag} + " wants a value");
+  if (flag == "--expect") {
+    arguments.expect = value;
+    return;
+  }
+  const std::uint64_t count = number(flag, value);
+  if (flag == "--seeds") {
+    arguments.seeds = count;
+  } else if (flag == "--from") {
+    arguments.from = count;
+  } else if (flag == "--seed") {
+    arguments.from = count;
+    arguments.seeds = 1;
+  } else if (count < 2 || count > 5'000) {
+    usage("a world has 2 to 5000 nodes");
+  } else {
+    arguments.world.nodes = static_cast<std::size_t>(count);
+  }
+}
+
+Arguments read(int count, char** values) {
+  Arguments arguments;
+  for (int i = 1; i < count; ++i) {
+    const std::string_view flag = values[i];
+    if (flag == "--help") {
+      std::printf("%s", kUsage);
+      std::exit(0);
+    } else if (flag == "--checkers") {
+      print_checkers();
+      std::exit(0);
+    } else if (flag == "--trace") {
+      arguments.world.print = true;
+    } else if (flag == "--hashes") {
+      arguments.hashes = true;
+    } else if (flag == "--every-fault") {
+      arguments.every_fault = true;
+    } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" || flag == "--expect") {
+      read_value(arguments, flag, i + 1 < count ? values[i + 1] : nullptr);
+      ++i;
+    } else {
+      usage("there is no option '" + std::string{flag} + "'");
+    }
+  }
+  return arguments;
+}
+
+void print_failure(const Report& report, std::size_t nodes) {
+  for (const std::string& line : report.last) std::printf("%s\n", line.c_str());
+  const std::string_view checker = name_of(report.broken->checker);
+  std::printf("\nseed %" PRIu64 " broke at event %" PRIu64 ", step %" PRIu64 " of the conductor\n", report.seed,
+              report.events, report.steps);
+  std::printf("checker %.*s: %s\n", static_cast<int>(checker.size()), checker.data(), report.broken->sentence.c_str());
+  std::printf("again: ./dev sim --seed %" PRIu64 " --nodes %zu --trace\n", report.seed, nodes);
+}
+
+int judge(const Arguments& arguments, const Census& census, std::uint64_t worlds, std::uint64_t steps) {
+  if (!arguments.expect.empty()) {
+    std::printf("checker %.*s found nothing in %" PRIu64 " worlds\n", static_cast<int>(arguments.expect.size()),
+                arguments.expect.data(), worlds);
+    return 1;
+  }
+  if (arguments.hashes) return 0;
+  std::printf("%s%" PRIu64 " worlds of %zu nodes, %" PRIu64 " steps of the conductor: nothing wrong\n",
+              census.table().c_str(), worlds, arguments.world.nodes, steps);
+  if (!arguments.every_fault) return 0;
+  const std::vector<std::string> missing = census.missing();
+  for (const std::string& name : missing) std::printf("never happened: %s\n", name.c_str());
+  return missing.empty() ? 0 : 1;
+}
+
+int run(const Arguments& arguments) {
+  set_log_level(LogLevel::off);
+  Census census;
+  std::uint64_t steps = 0;
+  for (std::uint64_t seed = arguments.from; seed - arguments.from < arguments.seeds; ++seed) {
+    World::Options options = arguments.world;
+    options.seed = seed;
+    const Report report = World(options).run();
+    if (arguments.hashes) std::printf("%" PRIu64 " %016" PRIx64 "\n", seed, report.hash);
+    if (report.broken) {
+      print_failure(report, options.nodes);
+      return arguments.expect == name_of(report.broken->checker) ? 0 : 1;
+    }
+    census.add(report.census);
+    steps += report.steps;
+  }
+  return judge(arguments, census, arguments.seeds, steps);
+}
+
+}  // namespace
+}  // namespace gimnet::sim
+
+int main(int count, char** values) { return gimnet::sim::run(gimnet::sim::read(count, values)); }

@@ -1,0 +1,308 @@
+#include "tests/sim/model.hpp"
+
+#include <algorithm>
+
+#include "proto/control/names.hpp"
+
+namespace gimnet::sim {
+
+using proto::GoodbyeCode;
+using proto::Role;
+
+namespace {
+
+std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
+}  // namespace
+
+std::optional<GoodbyeCode> Model::judge_name(const std::string& name, std::uint32_t claimant) const {
+  if (!proto::valid_name(name)) return GoodbyeCode::bad_name;
+  const auto holder = names_.find(name);
+  if (holder == names_.end() || holder->second == claimant) return std::nullopt;
+  if (sessions_.at(holder->second).connected) return GoodbyeCode::name_taken;
+  return std::nullopt;
+}
+
+void Model::judge_token(const Hello& hello, Verdict& verdict) const {
+  const auto found = past_.tokens.find(hello.hello.token);
+  if (found == past_.tokens.end()) return;
+  const GivenToken& token = found->second;
+  const auto least = least_.find(token.index);
+  const bool over = least != least_.end() && token.number < least->second;
+  if (over || token.expiry <= hello.wall || token.identity != hello.identity) return;
+  const auto holder = sessions_.find(token.index);
+  if (holder == sessions_.end()) {
+    if (token.name == hello.hello.name) verdict.former = token;
+  } else if (holder->second.number == token.number && holder->second.token_name == token.name) {
+    verdict.session = token.index;
+  }
+}
+
+/// Why the token was not honoured, for the census.
+void Model::count_token(const Hello& hello, const Verdict& verdict) {
+  const auto found = past_.tokens.find(hello.hello.token);
+  if (found == past_.tokens.end() || verdict.session != 0) return;
+  if (verdict.former) {
+    const bool earlier_life = past_.nodes.contains(found->second.index);
+    return census_.add(earlier_life ? Happening::restored_after_restart : Happening::restored_after_grace);
+  }
+  if (found->second.expiry <= hello.wall) return census_.add(Happening::token_expired);
+  if (found->second.identity != hello.identity) return census_.add(Happening::token_of_another_identity);
+  census_.add(Happening::token_of_the_past);
+}
+
+Past Model::past() const {
+  Past past = past_;
+  past.nodes.insert(nodes_given_.begin(), nodes_given_.end());
+  past.groups.insert(groups_given_.begin(), groups_given_.end());
+  return past;
+}
+
+Model::Verdict Model::judge(const Hello& hello) const {
+  Verdict verdict;
+  const bool known_role = hello.hello.role == Role::node || (hello.hello.role == Role::admin && hello.may_administer);
+  if (!known_role) {
+    verdict.refusal = GoodbyeCode::not_allowed;
+    return verdict;
+  }
+  judge_token(hello, verdict);
+  if (!hello.hello.name.empty()) verdict.refusal = judge_name(hello.hello.name, verdict.session);
+  if (verdict.refusal || verdict.session != 0) return verdict;
+  const auto holder = names_.find(hello.hello.name);
+  const bool somebody_goes = holder != names_.end() || longest_away_nameless();
+  if (sessions_.size() >= limits_.nodes && !somebody_goes) verdict.refusal = GoodbyeCode::hub_full;
+  return verdict;
+}
+
+void Model::refused(const Hello& hello, const proto::Goodbye& goodbye, milliseconds) {
+  const Verdict verdict = judge(hello);
+  if (verdict.refusal == goodbye.code) {
+    if (goodbye.code == GoodbyeCode::name_taken) census_.add(Happening::name_collision);
+    if (goodbye.code == GoodbyeCode::bad_name) census_.add(Happening::bad_name);
+    if (goodbye.code == GoodbyeCode::not_allowed) census_.add(Happening::wrong_role);
+    if (goodbye.code == GoodbyeCode::hub_full) census_.add(Happening::hub_full);
+    return;
+  }
+  const bool about_room = goodbye.code == GoodbyeCode::hub_full || verdict.refusal == GoodbyeCode::hub_full;
+  broken(about_room ? Checker::limits : Checker::names,
+         std::string{"a HELLO for the name "} + quoted(hello.hello.name) + " is refused with " +
+             proto::goodbye_name(goodbye.code) + " (" + goodbye.sentence + "), where " +
+             (verdict.refusal ? std::string{proto::goodbye_name(*verdict.refusal)} + " is due" : "it is to be let in"));
+}
+
+void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milliseconds now) {
+  const Verdict verdict = judge(hello);
+  const std::uint32_t index = index_of(attach.node);
+  if (verdict.refusal) {
+    broken(*verdict.refusal == GoodbyeCode::hub_full ? Checker::limits : Checker::names,
+           "a HELLO for the name " + quoted(hello.hello.name) + " is let in as node " + std::to_string(index) +
+               ", where " + proto::goodbye_name(*verdict.refusal) + " is due");
+  }
+  const std::uint32_t due = verdict.former ? verdict.former->index : verdict.session;
+  const bool right = attach.new_session ? verdict.session == 0 && (due == 0 || due == index) : verdict.session == index;
+  if (!right) {
+    broken(Checker::tokens, "a HELLO whose token is of " +
+                                (due == 0 ? std::string{"nobody"} : "node " + std::to_string(due)) + " gets " +
+                                (attach.new_session ? "a new session as" : "the session of") + " node " +
+                                std::to_string(index));
+  }
+  count_token(hello, verdict);
+  make_way(hello, verdict, now);
+  take_session(hello, verdict, index, now);
+  Session& session = sessions_.at(index);
+  generations_[index] = attach.session.generation;
+  if (!hello.hello.name.empty() && hello.hello.name != session.name) take_name(index, hello.hello.name, now);
+  session.role = hello.hello.role;
+  session.description = hello.hello.description;
+  session.place = hello.place;
+  session.token_name = session.name;
+  past_.tokens[attach.welcome.token] = {index, session.number, session.name, hello.identity,
+                                        hello.wall + milliseconds{limits_.token_ms}};
+  session.connected = true;
+  ++session.attachment;
+  require(attach.welcome.node == attach.node && attach.welcome.name == session.name, Checker::names,
+          "WELCOME says another id or name than the session has");
+  require(attach.welcome.last_goodbye_code == session.last_goodbye, Checker::answers,
+          "WELCOME does not say how the last connection was closed");
+  if (session.last_goodbye != 0) census_.add(Happening::last_goodbye_told);
+  session.last_goodbye = 0;
+}
+
+void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now) {
+  if (verdict.session == 0) {
+    if (!verdict.former) take_new_index(index, now);
+    nodes_given_.push_back(index);
+    Session& session = sessions_[index];
+    session.number = verdict.former ? verdict.former->number : hello.new_session;
+    session.joined = now;
+    session.came_back = verdict.former.has_value();
+    std::uint64_t& least = least_[index];
+    least = std::max(least, session.number);
+    return census_.add(Happening::joined);
+  }
+  Session& session = sessions_.at(index);
+  census_.add(session.connected ? Happening::came_back_replacing : Happening::came_back);
+  ++session.life;
+  session.came_back = true;
+  session.declares = true;
+  session.declare_until = now + milliseconds{limits_.grace_ms};
+  session.declare_order = ++orders_;
+}
+
+void Model::make_way(const Hello& hello, const Verdict& verdict, milliseconds now) {
+  const auto holder = names_.find(hello.hello.name);
+  if (!hello.hello.name.empty() && holder != names_.end() && holder->second != verdict.session) {
+    census_.add(Happening::name_taken_over);
+    end(holder->second, now);
+  }
+  if (verdict.session == 0) make_room(now);
+}
+
+void Model::make_room(milliseconds now) {
+  if (sessions_.size() < limits_.nodes) return;
+  const std::optional<std::uint32_t> away = longest_away_nameless();
+  require(away.has_value(), Checker::limits, "somebody is let in beyond the limit on nodes");
+  census_.add(Happening::room_made);
+  end(*away, now);
+}
+
+std::optional<std::uint32_t> Model::longest_away_nameless() const {
+  std::optional<std::uint32_t> found;
+  for (const auto& [index, session] : sessions_) {
+    if (session.connected || !session.name.empty()) continue;
+    if (!found || session.away_order < sessions_.at(*found).away_order) found = index;
+  }
+  return found;
+}
+
+void Model::take_new_index(std::uint32_t index, milliseconds now) {
+  if (sessions_.contains(index)) {
+    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", which is still a member");
+  }
+  const auto resting = resting_ids_.find(index);
+  if (resting != resting_ids_.end() && resting->second > now) {
+    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", which rests");
+  }
+  require(index != kHubIndex && index < kEveryIndex, Checker::ids, "a newcomer gets an id that is no node's");
+  if (past_.nodes.contains(index)) {
+    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", given out before the restart");
+  }
+  if (index > kEveryIndex - 64) census_.add(Happening::index_near_the_end);
+}
+
+void Model::take_name(std::uint32_t index, const std::string& name, milliseconds now) {
+  Session& session = sessions_.at(index);
+  if (!session.name.empty()) {
+    census_.add(Happening::name_changed);
+    const auto provided = session.provides;
+    for (const auto& [full_name, life] : provided) withdraw(full_name, now);
+    names_.erase(session.name);
+  }
+  session.name = name;
+  names_[name] = index;
+}
+
+void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
+  const Session* found = known(event.session, event.node);
+  if (found == nullptr || found->attachment != event.attachment || !found->connected) return;
+  const std::uint32_t index = index_of(event.node);
+  Session& session = sessions_.at(index);
+  const bool left = event.said_by_peer && event.code == GoodbyeCode::done;
+  const bool misconduct =
+      !event.said_by_peer && (event.code == GoodbyeCode::malformed || event.code == GoodbyeCode::wrong_source ||
+                              event.code == GoodbyeCode::not_allowed || event.code == GoodbyeCode::too_many_requests);
+  if (left) census_.add(Happening::goodbye);
+  if (misconduct) census_.add(session.name.empty() ? Happening::misconduct_nameless : Happening::misconduct_named);
+  if (left || (misconduct && session.name.empty())) {
+    least_[index] = session.number + 1;
+    return end(index, now);
+  }
+  if (!event.said_by_peer && event.code != GoodbyeCode::done) {
+    session.last_goodbye = static_cast<std::uint16_t>(event.code);
+  }
+  session.connected = false;
+  session.away_until = now + milliseconds{limits_.grace_ms};
+  session.away_order = ++orders_;
+}
+
+void Model::ticked(milliseconds now) {
+  std::vector<std::uint32_t> over;
+  for (const auto& [index, session] : sessions_) {
+    if (!session.connected && session.away_until <= now) over.push_back(index);
+  }
+  for (const std::uint32_t index : over) {
+    census_.add(Happening::grace_expired);
+    end(index, now);
+  }
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> silent;
+  for (const auto& [index, session] : sessions_) {
+    if (session.declares && session.declare_until <= now) silent.emplace_back(session.declare_order, index);
+  }
+  std::sort(silent.begin(), silent.end());
+  for (const auto& [order, index] : silent) {
+    sessions_.at(index).declares = false;
+    if (sessions_.at(index).connected) drop_undeclared(index, now);
+  }
+}
+
+void Model::end(std::uint32_t index, milliseconds now) {
+  const Session session = sessions_.at(index);
+  for (const auto& [full_name, life] : session.subscribes) unsubscribe(index, full_name);
+  for (const auto& [full_name, life] : session.provides) withdraw(full_name, now);
+  names_.erase(session.name);
+  generations_.erase(index);
+  sessions_.erase(index);
+  ended_.push_back(index);
+  rest(resting_ids_, index, now);
+}
+
+void Model::rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index, milliseconds now) {
+  resting[index] = now + milliseconds{limits_.grace_ms + std::max(limits_.block_ms, limits_.slow_consumer_ms)};
+}
+
+const Model::Session* Model::known(const hub::SessionRef& ref, NodeId node) const {
+  const auto found = sessions_.find(index_of(node));
+  if (found == sessions_.end() || generations_.at(found->first) != ref.generation) return nullptr;
+  return &found->second;
+}
+
+std::optional<milliseconds> Model::next_deadline() const {
+  std::optional<milliseconds> next;
+  for (const auto& [index, session] : sessions_) {
+    if (!session.connected && (!next || session.away_until < *next)) next = session.away_until;
+    if (session.connected && session.declares && (!next || session.declare_until < *next)) next = session.declare_until;
+  }
+  return next;
+}
+
+std::uint64_t Model::session_of(std::uint32_t index) const {
+  const auto found = sessions_.find(index);
+  return found == sessions_.end() ? 0 : found->second.number;
+}
+
+bool Model::provides(std::uint32_t index, std::uint32_t group) const {
+  const auto found = groups_.find(group);
+  return found != groups_.end() && found->second->second.service->provider == index;
+}
+
+bool Model::subscribes(std::uint32_t index, std::uint32_t group) const {
+  const auto found = groups_.find(group);
+  return found != groups_.end() && found->second->second.subscribers.contains(index);
+}
+
+std::vector<DueEvent> Model::take_due() {
+  std::vector<DueEvent> due;
+  for (DueEvent& event : due_) {
+    const auto found = sessions_.find(event.to);
+    if (found == sessions_.end() || !found->second.connected) {
+      census_.add(Happening::event_skipped_away);
+    } else {
+      due.push_back(std::move(event));
+    }
+  }
+  due_.clear();
+  std::sort(due.begin(), due.end());
+  return due;
+}
+
+}  // namespace gimnet::sim

@@ -1,0 +1,212 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hub/control/acceptor.hpp"
+#include "hub/limits.hpp"
+#include "hub/shard/commands.hpp"
+#include "proto/control/link.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/sim/census.hpp"
+#include "tests/sim/checker.hpp"
+#include "tests/sim/shards.hpp"
+
+namespace gimnet::sim {
+
+using std::chrono::milliseconds;
+
+/// What somebody has to be told.
+struct DueEvent {
+  std::uint32_t to = 0;  ///< node index
+  std::uint16_t operation = 0;
+  std::string name;             ///< SERVICE_MOVED: full name
+  std::uint32_t old_group = 0;  ///< or the group of SUBSCRIBER_...
+  std::uint32_t new_group = 0;
+  std::uint32_t message_type = 0;
+  std::uint32_t node = 0;         ///< SUBSCRIBER_...: who
+  std::uint32_t subscribers = 0;  ///< SUBSCRIBER_...: now
+  friend auto operator<=>(const DueEvent&, const DueEvent&) = default;
+};
+
+/// A token as the hub gave it out.
+struct GivenToken {
+  std::uint32_t index = 0;
+  std::uint64_t number = 0;  ///< of the session
+  std::string name;
+  std::string identity;
+  milliseconds expiry{};  ///< since 1970
+};
+
+/// What outlives the hub: tokens that nodes hold, and the indices that it must not give to newcomers any more.
+struct Past {
+  std::map<std::vector<std::byte>, GivenToken> tokens;
+  std::set<std::uint32_t> nodes;
+  std::set<std::uint32_t> groups;
+};
+
+/// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was told and what it
+/// answered. It shares no code with the hub but the messages, names and patterns (src/proto). Where the hub may choose
+/// (a new id) the model takes the choice over and checks that it was allowed.
+/// Thread safety: none. Errors: Broken, thrown at the first difference.
+class Model final : public Witness {
+ public:
+  Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
+      : limits_(limits), census_(census), hub_(hub), past_(std::move(past)) {}
+
+  struct Session {
+    std::uint64_t number = 0;  ///< of all sessions, never given twice
+    proto::Role role{};
+    bool connected = false;
+    std::uint32_t attachment = 0;
+    std::string name;
+    std::string description;
+    std::string place;
+    std::string token_name;  ///< for which its last token was given
+    bool came_back = false;
+    milliseconds joined{};
+    milliseconds away_until{};     ///< while it is not connected
+    std::uint64_t away_order = 0;  ///< who went first
+    milliseconds declare_until{};  ///< after a return
+    std::uint64_t declare_order = 0;
+    std::uint32_t life = 0;  ///< counts its returns
+    bool declares = false;
+    std::map<std::string, std::uint32_t> provides;    ///< full name: life in which it was declared last
+    std::map<std::string, std::uint32_t> subscribes;  ///< the same
+    std::uint16_t last_goodbye = 0;
+  };
+  struct Service {
+    std::uint32_t group = 0;
+    std::uint32_t provider = 0;
+    proto::ns::Advertise terms;
+  };
+  /// A full name that somebody provides or waits for.
+  struct Topic {
+    std::optional<Service> service;
+    std::set<std::uint32_t> subscribers;
+  };
+  using Topics = std::map<std::string, Topic>;
+
+  // What the conductor was told, and what it made of it
+  struct Hello {
+    const proto::Hello& hello;
+    bool may_administer = false;
+    std::string place;
+    std::string identity;
+    milliseconds wall{};
+    std::uint64_t new_session = 0;  ///< the number of the session, if it is a new one
+  };
+  void admitted(const Hello& hello, const hub::AttachCommand& attach, milliseconds now);
+  void refused(const Hello& hello, const proto::Goodbye& goodbye, milliseconds now);
+  void detached(const hub::DetachedEvent& event, milliseconds now);
+  void ticked(milliseconds now);
+  /// The answer to a request, nothing if there was none.
+  void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, milliseconds now);
+
+  /// Does the hub know the connection by which this came?
+  [[nodiscard]] const Session* known(const hub::SessionRef& session, NodeId node) const;
+  /// What had to be told in this step; those who are not connected are told nothing.
+  [[nodiscard]] std::vector<DueEvent> take_due();
+
+  [[nodiscard]] const std::map<std::uint32_t, Session>& sessions() const { return sessions_; }
+  [[nodiscard]] const std::map<std::string, std::uint32_t>& names() const { return names_; }
+  /// nullptr: nobody provides it, and nobody waits for it.
+  [[nodiscard]] const Topic* topic(const std::string& full_name) const;
+  /// By group index. Never null.
+  [[nodiscard]] const std::map<std::uint32_t, const Topics::value_type*>& groups() const { return groups_; }
+  /// Group and node indices that were ever given out, in this order.
+  [[nodiscard]] const std::vector<std::uint32_t>& groups_given() const { return groups_given_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& nodes_given() const { return nodes_given_; }
+  /// Whose session ended since this was last asked.
+  [[nodiscard]] std::vector<std::uint32_t> take_ended() { return std::exchange(ended_, {}); }
+  /// When something runs out next.
+  [[nodiscard]] std::optional<milliseconds> next_deadline() const;
+
+  /// When the hub is killed.
+  [[nodiscard]] Past past() const;
+
+  // Witness
+  [[nodiscard]] std::uint64_t session_of(std::uint32_t index) const override;
+  [[nodiscard]] bool provides(std::uint32_t index, std::uint32_t group) const override;
+  [[nodiscard]] bool subscribes(std::uint32_t index, std::uint32_t group) const override;
+
+ private:
+  /// What must become of a HELLO.
+  struct Verdict {
+    std::optional<proto::GoodbyeCode> refusal;
+    std::uint32_t session = 0;              ///< that is there and whose token it is; 0: none
+    std::optional<GivenToken> former = {};  ///< of a session that is not there any more
+  };
+  [[nodiscard]] Verdict judge(const Hello& hello) const;
+  void judge_token(const Hello& hello, Verdict& verdict) const;
+  void count_token(const Hello& hello, const Verdict& verdict);
+  void take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now);
+  [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name, std::uint32_t claimant) const;
+  void make_way(const Hello& hello, const Verdict& verdict, milliseconds now);
+  void make_room(milliseconds now);
+  [[nodiscard]] std::optional<std::uint32_t> longest_away_nameless() const;
+  void take_new_index(std::uint32_t index, milliseconds now);
+  void take_name(std::uint32_t index, const std::string& name, milliseconds now);
+  void end(std::uint32_t index, milliseconds now);
+  void rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index, milliseconds now);
+  void drop_undeclared(std::uint32_t index, milliseconds now);
+
+  [[nodiscard]] std::size_t subscribers(const std::string& full_name) const;
+  [[nodiscard]] const Service* service(const std::string& full_name) const;
+  void forget_if_unused(const std::string& full_name);
+  void withdraw(const std::string& full_name, milliseconds now);
+  void unsubscribe(std::uint32_t index, const std::string& full_name);
+  void tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
+                  const proto::ns::Advertise& terms);
+  void tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined);
+
+  // Requests; each checks the answer
+  struct Asked {
+    std::uint32_t index = 0;
+    Session& session;
+    std::span<const std::byte> payload;
+    std::span<const std::byte> answer;
+    milliseconds now{};
+  };
+  void judge_names(const Asked& asked, std::uint16_t operation);
+  void judge_services(const Asked& asked, std::uint16_t operation);
+  void judge_control(const Asked& asked, std::uint16_t operation);
+  void judge_list(const Asked& asked);
+  void judge_service_list(const Asked& asked);
+  void judge_connections(const Asked& asked);
+  void judge_advertise(const Asked& asked);
+  void open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
+                  const proto::ns::Advertise& terms);
+  void judge_withdraw(const Asked& asked);
+  void judge_subscribe(const Asked& asked);
+  void judge_unsubscribe(const Asked& asked);
+  void require_status(const Asked& asked, proto::Status status, Checker checker);
+  [[nodiscard]] NodeId id(std::uint32_t index) const { return make_id<NodeId>(hub_, index); }
+  [[nodiscard]] GroupId group_id(std::uint32_t index) const { return make_id<GroupId>(hub_, index); }
+
+  const hub::Limits& limits_;
+  Census& census_;
+  const HubId hub_;
+  std::map<std::uint32_t, Session> sessions_;
+  std::map<std::uint32_t, std::uint32_t> generations_;
+  std::map<std::string, std::uint32_t> names_;
+  Topics topics_;  ///< by full name
+  std::map<std::uint32_t, const Topics::value_type*> groups_;
+  std::vector<std::uint32_t> groups_given_;
+  std::vector<std::uint32_t> nodes_given_;
+  std::vector<std::uint32_t> ended_;
+  Past past_;                                          ///< of earlier lives, and the tokens of this one
+  std::map<std::uint32_t, std::uint64_t> least_;       ///< index: sessions below that number are over for good
+  std::map<std::uint32_t, milliseconds> resting_ids_;  ///< index: until when
+  std::map<std::uint32_t, milliseconds> resting_groups_;
+  std::vector<DueEvent> due_;
+  std::uint64_t orders_ = 0;
+};
+
+}  // namespace gimnet::sim

@@ -1,0 +1,207 @@
+#include "proto/control/names.hpp"
+#include "tests/sim/model.hpp"
+
+// Services and subscriptions of the reference model.
+
+namespace gimnet::sim {
+
+using proto::Status;
+namespace ns = proto::ns;
+
+namespace {
+
+bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
+  return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
+         a.delivery == b.delivery;
+}
+
+}  // namespace
+
+const Model::Topic* Model::topic(const std::string& full_name) const {
+  const auto found = topics_.find(full_name);
+  return found == topics_.end() ? nullptr : &found->second;
+}
+
+std::size_t Model::subscribers(const std::string& full_name) const {
+  const Topic* found = topic(full_name);
+  return found == nullptr ? 0 : found->subscribers.size();
+}
+
+const Model::Service* Model::service(const std::string& full_name) const {
+  const Topic* found = topic(full_name);
+  return found == nullptr || !found->service ? nullptr : &*found->service;
+}
+
+void Model::forget_if_unused(const std::string& full_name) {
+  const auto found = topics_.find(full_name);
+  if (!found->second.service && found->second.subscribers.empty()) topics_.erase(found);
+}
+
+void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
+                       const ns::Advertise& terms) {
+  for (const std::uint32_t subscriber : topics_.at(full_name).subscribers) {
+    DueEvent event;
+    event.to = subscriber;
+    event.operation = ns::ServiceMoved::kOperation;
+    event.name = full_name;
+    event.old_group = old_group;
+    event.new_group = new_group;
+    event.message_type = terms.message_type;
+    due_.push_back(std::move(event));
+  }
+}
+
+void Model::tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined) {
+  const Service* provided = service(full_name);
+  if (provided == nullptr) return;
+  DueEvent event;
+  event.to = provided->provider;
+  event.operation = joined ? ns::SubscriberJoined::kOperation : ns::SubscriberLeft::kOperation;
+  event.old_group = provided->group;
+  event.node = subscriber;
+  due_.push_back(std::move(event));
+}
+
+void Model::withdraw(const std::string& full_name, milliseconds now) {
+  Topic& entry = topics_.at(full_name);
+  const Service old = *entry.service;
+  entry.service.reset();
+  groups_.erase(old.group);
+  rest(resting_groups_, old.group, now);
+  sessions_.at(old.provider).provides.erase(full_name);
+  if (!entry.subscribers.empty()) census_.add(Happening::service_withdrawn);
+  tell_moved(full_name, old.group, 0, old.terms);
+  forget_if_unused(full_name);
+}
+
+void Model::unsubscribe(std::uint32_t index, const std::string& full_name) {
+  topics_.at(full_name).subscribers.erase(index);
+  sessions_.at(index).subscribes.erase(full_name);
+  tell_provider(full_name, index, false);
+  forget_if_unused(full_name);
+}
+
+void Model::drop_undeclared(std::uint32_t index, milliseconds now) {
+  const Session session = sessions_.at(index);
+  for (const auto& [full_name, life] : session.subscribes) {
+    if (life == session.life) continue;
+    census_.add(Happening::undeclared_dropped);
+    unsubscribe(index, full_name);
+  }
+  for (const auto& [full_name, life] : session.provides) {
+    if (life == session.life) continue;
+    census_.add(Happening::undeclared_dropped);
+    withdraw(full_name, now);
+  }
+}
+
+void Model::judge_advertise(const Asked& asked) {
+  const auto offer = proto::decode<ns::Advertise>(asked.payload);
+  if (!offer) return require_status(asked, Status::bad_request, Checker::answers);
+  Session& session = asked.session;
+  const std::string full_name = proto::join_service_name(session.name, offer->service);
+  if (session.name.empty() || !proto::valid_service_name(offer->service) || !proto::valid_name(full_name)) {
+    return require_status(asked, Status::bad_request, Checker::answers);
+  }
+  const Service* known = service(full_name);
+  if (known != nullptr && known->provider != asked.index) return require_status(asked, Status::taken, Checker::names);
+  if (known == nullptr && session.provides.size() >= limits_.services_per_node) {
+    census_.add(Happening::services_limit);
+    return require_status(asked, Status::limit, Checker::limits);
+  }
+  require_status(asked, Status::done, Checker::limits);
+  const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(asked.answer);
+  require(answer.has_value() && answer->subscribers == subscribers(full_name), Checker::answers,
+          "ADVERTISE is answered with a wrong number of subscribers");
+  session.provides[full_name] = session.life;
+  if (known == nullptr || !same_stream(known->terms, *offer)) {
+    return open_group(asked, full_name, index_of(answer->group), *offer);
+  }
+  require(index_of(answer->group) == known->group, Checker::answers,
+          "a service that is advertised again changes its group");
+  topics_.at(full_name).service->terms = *offer;
+}
+
+void Model::open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
+                       const ns::Advertise& terms) {
+  const auto resting = resting_groups_.find(group);
+  const auto free = [&](std::uint32_t index) {
+    const auto rests = resting_groups_.find(index);
+    return index != 0 && !groups_.contains(index) && (rests == resting_groups_.end() || rests->second <= asked.now);
+  };
+  const std::uint32_t former = asked.session.came_back ? index_of(terms.former_group) : 0;
+  const bool fresh = service(full_name) == nullptr;
+  if (fresh && free(former)) {
+    census_.add(Happening::former_group_kept);
+    require(group == former, Checker::answers, "a service that came back does not get its former group");
+  } else {
+    require(!past_.groups.contains(group), Checker::ids, "a new service gets a group given out before the restart");
+  }
+  require(!groups_.contains(group), Checker::ids, "a service gets the group of another one");
+  require(resting == resting_groups_.end() || resting->second <= asked.now, Checker::ids,
+          "a service gets a group that rests");
+  const auto entry = topics_.try_emplace(full_name).first;
+  const std::uint32_t old_group = entry->second.service ? entry->second.service->group : 0;
+  if (old_group != 0) {
+    groups_.erase(old_group);
+    rest(resting_groups_, old_group, asked.now);
+  }
+  if (!entry->second.subscribers.empty()) {
+    census_.add(old_group != 0 ? Happening::service_moved : Happening::subscribed_before_service);
+  }
+  entry->second.service = Service{group, asked.index, terms};
+  groups_[group] = &*entry;
+  groups_given_.push_back(group);
+  tell_moved(full_name, old_group, group, terms);
+}
+
+void Model::judge_withdraw(const Asked& asked) {
+  const auto wanted = proto::decode<ns::Withdraw>(asked.payload);
+  if (!wanted) return require_status(asked, Status::bad_request, Checker::answers);
+  const HubId owner = hub_of(wanted->group);
+  const auto found = owner == hub_ || owner == kOwnHub ? groups_.find(index_of(wanted->group)) : groups_.end();
+  if (found == groups_.end()) return require_status(asked, Status::not_found, Checker::answers);
+  const auto& [full_name, entry] = *found->second;
+  if (entry.service->provider != asked.index) return require_status(asked, Status::denied, Checker::answers);
+  require_status(asked, Status::done, Checker::answers);
+  withdraw(std::string{full_name}, asked.now);
+}
+
+void Model::judge_subscribe(const Asked& asked) {
+  const auto wanted = proto::decode<ns::Subscribe>(asked.payload);
+  if (!wanted || !proto::valid_name(wanted->name)) return require_status(asked, Status::bad_request, Checker::answers);
+  Session& session = asked.session;
+  const bool fresh = !session.subscribes.contains(wanted->name);
+  if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
+    census_.add(Happening::subscriptions_limit);
+    return require_status(asked, Status::limit, Checker::limits);
+  }
+  require_status(asked, Status::done, Checker::limits);
+  session.subscribes[wanted->name] = session.life;
+  if (fresh) {
+    topics_[wanted->name].subscribers.insert(asked.index);
+    tell_provider(wanted->name, asked.index, true);
+  }
+  const auto answer = proto::decode_answer<ns::SubscribeAnswer>(asked.answer);
+  const Service* provided = service(wanted->name);
+  require(answer.has_value() && index_of(answer->group) == (provided == nullptr ? 0 : provided->group),
+          Checker::answers, "SUBSCRIBE is answered with a wrong group");
+  if (provided != nullptr) {
+    const ns::Advertise& terms = provided->terms;
+    require(answer->message_type == terms.message_type && answer->instance == terms.instance &&
+                answer->delivery == terms.delivery,
+            Checker::answers, "SUBSCRIBE is answered with other terms than the provider's");
+  }
+}
+
+void Model::judge_unsubscribe(const Asked& asked) {
+  const auto wanted = proto::decode<ns::Unsubscribe>(asked.payload);
+  if (!wanted) return require_status(asked, Status::bad_request, Checker::answers);
+  if (!asked.session.subscribes.contains(wanted->name)) {
+    return require_status(asked, Status::not_found, Checker::answers);
+  }
+  require_status(asked, Status::done, Checker::answers);
+  unsubscribe(asked.index, wanted->name);
+}
+
+}  // namespace gimnet::sim

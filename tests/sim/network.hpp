@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "hub/transport/transport.hpp"
+#include "tests/sim/setting.hpp"
+
+namespace gimnet::sim {
+
+using Bytes = std::vector<std::byte>;
+
+/// A connection, with both its ends. Frames arrive in the order in which they were sent, after some time.
+struct Wire {
+  std::uint64_t number = 0;
+  std::uint32_t node = 0;    ///< who dialled
+  bool node_open = true;     ///< the node's end
+  bool hub_open = true;      ///< the hub's end
+  bool end_arrived = false;  ///< the hub can see that the node closed
+  bool mute = false;         ///< nothing is heard of the node, keep-alive neither
+  std::uint64_t mutes = 0;   ///< which silence it is
+  std::deque<Bytes> at_hub;  ///< arrived, not read
+  Time next_at_hub{};
+  Time next_at_node{};
+  std::uint64_t session = 0;  ///< that it was admitted for, as the reference model says; 0: not admitted
+  // Where its shard has it
+  bool attached = false;
+  std::size_t shard = 0;
+  std::uint32_t slot = 0;
+};
+using WirePointer = std::shared_ptr<Wire>;
+
+/// What the conductor and a shard hold of a wire.
+class WireTransport final : public hub::Transport {
+ public:
+  explicit WireTransport(WirePointer wire) : wire_(std::move(wire)) {}
+  hub::IoResult receive(std::span<std::byte>) override { return {}; }
+  hub::IoResult send(std::span<const iovec>) override { return {}; }
+  [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
+  void limit_unsent(std::uint32_t) override {}
+  [[nodiscard]] int descriptor() const override { return -1; }
+  [[nodiscard]] const WirePointer& wire() const { return wire_; }
+
+ private:
+  WirePointer wire_;
+};
+
+/// Brings frames from one end of a wire to the other. Thread safety: none.
+class Network {
+ public:
+  /// Whom it wakes.
+  struct Ends {
+    std::function<void(Wire&)> hub_has_something;
+    std::function<void(const WirePointer&, const Bytes&)> node_hears;
+    std::function<void(const WirePointer&)> node_sees_the_end;
+  };
+  explicit Network(Setting& setting) : setting_(setting) {}
+  void connect(Ends ends) { ends_ = std::move(ends); }
+
+  [[nodiscard]] WirePointer dial(std::uint32_t node);
+  /// When something sent now arrives.
+  [[nodiscard]] Time arrival(Time& next);
+  void to_hub(const WirePointer& wire, Bytes frame);
+  void to_node(const WirePointer& wire, Bytes frame);
+  /// The node's end closes; the hub learns of it after what was sent, or (`unseen`) not at all.
+  void close_by_node(const WirePointer& wire, bool unseen);
+  void close_by_hub(const WirePointer& wire);
+
+ private:
+  Setting& setting_;
+  Ends ends_;
+  std::uint64_t last_ = 0;
+};
+
+}  // namespace gimnet::sim

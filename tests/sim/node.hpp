@@ -1,0 +1,138 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/control/link.hpp"
+#include "proto/control/ns.hpp"
+#include "proto/frame/frame_header.hpp"
+#include "tests/sim/checker.hpp"
+#include "tests/sim/network.hpp"
+
+namespace gimnet::sim {
+
+/// A simulated node: it dials, joins, asks, sends, breaks and comes back as the seed says, and checks what it is told.
+/// Thread safety: none. Errors: Broken.
+class SimNode {
+ public:
+  /// What it needs of the world.
+  struct Around {
+    Setting& setting;
+    Network& network;
+    std::function<void(const WirePointer&, const proto::Hello&, const std::string& identity)> say_hello;
+    std::function<void(const WirePointer&, bool mute)> set_mute;
+  };
+  SimNode(const Around& around, std::uint32_t number);
+
+  /// Begins to act, now or soon.
+  void start();
+  void hears(const WirePointer& wire, const Bytes& frame);
+  void sees_the_end(const WirePointer& wire);
+
+  [[nodiscard]] std::uint32_t number() const { return number_; }
+  [[nodiscard]] bool is_slow() const { return slow_; }
+  [[nodiscard]] bool is_up() const { return wire_ != nullptr && link().welcomed; }
+  [[nodiscard]] bool waits_for_answers() const { return wire_ != nullptr && !link().open.empty(); }
+  /// Why the hub did not let it in last.
+  [[nodiscard]] proto::GoodbyeCode refusal() const { return refusal_; }
+  [[nodiscard]] NodeId id() const { return id_; }
+  [[nodiscard]] const std::string& name() const { return registered_; }
+  struct Provided {
+    proto::ns::Advertise offer;
+    GroupId group;
+  };
+  [[nodiscard]] const std::map<std::string, Provided>& provides() const { return provides_; }  ///< by service
+  [[nodiscard]] const std::map<std::string, GroupId>& subscribes() const { return subscribes_; }
+
+ private:
+  /// A request that is not answered yet.
+  struct Open {
+    proto::Kind kind{};
+    std::uint16_t operation = 0;
+    std::string subject;
+    proto::ns::Advertise offer;
+  };
+  [[nodiscard]] static Open about(std::string subject, proto::ns::Advertise offer = {}) {
+    return {{}, 0, std::move(subject), std::move(offer)};
+  }
+  /// What belongs to one connection.
+  struct Link {
+    WirePointer wire;
+    bool welcomed = false;
+    NodeId id;
+    std::map<std::uint16_t, Open> open;  ///< by request number
+    std::uint16_t last_request = 0;
+  };
+  [[nodiscard]] Link& link() { return links_.at(wire_->number); }
+  [[nodiscard]] const Link& link() const { return links_.at(wire_->number); }
+  [[nodiscard]] bool faulty() const;
+
+  void act_later();
+  void act();
+  void dial();
+  [[nodiscard]] proto::Hello hello(std::string& identity);
+  void spoil_token(proto::Hello& hello, std::string& identity);
+  bool break_something();
+  void fall(bool unseen);
+  void hang();
+  void say_goodbye();
+  void misbehave();
+  void lose_connection();
+  void give_up_others();
+  void forget_life();
+
+  void ask_something();
+  void ask_about_names(std::uint64_t choice);
+  void change_services(std::uint64_t choice);
+  void advertise(const std::string& service, bool anew);
+  void send_something();
+  void declare_again();
+  template <class Message>
+  void ask(const Message& message, Open open, proto::Kind kind = proto::Kind::ns) {
+    Link& to = link();
+    if (++to.last_request == proto::kNoRequest) ++to.last_request;
+    open.operation = Message::kOperation;
+    ask_raw(kind, proto::encode(message, to.last_request), std::move(open));
+  }
+  void ask_raw(proto::Kind kind, const proto::Payload& payload, Open open);
+  void send(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload, std::uint8_t flags = 0);
+
+  void on_link(const WirePointer& wire, std::span<const std::byte> payload);
+  void on_welcome(const WirePointer& wire, const proto::Welcome& welcome);
+  void on_control(Link& from, std::span<const std::byte> payload);
+  void on_answer(const Open& asked, std::span<const std::byte> payload);
+  void on_event(std::uint16_t operation, std::span<const std::byte> payload);
+  void on_data(const Link& from, const proto::FrameHeader& header);
+  void learn(NodeId node);
+  [[nodiscard]] std::string some_name();
+
+  const Around around_;
+  const std::uint32_t number_;
+  std::string wish_;  ///< the name; "" for a node without one
+  bool slow_ = false;
+  bool resumes_ = false;
+  std::string identity_;  ///< as the system tells the hub
+  // Of its session
+  std::vector<std::byte> token_;
+  std::vector<std::byte> old_token_;  ///< of a session before
+  NodeId id_;
+  std::string registered_;  ///< the name that it has
+  std::map<std::string, Provided> provides_;
+  std::map<std::string, GroupId> subscribes_;  ///< by full name; the group is 0 while nobody provides it
+  // Of its connection
+  WirePointer wire_;
+  std::map<std::uint64_t, Link> links_;  ///< by wire; those that it replaced itself, too
+  bool hung_ = false;
+  std::vector<std::pair<WirePointer, Bytes>> unheard_;  ///< came while it hung
+  proto::GoodbyeCode refusal_{};
+  Time not_before_{};          ///< it does not dial earlier
+  std::vector<NodeId> known_;  ///< others that it has heard of
+  std::set<std::uint32_t> known_groups_;
+  bool forgot_ = false;  ///< what it had subscribed to: the hub may send what it does not know
+};
+
+}  // namespace gimnet::sim

@@ -1,0 +1,226 @@
+#include <algorithm>
+
+#include "proto/control/ctrl.hpp"
+#include "tests/sim/node.hpp"
+#include "tests/sim/shards.hpp"
+
+// What a simulated node asks and sends, and what it makes of what comes back.
+
+namespace gimnet::sim {
+
+using proto::Kind;
+namespace ns = proto::ns;
+namespace ctrl = proto::ctrl;
+
+void SimNode::send(Kind kind, std::uint32_t dst, std::span<const std::byte> payload, std::uint8_t flags) {
+  proto::FrameHeader header;
+  header.dst = dst;
+  header.src = link().id.value();
+  header.kind = kind;
+  header.flags = flags;
+  around_.network.to_hub(wire_, frame_of(header, payload));
+}
+
+void SimNode::ask_raw(Kind kind, const proto::Payload& payload, Open open) {
+  open.kind = kind;
+  if (const auto view = proto::split_control(payload)) {
+    around_.setting.trace.note("node {a} asks operation {b} as request {c}: {t}", number_, view->header.operation,
+                               view->header.request, open.subject);
+    link().open[view->header.request] = std::move(open);
+  }
+  send(kind, 0, payload);
+}
+
+void SimNode::ask_something() {
+  Random& random = around_.setting.random;
+  if (link().open.size() >= around_.setting.plan.limits.requests) return;
+  const std::uint64_t choice = random.below(100);
+  if (choice < 25) return ask_about_names(choice);
+  if (choice < 65) return change_services(choice);
+  send_something();
+}
+
+void SimNode::ask_about_names(std::uint64_t choice) {
+  Random& random = around_.setting.random;
+  if (choice < 10) return ask(ns::Resolve{some_name()}, {});
+  if (choice < 13 && !known_.empty()) return ask(ns::Reverse{random.pick(known_)}, {});
+  if (choice < 17) {
+    ns::List list;
+    list.pattern = random.chance(500) ? "" : "robot/*";
+    list.records_max = static_cast<std::uint32_t>(random.between(1, 50));
+    if (!known_.empty() && random.chance(500)) list.after = random.pick(known_);
+    return ask(list, {});
+  }
+  if (choice < 20) {
+    ns::Services list;
+    list.pattern = random.chance(500) ? "" : "robot/*/s1";
+    list.records_max = static_cast<std::uint32_t>(random.between(1, 50));
+    return ask(list, {});
+  }
+  if (choice == 20) return ask(ctrl::HubInfo{}, {}, Kind::ctrl);
+  if (choice == 21) return ask(ctrl::Connections{}, {}, Kind::ctrl);
+  if (choice == 22) return ask(ctrl::Statistics{}, {}, Kind::ctrl);
+  if (choice == 23) return ask(ns::List{.pattern = "*/**/[", .after = {}}, {});
+  // Operations that there are not, and bodies that cannot be read.
+  proto::Payload odd = proto::encode(ns::Resolve{"x"}, ++link().last_request);
+  odd[random.chance(500) ? 1 : odd.size() - 1] = std::byte{0x7F};
+  ask_raw(random.chance(500) ? Kind::ns : Kind::ctrl, odd, {});
+}
+
+void SimNode::change_services(std::uint64_t choice) {
+  Random& random = around_.setting.random;
+  const std::uint64_t which = random.below(8);
+  if (choice < 38) return advertise("s" + std::to_string(which), false);
+  if (choice < 42 && !provides_.empty()) {
+    auto entry = provides_.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(provides_.size())));
+    return advertise(entry->first, true);
+  }
+  if (choice < 46 && !provides_.empty()) {
+    auto entry = provides_.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(provides_.size())));
+    return ask(ns::Withdraw{entry->second.group}, about(entry->first));
+  }
+  if (choice < 58) {
+    const std::string full_name = some_name() + "/s" + std::to_string(which % 4);
+    return ask(ns::Subscribe{full_name}, about(full_name));
+  }
+  if (choice < 63 && !subscribes_.empty()) {
+    auto entry = subscribes_.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(subscribes_.size())));
+    return ask(ns::Unsubscribe{entry->first}, about(entry->first));
+  }
+  if (choice == 63) {
+    const auto group = make_id<GroupId>(hub_of(id_), static_cast<std::uint32_t>(which + 1));
+    ns::Advertise perhaps_own;
+    perhaps_own.former_group = group;
+    return ask(ns::Withdraw{group}, about("", perhaps_own));
+  }
+  ns::Advertise wrong;
+  wrong.service = "not/one/part";
+  ask(wrong, about(wrong.service, wrong));
+}
+
+void SimNode::advertise(const std::string& service, bool anew) {
+  ns::Advertise offer;
+  offer.service = service;
+  const auto known = provides_.find(service);
+  if (known != provides_.end()) offer = known->second.offer;
+  offer.former_group = GroupId{};
+  if (anew) offer.message_type = static_cast<std::uint32_t>(around_.setting.random.below(4));
+  offer.metadata = around_.setting.random.chance(500) ? "about it" : "";
+  ask(offer, about(service, offer));
+}
+
+void SimNode::send_something() {
+  Random& random = around_.setting.random;
+  const std::uint64_t content = random.next();
+  const auto payload = std::as_bytes(std::span{&content, 1});
+  const std::uint64_t choice = random.below(10);
+  if (choice < 6) {
+    if (!known_.empty()) send(Kind::unicast, random.pick(known_).value(), payload);
+    return;
+  }
+  if (choice < 9 && !provides_.empty()) {
+    auto entry = provides_.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(provides_.size())));
+    if (entry->second.group != GroupId{}) send(Kind::group, entry->second.group.value(), payload);
+    return;
+  }
+  for (const auto& [full_name, group] : subscribes_) {
+    if (group == GroupId{}) continue;
+    // Only the provider may send to its subscribers; everybody may send to the provider.
+    const bool legal = random.chance(700);
+    return send(legal ? Kind::service : Kind::group, group.value(), payload);
+  }
+}
+
+void SimNode::on_control(Link& from, std::span<const std::byte> payload) {
+  const auto view = proto::split_control(payload);
+  require(view.has_value(), Checker::answers, "a control frame cannot be read");
+  if (!view->header.is_answer()) return on_event(view->header.operation, payload);
+  const auto asked = from.open.find(view->header.request);
+  require(asked != from.open.end(), Checker::answers, "a node gets an answer to what it did not ask here");
+  const Open open = asked->second;
+  around_.setting.trace.note("node {a} has its answer to request {b}: {c}", number_, view->header.request,
+                             static_cast<std::uint64_t>(proto::read_status(view->body).status));
+  from.open.erase(asked);
+  if (open.operation == 0) return;
+  require(view->header.operation == (open.operation | proto::kAnswerBit), Checker::answers,
+          "a node gets the answer to another request");
+  if (open.kind == Kind::ns && wire_ != nullptr && &from == &link()) on_answer(open, payload);
+}
+
+void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
+  const bool done = proto::read_status(proto::split_control(payload)->body).status == proto::Status::done;
+  switch (asked.operation) {
+    case ns::Resolve::kOperation:
+      if (done) learn(proto::decode_answer<ns::ResolveAnswer>(payload)->node);
+      break;
+    case ns::List::kOperation:
+      if (done) {
+        const auto answer = proto::decode_answer<ns::ListAnswer>(payload);
+        for (std::size_t i = 0; i < answer->nodes.size(); i += 7) learn(answer->nodes[i].node);
+      }
+      break;
+    case ns::Advertise::kOperation:
+      if (done) provides_[asked.subject] = {asked.offer, proto::decode_answer<ns::AdvertiseAnswer>(payload)->group};
+      break;
+    case ns::Withdraw::kOperation:
+      if (done) {
+        std::erase_if(provides_, [&asked](const auto& entry) {
+          return entry.first == asked.subject || entry.second.group == asked.offer.former_group;
+        });
+      }
+      break;
+    case ns::Subscribe::kOperation:
+      if (done) {
+        const GroupId group = proto::decode_answer<ns::SubscribeAnswer>(payload)->group;
+        subscribes_[asked.subject] = group;
+        known_groups_.insert(group.value());
+      }
+      break;
+    case ns::Unsubscribe::kOperation:
+      if (done) subscribes_.erase(asked.subject);
+      break;
+    default:
+      break;
+  }
+}
+
+void SimNode::on_event(std::uint16_t operation, std::span<const std::byte> payload) {
+  if (operation == ns::ServiceMoved::kOperation) {
+    const auto event = proto::decode<ns::ServiceMoved>(payload);
+    require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
+    known_groups_.insert(event->new_group.value());
+    const auto subscribed = subscribes_.find(event->name);
+    if (subscribed != subscribes_.end()) subscribed->second = event->new_group;
+  } else if (operation == ns::SubscriberJoined::kOperation) {
+    const auto event = proto::decode<ns::SubscriberJoined>(payload);
+    require(event.has_value(), Checker::events, "SUBSCRIBER_JOINED cannot be read");
+    learn(event->node);
+  }
+}
+
+void SimNode::on_data(const Link& from, const proto::FrameHeader& header) {
+  Census& census = around_.setting.census;
+  if (header.kind == Kind::unicast) {
+    require(header.dst == from.id.value(), Checker::right_session, "a node gets a frame for another one");
+    census.add(Happening::unicast_delivered);
+  } else if (header.kind == Kind::group) {
+    // A subscriber is in the table before its answer leaves, so that frames may come before the answer.
+    const bool subscribing = std::any_of(from.open.begin(), from.open.end(), [](const auto& entry) {
+      return entry.second.operation == ns::Subscribe::kOperation;
+    });
+    const bool told = known_groups_.contains(header.dst) || subscribing || forgot_;
+    if (!told) {
+      broken(Checker::events, "program " + std::to_string(number_) + " gets a frame of group " +
+                                  std::to_string(index_of(GroupId{header.dst})) + ", of which it was not told");
+    }
+    census.add(Happening::group_delivered);
+  } else if (header.kind == Kind::service) {
+    census.add(Happening::service_frame_delivered);
+  }
+}
+
+}  // namespace gimnet::sim

@@ -1,0 +1,68 @@
+#include "tests/sim/plan.hpp"
+
+#include <algorithm>
+
+namespace gimnet::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// 0 in a quarter of the worlds.
+std::uint64_t sometimes(Random& random, std::uint64_t most) {
+  const bool off = random.chance(250);
+  const std::uint64_t value = random.between(1, most);
+  return off ? 0 : value;
+}
+
+void draw_limits(Random& random, Plan& plan) {
+  hub::Limits& limits = plan.limits;
+  limits.grace_ms = random.between(700, 2'500);
+  limits.block_ms = 500;
+  limits.slow_consumer_ms = 1'000;
+  // In some worlds tokens run out while their nodes are there.
+  const std::uint64_t token_ms = random.between(1'000, 6'000);
+  if (random.chance(200)) limits.token_ms = token_ms;
+  limits.silent_ms = random.between(300, 2'000);
+  limits.requests = random.between(4, 16);
+  limits.services_per_node = random.between(2, 6);
+  limits.subscriptions_per_node = random.between(2, 8);
+  limits.page_records = random.between(4, 40);
+  // Half of the worlds have too small a hub.
+  const bool crowded = random.chance(500);
+  const std::uint64_t room = random.between(60, 95);
+  limits.nodes = crowded ? std::max<std::uint64_t>(2, plan.nodes * room / 100) : 4 * plan.nodes;
+}
+
+}  // namespace
+
+Plan Plan::draw(Random& random, std::size_t nodes) {
+  Plan plan;
+  plan.nodes = nodes;
+  plan.shards = static_cast<std::size_t>(random.between(1, 4));
+  draw_limits(random, plan);
+  plan.names = static_cast<std::uint32_t>(std::max<std::uint64_t>(1, nodes * random.between(70, 200) / 100));
+  plan.nameless = random.between(0, 300);
+  plan.waits_away = random.between(0, 1'000);
+  plan.acts_ms = static_cast<std::uint32_t>(random.between(300, 1'200));
+  plan.faults_until = 6s;
+  plan.end = plan.faults_until + std::chrono::milliseconds{3 * plan.limits.grace_ms + plan.limits.silent_ms} + 5s;
+  plan.latency_most = Time{random.between(200, 30'000)};
+  plan.crash = sometimes(random, 40);
+  plan.vanish = sometimes(random, 30);
+  plan.hang = sometimes(random, 30);
+  plan.goodbye = sometimes(random, 30);
+  plan.twin = sometimes(random, 20);
+  plan.misconduct = sometimes(random, 15);
+  plan.flood = sometimes(random, 10);
+  plan.bad_token = sometimes(random, 200);
+  plan.lost_token = sometimes(random, 500);
+  plan.rename = sometimes(random, 150);
+  plan.slow_reader = sometimes(random, 200);
+  plan.shard_pause = sometimes(random, 5);
+  plan.conductor_pause = sometimes(random, 5);
+  plan.disk_full = sometimes(random, 500);
+  plan.hub_kills = random.chance(300) ? static_cast<std::uint32_t>(random.between(1, 2)) : 0;
+  return plan;
+}
+
+}  // namespace gimnet::sim

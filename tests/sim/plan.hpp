@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "hub/limits.hpp"
+#include "tests/sim/agenda.hpp"
+#include "tests/sim/random.hpp"
+
+namespace gimnet::sim {
+
+/// What a seed makes of a world: sizes, limits, and how likely each fault is, in thousandths of a node's acts; 0
+/// switches a kind of fault off, which each seed does to some (swarm testing, Groce et al., ISSTA 2012).
+struct Plan {
+  std::size_t nodes = 0;
+  std::size_t shards = 1;
+  hub::Limits limits;
+  std::uint32_t names = 1;       ///< that nodes wish for; fewer than nodes, so that they collide
+  std::uint64_t nameless = 0;    ///< thousandths of the nodes
+  std::uint64_t waits_away = 0;  ///< thousandths of the nodes: they ask for resume
+  std::uint32_t acts_ms = 0;     ///< mean time between two acts of a node
+  Time faults_until{};
+  Time end{};
+  Time latency_most{};  ///< of a connection, one way
+  // Thousandths of acts
+  std::uint64_t crash = 0;
+  std::uint64_t vanish = 0;
+  std::uint64_t hang = 0;
+  std::uint64_t goodbye = 0;
+  std::uint64_t twin = 0;
+  std::uint64_t misconduct = 0;
+  std::uint64_t flood = 0;
+  // Thousandths of other occasions
+  std::uint64_t bad_token = 0;    ///< of HELLOs
+  std::uint64_t lost_token = 0;   ///< of crashes
+  std::uint64_t rename = 0;       ///< of HELLOs
+  std::uint64_t slow_reader = 0;  ///< of nodes
+  std::uint64_t shard_pause = 0;  ///< of turns
+  std::uint64_t conductor_pause = 0;
+  std::uint64_t disk_full = 0;  ///< of times that the hub keeps its state
+  std::uint32_t hub_kills = 0;  ///< in all
+
+  [[nodiscard]] static Plan draw(Random& random, std::size_t nodes);
+};
+
+}  // namespace gimnet::sim

@@ -1,0 +1,196 @@
+#include <algorithm>
+
+#include "tests/sim/shards.hpp"
+
+// How simulated shards read their connections, and bring frames to others.
+
+namespace gimnet::sim {
+
+using hub::GroupMember;
+using hub::GroupMembers;
+using hub::NodePlace;
+using proto::GoodbyeCode;
+using proto::Kind;
+
+void SimShards::has_something(Wire& wire) {
+  if (dead_ || !wire.attached) return;
+  Seat& seat = *shards_[wire.shard].seats[wire.slot];
+  if (seat.ready) return;
+  seat.ready = true;
+  shards_[wire.shard].ready.push_back(wire.slot);
+  want_turn(wire.shard);
+}
+
+void SimShards::serve_one(std::size_t index) {
+  Shard& shard = shards_[index];
+  const auto chosen = static_cast<std::size_t>(setting_.random.below(shard.ready.size()));
+  const std::uint32_t slot = shard.ready[chosen];
+  shard.ready[chosen] = shard.ready.back();
+  shard.ready.pop_back();
+  Seat* seat = shard.seats[slot].get();
+  if (seat == nullptr) return;
+  seat->ready = false;
+  if (seat->wire) read(index, *seat);
+}
+
+void SimShards::read(std::size_t index, Seat& seat) {
+  const WirePointer wire = seat.wire;
+  for (std::uint64_t most = setting_.random.between(1, 6); most > 0 && !wire->at_hub.empty(); --most) {
+    Bytes frame = std::move(wire->at_hub.front());
+    wire->at_hub.pop_front();
+    if (!handle(index, seat, std::move(frame))) return;
+  }
+  if (!wire->at_hub.empty()) return has_something(*wire);
+  if (!wire->end_arrived) return;
+  detach(seat, std::nullopt);
+  tell(index, seat, false, GoodbyeCode::done, {});
+}
+
+bool SimShards::handle(std::size_t index, Seat& seat, Bytes frame) {
+  const proto::FrameHeader header = proto::load_header(frame.data());
+  if ((header.flags & proto::kFlagReservedMask) != 0) {
+    close(index, seat, GoodbyeCode::malformed, "malformed frame");
+    return false;
+  }
+  if (header.src != seat.node.value()) {
+    close(index, seat, GoodbyeCode::wrong_source, "a frame's source is not this connection's node id");
+    return false;
+  }
+  if (header.kind == Kind::link) {
+    const auto goodbye = proto::decode<proto::Goodbye>(std::span{frame}.subspan(proto::kHeaderSize));
+    require(goodbye.has_value(), Checker::seam, "a simulated node said a GOODBYE that cannot be read");
+    detach(seat, std::nullopt);
+    tell(index, seat, true, goodbye->code, goodbye->sentence);
+    return false;
+  }
+  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
+    return handle_control(index, seat, std::move(frame));
+  route(index, frame, false);
+  return true;
+}
+
+bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {
+  if (++seat.requests > setting_.plan.limits.requests) {
+    setting_.census.add(Happening::requests_limit);
+    close(index, seat, GoodbyeCode::too_many_requests, "too many requests are unanswered");
+    return false;
+  }
+  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                     hub::ControlFrameEvent{seat.session, seat.attachment, seat.node, std::move(frame)}});
+  return true;
+}
+
+void SimShards::take_mail(std::size_t index) {
+  Shard& shard = shards_[index];
+  take_commands(index, shard.commands.size());
+  for (std::size_t count = shard.mail.size(); count > 0; --count) {
+    const Bytes frame = std::move(shard.mail.front());
+    shard.mail.pop_front();
+    route(index, frame, true);
+  }
+}
+
+void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
+  const proto::FrameHeader header = proto::load_header(frame.data());
+  switch (header.kind) {
+    case Kind::group:
+      return to_group(index, frame, handed_over);
+    case Kind::service:
+      return to_provider(index, frame, handed_over);
+    default:
+      return to_node(index, frame, index_of(NodeId{header.dst}), handed_over);
+  }
+}
+
+void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t node, bool handed_over) {
+  const std::uint64_t meant = witness_->session_of(node);
+  const NodePlace place = parts_.nodes.find(node);
+  if (!place.exists()) {
+    setting_.census.add(Happening::unicast_to_departed);
+    return;
+  }
+  if (place.shard.value() != index) {
+    if (handed_over) return;
+    setting_.census.add(Happening::unicast_across_shards);
+    shards_[place.shard.value()].mail.push_back(frame);
+    return want_turn(place.shard.value());
+  }
+  Seat* seat = find(index, place.slot, place.generation);
+  if (seat != nullptr) deliver(index, *seat, frame, meant);
+}
+
+void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over) {
+  const proto::FrameHeader header = proto::load_header(frame.data());
+  const std::uint32_t group = index_of(GroupId{header.dst});
+  const GroupMembers* members = parts_.groups.find(group);
+  if (members == nullptr || members->provider.value() != header.src) {
+    if (members != nullptr) setting_.census.add(Happening::group_of_another);
+    return;
+  }
+  require(witness_->provides(index_of(NodeId{header.src}), group), Checker::group_table,
+          "a node sends to a group that is not of a service of its own");
+  for (const GroupMember& member : members->by_shard[index]) {
+    Seat* seat = find(index, member.slot, member.generation);
+    if (seat == nullptr) continue;
+    const std::uint32_t node = index_of(seat->node);
+    require(witness_->subscribes(node, group), Checker::right_session,
+            "a frame of a service goes to a node that has not subscribed to it");
+    deliver(index, *seat, frame, witness_->session_of(node));
+  }
+  if (handed_over) return;
+  for (std::size_t other = 0; other < shards_.size(); ++other) {
+    if (other == index || members->by_shard[other].empty()) continue;
+    shards_[other].mail.push_back(frame);
+    want_turn(other);
+  }
+}
+
+void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
+  const GroupMembers* members = parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
+  if (members != nullptr) to_node(index, frame, index_of(members->provider), handed_over);
+}
+
+void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {
+  if (for_session == 0) broken(Checker::right_session, "a frame for a node that is not there waits for another one");
+  if (seat.number != for_session)
+    broken(Checker::right_session, "a frame waits for another session than the one it is for");
+  if (!seat.wire && !seat.waits_when_away) {
+    setting_.census.add(Happening::unicast_dropped_away);
+    return;
+  }
+  seat.data.push_back({frame, for_session});
+  want_flush(index, seat);
+}
+
+void SimShards::want_flush(std::size_t index, Seat& seat) {
+  if (seat.flush_due || !seat.wire) return;
+  if (seat.control.empty() && seat.data.empty()) return;
+  seat.flush_due = true;
+  Time delay{setting_.random.between(1, 300)};
+  if (parts_.is_slow(seat.wire->node)) {
+    setting_.census.add(Happening::slow_reader);
+    delay = Time{setting_.random.between(1'000, 300'000)};
+  }
+  setting_.agenda.after(delay, [this, index, session = seat.session] {
+    Seat* found = dead_ ? nullptr : find(index, session.slot, session.generation);
+    if (found == nullptr) return;
+    found->flush_due = false;
+    flush(index, *found);
+  });
+}
+
+void SimShards::flush(std::size_t index, Seat& seat) {
+  if (!seat.wire) return;
+  for (; !seat.control.empty(); seat.control.pop_front()) {
+    setting_.trace.mix(seat.control.front());
+    parts_.network.to_node(seat.wire, std::move(seat.control.front()));
+  }
+  for (; !seat.data.empty(); seat.data.pop_front()) {
+    require(seat.data.front().for_session == seat.wire->session, Checker::right_session,
+            "a frame leaves on a connection of another session");
+    setting_.trace.note("shard {a} hands a frame to wire {b}", index, seat.wire->number);
+    parts_.network.to_node(seat.wire, std::move(seat.data.front().frame));
+  }
+}
+
+}  // namespace gimnet::sim

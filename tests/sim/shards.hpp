@@ -1,0 +1,148 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "hub/concurrent/quiescence.hpp"
+#include "hub/control/shard_proxy.hpp"
+#include "hub/data/route/group_table.hpp"
+#include "hub/data/route/node_table.hpp"
+#include "proto/frame/frame_header.hpp"
+#include "tests/sim/checker.hpp"
+#include "tests/sim/network.hpp"
+
+namespace gimnet::sim {
+
+/// Who may get a frame, by the reference model and not by the hub's tables.
+class Witness {
+ public:
+  virtual ~Witness() = default;
+  /// The session that has the index now; 0: nobody.
+  [[nodiscard]] virtual std::uint64_t session_of(std::uint32_t index) const = 0;
+  /// Does the group exist, and does that node send to it?
+  [[nodiscard]] virtual bool provides(std::uint32_t index, std::uint32_t group) const = 0;
+  [[nodiscard]] virtual bool subscribes(std::uint32_t index, std::uint32_t group) const = 0;
+};
+
+/// The shards of a hub as the conductor sees them: commands are carried out in order, at any time later; events come
+/// back in order; tables are read at any time between; all commands that wait are carried out before mail is taken
+/// (hub/shard/commands.hpp). Frames go where the published tables say.
+/// Thread safety: none. Lifetime: one life of the hub.
+class SimShards final : public hub::ShardProxy {
+ public:
+  struct Parts {
+    HubId hub;
+    std::size_t shards = 1;
+    const hub::NodeTable& nodes;
+    const hub::GroupTable& groups;
+    hub::Quiescence& quiescence;
+    Network& network;
+    std::function<void()> conductor_wanted;
+    /// Called while the conductor sends what lets somebody know: it must have published before.
+    std::function<void(ShardIndex, const hub::ShardCommand&)> before_it_leaves;
+    std::function<bool(std::uint32_t node)> is_slow;
+  };
+  SimShards(Setting& setting, Parts parts);
+  void believe(const Witness& witness) { witness_ = &witness; }
+
+  // The conductor's side
+  void send(ShardIndex shard, hub::ShardCommand command) override;
+  [[nodiscard]] std::size_t shards() const override { return shards_.size(); }
+  /// Shards that have something to tell the conductor.
+  [[nodiscard]] std::vector<std::size_t> with_events() const;
+  [[nodiscard]] hub::ShardEvent take_event(std::size_t shard);
+  struct Sent {
+    ShardIndex shard;
+    const hub::ShardCommand* command = nullptr;
+  };
+  /// What was sent since forget_sent(). Valid until: time goes on.
+  [[nodiscard]] const std::vector<Sent>& sent() const { return sent_; }
+  void forget_sent() { sent_.clear(); }
+
+  // The network's side
+  void has_something(Wire& wire);
+  /// Nothing is heard of the node from now on, or again.
+  void set_mute(const WirePointer& wire, bool mute);
+  /// The hub's process is gone, and with it its ends of all connections.
+  void die();
+
+  /// Nothing waits to be done.
+  [[nodiscard]] bool idle() const;
+  [[nodiscard]] std::size_t connected() const;
+
+ private:
+  struct Data {
+    Bytes frame;
+    std::uint64_t for_session = 0;
+  };
+  /// A session on its shard, and its connection while it has one.
+  struct Seat {
+    hub::SessionRef session;
+    NodeId node;
+    std::uint64_t number = 0;  ///< of the session, by the reference model
+    std::uint32_t attachment = 0;
+    WirePointer wire;
+    bool waits_when_away = false;
+    std::uint64_t requests = 0;
+    std::deque<Bytes> control;
+    std::deque<Data> data;
+    bool ready = false;
+    bool flush_due = false;
+  };
+  struct Shard {
+    std::deque<hub::ShardCommand> commands;
+    std::deque<hub::ShardEvent> events;
+    std::deque<Bytes> mail;
+    std::vector<std::unique_ptr<Seat>> seats;  ///< by slot
+    std::vector<bool> used;                    ///< by slot: somebody had it before
+    std::vector<std::uint32_t> ready;          ///< slots to be read
+    bool turn_due = false;
+  };
+
+  void want_turn(std::size_t shard);
+  void turn(std::size_t shard);
+  void take_commands(std::size_t shard, std::size_t most);
+  void take_mail(std::size_t shard);
+  void serve_one(std::size_t shard);
+  void execute(std::size_t shard, hub::ShardCommand& command);
+  void attach(std::size_t shard, hub::AttachCommand& command);
+  Seat& seat_for(std::size_t shard, const hub::AttachCommand& command);
+  void say(std::size_t shard, const hub::SendControlCommand& command);
+  void release(std::size_t shard, hub::SessionRef session);
+  void drain(std::size_t shard);
+  void read(std::size_t shard, Seat& seat);
+  /// False: the connection has ended.
+  bool handle(std::size_t shard, Seat& seat, Bytes frame);
+  bool handle_control(std::size_t shard, Seat& seat, Bytes frame);
+  void close(std::size_t shard, Seat& seat, proto::GoodbyeCode code, const char* sentence);
+  void detach(Seat& seat, std::optional<proto::Goodbye> told);
+  void tell(std::size_t shard, const Seat& seat, bool said_by_peer, proto::GoodbyeCode code, std::string sentence);
+  void push_event(std::size_t shard, hub::ShardEvent event);
+
+  void route(std::size_t shard, const Bytes& frame, bool handed_over);
+  void to_node(std::size_t shard, const Bytes& frame, std::uint32_t index, bool handed_over);
+  void to_group(std::size_t shard, const Bytes& frame, bool handed_over);
+  void to_provider(std::size_t shard, const Bytes& frame, bool handed_over);
+  void deliver(std::size_t shard, Seat& seat, const Bytes& frame, std::uint64_t for_session);
+  void want_flush(std::size_t shard, Seat& seat);
+  void flush(std::size_t shard, Seat& seat);
+  [[nodiscard]] Seat* find(std::size_t shard, ConnectionSlot slot, std::uint32_t generation);
+
+  Setting& setting_;
+  const Parts parts_;
+  const Witness* witness_ = nullptr;
+  std::vector<Shard> shards_;
+  std::vector<Sent> sent_;
+  bool dead_ = false;
+};
+
+/// A whole frame; the header's length is filled in.
+[[nodiscard]] Bytes frame_of(proto::FrameHeader header, std::span<const std::byte> payload);
+/// A whole LINK frame from the hub.
+[[nodiscard]] Bytes link_frame(NodeId to, HubId hub, const proto::Payload& payload);
+
+}  // namespace gimnet::sim
