@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   std::string publish_url;
   std::string scenario_name;
   double seconds = 1;
+  double patience = 2;
   RunOptions options;
   app.add_option("--wire", wire_name, "how the subject is spoken to: gimnet, null, nats, mqtt, resp or zmtp");
   app.add_option("--connect", url, "tcp://HOST:PORT or unix:PATH")->required();
@@ -31,6 +32,8 @@ int main(int argc, char** argv) {
   app.add_option("--size", options.payload_bytes, "payload in bytes")
       ->check(CLI::Range(kPayloadBytesMin, kPayloadBytesMax));
   app.add_option("--seconds", seconds, "how long is measured")->check(CLI::Range(0.01, 3600.0));
+  app.add_option("--patience", patience, "seconds after which a message that has not come is lost")
+      ->check(CLI::Range(0.1, 600.0));
   app.add_option("--clients", options.client_count, "connections of idle_10000, connect_10000 and join_under_load")
       ->check(CLI::Range(2, 1'000'000));
   CLI11_PARSE(app, argc, argv);
@@ -42,6 +45,7 @@ int main(int argc, char** argv) {
   std::optional<Endpoint> publish_endpoint;
   if (!publish_url.empty()) publish_endpoint = parse_endpoint(publish_url);
   Engine engine(*wire, parse_endpoint(url), publish_endpoint);
+  engine.set_patience(std::chrono::nanoseconds(static_cast<std::int64_t>(patience * 1e9)));
   Findings findings = find_scenario(scenario_name)(engine, options);
   findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.process)));
   add_ledger(engine, findings);

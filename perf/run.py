@@ -26,6 +26,7 @@ QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 1.0
 SMOKE_SECONDS = 0.1
 SMOKE_CLIENTS = 200
+SMOKE_PATIENCE_SECONDS = 30
 SKIPPED = 77  # what ctest takes for a test that was left out
 
 
@@ -81,7 +82,8 @@ def make_settings(arguments: argparse.Namespace) -> Settings:
     return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
                     runs=arguments.runs or (1 if arguments.smoke else 3),
                     clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument,
-                    tries_max=1 if arguments.smoke else 2)
+                    tries_max=1 if arguments.smoke else 2,
+                    patience_seconds=SMOKE_PATIENCE_SECONDS if arguments.smoke else Settings.patience_seconds)
 
 
 def processor_name() -> str:

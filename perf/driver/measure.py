@@ -11,7 +11,7 @@ from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
 from driver.suite import Case, Plan
 
 # A generator that takes this much longer than its measurement hangs.
-EXTRA_SECONDS = 45
+EXTRA_SECONDS = 35
 
 
 @dataclass
@@ -22,6 +22,7 @@ class Settings:
     clients: int | None = None  # of idle_10000, connect_10000 and join_under_load
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
+    patience_seconds: float = 2.0  # a message that takes longer is lost
 
 
 @dataclass
@@ -42,14 +43,15 @@ def say(text: str) -> None:
 def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
     cpus = allowed_cpus()
     command = [str(settings.build / "bin" / "load_generator"), "--wire", subject.wire, "--scenario", case.scenario,
-               "--size", str(case.size), "--seconds", str(settings.seconds)]
+               "--size", str(case.size), "--seconds", str(settings.seconds),
+               "--patience", str(settings.patience_seconds)]
     if settings.clients is not None:
         command += ["--clients", str(settings.clients)]
     with subject:
         command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
         if case.transport in subject.publish_urls:
             command += ["--publish-to", subject.publish_urls[case.transport]]
-        limit = 3 * settings.seconds + EXTRA_SECONDS
+        limit = 3 * settings.seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
                                   preexec_fn=child_setup([cpus[0] if case.spec.one_cpu else cpus[-1]]))

@@ -18,7 +18,6 @@ constexpr std::size_t kCarryBytesMax = 2 * 1024 * 1024;
 constexpr std::size_t kEventsMax = 512;
 constexpr std::size_t kJoiningMax = 64;
 constexpr std::chrono::milliseconds kKeepAlive{900};
-constexpr std::chrono::seconds kAnswerLimit{10};
 
 }  // namespace
 
@@ -39,11 +38,12 @@ Engine::~Engine() {
 void Engine::connect(std::size_t count) {
   for (std::size_t begun = 0; begun < count; ++begun) {
     begin_connect();
-    const bool room = poll_until([this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, kAnswerLimit);
-    if (!room) fail("the subject admits nobody any more: no answer within 10 s");
+    const bool room =
+        poll_until([this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, answer_limit());
+    if (!room) fail("the subject admits nobody any more");
   }
-  const bool all = poll_until([this] { return wire_.joined_count() == clients_.size(); }, kAnswerLimit);
-  if (!all) fail("the subject did not admit all clients within 10 s");
+  const bool all = poll_until([this] { return wire_.joined_count() == clients_.size(); }, answer_limit());
+  if (!all) fail("the subject did not admit all clients in time");
 }
 
 void Engine::begin_connect() {
@@ -63,7 +63,7 @@ void Engine::open_publisher(Client& client) {
   client.set_publishing_side(side);
   watch(side);
   wire_.open_side(side);
-  if (!poll_until([&side] { return side.is_joined; }, kAnswerLimit)) fail("no answer to a publisher within 10 s");
+  if (!poll_until([&side] { return side.is_joined; }, answer_limit())) fail("no answer to a publisher in time");
 }
 
 void Engine::watch(Client& client) const {
@@ -77,14 +77,14 @@ void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
   Client& provider = client(0);
   if (!provider.is_in_group) {
     wire_.provide(provider);
-    if (!poll_until([&provider] { return provider.is_in_group; }, kAnswerLimit)) fail("no answer to ADVERTISE");
+    if (!poll_until([&provider] { return provider.is_in_group; }, answer_limit())) fail("no answer to ADVERTISE");
   }
   for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
     Client& subscriber = client(index);
     wire_.subscribe(subscriber);
     // Not a round trip each: every so many the last one's answer is waited for.
     if (index % kJoiningMax != 0) continue;
-    if (!poll_until([&subscriber] { return subscriber.is_in_group; }, kAnswerLimit)) fail("no answer to SUBSCRIBE");
+    if (!poll_until([&subscriber] { return subscriber.is_in_group; }, answer_limit())) fail("no answer to SUBSCRIBE");
   }
   const auto all_in_group = [this, first_subscriber, count] {
     for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
@@ -92,7 +92,7 @@ void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
     }
     return true;
   };
-  if (!poll_until(all_in_group, kAnswerLimit)) fail("the subject did not answer every SUBSCRIBE within 10 s");
+  if (!poll_until(all_in_group, answer_limit())) fail("the subject did not answer every SUBSCRIBE in time");
 }
 
 std::uint64_t Engine::poll(std::chrono::nanoseconds timeout) {

@@ -47,6 +47,11 @@ class Engine {
   /// Whether a client that the subject closes ends the program, which is the default.
   void tolerate_closing(bool tolerated) { is_closing_tolerated_ = tolerated; }
   void stop_reading(Client& client);
+  /// What stays away for longer is lost; 2 s unless set. More where nothing is timed, and a busy machine no fault.
+  void set_patience(std::chrono::nanoseconds patience) { patience_ = patience; }
+  [[nodiscard]] std::chrono::nanoseconds patience() const { return patience_; }
+  /// A subject that answers a request later than this is given up.
+  [[nodiscard]] std::chrono::nanoseconds answer_limit() const { return 5 * patience_; }
 
   [[nodiscard]] Client& client(std::size_t index) { return *clients_[index]; }
   [[nodiscard]] std::size_t client_count() const { return clients_.size(); }
@@ -69,6 +74,7 @@ class Engine {
   Clock::time_point next_keep_alive_;
   std::size_t closed_count_ = 0;
   bool is_closing_tolerated_ = false;
+  std::chrono::nanoseconds patience_ = std::chrono::seconds(2);
 };
 
 }  // namespace gimnet::perf

@@ -15,7 +15,6 @@ constexpr std::uint64_t kGrowth = 4;
 constexpr std::chrono::milliseconds kSlowRound{400};
 /// Writes of a publisher in one turn where each is a single message.
 constexpr std::size_t kUnbatchedWrites = 8;
-constexpr std::chrono::seconds kDrainLimit{2};
 constexpr std::chrono::milliseconds kPatience{1};
 
 }  // namespace
@@ -89,7 +88,7 @@ void Flood::run_for(std::chrono::nanoseconds duration) {
     const auto now = Clock::now();
     if (turn(kPatience) != 0) {
       last_settled = now;
-    } else if (now - last_settled > kDrainLimit) {
+    } else if (now - last_settled > engine_.patience()) {
       // Lost at the end of a stream: nothing after it would ever show the gap.
       missing_ = expected_ - settled_;
       last_settled = now;
@@ -105,7 +104,7 @@ void Flood::drain() {
     settled_ += settled;
     const auto now = Clock::now();
     if (settled != 0) last_settled = now;
-    if (now - last_settled > kDrainLimit) missing_ = expected_ - settled_;
+    if (now - last_settled > engine_.patience()) missing_ = expected_ - settled_;
   }
 }
 

@@ -26,7 +26,7 @@ class Flood {
   void warm_up(std::chrono::nanoseconds duration);
   /// Turns until `duration` is over.
   void run_for(std::chrono::nanoseconds duration);
-  /// Reads until all is settled. What does not come within 2 s counts as lost.
+  /// Reads until all is settled. What does not come in the engine's patience counts as lost.
   void drain();
 
   /// Deliveries that were asked for and are settled. Those of other messages that turn() settled are taken out.

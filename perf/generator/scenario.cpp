@@ -59,7 +59,7 @@ std::string Findings::json() const {
 void add_ledger(Engine& engine, Findings& findings) {
   if (!engine.wire().ask_for_ledger(engine.client(0))) return;
   const auto answered = [&engine] { return engine.wire().ledger().has_value(); };
-  if (!engine.poll_until(answered, std::chrono::seconds(10))) fail("the subject did not answer STATISTICS within 10 s");
+  if (!engine.poll_until(answered, engine.answer_limit())) fail("the subject did not answer STATISTICS in time");
   const Ledger ledger = *engine.wire().ledger();
   const auto gap =
       static_cast<std::int64_t>(ledger.accepted + ledger.copies - ledger.delivered - ledger.dropped - ledger.queued);
