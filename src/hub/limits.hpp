@@ -52,6 +52,10 @@ struct Limits {
   std::uint64_t requests = 64;
   std::uint64_t services_per_node = 1'024;
   std::uint64_t subscriptions_per_node = 1'024;
+  std::uint64_t sync_window = 1'024;
+  std::uint64_t subscription_depth = 64;
+  std::uint64_t subscription_rate_hz = 1'000;
+  std::uint64_t retained_bytes = 1ull << 20;
   std::uint64_t page_records = 256;
   std::uint64_t scan_records = 4'096;
   std::uint64_t watches_per_node = 64;

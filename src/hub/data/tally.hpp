@@ -26,6 +26,7 @@ struct Tally {
   std::uint64_t mailbox_entries = 0;
   std::uint64_t mailbox_frames = 0;
   std::uint64_t lane0_demoted = 0;
+  std::uint64_t not_retained = 0;
 
   void drop(proto::DropReason reason, std::uint64_t frames) {
     dropped[static_cast<std::size_t>(reason)] += frames;
@@ -49,6 +50,7 @@ struct Tally {
     counters.mailbox_entries.add(mailbox_entries);
     counters.mailbox_frames.add(mailbox_frames);
     counters.lane0_demoted.add(lane0_demoted);
+    counters.not_retained.add(not_retained);
     *this = Tally{};
   }
 };

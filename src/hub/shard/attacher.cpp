@@ -108,11 +108,22 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command, 
   state_.tally.drop(proto::DropReason::link_lost, lost);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
   connection.resume.reset();
+  count_anew(connection);
   if (!command.resume_wanted) return;
   connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);
   connection.resume->hub_epoch = random_epoch();
   connection.resume->peer_epoch = command.peer_epoch;
   connection.resume->peer_resume_bytes = command.peer_resume_bytes;
+}
+
+/// What was on its way to the subscriber is lost, and both ends count its messages from 0.
+void Attacher::count_anew(Connection& connection) {
+  if (!connection.paced) return;
+  state_.pacer.on_new_epoch(connection);
+  connection.paced->for_each([&](PacedSubscription& each) {
+    const bool has_newer = each.held() != 0 || connection.outbox.waiting_messages(each.group()) != 0;
+    if (each.active && each.retained && !has_newer) state_.retained.ask_start(each);
+  });
 }
 
 void Attacher::welcome(Connection& connection, const proto::Welcome& welcome, std::uint64_t gap) {

@@ -70,6 +70,7 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
     state_.drops.drop(partial.bytes, partial.size, partial.frames, proto::DropReason::link_lost);
   }
   connection.outbox.drop_all(proto::DropReason::link_lost, state_.egress);
+  state_.pacer.on_away(connection);
   if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
 }
 
@@ -90,6 +91,8 @@ void Closer::release(SessionRef session) {
   state_.tally.queued -= static_cast<std::int64_t>(lost);
   state_.tally.drop(proto::DropReason::link_lost, lost);
   connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);
+  state_.pacer.forget(*connection);
+  state_.retained.forget_provider(connection->node);
   state_.queues.set(connection->slot, 0);
   state_.recipients.remove(*connection);
   state_.counters.sessions.subtract(1);

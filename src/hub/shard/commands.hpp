@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/ids.hpp"
+#include "hub/data/fanout/paced_subscription.hpp"
 #include "hub/transport/transport.hpp"
 #include "proto/control/link.hpp"
 
@@ -15,9 +16,10 @@
 // between the two threads, but for the tables that control publishes.
 //
 // Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and sends AttachCommand
-// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send. So
-// commands that wait are carried out before mail that came after them: a frame neither finds its recipient unattached
-// nor overtakes the event about it.
+// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send; it
+// publishes a group before it sends the PaceCommand of a member, and that before any answer. So commands that wait are
+// carried out before mail that came after them: a frame neither finds its recipient unattached nor overtakes the event
+// about it.
 
 namespace gimnet::hub {
 
@@ -71,6 +73,27 @@ struct ReleaseCommand {
   SessionRef session;
 };
 
+/// The session's subscription to that group is paced from now on, or has other terms. `retained`: it begins with the
+/// last message.
+struct PaceCommand {
+  SessionRef session;
+  GroupId group;
+  PaceTerms terms;
+  bool retained = false;
+};
+
+/// A paced subscription ended. `group_gone`: so did the group, and its id may be another's later.
+struct EndPaceCommand {
+  SessionRef session;
+  GroupId group;
+  bool group_gone = false;
+};
+
+/// To the provider's shard: the group is gone, its last message is not kept any more.
+struct ForgetRetainedCommand {
+  GroupId group;
+};
+
 /// Say GOODBYE `draining` to everybody after what waits was written, or at the deadline; then answer DrainedEvent.
 struct DrainCommand {
   std::uint64_t deadline_ms = 0;  ///< from now
@@ -79,8 +102,8 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand =
-    std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, DrainCommand, StopCommand>;
+using ShardCommand = std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, PaceCommand,
+                                  EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor --------------------------------------------------------------------------------------------
 

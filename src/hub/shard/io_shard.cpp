@@ -77,6 +77,11 @@ void IoShard::run() {
 int IoShard::sleep_ms() {
   if (flush_again_ || !state_.recipients.dirty().empty()) return 0;
   int timeout_ms = keeper_.next_tick_ms();
+  if (const std::uint64_t due_ms = state_.pacer.next_due_ms(); due_ms != Pacer::kNever) {
+    constexpr std::uint64_t kLongestMs = 60'000;
+    const auto pace_ms = due_ms > state_.now_ms ? static_cast<int>(std::min(due_ms - state_.now_ms, kLongestMs)) : 0;
+    timeout_ms = timeout_ms < 0 ? pace_ms : std::min(timeout_ms, pace_ms);
+  }
   if (state_.drops.pending()) {
     const auto report_ms = static_cast<int>(std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
     timeout_ms = timeout_ms < 0 ? report_ms : std::min(timeout_ms, report_ms);
@@ -105,6 +110,7 @@ void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
   serve(ready);
   read_waiting();
   keeper_.tick();
+  state_.pacer.release_due();
   flush();
   state_.signals.send_reports();
   finish_turn();
@@ -189,10 +195,26 @@ void IoShard::execute(ShardCommand& command) {
                    }
                  },
                  [&](ReleaseCommand& release) { closer_.release(release.session); },
+                 [&](PaceCommand& pace) { begin_pace(pace); },
+                 [&](EndPaceCommand& end) {
+                   if (Connection* connection = state_.find(end.session)) {
+                     state_.pacer.unsubscribe(*connection, end.group, end.group_gone);
+                   }
+                 },
+                 [&](ForgetRetainedCommand& forget) { state_.retained.forget(forget.group); },
                  [&](DrainCommand& drain) { keeper_.drain(drain.deadline_ms); },
                  [&](StopCommand&) { stopped_ = true; },
              },
              command);
+}
+
+void IoShard::begin_pace(const PaceCommand& command) {
+  Connection* connection = state_.find(command.session);
+  if (connection == nullptr) return;
+  const bool begins = Pacer::find(*connection, command.group) == nullptr;
+  PacedSubscription& subscription = state_.pacer.subscribe(*connection, command.group, command.terms);
+  subscription.retained = command.retained;
+  if (begins && command.retained) state_.retained.ask_start(subscription);
 }
 
 }  // namespace gimnet::hub

@@ -60,6 +60,7 @@ class IoShard {
   void flush();
   void finish_turn();
   void execute(ShardCommand& command);
+  void begin_pace(const PaceCommand& command);
 
   ShardState state_;
   Closer closer_;

@@ -1,10 +1,21 @@
 #include "hub/shard/reader.hpp"
 
+#include <cstring>
+
 #include "base/clock.hpp"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
+namespace {
+
+GroupStart start_of(const Mail& mail) {
+  GroupStart start;
+  std::memcpy(&start, mail.small, sizeof start);
+  return start;
+}
+
+}  // namespace
 
 void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
   std::byte frame[proto::flow::kFrameSizeMax];
@@ -139,6 +150,9 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
   if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
   if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) on_skip(connection, *skip);
+  if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
+    if (!state_.pacer.on_credit(connection, credit->group, credit->taken)) state_.counters.bad_credits.add(1);
+  }
   return true;
 }
 
@@ -197,6 +211,13 @@ void Reader::take_mail(const Mail& mail) {
       return state_.signals.apply_hold(mail.node, true);
     case MailKind::release:
       return state_.signals.apply_hold(mail.node, false);
+    case MailKind::start_wanted:
+      return state_.retained.on_start_wanted(start_of(mail));
+    case MailKind::start:
+      return state_.retained.on_start(start_of(mail));
+    case MailKind::retained:
+      return state_.retained.on_handed(start_of(mail),
+                                       {state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});
   }
 }
 

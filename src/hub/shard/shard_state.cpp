@@ -22,7 +22,9 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              .signals = signals,
              .hub = hub_shared.hub},
       fanout(index, hub_shared.mailboxes, recipients, egress),
-      router(hub_shared.hub, hub_shared.nodes, hub_shared.groups, fanout),
+      pacer(fanout),
+      retained(hub_shared.nodes, hub_shared.groups, fanout, pacer),
+      router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
       receive_buffer(pool, tally, hub_shared.limits.partial_bytes),
       gate(hub_shared.limits, tally) {}
 

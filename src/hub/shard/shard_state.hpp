@@ -9,6 +9,8 @@
 #include "hub/data/budget.hpp"
 #include "hub/data/buffer_pool.hpp"
 #include "hub/data/fanout/fanout.hpp"
+#include "hub/data/fanout/pacer.hpp"
+#include "hub/data/fanout/retained_messages.hpp"
 #include "hub/data/ingress/ingress_gate.hpp"
 #include "hub/data/ingress/receive_buffer.hpp"
 #include "hub/data/route/router.hpp"
@@ -57,6 +59,8 @@ struct ShardState {
   EgressContext egress;
   RecipientTable recipients;
   Fanout fanout;
+  Pacer pacer;
+  RetainedMessages retained;
   Router router;
   ReceiveBuffer receive_buffer;
   IngressGate gate;

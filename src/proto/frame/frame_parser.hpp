@@ -139,6 +139,9 @@ struct FrameView {
   std::optional<std::uint64_t> key;         ///< where KEYED is set: its 8 bytes as a little-endian number
   std::span<const std::byte> payload;       ///< what is left
   std::span<const std::byte> after_header;  ///< everything after the 16 bytes
+
+  /// It is a message, or the last fragment of one.
+  [[nodiscard]] bool ends_message() const { return !fragment || fragment->offset + payload.size() == fragment->total; }
 };
 
 /// Takes one frame apart and checks all of section 2 that a frame shows by itself. `frame` may be longer than the

@@ -153,13 +153,14 @@ void GatherWriter::owe(std::size_t lane, std::uint32_t bytes, std::array<LaneCur
 }
 
 std::uint32_t GatherWriter::allowed(const Run& run, std::size_t planned, Job& job) {
-  if (job.resume == nullptr || job.resume->make_room(planned, run.size)) return run.size;
+  const CountedGroups* counted = job.outbox.counted_groups();
+  if (job.resume == nullptr || job.resume->make_room(planned, run.size, counted)) return run.size;
   std::uint32_t size = 0;
   for (std::uint32_t frame = 0; frame < run.frames; ++frame) {
     const auto next = static_cast<std::uint32_t>(proto::load_header(run.bytes + size).frame_size());
     // A frame larger than the buffer is kept alone.
     const bool alone = planned + size == 0 && job.resume->bytes() == 0;
-    if (!alone && !job.resume->make_room(planned + size, next)) break;
+    if (!alone && !job.resume->make_room(planned + size, next, counted)) break;
     size += next;
   }
   return size;

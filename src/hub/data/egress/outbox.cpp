@@ -153,6 +153,7 @@ bool Outbox::is_cut(const Entry& entry, const proto::FrameHeader& header, Egress
   });
   if (cut == cut_.end()) return false;
   if (entry.complete) cut_.erase(cut);
+  tell_lost(entry);
   context.tally.queued -= entry.frames;
   context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, proto::DropReason::cut_message);
   return true;
@@ -237,6 +238,7 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
     if (cut_.size() == kCutMessagesMax) cut_.erase(cut_.begin());
     cut_.push_back({NodeId{entry.run.header().src}, entry.message_number});
   }
+  tell_lost(entry);
   context.tally.queued -= entry.frames;
   do {
     if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason);
@@ -331,9 +333,42 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
 void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
   for (; !replay_.empty(); replay_.pop_front()) {
     const Run& run = replay_.front();
+    tell_lost(run);
     context.tally.queued -= run.frames;
     context.drops.drop_mixed(run.bytes, run.size, reason);
   }
+}
+
+void Outbox::tell_lost(const Entry& entry) const {
+  if (counted_ == nullptr) return;
+  const proto::FrameHeader header = entry.run.header();
+  if (header.kind != proto::Kind::group) return;
+  counted_->on_lost(GroupId{header.dst}, entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames);
+}
+
+void Outbox::tell_lost(const Run& run) const {
+  if (counted_ == nullptr) return;
+  for (Run rest = run.share(); rest.frames != 0; rest.skip_frame()) {
+    const proto::FrameHeader header = rest.header();
+    if (header.kind != proto::Kind::group) continue;
+    const auto frame = proto::parse_frame({rest.bytes, rest.size}, proto::Origin::hub);
+    if (frame && frame->ends_message()) counted_->on_lost(GroupId{header.dst}, 1);
+  }
+}
+
+std::uint64_t Outbox::waiting_messages(GroupId group) {
+  std::uint64_t messages = 0;
+  for (LaneQueue& lane : lanes_) {
+    RingQueue<Entry>& entries = lane.entries();
+    for (std::uint64_t number = entries.first_number(); number != entries.end_number(); ++number) {
+      const Entry& entry = entries.at(number);
+      if (entry.frames == 0) continue;
+      const proto::FrameHeader header = entry.run.header();
+      if (header.kind != proto::Kind::group || header.dst != group.value()) continue;
+      messages += entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames;
+    }
+  }
+  return messages;
 }
 
 void Outbox::trim() {

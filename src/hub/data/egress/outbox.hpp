@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/egress/lane_queue.hpp"
 #include "hub/data/egress/pause_book.hpp"
@@ -31,6 +32,14 @@ class Outbox {
   /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that waits: the peer asks
   /// and does not listen.
   [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context);
+
+  /// Who is told of messages of counted groups that are dropped here; nullptr: nobody.
+  void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
+  [[nodiscard]] const CountedGroups* counted_groups() const { return counted_; }
+  /// Messages of that group of which the end still waits in a lane.
+  [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
+  /// Frames that were for this connection did not get here.
+  void tell_lost(const Run& run) const;
 
   /// Frames of an earlier connection, to be written again before all lanes.
   [[nodiscard]] RingQueue<Run>& replay() { return replay_; }
@@ -102,6 +111,7 @@ class Outbox {
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   void forget_cut(NodeId src, std::uint32_t number);
+  void tell_lost(const Entry& entry) const;
   /// Many small messages that cannot form runs take more memory for their entries than for their bytes.
   void charge_entries(EgressContext& context);
   void settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context);
@@ -119,6 +129,7 @@ class Outbox {
   std::uint32_t chunk_used_ = 0;
   std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk
   PauseBook pauses_;
+  CountedGroups* counted_ = nullptr;
   std::vector<CutMessage> cut_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/entry.hpp"
 #include "hub/data/ring_queue.hpp"
 
@@ -10,13 +11,14 @@ namespace gimnet::hub {
 
 /// Data frames that were written and not confirmed yet, in the order written, so that a connection can go on where it
 /// broke (docs/protocol.md, section 3). Bounded: a full buffer lets frames at its front go that were not sent with
-/// BLOCK; a frame sent with BLOCK is waited for. Thread safety: one shard.
+/// BLOCK; a frame sent with BLOCK, or of a group that is counted, is waited for. Thread safety: one shard.
 class ResumeBuffer {
  public:
   explicit ResumeBuffer(std::uint64_t bytes_max) : bytes_max_(bytes_max) {}
 
   /// Room for `size` more bytes behind `planned` ones that are about to be written? Lets frames go where that helps.
-  [[nodiscard]] bool make_room(std::uint64_t planned, std::uint32_t size);
+  /// `counted` may be nullptr.
+  [[nodiscard]] bool make_room(std::uint64_t planned, std::uint32_t size, const CountedGroups* counted = nullptr);
   /// `run` was handed to the kernel.
   void wrote(Run run);
   /// The peer has taken `count` frames of this epoch. Returns how many of them are newly confirmed; none for a count

@@ -15,6 +15,7 @@ Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable&
 
 void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
   if (!recipient.connected && !recipient.waits_when_away) {
+    recipient.outbox.tell_lost(run);
     context_.drops.drop(run.bytes, run.size, run.frames, proto::DropReason::away);
     return;
   }
@@ -31,6 +32,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
     if (frame.size - proto::kHeaderSize <= recipient.frame_bytes) {
       push(recipient, frame, frame.header(), handover);
     } else {
+      recipient.outbox.tell_lost(frame);
       context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::too_large);
     }
   }

@@ -20,6 +20,17 @@ enum class MailKind : std::uint8_t {
   control,  ///< one whole frame of FLOW or REPORT in `small`, for the node
   hold,     ///< stop reading the node until as many `release`
   release,
+  start_wanted,  ///< a subscriber of a retained group wants to begin: `small` is a GroupStart
+  start,         ///< it begins here: what came before in this mailbox is not for it, what comes after is
+  retained,      ///< frames of the last message, for that one subscriber
+};
+
+/// A subscriber that begins with the last message of a group (RetainedMessages).
+struct GroupStart {
+  GroupId group;
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+  ShardIndex shard;
 };
 
 /// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a word about a sender.

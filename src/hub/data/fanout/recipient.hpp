@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "base/check.hpp"
 #include "base/ids.hpp"
 #include "hub/data/egress/outbox.hpp"
+#include "hub/data/fanout/paced_book.hpp"
 
 namespace gimnet::hub {
 
@@ -19,6 +21,7 @@ struct Recipient {
   bool waits_when_away = false;  ///< asked for resume: frames wait during its grace time
   bool dirty = false;            ///< is in the list of those to be flushed
   Outbox outbox;
+  std::unique_ptr<PacedBook> paced;  ///< if one of its subscriptions is (Pacer)
 };
 
 /// The sessions of a shard by slot, and those that this turn has something to write for. Thread safety: one shard.

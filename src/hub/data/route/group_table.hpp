@@ -20,6 +20,9 @@ struct GroupMembers {
   NodeId provider;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<std::vector<GroupMember>> by_shard;
+  /// Those of which the shard paces what they get (Pacer); empty if there are none.
+  std::vector<std::vector<GroupMember>> paced_by_shard;
+  bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
 };
 
 /// Group index to recipients, for the groups that this hub owns. Thread safety: one writer (the conductor), any

@@ -97,14 +97,30 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
     fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
   }
+  const bool paced = !members->paced_by_shard.empty();
+  if (paced) outcomes += to_paced(run, header, members->paced_by_shard[fanout_.self().value()]);
   if (!handed_over) {
     std::uint64_t shards = 0;
     for (std::size_t shard = 0; shard < members->by_shard.size(); ++shard) {
-      if (!members->by_shard[shard].empty()) shards |= std::uint64_t{1} << shard;
+      const bool any = !members->by_shard[shard].empty() || (paced && !members->paced_by_shard[shard].empty());
+      if (any) shards |= std::uint64_t{1} << shard;
     }
     to_other_shards(run, shards, outcomes);
+    if (members->retain) retained_.keep(run, header);
   }
   settle(run, outcomes);
+}
+
+/// A member whose subscription has not reached this shard yet, or has not begun, is none yet.
+std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const std::vector<GroupMember>& here) {
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
+  std::uint32_t outcomes = 0;
+  for (const GroupMember& member : here) {
+    const Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
+    PacedSubscription* subscription = recipient != nullptr ? Pacer::find(*recipient, GroupId{header.dst}) : nullptr;
+    if (subscription != nullptr && pacer_.offer(*subscription, run, header, handover)) ++outcomes;
+  }
+  return outcomes;
 }
 
 void Router::to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes) {

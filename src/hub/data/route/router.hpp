@@ -4,6 +4,8 @@
 
 #include "base/ids.hpp"
 #include "hub/data/fanout/fanout.hpp"
+#include "hub/data/fanout/pacer.hpp"
+#include "hub/data/fanout/retained_messages.hpp"
 #include "hub/data/route/group_table.hpp"
 #include "hub/data/route/node_table.hpp"
 #include "proto/frame/frame_header.hpp"
@@ -14,8 +16,20 @@ namespace gimnet::hub {
 /// are published by the conductor.
 class Router {
  public:
-  Router(HubId hub, const NodeTable& nodes, const GroupTable& groups, Fanout& fanout)
-      : hub_(hub), nodes_(nodes), groups_(groups), fanout_(fanout) {}
+  struct Parts {
+    const NodeTable& nodes;
+    const GroupTable& groups;
+    Fanout& fanout;
+    Pacer& pacer;
+    RetainedMessages& retained;
+  };
+  Router(HubId hub, const Parts& parts)
+      : hub_(hub),
+        nodes_(parts.nodes),
+        groups_(parts.groups),
+        fanout_(parts.fanout),
+        pacer_(parts.pacer),
+        retained_(parts.retained) {}
 
   /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for the length, alone if
   /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate.
@@ -31,6 +45,8 @@ class Router {
   void dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
   void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
+                                       const std::vector<GroupMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
@@ -43,6 +59,8 @@ class Router {
   const NodeTable& nodes_;
   const GroupTable& groups_;
   Fanout& fanout_;
+  Pacer& pacer_;
+  RetainedMessages& retained_;
 };
 
 }  // namespace gimnet::hub

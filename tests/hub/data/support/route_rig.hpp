@@ -17,10 +17,14 @@ class RouteRig {
         mailbox_here(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         mailbox_there(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context),
-        router(HubId{7}, nodes, groups, fanout) {}
+        pacer(fanout),
+        retained(nodes, groups, fanout, pacer),
+        router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
   ~RouteRig() {
-    for (const auto& recipient : recipients_made)
+    for (const auto& recipient : recipients_made) {
       recipient->outbox.drop_all(proto::DropReason::link_lost, egress.context);
+      pacer.forget(*recipient);
+    }
     take_mail();
   }
 
@@ -87,6 +91,8 @@ class RouteRig {
   Mailbox mailbox_here;
   Mailbox mailbox_there;
   Fanout fanout;
+  Pacer pacer;
+  RetainedMessages retained;
   Router router;
   GroupMembers members;
   std::vector<std::unique_ptr<Recipient>> recipients_made;

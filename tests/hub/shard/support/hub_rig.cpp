@@ -17,7 +17,10 @@ void FakeNode::on_frame(const GotFrame& frame) {
   }
   control.push_back(frame);
   if (frame.header.kind == proto::Kind::link) {
-    if (const auto message = proto::decode<proto::Welcome>(frame.body)) welcome = *message;
+    if (const auto message = proto::decode<proto::Welcome>(frame.body)) {
+      welcome = *message;
+      if (!welcome->resumed) data_frames = 0;
+    }
     if (const auto message = proto::decode<proto::Goodbye>(frame.body)) goodbye = *message;
   } else if (frame.header.kind == proto::Kind::flow) {
     const auto message = proto::flow::decode(frame.body);
@@ -143,7 +146,6 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   nodes_.publish(index_of(node.id), {node.shard, node.session.slot, node.session.generation});
   turn_shard(node.shard.value());
   node.read();
-  if (node.welcome && !node.welcome->resumed) node.data_frames = 0;
 }
 
 void HubRig::release(FakeNode& node) {
@@ -160,8 +162,31 @@ void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vect
   for (const FakeNode* member : members) {
     group->by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});
   }
+  publish(index, std::move(group));
+}
+
+void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
+                                 bool retain) {
+  auto group = std::make_unique<GroupMembers>();
+  group->provider = provider;
+  group->retain = retain;
+  group->by_shard.resize(shards_.size());
+  group->paced_by_shard.resize(shards_.size());
+  for (const FakeNode* member : paced) {
+    group->paced_by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});
+  }
+  publish(index, std::move(group));
+}
+
+void HubRig::publish(std::uint32_t index, std::unique_ptr<GroupMembers> group) {
   static_cast<void>(groups_.exchange(index, group.get()));
   members_.push_back(std::move(group));
+}
+
+void HubRig::withdraw_group(std::uint32_t index) { static_cast<void>(groups_.exchange(index, nullptr)); }
+
+void HubRig::pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained) {
+  command(node.shard.value(), PaceCommand{node.session, GroupId{group(index)}, terms, retained});
 }
 
 std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,

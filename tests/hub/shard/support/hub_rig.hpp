@@ -100,6 +100,11 @@ class HubRig {
   void command(std::size_t shard, ShardCommand command);
   /// Makes `provider` the owner of a group with these members.
   void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members);
+  /// The same with members that are paced: each needs pace() too.
+  void publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
+                           bool retain = false);
+  void withdraw_group(std::uint32_t index);
+  void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false);
 
   void write(FakeNode& node, std::span<const std::byte> bytes) { node.pipe.write(bytes); }
   void send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec = {});
@@ -136,6 +141,7 @@ class HubRig {
 
  private:
   void attach(FakeNode& node, const JoinSpec& spec, bool new_session);
+  void publish(std::uint32_t index, std::unique_ptr<GroupMembers> group);
   [[nodiscard]] std::uint64_t activity() const;
 
   Limits limits_;

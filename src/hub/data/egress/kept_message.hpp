@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/egress/egress_context.hpp"
+#include "hub/data/egress/entry.hpp"
+
+namespace gimnet::hub {
+
+/// One message that is kept, whole or as far as it came: references to its frames, and small ones in memory of their
+/// own, so that they do not keep a read buffer. What it keeps counts against the budget. Cleared and filled again it
+/// does not allocate. Thread safety: one shard.
+class KeptMessage {
+ public:
+  KeptMessage() = default;
+  KeptMessage(KeptMessage&&) = default;
+  KeptMessage& operator=(KeptMessage&&) = default;
+
+  [[nodiscard]] bool empty() const { return frames_ == 0; }
+  [[nodiscard]] std::uint32_t frames() const { return frames_; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+  /// The next frame. `shared`: others keep the same bytes, so a reference costs nothing.
+  void append(const Run& frame, bool shared, EgressContext& context);
+  void clear();
+
+  /// Calls take(const Run&) for each stretch of frames, in order.
+  template <class Take>
+  void for_each(Take&& take) const {
+    if (first_.frames != 0) take(first_);
+    for (const Run& run : more_) take(run);
+  }
+
+ private:
+  /// A stretch below this is copied out of the slab that it lies in.
+  static constexpr std::uint32_t kCopyBytesMax = 16 * 1024;
+
+  [[nodiscard]] Run copy(const Run& frame, EgressContext& context);
+
+  Run first_;
+  std::vector<Run> more_;
+  BufferRef chunk_;  ///< where copies go
+  std::uint32_t chunk_used_ = 0;
+  std::uint32_t frames_ = 0;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace gimnet::hub

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "hub/data/egress/kept_message.hpp"
+
+namespace gimnet::hub {
+
+struct Recipient;
+
+/// What a subscriber gets of a service at most.
+struct PaceTerms {
+  std::uint32_t window = 0;       ///< messages that it has not credited; 0: any number
+  std::uint32_t depth = 1;        ///< newest messages that are held for it
+  std::uint32_t interval_us = 0;  ///< between two messages at least; 0: none
+  friend bool operator==(const PaceTerms&, const PaceTerms&) = default;
+};
+
+/// One subscriber of one group, where the hub decides which messages it gets when: how many are on their way to it, the
+/// newest ones that are held, and those of which only the beginning has come. It decides; the Pacer moves the frames.
+///
+/// What is on the way is counted in ends of messages: a frame that is a message, or the last fragment of one. Both ends
+/// see the same ones, whatever became of the rest of the message (docs/protocol.md, section 8).
+/// Thread safety: one shard.
+class PacedSubscription {
+ public:
+  PacedSubscription(Recipient& recipient, GroupId group, const PaceTerms& terms)
+      : recipient_(recipient), group_(group) {
+    set_terms(terms);
+  }
+
+  [[nodiscard]] Recipient& recipient() const { return recipient_; }
+  [[nodiscard]] GroupId group() const { return group_; }
+  [[nodiscard]] const PaceTerms& terms() const { return terms_; }
+  /// What is held stays, even if it is more than the new depth.
+  void set_terms(const PaceTerms& terms);
+
+  // ---- the window and the clock
+
+  /// Messages that may begin now, if the clock allows more than one.
+  [[nodiscard]] std::uint64_t space() const;
+  [[nodiscard]] bool is_due(std::uint64_t now_us) const { return terms_.interval_us == 0 || now_us >= due_us_; }
+  [[nodiscard]] bool may_begin(std::uint64_t now_us) const { return space() != 0 && is_due(now_us); }
+  /// A message begins to go to the subscriber.
+  void on_begun(std::uint64_t now_us);
+  /// So many messages ended on their way to the subscriber.
+  void on_sent(std::uint64_t messages) { sent_ += messages; }
+  /// Of them, so many were dropped before they left.
+  void on_lost(std::uint64_t messages);
+  /// The subscriber says how many it took in total. False: it cannot be, and counts as all that were sent, or not at
+  /// all where it is less than before.
+  [[nodiscard]] bool on_credit(std::uint64_t total);
+  /// Both ends count from 0 again; so many ended messages still wait to be written.
+  void on_new_epoch(std::uint64_t waiting);
+  [[nodiscard]] std::uint64_t uncredited() const { return sent_ - lost_ - credited_; }
+  [[nodiscard]] std::uint64_t due_us() const { return due_us_; }
+
+  // ---- messages
+
+  /// A fragmented message of one lane that has begun and not ended.
+  struct Open {
+    enum class State : std::uint8_t {
+      none,
+      passing,   ///< its fragments go to the subscriber as they come
+      arriving,  ///< they are kept until the message is whole, or may go
+      cut,       ///< the rest is dropped
+    };
+    State state = State::none;
+    std::uint32_t number = 0;
+    std::uint32_t next_offset = 0;
+    std::uint64_t came_ms = 0;  ///< its last fragment
+    KeptMessage message;
+  };
+  [[nodiscard]] Open& open(std::size_t lane) { return open_[lane]; }
+  [[nodiscard]] std::array<Open, proto::kLaneCount>& open() { return open_; }
+
+  [[nodiscard]] std::size_t held() const { return held_; }
+  [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
+  /// The oldest held message. REQUIRES: held() != 0.
+  [[nodiscard]] KeptMessage& oldest() { return ring_[first_]; }
+  /// Lets the oldest go: clears it. REQUIRES: held() != 0.
+  void pop_oldest();
+  /// Holds a whole message behind the others; `message` is empty afterwards. REQUIRES: held() < terms().depth.
+  void push_newest(KeptMessage& message);
+
+  /// The subscription ended; its counts go on if it begins again on the same connection.
+  bool active = true;
+  /// Nothing is for it before so many starts came from the provider's shard (RetainedMessages).
+  std::uint32_t awaited_starts = 0;
+  bool retained = false;   ///< of a service whose last message is kept
+  bool ripe = false;       ///< is in the pacer's list of those that may have room
+  bool scheduled = false;  ///< is in the pacer's list of those that wait for their time
+
+ private:
+  Recipient& recipient_;
+  const GroupId group_;
+  PaceTerms terms_;
+  std::uint64_t sent_ = 0;
+  std::uint64_t lost_ = 0;
+  std::uint64_t credited_ = 0;
+  std::uint64_t due_us_ = 0;
+  std::vector<KeptMessage> ring_;
+  std::size_t first_ = 0;
+  std::size_t held_ = 0;
+  std::uint64_t held_bytes_ = 0;
+  std::array<Open, proto::kLaneCount> open_;
+};
+
+}  // namespace gimnet::hub

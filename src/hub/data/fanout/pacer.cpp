@@ -1,0 +1,309 @@
+#include "hub/data/fanout/pacer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using State = PacedSubscription::Open::State;
+
+/// The heap has the subscription first that is due first.
+bool later(const PacedSubscription* a, const PacedSubscription* b) { return a->due_us() > b->due_us(); }
+
+/// The first frame of `run`, which loses it.
+Run take_frame(Run& run) {
+  Run frame = run.share();
+  frame.size = run.skip_frame();
+  frame.frames = 1;
+  return frame;
+}
+
+}  // namespace
+
+PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms) {
+  if (!recipient.paced) {
+    recipient.paced = std::make_unique<PacedBook>(recipient, ripe_);
+    recipient.outbox.set_counted_groups(recipient.paced.get());
+  }
+  PacedSubscription* known = recipient.paced->find(group);
+  if (known == nullptr) return recipient.paced->add(group, terms);
+  known->active = true;
+  if (!(known->terms() == terms)) known->set_terms(terms);
+  while (known->held() > known->terms().depth) drop_oldest(*known, DropReason::replaced);
+  release(*known);
+  return *known;
+}
+
+void Pacer::unsubscribe(Recipient& recipient, GroupId group, bool group_gone) {
+  PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
+  if (known == nullptr) return;
+  drop_held(*known, DropReason::no_subscriber);
+  unschedule(*known);
+  known->active = false;
+  if (group_gone || recipient.paced->size() > kEndedMax) recipient.paced->erase(*known);
+}
+
+PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
+  PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
+  return known != nullptr && known->active ? known : nullptr;
+}
+
+bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                  Handover handover) {
+  if (subscription.awaited_starts != 0) return false;
+  const Recipient& recipient = subscription.recipient();
+  if (!recipient.connected && !recipient.waits_when_away) {
+    context_.drops.drop(run.bytes, run.size, run.frames, DropReason::away);
+  } else if (header.has(proto::kFlagFragment)) {
+    give_up_stalled(subscription);
+    offer_fragment(subscription, run, header, handover);
+    // A message that was given up made room.
+    release(subscription);
+  } else {
+    give_up_stalled(subscription);
+    abandon(subscription.open(header.lane & proto::kLaneMask), DropReason::cut_message);
+    offer_plain(subscription, run, header, handover);
+  }
+  return true;
+}
+
+/// A message that its provider gave up in one lane while it goes on in another would keep its place for ever.
+void Pacer::give_up_stalled(PacedSubscription& subscription) {
+  for (Open& open : subscription.open()) {
+    if (open.state == State::none || context_.now_ms - open.came_ms < context_.limits.block_ms) continue;
+    abandon(open, DropReason::cut_message);
+  }
+}
+
+void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                        Handover handover) {
+  Run rest = run.share();
+  if (subscription.held() == 0 && subscription.terms().interval_us == 0 && subscription.space() >= run.frames) {
+    return pass(subscription, rest, run.frames, header, handover);
+  }
+  while (rest.frames != 0) {
+    const Run frame = take_frame(rest);
+    if (subscription.held() == 0 && subscription.may_begin(now_us())) {
+      subscription.on_begun(now_us());
+      pass(subscription, frame, 1, header, handover);
+    } else if (context_.budget.exhausted()) {
+      context_.drops.drop(frame.bytes, frame.size, 1, DropReason::over_budget);
+    } else {
+      keep(scratch_, frame, handover);
+      hold(subscription, scratch_, header.lane & proto::kLaneMask);
+    }
+  }
+  release(subscription);
+}
+
+void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                           Handover handover) {
+  Open& open = subscription.open(header.lane & proto::kLaneMask);
+  const auto frame = proto::parse_frame({run.bytes, run.size}, proto::Origin::hub);
+  GIMNET_CHECK(frame && frame->fragment);  // the gate parsed it
+  const proto::FragmentHeader& fragment = *frame->fragment;
+  const auto size = static_cast<std::uint32_t>(frame->payload.size());
+  const bool ends = frame->ends_message();
+  if (fragment.offset == 0) {
+    abandon(open, DropReason::cut_message);
+    begin_message(subscription, open, fragment.message);
+  } else if (open.state == State::none || open.number != fragment.message || open.next_offset != fragment.offset) {
+    abandon(open, DropReason::cut_message);
+    return context_.drops.drop(run.bytes, run.size, 1, DropReason::cut_message);
+  }
+  open.next_offset = fragment.offset + size;
+  open.came_ms = context_.now_ms;
+  if (open.state == State::arriving && context_.budget.exhausted()) {
+    abandon(open, DropReason::over_budget);
+    open.state = State::cut;
+  }
+  switch (open.state) {
+    case State::passing:
+      // Until its last frame it counts as under way by itself, from then on by that frame.
+      if (ends) open.state = State::none;
+      return pass(subscription, run, ends ? 1 : 0, header, handover);
+    case State::arriving:
+      keep(open.message, run, handover);
+      if (ends) end_message(subscription, open);
+      return;
+    case State::cut:
+    case State::none:
+      context_.drops.drop(run.bytes, run.size, 1, DropReason::cut_message);
+      if (ends) open.state = State::none;
+  }
+}
+
+void Pacer::begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number) {
+  open.number = number;
+  open.next_offset = 0;
+  const bool now = subscription.held() == 0 && subscription.may_begin(now_us());
+  if (now) subscription.on_begun(now_us());
+  open.state = now ? State::passing : State::arriving;
+}
+
+void Pacer::end_message(PacedSubscription& subscription, Open& open) {
+  open.state = State::none;
+  hold(subscription, open.message, static_cast<std::size_t>(&open - subscription.open().data()));
+}
+
+void Pacer::abandon(Open& open, DropReason reason) {
+  drop(open.message, reason);
+  open.message.clear();
+  open.state = State::none;
+}
+
+void Pacer::pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended, const proto::FrameHeader& header,
+                 Handover handover) {
+  subscription.on_sent(ended);
+  fanout_.deliver(subscription.recipient(), run, header, handover);
+}
+
+void Pacer::keep(KeptMessage& message, const Run& frame, Handover handover) {
+  message.append(frame, handover.fan_out, context_);
+  context_.tally.queued += 1;
+}
+
+void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane) {
+  while (subscription.held() >= subscription.terms().depth) drop_oldest(subscription, DropReason::replaced);
+  const std::uint64_t limits[] = {context_.limits.lane0_bytes, context_.limits.lane1_bytes, context_.limits.lane2_bytes,
+                                  context_.limits.lane3_bytes};
+  while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limits[lane]) {
+    drop_oldest(subscription, DropReason::queue_full);
+  }
+  subscription.push_newest(message);
+}
+
+void Pacer::drop_oldest(PacedSubscription& subscription, DropReason reason) {
+  drop(subscription.oldest(), reason);
+  subscription.pop_oldest();
+}
+
+void Pacer::drop_held(PacedSubscription& subscription, DropReason reason) {
+  while (subscription.held() != 0) drop_oldest(subscription, reason);
+  for (Open& open : subscription.open()) abandon(open, reason);
+}
+
+void Pacer::drop(const KeptMessage& message, DropReason reason) {
+  context_.tally.queued -= message.frames();
+  message.for_each([&](const Run& run) { context_.drops.drop(run.bytes, run.size, run.frames, reason); });
+}
+
+bool Pacer::on_credit(const Recipient& recipient, GroupId group, std::uint64_t total) {
+  PacedSubscription* known = recipient.paced ? recipient.paced->find(group) : nullptr;
+  if (known == nullptr) return false;
+  const bool possible = known->on_credit(total);
+  release(*known);
+  return possible;
+}
+
+void Pacer::release(PacedSubscription& subscription) {
+  if (!subscription.active) return;
+  while (subscription.may_begin(now_us()) && subscription.held() != 0) {
+    // With a time between two, what is not the newest would only be older by then.
+    while (subscription.terms().interval_us != 0 && subscription.held() > 1) {
+      drop_oldest(subscription, DropReason::replaced);
+    }
+    release_oldest(subscription);
+  }
+  while (subscription.held() == 0 && subscription.may_begin(now_us()) && release_open(subscription)) {
+  }
+  schedule(subscription);
+}
+
+void Pacer::release_oldest(PacedSubscription& subscription) {
+  subscription.on_begun(now_us());
+  subscription.on_sent(1);
+  write_kept(subscription, subscription.oldest());
+  subscription.pop_oldest();
+}
+
+/// A message of which the beginning has come goes on as it comes.
+bool Pacer::release_open(PacedSubscription& subscription) {
+  for (Open& open : subscription.open()) {
+    if (open.state != State::arriving) continue;
+    open.state = State::passing;
+    subscription.on_begun(now_us());
+    write_kept(subscription, open.message);
+    open.message.clear();
+    return true;
+  }
+  return false;
+}
+
+void Pacer::write_kept(PacedSubscription& subscription, const KeptMessage& message) {
+  context_.tally.queued -= message.frames();
+  message.for_each([&](const Run& run) {
+    for (Run rest = run.share(); rest.frames != 0;) {
+      const Run frame = take_frame(rest);
+      fanout_.deliver(subscription.recipient(), frame, frame.header(), Handover{});
+    }
+  });
+}
+
+void Pacer::on_new_epoch(Recipient& recipient) {
+  if (!recipient.paced) return;
+  recipient.paced->for_each([&](PacedSubscription& each) {
+    each.on_new_epoch(recipient.outbox.waiting_messages(each.group()));
+    release(each);
+  });
+}
+
+void Pacer::on_away(Recipient& recipient) {
+  if (!recipient.paced) return;
+  recipient.paced->for_each([&](PacedSubscription& each) {
+    drop_held(each, DropReason::link_lost);
+    unschedule(each);
+  });
+}
+
+void Pacer::forget(Recipient& recipient) {
+  if (!recipient.paced) return;
+  on_away(recipient);
+  recipient.outbox.set_counted_groups(nullptr);
+  recipient.paced.reset();
+}
+
+void Pacer::release_due() {
+  while (!ripe_.empty()) {
+    // What is let go may be lost at once, and make others ripe.
+    std::swap(ripe_, ripe_now_);
+    for (PacedSubscription* each : ripe_now_) each->ripe = false;
+    for (PacedSubscription* each : ripe_now_) release(*each);
+    ripe_now_.clear();
+  }
+  while (!scheduled_.empty() && scheduled_.front()->due_us() <= now_us()) {
+    PacedSubscription& due = *scheduled_.front();
+    std::pop_heap(scheduled_.begin(), scheduled_.end(), later);
+    scheduled_.pop_back();
+    due.scheduled = false;
+    release(due);
+  }
+}
+
+std::uint64_t Pacer::next_due_ms() const {
+  if (!ripe_.empty()) return 0;
+  // Rounded up: a moment early there would be nothing to do.
+  return scheduled_.empty() ? kNever : (scheduled_.front()->due_us() + 999) / 1000;
+}
+
+void Pacer::schedule(PacedSubscription& subscription) {
+  if (subscription.scheduled || !subscription.active || subscription.is_due(now_us())) return;
+  const bool arriving = std::any_of(subscription.open().begin(), subscription.open().end(),
+                                    [](const Open& open) { return open.state == State::arriving; });
+  if (subscription.space() == 0 || (subscription.held() == 0 && !arriving)) return;
+  subscription.scheduled = true;
+  scheduled_.push_back(&subscription);
+  std::push_heap(scheduled_.begin(), scheduled_.end(), later);
+}
+
+void Pacer::unschedule(PacedSubscription& subscription) {
+  if (!std::exchange(subscription.scheduled, false)) return;
+  std::erase(scheduled_, &subscription);
+  std::make_heap(scheduled_.begin(), scheduled_.end(), later);
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hub/data/fanout/fanout.hpp"
+#include "hub/data/fanout/paced_book.hpp"
+
+namespace gimnet::hub {
+
+/// Gives the recipients of a shard no more of a group than their subscriptions allow: a window of messages that they
+/// have not credited, a time between two, the newest ones held. What is held ends like everything else: delivered, or
+/// in the drop book. A subscription that is not paced never comes here.
+/// Thread safety: one shard. Ownership: none; books belong to their recipients, which are forgotten before they go.
+class Pacer {
+ public:
+  explicit Pacer(Fanout& fanout) : fanout_(fanout), context_(fanout.context()) {}
+
+  /// A subscription begins, or has new terms. Returns it.
+  PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms);
+  /// It ends. Its counts are kept for the next one on this connection, unless the group is gone.
+  void unsubscribe(Recipient& recipient, GroupId group, bool group_gone);
+  /// The subscription of that group; nullptr if the recipient has none that is active.
+  [[nodiscard]] static PacedSubscription* find(const Recipient& recipient, GroupId group);
+
+  /// Frames of the group, as a router has them. False: they are not for this subscriber. REQUIRES: as Outbox::push().
+  [[nodiscard]] bool offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                           Handover handover);
+  /// The recipient says how many messages of the group it took. False: it has no such subscription, or the number
+  /// cannot be.
+  [[nodiscard]] bool on_credit(const Recipient& recipient, GroupId group, std::uint64_t total);
+
+  /// The recipient's counts begin anew; what still waits in its outbox will be written.
+  void on_new_epoch(Recipient& recipient);
+  /// The recipient lost its connection, and nothing waits for it.
+  void on_away(Recipient& recipient);
+  /// The recipient goes.
+  void forget(Recipient& recipient);
+
+  /// Lets go what is due by now, and what has room since something was lost. Once a turn.
+  void release_due();
+  /// When release_due() has something to do: 0 at once, kNever nothing waits. In ms, monotonic.
+  static constexpr std::uint64_t kNever = UINT64_MAX;
+  [[nodiscard]] std::uint64_t next_due_ms() const;
+
+ private:
+  using Open = PacedSubscription::Open;
+
+  /// Subscriptions that ended and whose counts are kept, beside the active ones of a recipient.
+  static constexpr std::size_t kEndedMax = 1024;
+
+  [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
+  void offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                   Handover handover);
+  void offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
+                      Handover handover);
+  void give_up_stalled(PacedSubscription& subscription);
+  void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);
+  void end_message(PacedSubscription& subscription, Open& open);
+  /// A message that will not end: what is kept of it goes.
+  void abandon(Open& open, proto::DropReason reason);
+  void pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended, const proto::FrameHeader& header,
+            Handover handover);
+  void keep(KeptMessage& message, const Run& frame, Handover handover);
+  void hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane);
+  void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
+  void drop_held(PacedSubscription& subscription, proto::DropReason reason);
+  void drop(const KeptMessage& message, proto::DropReason reason);
+  void release(PacedSubscription& subscription);
+  void release_oldest(PacedSubscription& subscription);
+  [[nodiscard]] bool release_open(PacedSubscription& subscription);
+  void write_kept(PacedSubscription& subscription, const KeptMessage& message);
+  void schedule(PacedSubscription& subscription);
+  void unschedule(PacedSubscription& subscription);
+
+  Fanout& fanout_;
+  EgressContext& context_;
+  std::vector<PacedSubscription*> ripe_;
+  std::vector<PacedSubscription*> ripe_now_;
+  std::vector<PacedSubscription*> scheduled_;  ///< a heap, the next one first
+  KeptMessage scratch_;
+};
+
+}  // namespace gimnet::hub

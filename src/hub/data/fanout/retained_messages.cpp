@@ -1,0 +1,144 @@
+#include "hub/data/fanout/retained_messages.hpp"
+
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "proto/frame/frame_parser.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+static_assert(std::is_trivially_copyable_v<GroupStart> && sizeof(GroupStart) <= sizeof Mail::small);
+
+Mail mail_about(MailKind kind, const GroupStart& start) {
+  Mail mail;
+  mail.kind = kind;
+  mail.small_size = sizeof start;
+  std::memcpy(mail.small, &start, sizeof start);
+  return mail;
+}
+
+}  // namespace
+
+RetainedMessages::Entry& RetainedMessages::entry(const proto::FrameHeader& header) {
+  std::unique_ptr<Entry>& place = entries_[header.dst];
+  if (!place) place = std::make_unique<Entry>();
+  place->provider = NodeId{header.src};
+  return *place;
+}
+
+void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
+  Entry& kept = entry(header);
+  if (header.has(proto::kFlagFragment)) return keep_fragment(kept, run, header);
+  Arriving& arriving = kept.arriving[header.lane & proto::kLaneMask];
+  arriving.open = false;
+  arriving.message.clear();
+  Run last = run.share();
+  while (last.frames > 1) last.skip_frame();
+  kept.last.clear();
+  if (may_keep(kept, last.size - proto::kHeaderSize)) kept.last.append(last, false, context_);
+}
+
+void RetainedMessages::keep_fragment(Entry& kept, const Run& run, const proto::FrameHeader& header) {
+  const auto frame = proto::parse_frame({run.bytes, run.size}, proto::Origin::hub);
+  GIMNET_CHECK(frame && frame->fragment);  // the gate parsed it
+  const proto::FragmentHeader& fragment = *frame->fragment;
+  Arriving& arriving = kept.arriving[header.lane & proto::kLaneMask];
+  if (fragment.offset == 0) {
+    arriving.message.clear();
+    arriving.open = may_keep(kept, fragment.total);
+    arriving.number = fragment.message;
+    arriving.next_offset = 0;
+  }
+  const bool follows = arriving.number == fragment.message && arriving.next_offset == fragment.offset;
+  if (!arriving.open || !follows) {
+    arriving.open = false;
+    return arriving.message.clear();
+  }
+  arriving.message.append(run, false, context_);
+  arriving.next_offset = fragment.offset + static_cast<std::uint32_t>(frame->payload.size());
+  if (!frame->ends_message()) return;
+  kept.last.clear();
+  std::swap(kept.last, arriving.message);
+  arriving.open = false;
+}
+
+/// A message that cannot be kept leaves none behind: an older one would not be the last.
+bool RetainedMessages::may_keep(Entry& kept, std::uint64_t bytes) {
+  if (bytes <= context_.limits.retained_bytes && !context_.budget.exhausted()) return true;
+  kept.last.clear();
+  ++context_.tally.not_retained;
+  return false;
+}
+
+void RetainedMessages::forget(GroupId group) { entries_.erase(group.value()); }
+
+void RetainedMessages::forget_provider(NodeId provider) {
+  boost::unordered::erase_if(entries_, [&](const auto& each) { return each.second->provider == provider; });
+}
+
+void RetainedMessages::on_start_wanted(const GroupStart& start) {
+  // What was routed before this moment is under way before the start.
+  fanout_.post_all();
+  if (start.shard == fanout_.self()) {
+    on_start(start);
+  } else {
+    fanout_.post_word(start.shard, mail_about(MailKind::start, start));
+  }
+  const auto found = entries_.find(start.group.value());
+  if (found == entries_.end()) return;
+  hand(start, found->second->last);
+  for (const Arriving& arriving : found->second->arriving) hand(start, arriving.message);
+}
+
+void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message) {
+  message.for_each([&](const Run& run) {
+    context_.tally.copies += run.frames;
+    context_.tally.queued += run.frames;
+    if (start.shard == fanout_.self()) return on_handed(start, run);
+    Mail mail = mail_about(MailKind::retained, start);
+    mail.bytes = run.bytes;
+    mail.size = run.size;
+    mail.frames = run.frames;
+    mail.lent = BufferPool::lend(*run.buffer.get());
+    // Full or not: a subscriber asks once.
+    fanout_.post_word(start.shard, mail);
+  });
+}
+
+void RetainedMessages::ask_start(PacedSubscription& subscription) {
+  const GroupMembers* members = groups_.find(index_of(subscription.group()));
+  const NodePlace provider = members != nullptr ? nodes_.find(index_of(members->provider)) : NodePlace{};
+  ++subscription.awaited_starts;
+  if (!provider.exists()) return;  // the group is about to go
+  const Recipient& recipient = subscription.recipient();
+  const GroupStart start{subscription.group(), recipient.slot, recipient.generation, fanout_.self()};
+  if (provider.shard == fanout_.self()) return on_start_wanted(start);
+  fanout_.post_word(provider.shard, mail_about(MailKind::start_wanted, start));
+}
+
+PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) const {
+  const Recipient* recipient = fanout_.recipients().find(start.slot, start.generation);
+  return recipient != nullptr && recipient->paced ? recipient->paced->find(start.group) : nullptr;
+}
+
+void RetainedMessages::on_start(const GroupStart& start) {
+  PacedSubscription* subscription = subscription_of(start);
+  if (subscription != nullptr && subscription->awaited_starts != 0) --subscription->awaited_starts;
+}
+
+void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {
+  context_.tally.queued -= frames.frames;
+  PacedSubscription* subscription = subscription_of(start);
+  for (Run rest = frames.share(); rest.frames != 0;) {
+    Run frame = rest.share();
+    frame.size = rest.skip_frame();
+    frame.frames = 1;
+    const bool taken = subscription != nullptr && subscription->active &&
+                       pacer_.offer(*subscription, frame, frame.header(), Handover{});
+    if (!taken) context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::no_subscriber);
+  }
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include "hub/data/egress/kept_message.hpp"
+#include "hub/data/fanout/pacer.hpp"
+#include "hub/data/route/group_table.hpp"
+#include "hub/data/route/node_table.hpp"
+
+namespace gimnet::hub {
+
+/// The last message of each retained group, kept on its provider's shard, which is where the order of the group's
+/// messages is decided; and how a new subscriber gets it, exactly between two others.
+///
+/// The subscriber's shard asks the provider's for a start. That sends the start and the last message by the mailbox
+/// through which it hands over the group's frames: what came before the start the subscriber does not get, what comes
+/// after it does. Of a message that is just coming it gets what came so far behind the last one.
+///
+/// Thread safety: one shard. Limits: retained_bytes for one message, and the budget.
+class RetainedMessages {
+ public:
+  RetainedMessages(const NodeTable& nodes, const GroupTable& groups, Fanout& fanout, Pacer& pacer)
+      : nodes_(nodes), groups_(groups), fanout_(fanout), pacer_(pacer), context_(fanout.context()) {}
+
+  // ---- the provider's shard
+
+  /// Frames of a retained group from their provider, as Router::route() gets them.
+  void keep(const Run& run, const proto::FrameHeader& header);
+  /// The group is gone.
+  void forget(GroupId group);
+  /// The provider's session is over.
+  void forget_provider(NodeId provider);
+  /// A subscriber on whatever shard wants to begin.
+  void on_start_wanted(const GroupStart& start);
+  [[nodiscard]] std::size_t groups() const { return entries_.size(); }
+
+  // ---- the subscriber's shard
+
+  /// The subscription gets nothing until its start.
+  void ask_start(PacedSubscription& subscription);
+  void on_start(const GroupStart& start);
+  /// Frames of the last message that belong to that start.
+  void on_handed(const GroupStart& start, const Run& frames);
+
+ private:
+  /// A fragmented message of one lane of which the end has not come.
+  struct Arriving {
+    bool open = false;
+    std::uint32_t number = 0;
+    std::uint32_t next_offset = 0;
+    KeptMessage message;
+  };
+  struct Entry {
+    NodeId provider;
+    KeptMessage last;
+    std::array<Arriving, proto::kLaneCount> arriving;
+  };
+
+  [[nodiscard]] Entry& entry(const proto::FrameHeader& header);
+  void keep_fragment(Entry& entry, const Run& run, const proto::FrameHeader& header);
+  [[nodiscard]] bool may_keep(Entry& entry, std::uint64_t bytes);
+  void hand(const GroupStart& start, const KeptMessage& message);
+  [[nodiscard]] PacedSubscription* subscription_of(const GroupStart& start) const;
+
+  const NodeTable& nodes_;
+  const GroupTable& groups_;
+  Fanout& fanout_;
+  Pacer& pacer_;
+  EgressContext& context_;
+  boost::unordered_flat_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
+};
+
+}  // namespace gimnet::hub

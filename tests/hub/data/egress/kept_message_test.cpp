@@ -1,0 +1,64 @@
+#include "hub/data/egress/kept_message.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/egress_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using testing::EgressRig;
+
+std::string bytes_of(const KeptMessage& message) {
+  std::string all;
+  message.for_each([&](const hub::Run& run) { all.append(reinterpret_cast<const char*>(run.bytes), run.size); });
+  return all;
+}
+
+TEST(KeptMessage, KeepsSmallFramesInMemoryOfItsOwn) {
+  EgressRig rig;
+  KeptMessage message;
+  const hub::Run run = rig.run({"hello"});
+  message.append(run, false, rig.context);
+  EXPECT_EQ(message.frames(), 1u);
+  EXPECT_EQ(message.bytes(), run.size);
+  message.for_each([&](const hub::Run& piece) { EXPECT_NE(piece.buffer.get(), run.buffer.get()); });
+  EXPECT_EQ(bytes_of(message), std::string(reinterpret_cast<const char*>(run.bytes), run.size));
+  EXPECT_EQ(rig.pool.pinned_bytes(), 1024u);
+  message.clear();
+  EXPECT_TRUE(message.empty());
+  EXPECT_EQ(rig.pool.pinned_bytes(), 0u) << "what is not kept is not charged";
+}
+
+TEST(KeptMessage, RefersToWhatIsLargeOrSharedAnyway) {
+  EgressRig rig;
+  KeptMessage large;
+  const hub::Run run = rig.run({std::string(16 * 1024, 'x')});
+  large.append(run, false, rig.context);
+  large.for_each([&](const hub::Run& piece) { EXPECT_EQ(piece.bytes, run.bytes); });
+  KeptMessage shared;
+  const hub::Run small = rig.run({"small"});
+  shared.append(small, true, rig.context);
+  shared.for_each([&](const hub::Run& piece) { EXPECT_EQ(piece.bytes, small.bytes); });
+  EXPECT_GT(rig.pool.pinned_bytes(), kSlabReadBytes);
+}
+
+TEST(KeptMessage, PutsTheFramesOfAMessageBehindEachOther) {
+  EgressRig rig;
+  KeptMessage message;
+  std::string wanted;
+  for (int i = 0; i < 10; ++i) {
+    const hub::Run run = rig.run({std::string(3'000, static_cast<char>('a' + i))});
+    wanted.append(reinterpret_cast<const char*>(run.bytes), run.size);
+    message.append(run, false, rig.context);
+  }
+  EXPECT_EQ(message.frames(), 10u);
+  EXPECT_EQ(bytes_of(message), wanted);
+  std::size_t pieces = 0;
+  message.for_each([&](const hub::Run&) { ++pieces; });
+  EXPECT_LT(pieces, 10u);
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,237 @@
+#include "hub/data/fanout/pacer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/hub/data/support/route_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using testing::RouteRig;
+using testing::TestFrame;
+
+constexpr GroupId kGroup{7u << 20 | 5};
+constexpr std::uint64_t kStartMs = 1'000'000;
+
+class PacerTest : public ::testing::Test {
+ protected:
+  PacerTest() { rig.egress.context.now_ms = kStartMs; }
+  void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
+
+  PacedSubscription& subscribe(const PaceTerms& terms) { return rig.pacer.subscribe(recipient, kGroup, terms); }
+  void offer(PacedSubscription& subscription, const std::vector<std::string>& texts, std::uint8_t lane = 1) {
+    const hub::Run run = rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group, .lane = lane});
+    EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
+  }
+  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset, std::uint32_t total,
+                      const std::string& text, std::uint8_t lane = 1) {
+    std::string all(proto::kFragmentHeaderSize, '\0');
+    proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
+    const TestFrame frame{.kind = proto::Kind::group, .flags = proto::kFlagFragment, .lane = lane};
+    const hub::Run run = rig.make_run(kGroup.value(), {all + text}, frame);
+    EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
+  }
+  /// What went into the outbox since the last call.
+  std::vector<std::string> sent() {
+    std::vector<std::string> texts;
+    for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
+      LaneQueue& queue = recipient.outbox.lane(lane);
+      while (!queue.empty()) {
+        Entry& entry = queue.front();
+        do {
+          for (hub::Run rest = entry.run.share(); rest.frames != 0; rest.skip_frame()) {
+            std::size_t skip = proto::kHeaderSize;
+            if (rest.header().has(proto::kFlagFragment)) skip += proto::kFragmentHeaderSize;
+            texts.emplace_back(reinterpret_cast<const char*>(rest.bytes) + skip, rest.header().frame_size() - skip);
+          }
+        } while (entry.next_piece());
+        rig.egress.tally.queued -= entry.frames;
+        rig.egress.tally.delivered += entry.frames;
+        queue.on_left(entry, entry.size);
+        queue.pop_front();
+      }
+    }
+    return texts;
+  }
+  void pass_ms(std::uint64_t ms) {
+    rig.egress.context.now_ms += ms;
+    rig.pacer.release_due();
+  }
+  std::uint64_t dropped(DropReason reason) { return rig.egress.dropped(reason); }
+
+  RouteRig rig;
+  Recipient& recipient = rig.add_here(2);
+};
+
+TEST_F(PacerTest, LetsThroughAWindowAndHoldsTheNewest) {
+  PacedSubscription& one = subscribe({.window = 2});
+  offer(one, {"1", "2", "3", "4", "5"});
+  EXPECT_THAT(sent(), ElementsAre("1", "2"));
+  EXPECT_EQ(dropped(DropReason::replaced), 2u);
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_THAT(sent(), ElementsAre("5"));
+  offer(one, {"6"});
+  EXPECT_THAT(sent(), IsEmpty());
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 3));
+  EXPECT_THAT(sent(), ElementsAre("6"));
+  offer(one, {"7"});
+  EXPECT_THAT(sent(), ElementsAre("7"));
+}
+
+TEST_F(PacerTest, HoldsTheNewestOfItsDepthInOrder) {
+  PacedSubscription& one = subscribe({.window = 1, .depth = 3});
+  offer(one, {"1", "2", "3", "4", "5"});
+  EXPECT_THAT(sent(), ElementsAre("1"));
+  for (std::uint64_t total = 1; total <= 3; ++total) {
+    EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, total));
+    EXPECT_THAT(sent(), ElementsAre(std::to_string(total + 2)));
+  }
+  subscribe({.window = 1, .depth = 3});
+  offer(one, {"6", "7", "8"});
+  subscribe({.window = 1, .depth = 1});
+  EXPECT_EQ(one.held(), 1u) << "fewer from now on";
+  subscribe({.window = 2, .depth = 1});
+  EXPECT_THAT(sent(), ElementsAre("8")) << "a larger window opens at once";
+}
+
+TEST_F(PacerTest, GivesTheNewestAtEachDueTime) {
+  PacedSubscription& one = subscribe({.interval_us = 20'000});
+  offer(one, {"1"});
+  EXPECT_THAT(sent(), ElementsAre("1"));
+  for (int i = 2; i < 6; ++i) {
+    pass_ms(4);
+    offer(one, {std::to_string(i)});
+  }
+  EXPECT_THAT(sent(), IsEmpty());
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 20);
+  pass_ms(4);
+  EXPECT_THAT(sent(), ElementsAre("5"));
+  EXPECT_EQ(rig.pacer.next_due_ms(), Pacer::kNever) << "nothing is held";
+  pass_ms(100);
+  offer(one, {"6"});
+  EXPECT_THAT(sent(), ElementsAre("6"));
+}
+
+TEST_F(PacerTest, ARateNeverLetsMoreThrough) {
+  PacedSubscription& one = subscribe({.interval_us = 10'000});
+  std::size_t got = 0;
+  for (int ms = 0; ms < 1'000; ++ms) {
+    offer(one, {"x", "y"});
+    pass_ms(1);
+    got += sent().size();
+  }
+  EXPECT_EQ(got, 101u) << "the first, and one each 10 ms";
+}
+
+TEST_F(PacerTest, WholeMessagesOfManyFragmentsCountOnce) {
+  PacedSubscription& one = subscribe({.window = 1});
+  offer_fragment(one, 1, 0, 4, "ab");
+  EXPECT_THAT(sent(), ElementsAre("ab")) << "it goes as it comes";
+  offer_fragment(one, 1, 2, 4, "cd");
+  EXPECT_THAT(sent(), ElementsAre("cd"));
+  offer_fragment(one, 2, 0, 4, "ef");
+  EXPECT_THAT(sent(), IsEmpty());
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_THAT(sent(), ElementsAre("ef")) << "what has come of it goes, and the rest as it comes";
+  offer_fragment(one, 2, 2, 4, "gh");
+  EXPECT_THAT(sent(), ElementsAre("gh"));
+  offer_fragment(one, 3, 0, 4, "ij");
+  offer_fragment(one, 3, 2, 4, "kl");
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 2));
+  EXPECT_THAT(sent(), ElementsAre("ij", "kl"));
+}
+
+TEST_F(PacerTest, AMessageThatIsStillComingDoesNotReplaceAWholeOne) {
+  PacedSubscription& one = subscribe({.window = 1});
+  offer(one, {"1", "2"});
+  offer_fragment(one, 9, 0, 4, "ab");
+  EXPECT_THAT(sent(), ElementsAre("1"));
+  offer(one, {"3"});  // it has no end
+  EXPECT_EQ(dropped(DropReason::cut_message), 1u);
+  offer_fragment(one, 9, 2, 4, "cd");
+  EXPECT_EQ(dropped(DropReason::cut_message), 2u) << "the rest of it";
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  EXPECT_THAT(sent(), ElementsAre("3"));
+}
+
+TEST_F(PacerTest, AMessageWithoutAnEndGivesItsPlaceBack) {
+  PacedSubscription& one = subscribe({.window = 1});
+  offer_fragment(one, 1, 0, 4, "ab");
+  offer(one, {"next"});
+  EXPECT_THAT(sent(), ElementsAre("ab", "next")) << "of the same lane: the next message shows it";
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1));
+  offer_fragment(one, 2, 0, 4, "cd", 2);
+  offer(one, {"other"});
+  EXPECT_THAT(sent(), ElementsAre("cd"));
+  rig.egress.context.now_ms += rig.egress.limits.block_ms;
+  offer(one, {"later"});
+  EXPECT_THAT(sent(), ElementsAre("later")) << "of another lane: the time";
+}
+
+TEST_F(PacerTest, WhatTheOutboxDropsCountsAsTaken) {
+  PacedSubscription& one = subscribe({.window = 2});
+  offer(one, {"1", "2", "3"});
+  recipient.outbox.drop_all(DropReason::link_lost, rig.egress.context);
+  EXPECT_EQ(one.uncredited(), 0u);
+  EXPECT_EQ(rig.pacer.next_due_ms(), 0u);
+  rig.pacer.release_due();
+  EXPECT_THAT(sent(), ElementsAre("3"));
+}
+
+TEST_F(PacerTest, WhatIsTooLargeForTheSubscriberIsNotWaitedFor) {
+  recipient.frame_bytes = 100;
+  PacedSubscription& one = subscribe({.window = 1});
+  offer(one, {std::string(101, 'x')});
+  rig.pacer.release_due();
+  EXPECT_EQ(dropped(DropReason::too_large), 1u);
+  EXPECT_EQ(one.space(), 1u);
+}
+
+TEST_F(PacerTest, HoldsWithinTheLaneAndTheBudget) {
+  PacedSubscription& one = subscribe({.window = 1, .depth = 64});
+  const std::string large(60'000, 'x');
+  for (int i = 0; i < 40; ++i) offer(one, {large});
+  EXPECT_LE(one.held_bytes(), rig.egress.limits.lane1_bytes);
+  EXPECT_GT(dropped(DropReason::queue_full), 0u);
+  EXPECT_GT(rig.egress.pool.pinned_bytes(), one.held_bytes()) << "what is held is charged";
+  rig.egress.lease.take(rig.egress.limits.budget_bytes);
+  offer(one, {"x"});
+  EXPECT_EQ(dropped(DropReason::over_budget), 1u);
+  rig.egress.lease.give_back(rig.egress.limits.budget_bytes);
+}
+
+TEST_F(PacerTest, ForASubscriberThatIsAway) {
+  PacedSubscription& one = subscribe({.window = 1});
+  offer(one, {"1", "2"});
+  recipient.connected = false;
+  recipient.outbox.drop_all(DropReason::link_lost, rig.egress.context);
+  rig.pacer.on_away(recipient);
+  rig.pacer.release_due();
+  offer(one, {"3"});
+  EXPECT_EQ(dropped(DropReason::away), 1u);
+  recipient.connected = true;
+  rig.pacer.on_new_epoch(recipient);
+  offer(one, {"4", "5"});
+  EXPECT_THAT(sent(), ElementsAre("4"));
+}
+
+TEST_F(PacerTest, CountsGoOnWhenASubscriptionBeginsAgain) {
+  PacedSubscription& one = subscribe({.window = 2});
+  offer(one, {"1", "2", "3"});
+  rig.pacer.unsubscribe(recipient, kGroup, false);
+  EXPECT_EQ(Pacer::find(recipient, kGroup), nullptr);
+  EXPECT_EQ(dropped(DropReason::no_subscriber), 1u);
+  EXPECT_TRUE(rig.pacer.on_credit(recipient, kGroup, 1)) << "they are still on their way";
+  PacedSubscription& again = subscribe({.window = 2});
+  offer(again, {"4", "5"});
+  EXPECT_THAT(sent(), ElementsAre("1", "2", "4"));
+  rig.pacer.unsubscribe(recipient, kGroup, true);
+  EXPECT_FALSE(rig.pacer.on_credit(recipient, kGroup, 3)) << "nobody knows that group";
+}
+
+}  // namespace
+}  // namespace gimnet::hub

@@ -1,0 +1,177 @@
+#include "hub/data/fanout/retained_messages.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/hub/shard/support/hub_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::Kind;
+using testing::FakeNode;
+using testing::HubRig;
+
+using Texts = std::vector<std::string>;
+
+/// A retained group of a provider on shard 0, and subscribers that come late.
+class RetainedMessagesTest : public ::testing::Test {
+ protected:
+  static Limits limits() {
+    Limits limits;
+    limits.retained_bytes = 100'000;
+    return limits;
+  }
+  void SetUp() override { rig.publish_paced_group(1, provider.id, {}, true); }
+
+  void publish(const std::string& text) {
+    rig.send(provider, HubRig::group(1), text, {.kind = Kind::group});
+    rig.turn();
+  }
+  void publish_fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total, const std::string& text) {
+    std::string all(proto::kFragmentHeaderSize, '\0');
+    proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
+    rig.send(provider, HubRig::group(1), all + text, {.kind = Kind::group, .flags = proto::kFlagFragment});
+    rig.turn();
+  }
+  FakeNode& subscriber(std::size_t shard, const PaceTerms& terms = {}) {
+    FakeNode& node = rig.join(shard);
+    members.push_back(&node);
+    rig.publish_paced_group(1, provider.id, members, true);
+    rig.pace(node, 1, terms, true);
+    return node;
+  }
+  Texts got(FakeNode& node) {
+    rig.settle();
+    Texts texts;
+    for (const auto& frame : node.frames) {
+      const std::size_t skip = frame.header.has(proto::kFlagFragment) ? proto::kFragmentHeaderSize : 0;
+      texts.push_back(frame.text().substr(skip));
+    }
+    node.frames.clear();
+    return texts;
+  }
+
+  HubRig rig{2, limits()};
+  FakeNode& provider = rig.join(0);
+  std::vector<FakeNode*> members;
+};
+
+TEST_F(RetainedMessagesTest, ALateSubscriberGetsTheLastFirst) {
+  publish("one");
+  publish("two");
+  FakeNode& here = subscriber(0);
+  FakeNode& there = subscriber(1);
+  rig.settle();
+  publish("three");
+  EXPECT_EQ(got(here), (Texts{"two", "three"}));
+  EXPECT_EQ(got(there), (Texts{"two", "three"}));
+}
+
+TEST_F(RetainedMessagesTest, OnlyTheLastOfABurst) {
+  const auto one = HubRig::frame(provider, HubRig::group(1), "one", {.kind = Kind::group});
+  auto burst = one;
+  const auto two = HubRig::frame(provider, HubRig::group(1), "two", {.kind = Kind::group});
+  burst.insert(burst.end(), two.begin(), two.end());
+  rig.write(provider, burst);
+  rig.turn();
+  EXPECT_EQ(got(subscriber(1)), Texts{"two"});
+}
+
+TEST_F(RetainedMessagesTest, NoneThereIsNoneGiven) {
+  FakeNode& node = subscriber(1);
+  EXPECT_EQ(got(node), Texts{});
+  publish("one");
+  EXPECT_EQ(got(node), Texts{"one"});
+}
+
+TEST_F(RetainedMessagesTest, NeverOneThatWasUnderWayBefore) {
+  FakeNode& early = subscriber(1);
+  EXPECT_EQ(got(early), Texts{});
+  // "one" waits in the other shard's mailbox when the late one is published and its shard has not heard of it.
+  rig.send(provider, HubRig::group(1), "one", {.kind = Kind::group});
+  rig.turn_shard(0);
+  FakeNode& late = subscriber(1);
+  EXPECT_EQ(got(late), Texts{"one"}) << "once";
+  EXPECT_EQ(got(early), Texts{"one"});
+}
+
+TEST_F(RetainedMessagesTest, ASubscriberInTheMiddleOfAMessageGetsAllOfIt) {
+  publish("last");
+  publish_fragment(5, 0, 6, "ab");
+  publish_fragment(5, 2, 6, "cd");
+  FakeNode& node = subscriber(1);
+  rig.settle();
+  publish_fragment(5, 4, 6, "ef");
+  EXPECT_EQ(got(node), (Texts{"last", "ab", "cd", "ef"}));
+  EXPECT_EQ(got(subscriber(0)), (Texts{"ab", "cd", "ef"}));
+}
+
+TEST_F(RetainedMessagesTest, AMessageWithoutAnEndIsNotTheLast) {
+  publish("last");
+  publish_fragment(5, 0, 6, "ab");
+  publish_fragment(6, 0, 6, "AB");
+  publish_fragment(6, 4, 6, "EF");
+  EXPECT_EQ(got(subscriber(0)), Texts{"last"});
+}
+
+TEST_F(RetainedMessagesTest, WhatIsTooLargeIsNotKeptNorIsAnOlderOne) {
+  publish("old");
+  publish_fragment(5, 0, 100'001, std::string(50'000, 'x'));
+  publish_fragment(5, 50'000, 100'001, std::string(50'001, 'x'));
+  EXPECT_EQ(rig.sum(&ShardCounters::not_retained), 1u);
+  EXPECT_EQ(got(subscriber(1)), Texts{});
+  publish_fragment(6, 0, 100'000, std::string(50'000, 'x'));
+  publish_fragment(6, 50'000, 100'000, std::string(50'000, 'x'));
+  EXPECT_EQ(rig.sum(&ShardCounters::not_retained), 1u);
+  EXPECT_EQ(got(subscriber(1)).size(), 2u) << "at the limit";
+}
+
+TEST_F(RetainedMessagesTest, IsChargedAndFreedWithItsService) {
+  publish(std::string(5'000, 'x'));
+  rig.turn();
+  EXPECT_GE(rig.sum(&ShardCounters::pinned_bytes), 5'000u);
+  rig.withdraw_group(1);
+  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}});
+  rig.turn();
+  EXPECT_EQ(rig.sum(&ShardCounters::pinned_bytes), 0u);
+  EXPECT_EQ(rig.state(0).retained.groups(), 0u);
+}
+
+TEST_F(RetainedMessagesTest, LivesThroughItsProvidersGraceTimeAndNotLonger) {
+  publish("last");
+  provider.pipe.close();
+  rig.settle();
+  EXPECT_EQ(got(subscriber(1)), Texts{"last"});
+  rig.release(provider);
+  rig.turn();
+  EXPECT_EQ(rig.state(0).retained.groups(), 0u);
+}
+
+TEST_F(RetainedMessagesTest, AfterABreakWithoutResumeTheLastComesAgain) {
+  FakeNode& node = subscriber(1);
+  EXPECT_EQ(got(node), Texts{});
+  publish("one");
+  EXPECT_EQ(got(node), Texts{"one"});
+  node.pipe.close();
+  rig.settle();
+  publish("two");
+  publish("three");
+  rig.rejoin(node);
+  EXPECT_EQ(got(node), Texts{"three"});
+  publish("four");
+  EXPECT_EQ(got(node), Texts{"four"});
+}
+
+TEST_F(RetainedMessagesTest, CountsInTheWindowAndIsHeldLikeAnyOther) {
+  publish("one");
+  FakeNode& node = subscriber(1, {.window = 1});
+  EXPECT_EQ(got(node), Texts{"one"});
+  publish("two");
+  publish("three");
+  EXPECT_EQ(got(node), Texts{});
+  rig.send_flow(node, proto::flow::Credit{GroupId{HubRig::group(1)}, 1});
+  EXPECT_EQ(got(node), Texts{"three"});
+}
+
+}  // namespace
+}  // namespace gimnet::hub
