@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Every path by which a person meets an error of `gimnet`: what happened, to what, what to do, and the exit code. The
-tables are the test; {url}, {port} and {folder} stand for those of the run."""
+tables are the test; {port}, {folder} and {robot} stand for those of the run."""
 
 import os
 import socket
@@ -79,9 +79,9 @@ WRONG_HUBS = [
 # A hub with the nodes `robot` (takes at most 100,000 bytes a message) and `mute` (does nothing) and the service
 # robot2/odom: exit code, words, arguments, standard input.
 WITH_A_HUB = [
-    (DENIED, ["the name 'robot' is held by node 7.1, connected over tcp from 127.0.0.1", "end that one, or choose another"],
+    (DENIED, ["the name 'robot' is held by node {robot}, connected over tcp from 127.0.0.1", "end that one, or choose another"],
      ["recv", "--name", "robot"], b""),
-    (DENIED, ["the name 'robot' is held by node 7.1"], ["pub", "robot/odom"], b"x\n"),
+    (DENIED, ["the name 'robot' is held by node {robot}"], ["pub", "robot/odom"], b"x\n"),
     (USAGE, ["'no spaces'", NAME_RULE], ["recv", "--name", "no spaces"], b""),
     (USAGE, ["it has more than 255 bytes"], ["recv", "--name", "x" * 256], b""),
     (USAGE, ["it has an empty part"], ["pub", "a//b"], b"x\n"),
@@ -108,7 +108,7 @@ WITH_A_HUB = [
     (FAILED, ["cannot read {folder}: Is a directory"], ["send", "robot", "--file", "{folder}"], b""),
     (FAILED, ["cannot send {folder}/huge: it is larger than a message can be, 1073741824 bytes; send it in parts"],
      ["send", "robot", "--file", "{folder}/huge"], b""),
-    (FAILED, ["cannot send to 7.1: the receiver refused the message: it is larger than it takes"],
+    (FAILED, ["cannot send to {robot}: the receiver refused the message: it is larger than it takes"],
      ["send", "robot", "--file", "{folder}/large"], b""),
 ]
 
@@ -118,7 +118,7 @@ class Tool(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="gimnet-test-")
         self.addCleanup(folder.cleanup)
         with socket.create_server(("127.0.0.1", 0)) as closed:
-            self.places = {"folder": folder.name, "port": closed.getsockname()[1], "url": ""}
+            self.places = {"folder": folder.name, "port": closed.getsockname()[1]}
         for name, size in (("text", 5), ("large", 2 << 20), ("huge", (1 << 30) + 1)):
             with open(os.path.join(folder.name, name), "wb") as file:
                 file.truncate(size)
@@ -166,6 +166,7 @@ class Errors(Tool):
     def test_with_a_hub(self):
         hub = Hub(self)
         start_recv(self, hub, "robot", "--max-size", "100000")
+        self.places["robot"] = hub.wait_for_node("robot")["id"]
         Client(self, hub).join("mute")
         start_gimnet(self, hub, "pub", "robot2/odom", "--wait", "1")
         hub.wait_for_node("robot2")

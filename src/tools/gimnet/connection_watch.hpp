@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "gimnet/gimi.hpp"
 
@@ -17,6 +18,7 @@ class ConnectionWatch {
   Node& node_;
   bool connected_ = true;
   std::uint32_t reconnects_ = 0;
+  std::string told_;  ///< why it broke last
 };
 
 }  // namespace gimnet::tool
