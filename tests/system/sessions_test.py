@@ -11,9 +11,11 @@ import unittest
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.proxy import Proxy
 from support.waiting import wait_until
-from support.wire import FLAG_KEYED, GOODBYE, LINK, NS, OPENING, WELCOME, Client, control, frame, hello, number, text
+from support.wire import (FLAG_KEYED, FLAG_REPORT, GOODBYE, LINK, NS, OPENING, REPORT, WELCOME, Client, Closed, control,
+                          frame, hello, number, text)
 
 RESOLVE = 3
+AWAY = 3  # the reason of a REPORT
 
 
 def resolve(client, name):
@@ -32,6 +34,13 @@ def node_id(text_form):
 
 def id_of(hub, name):
     return node_id(hub.wait_for_node(name)["id"])
+
+
+def is_served(client):
+    try:
+        return resolve(client, "B") == client.id
+    except (Closed, OSError):
+        return False
 
 
 def message(client, target, sequence, data):
@@ -76,6 +85,9 @@ class Restart(unittest.TestCase):
         again.send(message(again, k_id, 1, b"still you"))
         wait_until(lambda: k.out == b"still you\n", "the message at K")
         self.assertEqual(resolved(hub), 0)
+        # J may still come: it is away, not unknown.
+        again.send(again.frame(j_id, b"?", flags=FLAG_REPORT))
+        self.assertEqual(again.next_where(lambda got: got.kind == REPORT).payload[0], AWAY)
         # J was killed with the hub; started again, it has its id and name, too.
         start_recv(self, hub, "J")
         self.assertEqual(id_of(hub, "J"), j_id)
@@ -174,8 +186,27 @@ class Tokens(unittest.TestCase):
 
     def test_junk_counts_as_none(self):
         hub = Hub(self)
-        for junk in (b"\x00", bytes(56), os.urandom(56), os.urandom(128)):
-            self.assertEqual(Client(self, hub).join(token=junk).welcome.get(16), None)
+        first = Client(self, hub).join()
+        token = first.welcome[2]
+        for junk in (b"\x00", bytes(56), os.urandom(56), os.urandom(128), token[:-1], token[1:], token + b"\x00"):
+            self.assertNotEqual(Client(self, hub).join(token=junk).id, first.id)
+        too_long = Client(self, hub)
+        too_long.send(OPENING + hello(token=bytes(129)))
+        self.assertEqual(too_long.first_answer().goodbye, "malformed")
+
+    def test_of_two_who_show_one_at_once_one_has_the_session(self):
+        hub = Hub(self)
+        token = Client(self, hub).join("B").welcome[2]
+        claimants = [Client(self, hub) for _ in range(2)]
+        for claimant in claimants:
+            claimant.send(OPENING + hello("B", token=token))
+        for claimant in claimants:
+            answer = claimant.first_answer()
+            self.assertEqual(answer.operation, WELCOME)
+            claimant.id = answer.dst
+        self.assertEqual(claimants[0].id, claimants[1].id)
+        wait_until(lambda: sum(node["name"] == "B" and node["connected"] for node in hub.nodes()) == 1, "one B")
+        self.assertEqual(sum(is_served(claimant) for claimant in claimants), 1)
 
     def test_an_expired_one_counts_as_none(self):
         hub = Hub(self, "--limit", "token_ms=1000")

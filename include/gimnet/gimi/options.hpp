@@ -30,6 +30,9 @@ struct NodeOptions {
   /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed. Default: nodes with a
   /// name.
   std::optional<bool> resume;
+  /// A node with a name that crashed has its id and name again at once: its session token stands in a file of the
+  /// user's runtime folder while it lives. false: in memory only.
+  bool keep_token = true;
   /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
   std::optional<std::uint8_t> shard;
   std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, up to 1 GiB

@@ -89,6 +89,7 @@ nif_status Core::connect(const NodeOptions& options) {
   how.connect_timeout_ms = nif_timeout(options.timeout);
   how.wait_for_hub = options.wait_for_hub ? 1 : 0;
   how.no_reconnect = options.reconnect ? 0 : 1;
+  how.no_token_file = options.keep_token ? 0 : 1;
   if (options.resume) how.resume = *options.resume ? NIF_RESUME_ON : NIF_RESUME_OFF;
   if (options.shard) how.shard_plus_one = static_cast<std::uint8_t>(*options.shard + 1);
   how.receive_queue_bytes = options.receive_bytes;

@@ -56,6 +56,10 @@ Conductor::Conductor(HubFacts facts, Placement placement, const Limits& limits, 
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       state_(wiring_.start.state) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
+  if (state_.boot > 1) {
+    wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
+    returns_until_ = facts_.started + milliseconds{limits_.grace_ms};
+  }
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
@@ -201,13 +205,19 @@ void Conductor::tick(milliseconds now) {
   membership_.tick(now, effects);
   if (keep_again_at_ && *keep_again_at_ <= now) effects.emplace_back(StateDue{});
   carry_out(effects, now);
+  if (returns_until_ && *returns_until_ <= now) {
+    wiring_.tables.nodes.expect_returns_below(0);
+    returns_until_.reset();
+  }
   publisher_.collect();
 }
 
 std::optional<milliseconds> Conductor::next_deadline() const {
-  const std::optional<milliseconds> deadline = membership_.next_deadline();
-  if (!keep_again_at_ || (deadline && *deadline < *keep_again_at_)) return deadline;
-  return keep_again_at_;
+  std::optional<milliseconds> deadline = membership_.next_deadline();
+  for (const std::optional<milliseconds>& other : {keep_again_at_, returns_until_}) {
+    if (other && (!deadline || *other < *deadline)) deadline = other;
+  }
+  return deadline;
 }
 
 void Conductor::drain() {

@@ -102,6 +102,8 @@ class Conductor {
   NameCounters name_counters_;
   HubState state_;                                          ///< as it was kept last
   std::optional<std::chrono::milliseconds> keep_again_at_;  ///< it could not be kept
+  /// After a restart: until then nodes that are not back yet count as away.
+  std::optional<std::chrono::milliseconds> returns_until_;
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;
 };

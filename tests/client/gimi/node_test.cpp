@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "gimnet/gimi.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
+#include "tests/client/nif/support/runtime_folder.hpp"
 
 namespace gimnet {
 namespace {
@@ -32,6 +34,21 @@ TEST_F(NodeTest, JoinsWithAName) {
   EXPECT_TRUE(state.connected);
   EXPECT_EQ(state.peer, node.peer());
   EXPECT_TRUE(node.peer());
+}
+
+TEST_F(NodeTest, KeepsItsTokenWhileItLivesUnlessToldNotTo) {
+  const nif::test::RuntimeFolder runtime;
+  NodeOptions options;
+  options.name = "robot";
+  options.hub = hub_.url();
+  for (const bool keep : {true, false}) {
+    options.keep_token = keep;
+    const auto node = Node::join(options);
+    ASSERT_TRUE(node);
+    const bool kept = std::filesystem::exists(runtime.tokens()) && !std::filesystem::is_empty(runtime.tokens());
+    EXPECT_EQ(kept, keep);
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(runtime.tokens())) << "gone with its node";
 }
 
 TEST_F(NodeTest, SaysWhyItCannotJoin) {

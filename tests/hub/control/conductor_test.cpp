@@ -303,6 +303,29 @@ TEST_F(RestartedConductorTest, GoesOnWithinItsBlockWhileStateCannotBeKeptAndTrie
   EXPECT_EQ(kept.size(), 2u);
 }
 
+class SecondStartTest : public ::testing::Test, protected TestConductor {
+ protected:
+  SecondStartTest() : TestConductor(Placement::spread, second_start()) { set_log_level(LogLevel::off); }
+  ~SecondStartTest() override { set_log_level(LogLevel::info); }
+  static HubStart second_start() {
+    HubStart start{{}, {4'097, IndexPool::kBlock}, {4'097, IndexPool::kBlock}};
+    start.state.boot = 2;
+    return start;
+  }
+};
+
+TEST_F(SecondStartTest, NodesThatAreNotBackAreAwayForAGraceTime) {
+  const std::chrono::milliseconds end = facts().started + std::chrono::milliseconds{limits.grace_ms};
+  EXPECT_TRUE(nodes.may_return(4'096));
+  EXPECT_EQ(index_of(join("Z").id), 4'097u);
+  EXPECT_EQ(conductor.next_deadline(), end);
+  conductor.tick(end - 1ms);
+  EXPECT_TRUE(nodes.may_return(4'096));
+  conductor.tick(end);
+  EXPECT_FALSE(nodes.may_return(4'096));
+  EXPECT_EQ(conductor.next_deadline(), std::nullopt);
+}
+
 TEST_F(ConductorTest, ATokenIsForItsIdentityOnly) {
   const Node robot = join("robot");
   detach(robot);

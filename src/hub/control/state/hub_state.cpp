@@ -23,6 +23,7 @@ constexpr std::size_t kUniqueIdAt = 48;
 constexpr std::size_t kBootAt = 64;
 constexpr std::size_t kNodeMarkAt = 72;
 constexpr std::size_t kGroupMarkAt = 76;
+constexpr std::size_t kUnusedAt = 80;
 constexpr std::size_t kKickedAt = 88;
 constexpr std::size_t kKickedSize = 24;
 static_assert(kHubStateBytesMax == kKickedAt + kKickedMax * kKickedSize + std::tuple_size_v<Digest>);
@@ -78,10 +79,11 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
     return Error{"another version of tcphub wrote it"};
   }
   const std::size_t kicked = load_le<std::uint32_t>(bytes.data() + kKickedCountAt);
-#ifndef GIMNET_BUG_STATE_COUNT_UNCHECKED
-  if (kicked > kKickedMax || bytes.size() != kKickedAt + kicked * kKickedSize + std::tuple_size_v<Digest>) {
-    return Error{"its length is not what it says"};
-  }
+  const std::size_t size = kKickedAt + std::min(kicked, kKickedMax) * kKickedSize + std::tuple_size_v<Digest>;
+#ifdef GIMNET_BUG_STATE_LONGER_THAN_IT_SAYS
+  if (kicked > kKickedMax || bytes.size() < size) return Error{"its length is not what it says"};
+#else
+  if (kicked > kKickedMax || bytes.size() != size) return Error{"its length is not what it says"};
 #endif
   const std::size_t end = bytes.size() - std::tuple_size_v<Digest>;
   if (!same_bytes(sha256(bytes.first(end)), bytes.subspan(end))) return Error{"it is damaged"};
@@ -91,12 +93,15 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   state.boot = load_le<std::uint64_t>(bytes.data() + kBootAt);
   state.node_mark = load_le<std::uint32_t>(bytes.data() + kNodeMarkAt);
   state.group_mark = load_le<std::uint32_t>(bytes.data() + kGroupMarkAt);
-  if (state.boot > kBootMax || !is_index(state.node_mark) || !is_index(state.group_mark)) {
+  const std::uint64_t unused = load_le<std::uint64_t>(bytes.data() + kUnusedAt);
+  if (state.boot > kBootMax || !is_index(state.node_mark) || !is_index(state.group_mark) || unused != 0) {
     return Error{"it holds numbers that no hub writes"};
   }
   for (std::size_t i = 0; i < kicked; ++i) {
-    const SessionToken token = read_kicked(bytes.data() + kKickedAt + i * kKickedSize);
-    if (!is_index(token.index)) return Error{"it holds numbers that no hub writes"};
+    const std::byte* at = bytes.data() + kKickedAt + i * kKickedSize;
+    const SessionToken token = read_kicked(at);
+    if (!is_index(token.index) || load_le<std::uint32_t>(at + 4) != 0)
+      return Error{"it holds numbers that no hub writes"};
     state.kicked.push_back(token);
   }
   return state;

@@ -53,7 +53,7 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
 #endif
   if (token->number < floor_.at(token->index)) return {};
   if (holds) return {holder, std::nullopt};
-  if (holder != nullptr) return {};
+  if (holder != nullptr || indices_.held(token->index)) return {};
   return {nullptr, token};
 }
 

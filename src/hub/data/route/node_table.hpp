@@ -42,6 +42,15 @@ class NodeTable {
     return unpack(words_[index].load(std::memory_order_acquire));  // pairs with the release store in publish()
   }
 
+  /// Nodes with a lower index may be on their way back to a hub that was restarted: for them nobody is `away`, not
+  /// unknown. 0: nobody is expected. Index 0 is the hub itself.
+  void expect_returns_below(std::uint32_t index) {
+    returns_below_.store(index, std::memory_order_relaxed);  // relaxed: words a reason, decides nothing
+  }
+  [[nodiscard]] bool may_return(std::uint32_t index) const {
+    return index > 0 && index < returns_below_.load(std::memory_order_relaxed);  // relaxed: as above
+  }
+
   /// The shards (a bit set) on which a node lives.
   [[nodiscard]] std::uint64_t shards() const {
     return shards_.load(std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
@@ -56,6 +65,7 @@ class NodeTable {
 
   std::atomic<std::uint64_t>* words_;
   std::atomic<std::uint64_t> shards_{0};
+  std::atomic<std::uint32_t> returns_below_{0};
   std::array<std::uint32_t, kShardsMax> nodes_by_shard_{};  ///< the writer's
 };
 

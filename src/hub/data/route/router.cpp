@@ -62,7 +62,7 @@ void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
 void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over) {
   if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
   const NodePlace place = nodes_.find(index_of(node));
-  if (!place.exists()) return drop(run, proto::DropReason::no_such_node);
+  if (!place.exists()) return drop(run, why_absent(node));
   if (place.shard != fanout_.self()) {
     // A frame that was handed over here and would have to go on is for a node that left meanwhile.
     if (handed_over) return drop(run, proto::DropReason::no_such_node);
@@ -71,6 +71,11 @@ void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId no
   Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
   if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
   fanout_.deliver(*recipient, run, header, Handover{});
+}
+
+proto::DropReason Router::why_absent(NodeId node) const {
+  const bool returns = hub_of(node) == hub_ && nodes_.may_return(index_of(node));
+  return returns ? proto::DropReason::away : proto::DropReason::no_such_node;
 }
 
 const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader& header) {
@@ -145,7 +150,8 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
   std::uint64_t shards = 0;
   std::uint32_t outcomes = 0;
   for (std::uint32_t i = 0; i < header.dst; ++i) {
-    const NodePlace place = place_of(NodeId{load_le<std::uint32_t>(ids + std::size_t{4} * i)});
+    const NodeId node{load_le<std::uint32_t>(ids + std::size_t{4} * i)};
+    const NodePlace place = place_of(node);
     if (place.exists() && place.shard != fanout_.self()) {
       shards |= std::uint64_t{1} << place.shard.value();
       continue;
@@ -154,7 +160,7 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
     if (recipient == nullptr) {
       // Counted by the shard that took the frame in; on the others the id is somebody else's business.
       if (handed_over) continue;
-      drop(run, proto::DropReason::no_such_node);
+      drop(run, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
       ++outcomes;
       continue;
     }

@@ -52,6 +52,8 @@ class Router {
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes);
   [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header);
+  /// REQUIRES: no session has that id.
+  [[nodiscard]] proto::DropReason why_absent(NodeId node) const;
   void drop(const Run& run, proto::DropReason reason);
   void settle(const Run& run, std::uint32_t outcomes);
 

@@ -81,6 +81,11 @@ TEST(HubState, SaysWhatIsWrong) {
       EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << offset << " " << index;
     }
   }
+  for (const std::size_t unused : {80u, 87u, 92u, 95u}) {
+    wrong = bytes;
+    wrong[unused] = std::byte{1};
+    EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << unused;
+  }
   wrong = bytes;
   store_le(wrong.data() + 64, kBootMax + 1);
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));

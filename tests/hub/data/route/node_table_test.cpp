@@ -38,5 +38,17 @@ TEST(NodeTable, KnowsTheShardsWithNodes) {
   EXPECT_EQ(table.shards(), 0u);
 }
 
+TEST(NodeTable, KnowsWhoMayComeBack) {
+  NodeTable table;
+  EXPECT_FALSE(table.may_return(1));
+  table.expect_returns_below(4'097);
+  EXPECT_TRUE(table.may_return(1));
+  EXPECT_TRUE(table.may_return(4'096));
+  EXPECT_FALSE(table.may_return(4'097));
+  EXPECT_FALSE(table.may_return(0)) << "the hub itself";
+  table.expect_returns_below(0);
+  EXPECT_FALSE(table.may_return(1));
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -47,6 +47,18 @@ TEST_F(RouterTest, UnicastToNobody) {
   EXPECT_EQ(dropped(DropReason::no_route), 1u);
 }
 
+TEST_F(RouterTest, WhoIsNotBackYetAfterARestartIsAway) {
+  rig.nodes.expect_returns_below(9);
+  rig.route(kHub | 8, {"x"});
+  rig.route(kHub | 9, {"x"});
+  std::string ids(8, '\0');
+  const std::uint32_t all[] = {kHub | 7, 8u << 20 | 1};
+  std::memcpy(ids.data(), all, sizeof all);
+  rig.route(2, {ids + "payload"}, {.kind = Kind::list});
+  EXPECT_EQ(dropped(DropReason::away), 2u);
+  EXPECT_EQ(dropped(DropReason::no_such_node), 2u);
+}
+
 TEST_F(RouterTest, UnicastToASlotThatIsSomebodyElses) {
   rig.add_here(2);
   rig.nodes.publish(2, {ShardIndex{0}, ConnectionSlot{2}, 99});
