@@ -76,10 +76,10 @@ Work parser(std::uint32_t destinations) {
 struct Routing {
   testing::RouteRig rig;
   benchmarks::NullTransport transport;
-  std::vector<GatherWriter> writers = std::vector<GatherWriter>(kFirstNode + kFanOut);
+  std::vector<GatherWriter> writers;
   std::vector<hub::Run> runs;
 
-  explicit Routing(std::uint32_t nodes) {
+  explicit Routing(std::uint32_t nodes) : writers(kFirstNode + nodes) {
     for (std::uint32_t i = 0; i < nodes; ++i) rig.add_here(kFirstNode + i);
   }
   void flush() {
@@ -93,10 +93,12 @@ struct Routing {
   }
 };
 
-Work router() {
-  auto routing = std::make_shared<Routing>(kDestinations);
+/// A hub with so many nodes; what it costs must not depend on that.
+Work router(std::uint32_t nodes) {
+  auto routing = std::make_shared<Routing>(nodes);
   for (std::uint32_t i = 0; i < kDestinations; ++i) {
-    routing->runs.push_back(routing->rig.make_run(node_id(kFirstNode + i), {kPayload}));
+    const std::uint32_t index = kFirstNode + i * (nodes / kDestinations);
+    routing->runs.push_back(routing->rig.make_run(node_id(index), {kPayload}));
   }
   return {kFramesPerTurn, [routing] {
             for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
@@ -216,7 +218,8 @@ struct Script {
 constexpr Script kScripts[] = {
     {"parser_run", [] { return parser(1); }},
     {"parser_in_turns", [] { return parser(kDestinations); }},
-    {"router_in_turns", router},
+    {"router_in_turns", [] { return router(kDestinations); }},
+    {"router_of_10000_nodes", [] { return router(10'000); }},
     {"outbox", outbox},
     {"fan_out_100", fan_out},
     {"mailbox", mailbox},

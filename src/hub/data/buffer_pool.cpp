@@ -8,6 +8,8 @@
 namespace gimnet::hub {
 namespace {
 constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kBufferRoom = 64;  // before its bytes
+static_assert(sizeof(Buffer) <= kBufferRoom);
 constexpr std::size_t kHeaderRoom = 16;  // a frame's header, which its length does not count
 constexpr std::size_t kFreeForeignMax = 4096;
 }  // namespace
@@ -31,7 +33,7 @@ Buffer* BufferPool::FreeList::pop() {
 
 BufferPool::BufferPool(std::uint32_t frame_bytes, BudgetLease& budget)
     : slab_bytes_(static_cast<std::uint32_t>(kSlabReadBytes + kHeaderRoom + frame_bytes)),
-      chunk_bytes_{1024, 4 * 1024, 16 * 1024, static_cast<std::uint32_t>(kHeaderRoom + frame_bytes)},
+      chunk_bytes_{256, 1024, 4 * 1024, 16 * 1024, static_cast<std::uint32_t>(kHeaderRoom + frame_bytes)},
       budget_(budget) {}
 
 BufferPool::~BufferPool() {
@@ -160,8 +162,10 @@ void BufferPool::take_back_lent() {
 }
 
 Buffer* BufferPool::allocate(std::uint32_t capacity, BufferKind kind) {
-  auto* buffer = new Buffer;
-  buffer->data = static_cast<std::byte*>(::operator new(capacity, std::align_val_t{kAlignment}));
+  // One piece of memory, so that a small chunk is two neighbouring cache lines and not two somewhere.
+  void* memory = ::operator new(kBufferRoom + capacity, std::align_val_t{kAlignment});
+  auto* buffer = new (memory) Buffer;
+  buffer->data = static_cast<std::byte*>(memory) + kBufferRoom;
   buffer->capacity = capacity;
   buffer->kind = kind;
   buffer->pool = this;
@@ -169,8 +173,12 @@ Buffer* BufferPool::allocate(std::uint32_t capacity, BufferKind kind) {
 }
 
 void BufferPool::free_buffer(Buffer* buffer) {
-  if (buffer->kind != BufferKind::foreign) ::operator delete(buffer->data, std::align_val_t{kAlignment});
-  delete buffer;
+  if (buffer->kind == BufferKind::foreign) {
+    delete buffer;
+    return;
+  }
+  buffer->~Buffer();
+  ::operator delete(buffer, std::align_val_t{kAlignment});
 }
 
 }  // namespace gimnet::hub

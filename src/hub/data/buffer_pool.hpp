@@ -65,12 +65,12 @@ class BufferPool {
   void keep_or_free(Buffer& buffer);
 
   const std::uint32_t slab_bytes_;
-  const std::array<std::uint32_t, 4> chunk_bytes_;
+  const std::array<std::uint32_t, 5> chunk_bytes_;
   BudgetLease& budget_;
   FreeList free_slabs_;
   FreeList free_foreign_;
   std::vector<Buffer*> adopted_;         ///< foreign buffers in use, the last one of each lending pool
-  std::array<FreeList, 4> free_chunks_;  ///< by size, as chunk_bytes_
+  std::array<FreeList, 5> free_chunks_;  ///< by size, as chunk_bytes_
   std::vector<Buffer*> lent_;            ///< free here, still read by another shard
   std::uint64_t pinned_bytes_ = 0;
 };

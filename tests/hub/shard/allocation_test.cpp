@@ -94,6 +94,15 @@ TEST_F(Allocation, NoneForAMillionFramesToOneAndInTurns) {
   run(1'000'000);
 }
 
+// Each recipient of a read begins a chunk in the same turn, and a read may have thousands.
+TEST_F(Allocation, NoneForAReadThatSpeaksToThousands) {
+  FakeNode& sender = rig.join(0);
+  constexpr std::size_t kRecipients = 5'000;
+  for (std::size_t i = 0; i < kRecipients; ++i) nodes.push_back(&rig.join(0));
+  for (const FakeNode* node : nodes) add(sender, node->id.value(), "");
+  run(3 * kRecipients);
+}
+
 TEST_F(Allocation, NoneForFanOut) {
   for (std::size_t i = 0; i < 20; ++i) nodes.push_back(&rig.join(i % 2));
   rig.publish_group(1, nodes[0]->id, nodes);

@@ -227,6 +227,13 @@ void LaneQueue::forget_messages() {
   forget(messages_);
 }
 
+std::size_t LaneQueue::capacity_bytes() const {
+  std::size_t bytes = entries_.capacity_bytes();
+  if (streams_) bytes += streams_->bucket_count() * (sizeof(StreamIndex::value_type) + 1);
+  if (messages_) bytes += messages_->bucket_count() * (sizeof(MessageIndex::value_type) + 1);
+  return bytes;
+}
+
 void LaneQueue::trim() {
   entries_.trim();
   if (!entries_.empty()) return;

@@ -56,6 +56,8 @@ class LaneQueue {
   void pop_front();
 
   [[nodiscard]] RingQueue<Entry>& entries() { return entries_; }
+  /// Memory that the lane itself takes, entries and indexes, whatever they refer to.
+  [[nodiscard]] std::size_t capacity_bytes() const;
   /// Streams that are remembered.
   [[nodiscard]] std::size_t streams() const { return streams_ ? streams_->size() : 0; }
   /// Nothing came for a while: gives back memory that only a busy lane needs.

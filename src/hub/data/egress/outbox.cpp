@@ -9,7 +9,8 @@
 
 namespace gimnet::hub {
 namespace {
-constexpr std::uint32_t kFirstChunkBytes = 1024;
+constexpr std::uint32_t kFirstChunkBytes = 256;
+constexpr std::uint32_t kChunkGrowth = 4;  // from one size of the pool to the next
 constexpr std::uint32_t kChunkBytesMax = 16 * 1024;
 }  // namespace
 
@@ -47,7 +48,7 @@ bool Outbox::fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) c
 Run Outbox::copy(const Run& run, EgressContext& context) {
   if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
     // A large one saves entries and calls where there is room; where there is none, each outbox takes what it must.
-    chunk_bytes_ = context.budget.exhausted() ? 0 : std::clamp(2 * chunk_bytes_, kFirstChunkBytes, kChunkBytesMax);
+    chunk_bytes_ = context.budget.exhausted() ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kChunkBytesMax);
     chunk_ = context.pool.take_chunk(std::max(run.size, chunk_bytes_));
     chunk_used_ = 0;
     // At once where something waits: by the end of the turn many outboxes may have begun one.
@@ -254,7 +255,7 @@ void Outbox::settle(EgressContext& context) {
 
 void Outbox::charge_entries(EgressContext& context) {
   std::uint64_t bytes = 0;
-  for (LaneQueue& lane : lanes_) bytes += lane.entries().capacity_bytes();
+  for (const LaneQueue& lane : lanes_) bytes += lane.capacity_bytes();
   // A ring doubles into new memory; the allocator keeps the old one for a while (tests/stress/budget_test.cpp).
   bytes += bytes / 2;
   if (bytes > charged_bytes_) context.budget.take(bytes - charged_bytes_);
@@ -288,7 +289,7 @@ void Outbox::on_emptied(EgressContext& context) {
   backlog_ = false;
   owed_ = {};
   chunk_.reset();
-  chunk_bytes_ /= 2;
+  chunk_bytes_ /= kChunkGrowth;
 }
 
 void Outbox::signal_room(EgressContext& context) {

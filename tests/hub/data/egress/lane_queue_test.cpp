@@ -103,6 +103,7 @@ TEST_F(LaneQueueTest, FindsMessagesHoweverManyAreInterleaved) {
       lane.append_fragment(*found, rig.run({"the end"}, {.src = 1 + number % 2}), true, rig.pieces);
       EXPECT_EQ(find(number), nullptr) << "complete";
     }
+    EXPECT_EQ(lane.capacity_bytes() > lane.entries().capacity_bytes(), messages > 64) << "an index is counted";
     // A number that is used again is the newer message's.
     lane.push(part(5, false));
     ASSERT_NE(find(5), nullptr);
