@@ -171,6 +171,44 @@ TEST(BegunFrames, AreBoundedTogetherAndEndInTime) {
   expect_good_nodes_are_served(hub);
 }
 
+// Beginnings of messages that never end, pieces of one byte between those of others, for a node that does not read.
+TEST(Fragments, ThatNeverEndAreBoundedByTheBudget) {
+  constexpr std::int64_t kBudget = 16 * kMiB;
+  const HubProcess hub({"--shards", "2", "--limit", "budget_bytes=16M", "--limit", "lane1_bytes=64M", "--limit",
+                        "silent_ms=600000", "--limit", "slow_consumer_ms=600000"});
+  RawNode liar(hub.unix_url());
+  RawNode stopped(hub.unix_url());
+  RawNode observer(hub.unix_url());
+  const std::int64_t before = hub.resident_bytes();
+  std::int64_t highest = before;
+  constexpr std::uint32_t kTotal = 0xFFFFFFFF;
+  constexpr std::uint32_t kPieces = 100;
+  constexpr std::uint32_t kMessages = 200'000;  // several times what the budget has room for
+  std::uint64_t sent = 0;
+  for (std::uint32_t piece = 0; piece < kPieces; ++piece) {
+    for (std::uint32_t message = piece * kMessages / kPieces; message < (piece + 1) * kMessages / kPieces; ++message) {
+      for (const std::uint32_t offset : {0u, 1u, 2u}) {
+        for (const std::uint32_t back : {0u, 50u}) {
+          proto::FrameParts parts = parts_of(proto::Kind::unicast, stopped.id().value(), proto::Policy::drop);
+          parts.fragment = proto::FragmentHeader{message - std::min(back, message), offset, kTotal};
+          liar.put(parts, std::vector<std::byte>(1));
+          ++sent;
+        }
+      }
+    }
+    liar.flush_all();
+    highest = std::max(highest, hub.resident_bytes());
+  }
+  // What two shards keep for reading into, and what one long queue outgrew, come on top.
+  EXPECT_LE(highest - before, kBudget + kBudget / 10 + 24 * kMiB);
+  expect_good_nodes_are_served(hub);
+  const Statistics now = wait_for(
+      observer, [&](const Statistics& each) { return each["accepted"] == sent + 1; }, "all that the liar sent");
+  EXPECT_GT(now["queued"], 0u);
+  EXPECT_GT(now["dropped.over_budget"], 0u) << "the test is too small";
+  EXPECT_TRUE(now.is_balanced()) << now.text();
+}
+
 /// Bytes that are wrong after WELCOME, and what they count as.
 struct Wrong {
   const char* what;

@@ -185,6 +185,10 @@ class Frames(HostileInput):
             self.malformed(flags=FLAG_FRAGMENT, payload=payload)
         self.malformed(flags=FLAG_KEYED, payload=bytes(7))
 
+    def test_flow_and_link_for_somebody_else(self):
+        self.malformed(dst=7 << 20 | 1, kind=FLOW, payload=b"\x01" + bytes(15))
+        self.malformed(dst=7 << 20 | 1, kind=LINK, payload=control(3))
+
     def test_fragments_that_lie(self):
         for number, offset, total in ((1, 0, 0), (1, 1, 1), (1, 2**32 - 1, 2**32 - 1), (1, 5, 4), (1, 2**32 - 1, 1)):
             self.malformed(flags=FLAG_FRAGMENT, payload=struct.pack("<III", number, offset, total) + b"xy")
@@ -235,6 +239,37 @@ class Frames(HostileInput):
             return "bad_request"
         except Closed:
             return "malformed"
+
+    def test_bitestream_bombs_in_requests(self):
+        client = Client(self, self.hub).join()
+        deep = b"\0"
+        while len(deep) < 50_000:
+            deep = value(3, 14, deep)
+        claims = bytes([15 << 3 | 2, 3, 0, 0]) + struct.pack("<I", 2**32 - 1)
+        many = value(3, 15, b"a") * 10_000
+        for name, body in (("nested", deep), ("a length of 2^32-1", claims), ("10,000 keys", many)):
+            for operation in (3, 5, 7, 10):
+                with self.subTest(bomb=name, operation=operation):
+                    before = self.refused("bad_request")
+                    status = client.ask(NS, operation, body)[1]
+                    if status == 2:
+                        self.assertEqual(self.refused("bad_request"), before + 1)
+                    else:
+                        self.assertEqual(name, "10,000 keys", "the first of repeated keys counts")
+
+    def refused(self, status):
+        """Requests that were answered so; the counter is there once it is not 0."""
+        return self.hub.status()["counters"].get(f"names.refused.{status}", 0)
+
+    def test_a_request_for_a_hub_that_is_not_there(self):
+        client = Client(self, self.hub).join()
+        before = self.refused("not_found")
+        for dst in (8 << 20, client.id, 0xFFFFFFFF):
+            client.send(client.frame(dst, control(3, text(3, "robot"), 9), kind=NS))
+            answer = client.next_where(lambda got: got.kind == NS)
+            self.assertEqual(answer.payload[:4], struct.pack("<HH", 0x8003, 9))
+            self.assertIn(b"no route", answer.payload)
+        self.assertEqual(self.refused("not_found"), before + 3)
 
     def test_too_many_requests(self):
         client = Client(self, self.hub).join()
