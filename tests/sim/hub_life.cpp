@@ -150,6 +150,14 @@ void HubLife::tick() {
   if (garbage && !conductor_.has_garbage()) setting_.census.add(Happening::garbage_freed);
 }
 
+bool HubLife::serve_watches() {
+  shards_.forget_sent();
+  const bool more = conductor_.serve_watches(setting_.agenda.now_ms());
+  trace_sent();
+  checks_.after_step(setting_.agenda.now_ms());
+  return more;
+}
+
 void HubLife::drain() {
   shards_.forget_sent();
   conductor_.drain();

@@ -35,6 +35,9 @@ class HubLife {
   void take_event(std::size_t shard);
   void tick();
   void drain();
+  /// A piece of what those who watch are to be told. True: there is more.
+  bool serve_watches();
+  [[nodiscard]] bool is_watched() const { return conductor_.watches().size() > 0; }
 
   [[nodiscard]] hub::Conductor& conductor() { return conductor_; }
   [[nodiscard]] SimShards& shards() { return shards_; }

@@ -116,8 +116,10 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   session.description = hello.hello.description;
   session.place = hello.place;
   session.token_name = session.name;
-  past_.tokens[attach.welcome.token] = {index, session.number, session.name, hello.identity,
-                                        hello.wall + milliseconds{limits_.token_ms}};
+  session.identity = hello.identity;
+  session.token_expiry = hello.wall + milliseconds{limits_.token_ms};
+  session.watches.clear();
+  past_.tokens[attach.welcome.token] = {index, session.number, session.name, session.identity, session.token_expiry};
   session.connected = true;
   ++session.attachment;
   require(attach.welcome.node == attach.node && attach.welcome.name == session.name, Checker::names,
@@ -199,7 +201,7 @@ void Model::take_name(std::uint32_t index, const std::string& name, milliseconds
     names_.erase(session.name);
   }
   session.name = name;
-  names_[name] = index;
+  if (!name.empty()) names_[name] = index;
 }
 
 void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
@@ -221,6 +223,7 @@ void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
     session.last_goodbye = static_cast<std::uint16_t>(event.code);
   }
   session.connected = false;
+  session.watches.clear();
   session.away_until = now + milliseconds{limits_.grace_ms};
   session.away_order = ++orders_;
 }

@@ -69,6 +69,9 @@ class Model final : public Witness {
     std::string description;
     std::string place;
     std::string token_name;  ///< for which its last token was given
+    std::string identity;
+    milliseconds token_expiry{};  ///< since 1970
+    std::set<std::uint32_t> watches;
     bool came_back = false;
     milliseconds joined{};
     milliseconds away_until{};     ///< while it is not connected
@@ -177,6 +180,11 @@ class Model final : public Witness {
   void judge_names(const Asked& asked, std::uint16_t operation);
   void judge_services(const Asked& asked, std::uint16_t operation);
   void judge_control(const Asked& asked, std::uint16_t operation);
+  void judge_register(const Asked& asked);
+  void judge_unregister(const Asked& asked);
+  void judge_watch(const Asked& asked);
+  void judge_unwatch(const Asked& asked);
+  void renamed(const Asked& asked, const std::string& name, const std::vector<std::byte>& token);
   void judge_list(const Asked& asked);
   void judge_service_list(const Asked& asked);
   void judge_connections(const Asked& asked);

@@ -2,6 +2,8 @@
 
 #include "proto/control/ctrl.hpp"
 #include "proto/control/names.hpp"
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
 #include "tests/sim/model.hpp"
 
 // What the answers to questions must say.
@@ -72,6 +74,10 @@ void Model::judge_names(const Asked& asked, std::uint16_t operation) {
     require_status(asked, Status::done, Checker::answers);
     require(proto::decode_answer<ns::ReverseAnswer>(asked.answer)->name == found->second.name, Checker::names,
             "REVERSE says another name than the node has");
+  } else if (operation == ns::RegisterName::kOperation) {
+    judge_register(asked);
+  } else if (operation == ns::UnregisterName::kOperation) {
+    judge_unregister(asked);
   } else if (operation == ns::List::kOperation) {
     judge_list(asked);
   } else {
@@ -91,6 +97,13 @@ void Model::judge_services(const Asked& asked, std::uint16_t operation) {
       return judge_unsubscribe(asked);
     case ns::Services::kOperation:
       return judge_service_list(asked);
+    case ns::Watch::kOperation:
+      return judge_watch(asked);
+    case ns::Unwatch::kOperation:
+      return judge_unwatch(asked);
+    case ns::WatchTaken::kOperation:
+      return require_status(asked, proto::decode<ns::WatchTaken>(asked.payload) ? Status::done : Status::bad_request,
+                            Checker::answers);
     default:
       census_.add(Happening::unknown_operation);
       require_status(asked, Status::not_supported, Checker::answers);

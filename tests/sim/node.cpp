@@ -59,6 +59,7 @@ void SimNode::act() {
   }
   if (faulty() && break_something()) return;
   if (!link().welcomed || now > around_.setting.plan.end - kQuietEnd) return;
+  say_taken();
   for (std::uint64_t count = around_.setting.random.between(1, 3); count > 0; --count) ask_something();
 }
 
@@ -159,6 +160,8 @@ void SimNode::lose_connection() {
     // It may have subscribed to something and does not know it.
     forgot_ = forgot_ || !link().open.empty();
     links_.erase(wire_->number);
+    watches_ = false;
+    untaken_ = 0;
   }
   wire_ = nullptr;
 }
@@ -172,10 +175,14 @@ void SimNode::forget_life() {
   provides_.clear();
   subscribes_.clear();
   known_.clear();
+  view_ = {};
+  wants_watch_ = false;
 }
 
 void SimNode::dial() {
   forgot_ = forgot_ || waits_for_answers();
+  watches_ = false;
+  untaken_ = 0;
   wire_ = around_.network.dial(number_);
   links_[wire_->number].wire = wire_;
   std::string identity = identity_;
@@ -305,6 +312,7 @@ void SimNode::declare_again() {
     }
     ask(ns::Subscribe{full_name}, about(full_name));
   }
+  if (wants_watch_) watch();
 }
 
 void SimNode::learn(NodeId node) {

@@ -12,6 +12,7 @@
 #include "proto/frame/frame_header.hpp"
 #include "tests/sim/checker.hpp"
 #include "tests/sim/network.hpp"
+#include "tests/sim/watch_view.hpp"
 
 namespace gimnet::sim {
 
@@ -47,6 +48,8 @@ class SimNode {
   };
   [[nodiscard]] const std::map<std::string, Provided>& provides() const { return provides_; }  ///< by service
   [[nodiscard]] const std::map<std::string, GroupId>& subscribes() const { return subscribes_; }
+  /// What it knows by watching; nullptr if it does not watch.
+  [[nodiscard]] const WatchView* view() const { return watches_ ? &view_ : nullptr; }
 
  private:
   /// A request that is not answered yet.
@@ -91,6 +94,11 @@ class SimNode {
   void advertise(const std::string& service, bool anew);
   void send_something();
   void declare_again();
+  void watch_or_rename(std::uint64_t choice);
+  void watch();
+  void say_taken();
+  void on_own_name(const Open& asked, std::span<const std::byte> payload);
+  void on_watch_events(std::span<const std::byte> payload);
   template <class Message>
   void ask(const Message& message, Open open, proto::Kind kind = proto::Kind::ns) {
     Link& to = link();
@@ -132,7 +140,11 @@ class SimNode {
   Time not_before_{};          ///< it does not dial earlier
   std::vector<NodeId> known_;  ///< others that it has heard of
   std::set<std::uint32_t> known_groups_;
-  bool forgot_ = false;  ///< what it had subscribed to: the hub may send what it does not know
+  WatchView view_;
+  bool watches_ = false;       ///< the hub has granted it, on this connection
+  bool wants_watch_ = false;   ///< asked for it, and will again on the next one
+  std::uint32_t untaken_ = 0;  ///< WATCH_EVENTS that it has not said to have taken
+  bool forgot_ = false;        ///< what it had subscribed to: the hub may send what it does not know
 };
 
 }  // namespace gimnet::sim

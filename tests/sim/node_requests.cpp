@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "proto/control/ctrl.hpp"
+#include "proto/control/ns_watch.hpp"
 #include "tests/sim/node.hpp"
 #include "tests/sim/shards.hpp"
 
@@ -37,6 +38,7 @@ void SimNode::ask_something() {
   const std::uint64_t choice = random.below(100);
   if (choice < 25) return ask_about_names(choice);
   if (choice < 65) return change_services(choice);
+  if (choice < 72) return watch_or_rename(choice);
   send_something();
 }
 
@@ -145,6 +147,7 @@ void SimNode::on_control(Link& from, std::span<const std::byte> payload) {
   around_.setting.trace.note("node {a} has its answer to request {b}: {c}", number_, view->header.request,
                              static_cast<std::uint64_t>(proto::read_status(view->body).status));
   from.open.erase(asked);
+  if (!faulty()) say_taken();
   if (open.operation == 0) return;
   require(view->header.operation == (open.operation | proto::kAnswerBit), Checker::answers,
           "a node gets the answer to another request");
@@ -184,12 +187,15 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
       if (done) subscribes_.erase(asked.subject);
       break;
     default:
+      if (done) on_own_name(asked, payload);
       break;
   }
 }
 
 void SimNode::on_event(std::uint16_t operation, std::span<const std::byte> payload) {
-  if (operation == ns::ServiceMoved::kOperation) {
+  if (operation == ns::WatchEvents::kOperation) {
+    on_watch_events(payload);
+  } else if (operation == ns::ServiceMoved::kOperation) {
     const auto event = proto::decode<ns::ServiceMoved>(payload);
     require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
     known_groups_.insert(event->new_group.value());

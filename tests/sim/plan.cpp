@@ -26,6 +26,11 @@ void draw_limits(Random& random, Plan& plan) {
   limits.requests = random.between(4, 16);
   limits.services_per_node = random.between(2, 6);
   limits.subscriptions_per_node = random.between(2, 8);
+  limits.watches = random.between(1, 3);
+  limits.watches_per_node = random.between(1, 2);
+  const bool forgetful = random.chance(500);
+  limits.watch_changes = forgetful ? random.between(5, 100) : random.between(1'000, 3'000);
+  limits.scan_records = 64;
   limits.page_records = random.between(4, 40);
   // Half of the worlds have too small a hub.
   const bool crowded = random.chance(500);
@@ -57,7 +62,7 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.bad_token = sometimes(random, 200);
   plan.lost_token = sometimes(random, 500);
   plan.rename = sometimes(random, 150);
-  plan.slow_reader = sometimes(random, 200);
+  plan.slow_reader = sometimes(random, 400);
   plan.shard_pause = sometimes(random, 5);
   plan.conductor_pause = sometimes(random, 5);
   plan.disk_full = sometimes(random, 500);

@@ -79,6 +79,7 @@ void World::kill_hub() {
   newcomers_.clear();
   clock_.reset();
   clock_due_ = false;
+  watches_due_ = false;
   // What is still on its way to the old life finds its wires closed; the old shards stay until then.
   dead_.push_back(std::move(life_));
   begin_life(dead_.back()->model().past());
@@ -108,14 +109,16 @@ void World::want_conductor(Time delay) {
 }
 
 void World::conductor_turn() {
-  enum class Choice { clock, newcomer, event };
+  enum class Choice { clock, newcomer, event, watches };
   std::vector<Choice> choices;
   const std::vector<std::size_t> shards = life_->shards().with_events();
   if (clock_due_) choices.push_back(Choice::clock);
   if (!newcomers_.empty()) choices.push_back(Choice::newcomer);
   if (!shards.empty()) choices.push_back(Choice::event);
+  if (watches_due_) choices.push_back(Choice::watches);
   if (choices.empty()) return;
   ++steps_;
+  bool more_watching = life_->is_watched();
   switch (setting_.random.pick(choices)) {
     case Choice::clock:
       clock_due_ = false;
@@ -127,10 +130,16 @@ void World::conductor_turn() {
       break;
     case Choice::event:
       life_->take_event(setting_.random.pick(shards));
+      more_watching = life_->is_watched();
+      break;
+    case Choice::watches:
+      more_watching = life_->serve_watches();
       break;
   }
+  watches_due_ = more_watching;
   arm_clock();
-  if (choices.size() > 1 || !newcomers_.empty() || !life_->shards().with_events().empty()) want_conductor(Time{0});
+  if (choices.size() > 1 || watches_due_ || !newcomers_.empty() || !life_->shards().with_events().empty())
+    want_conductor(Time{0});
 }
 
 void World::admit() {
@@ -221,6 +230,7 @@ void World::require_agreed(const SimNode& node) const {
   if (session == model.sessions().end() || session->second.name != node.name()) {
     broken(Checker::convergence, "node " + std::to_string(index) + " believes that it is a member, and is not");
   }
+  if (node.view() != nullptr) node.view()->require_agreed(model);
   for (const auto& [service, provided] : node.provides()) {
     const Model::Topic* topic = model.topic(node.name() + "/" + service);
     const bool same = topic != nullptr && topic->service && topic->service->provider == index &&

@@ -66,6 +66,7 @@ class World {
   std::deque<HubLife::Newcomer> newcomers_;
   bool turn_due_ = false;
   bool clock_due_ = false;
+  bool watches_due_ = false;
   std::optional<Time> clock_;  ///< when the conductor wants to look at it
   std::uint64_t lives_ = 0;
   std::uint64_t sessions_ = 0;

@@ -1,0 +1,67 @@
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
+#include "tests/sim/node.hpp"
+
+// How a simulated node changes its own name, and watches everything.
+
+namespace gimnet::sim {
+
+namespace ns = proto::ns;
+
+namespace {
+constexpr std::uint32_t kWatch = 1;
+}  // namespace
+
+void SimNode::watch_or_rename(std::uint64_t choice) {
+  if (choice < 67) {
+    const std::string name = some_name();
+    return ask(ns::RegisterName{name}, about(name));
+  }
+  if (choice == 67) return ask(ns::UnregisterName{}, {});
+  if (choice == 68 && watches_) return ask(ns::Unwatch{kWatch}, {});
+  if (choice == 69) return ask(ns::Unwatch{kWatch + 5}, {});
+  if (!wants_watch_) watch();
+}
+
+void SimNode::watch() {
+  wants_watch_ = true;
+  ask(view_.request(kWatch), {});
+}
+
+/// Sooner or later, so that the hub holds changes back and has to begin again. Never a request too many.
+void SimNode::say_taken() {
+  if (untaken_ == 0 || !is_up() || link().open.size() >= around_.setting.plan.limits.requests) return;
+  ask(ns::WatchTaken{untaken_}, {});
+  untaken_ = 0;
+}
+
+void SimNode::on_own_name(const Open& asked, std::span<const std::byte> payload) {
+  if (asked.operation == ns::RegisterName::kOperation) {
+    const auto answer = proto::decode_answer<ns::RegisterNameAnswer>(payload);
+    if (answer->name != registered_) provides_.clear();
+    wish_ = registered_ = answer->name;
+    token_ = answer->token;
+  } else if (asked.operation == ns::UnregisterName::kOperation) {
+    provides_.clear();
+    wish_ = registered_ = "";
+    token_ = proto::decode_answer<ns::UnregisterNameAnswer>(payload)->token;
+  } else if (asked.operation == ns::Watch::kOperation) {
+    watches_ = true;
+    view_.granted(proto::decode_answer<ns::WatchAnswer>(payload)->snapshot);
+  } else if (asked.operation == ns::Unwatch::kOperation) {
+    watches_ = wants_watch_ = false;
+    view_ = {};
+  }
+}
+
+void SimNode::on_watch_events(std::span<const std::byte> payload) {
+  const auto events = proto::decode<ns::WatchEvents>(payload);
+  require(events.has_value(), Checker::events, "WATCH_EVENTS cannot be read");
+  ++untaken_;
+  if (!watches_ || events->watch != kWatch) return;
+  view_.take(*events, around_.setting.census);
+  const bool soon = around_.setting.random.chance(700);
+  if (soon || !faulty()) say_taken();
+}
+
+}  // namespace gimnet::sim
