@@ -35,7 +35,7 @@ def main() -> int:
         return 77
     for verdict in planted + again:
         print(verdict)
-    assert all(verdict.is_slower and verdict.change < 0.10 for verdict in planted), "the slow-down was not found"
+    assert all(verdict.is_slower and verdict.change < 0.20 for verdict in planted), "not found, or no twentieth any more"
     assert not any(verdict.is_slower or verdict.is_faster for verdict in again), "the same program counted differently"
     return 0
 

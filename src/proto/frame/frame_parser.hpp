@@ -54,6 +54,9 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
 /// frame that may_form_run() excludes is a run of its own. Of the rules of section 2 only the length is checked: the
 /// caller checks one header per run. REQUIRES: begin <= end.
 [[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end, std::uint32_t max_length) {
+#if defined(GIMNET_BUG_SLOW_PARSER)
+  asm volatile("nop\n\tnop\n\tnop\n\tnop");
+#endif
   const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
   if (available < kHeaderSize) return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize)};
   const FrameHeader header = load_header(begin);
@@ -63,9 +66,6 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   }
   std::size_t size = header.frame_size();
   std::uint32_t frames = 1;
-#if defined(GIMNET_BUG_SLOW_PARSER)
-  asm volatile("nop\n\tnop");
-#endif
   if (may_form_run(header)) {
     const auto addresses = load_le<std::uint64_t>(begin + 4);
     const auto attributes = load_le<std::uint32_t>(begin + 12);
