@@ -299,7 +299,32 @@ void Conductor::carry_out_one(const ServiceMovedDue& effect) {
   event.message_type = effect.message_type;
   event.instance = effect.instance;
   event.delivery = static_cast<ns::Delivery>(effect.delivery);
+  event.window = effect.window;
+  event.retain = effect.retain;
   send_event(*session, proto::encode(event));
+}
+
+void Conductor::carry_out_one(const PaceDue& effect) {
+  const Session* session = membership_.sessions().find(effect.subscriber);
+  if (session == nullptr) return;
+  const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
+  wiring_.shards.send(
+      session->place.shard,
+      PaceCommand{ref_of(session->place), make_id<GroupId>(facts_.id, effect.group), terms, effect.retained});
+}
+
+void Conductor::carry_out_one(const PaceEnded& effect) {
+  const Session* session = membership_.sessions().find(effect.subscriber);
+  if (session == nullptr) return;  // its subscriptions end with it
+  wiring_.shards.send(
+      session->place.shard,
+      EndPaceCommand{ref_of(session->place), make_id<GroupId>(facts_.id, effect.group), effect.group_gone});
+}
+
+void Conductor::carry_out_one(const RetainedDropped& effect) {
+  const Session* session = membership_.sessions().find(effect.provider);
+  if (session == nullptr) return;  // what its shard keeps of it ends with it
+  wiring_.shards.send(session->place.shard, ForgetRetainedCommand{make_id<GroupId>(facts_.id, effect.group)});
 }
 
 void Conductor::carry_out_one(const SubscriberDue& effect) {

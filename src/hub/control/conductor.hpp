@@ -84,6 +84,9 @@ class Conductor {
   void carry_out_one(const GroupChanged& effect);
   void carry_out_one(const SessionEnded& effect);
   void carry_out_one(const ServiceMovedDue& effect);
+  void carry_out_one(const PaceDue& effect);
+  void carry_out_one(const PaceEnded& effect);
+  void carry_out_one(const RetainedDropped& effect);
   void carry_out_one(const SubscriberDue& effect);
   void carry_out_one(const CloseDue& effect);
   void carry_out_one(const StateDue& effect);

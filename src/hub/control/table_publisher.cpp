@@ -24,10 +24,14 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     members = std::make_unique<GroupMembers>();
     members->provider = make_id<NodeId>(hub_, topic->service->provider);
     members->by_shard.resize(shards_);
+    members->retain = topic->service->terms.retain;
     for (const std::uint32_t subscriber : topic->subscribers) {
       const Session* session = membership.sessions().find(subscriber);
       GIMNET_CHECK(session != nullptr);
-      members->by_shard[session->place.shard.value()].push_back({session->place.slot, session->place.generation});
+      const bool paced = topic->pace_of(subscriber).has_value();
+      if (paced) members->paced_by_shard.resize(shards_);
+      auto& by_shard = paced ? members->paced_by_shard : members->by_shard;
+      by_shard[session->place.shard.value()].push_back({session->place.slot, session->place.generation});
     }
   }
   static_cast<void>(tables_.groups.exchange(index, members.get()));

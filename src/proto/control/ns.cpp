@@ -168,6 +168,8 @@ void Advertise::write(bitestream::Writer& writer) const {
   put_choice(writer, 7, delivery);
   put_clean_text(writer, 8, metadata, kMetadataBytesMax);
   if (former_group.value() != 0) writer.put_u32(9, former_group.value());
+  if (window != 0) writer.put_u32(10, window);
+  if (retain) writer.put_bool(11, retain);
 }
 Advertise Advertise::read(Fields& fields) {
   Advertise advertise;
@@ -175,9 +177,11 @@ Advertise Advertise::read(Fields& fields) {
   advertise.message_type = fields.number<std::uint32_t>(4, "message type", 0);
   advertise.instance = fields.number<std::uint32_t>(5, "instance", 0);
   advertise.direction = read_known_choice(fields, 6, "direction", Direction::accepts);
-  advertise.delivery = read_known_choice(fields, 7, "delivery", Delivery::latest);
+  advertise.delivery = read_known_choice(fields, 7, "delivery", Delivery::sync);
   advertise.metadata = fields.text(8, "metadata", kMetadataBytesMax);
   advertise.former_group = read_id<GroupId>(fields, 9, "former group id");
+  advertise.window = fields.number<std::uint32_t>(10, "window", 0);
+  advertise.retain = fields.flag(11, "retain", false);
   return advertise;
 }
 
@@ -221,6 +225,8 @@ void write_record(bitestream::Writer& writer, const ServiceRecord& record) {
   put_clean_text(writer, 8, record.metadata, kMetadataBytesMax);
   writer.put_u32(9, record.subscribers);
   put_clean_text(writer, 10, record.hub_name, kNameBytesMax);
+  if (record.window != 0) writer.put_u32(11, record.window);
+  if (record.retain) writer.put_bool(12, record.retain);
 }
 ServiceRecord read_service_record(Fields& fields) {
   ServiceRecord service;
@@ -234,6 +240,8 @@ ServiceRecord read_service_record(Fields& fields) {
   service.metadata = fields.text(8, "metadata", kMetadataBytesMax);
   service.subscribers = fields.number<std::uint32_t>(9, "number of subscribers", 0);
   service.hub_name = fields.text(10, "hub name", kNameBytesMax);
+  service.window = fields.number<std::uint32_t>(11, "window", 0);
+  service.retain = fields.flag(12, "retain", false);
   return service;
 }
 
@@ -252,14 +260,28 @@ ServicesAnswer ServicesAnswer::read(Fields& fields) {
   return answer;
 }
 
-void Subscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
-Subscribe Subscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
+void Subscribe::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kSentenceBytesMax);
+  if (window != 0) writer.put_u32(4, window);
+  if (depth != 1) writer.put_u32(5, depth);
+  if (rate_hz != 0.0) writer.put_f64(6, rate_hz);
+}
+Subscribe Subscribe::read(Fields& fields) {
+  Subscribe subscribe;
+  subscribe.name = read_name(fields, 3, "full service name");
+  subscribe.window = fields.number<std::uint32_t>(4, "window", 0);
+  subscribe.depth = fields.number<std::uint32_t>(5, "depth", 1);
+  subscribe.rate_hz = fields.number<double>(6, "maximal rate", 0.0);
+  return subscribe;
+}
 
 void SubscribeAnswer::write(bitestream::Writer& writer) const {
   writer.put_u32(3, group.value());
   writer.put_u32(4, message_type);
   writer.put_u32(5, instance);
   put_choice(writer, 7, delivery);
+  if (window != 0) writer.put_u32(8, window);
+  if (retain) writer.put_bool(9, retain);
 }
 SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   SubscribeAnswer answer;
@@ -267,6 +289,8 @@ SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   answer.message_type = fields.number<std::uint32_t>(4, "message type", 0);
   answer.instance = fields.number<std::uint32_t>(5, "instance", 0);
   answer.delivery = read_choice<Delivery>(fields, 7, "delivery");
+  answer.window = fields.number<std::uint32_t>(8, "window", 0);
+  answer.retain = fields.flag(9, "retain", false);
   return answer;
 }
 
@@ -280,6 +304,8 @@ void ServiceMoved::write(bitestream::Writer& writer) const {
   writer.put_u32(6, message_type);
   writer.put_u32(7, instance);
   put_choice(writer, 8, delivery);
+  if (window != 0) writer.put_u32(9, window);
+  if (retain) writer.put_bool(10, retain);
 }
 ServiceMoved ServiceMoved::read(Fields& fields) {
   ServiceMoved moved;
@@ -289,6 +315,8 @@ ServiceMoved ServiceMoved::read(Fields& fields) {
   moved.message_type = fields.number<std::uint32_t>(6, "message type", 0);
   moved.instance = fields.number<std::uint32_t>(7, "instance", 0);
   moved.delivery = read_choice<Delivery>(fields, 8, "delivery");
+  moved.window = fields.number<std::uint32_t>(9, "window", 0);
+  moved.retain = fields.flag(10, "retain", false);
   return moved;
 }
 

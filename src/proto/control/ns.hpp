@@ -48,7 +48,7 @@ inline constexpr std::size_t kRequestsEnd = 32;
 [[nodiscard]] const char* operation_name(std::uint16_t operation);
 
 enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
-enum class Delivery : std::uint8_t { stream = 0, latest = 1 };
+enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// Records of one page, if the request does not say.
 inline constexpr std::uint32_t kPageRecordsDefault = 256;
@@ -146,7 +146,9 @@ struct Advertise {
   Direction direction = Direction::provides;
   Delivery delivery = Delivery::stream;
   std::string metadata;
-  GroupId former_group;  ///< from before a reconnect; 0: none
+  GroupId former_group;      ///< from before a reconnect; 0: none
+  std::uint32_t window = 0;  ///< n of delivery sync(n)
+  bool retain = false;       ///< the hub keeps the last message for new subscribers
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Advertise read(Fields& fields);
   friend bool operator==(const Advertise&, const Advertise&) = default;
@@ -203,6 +205,8 @@ struct ServiceRecord {
   std::string metadata;
   std::uint32_t subscribers = 0;
   std::string hub_name;
+  std::uint32_t window = 0;  ///< n of delivery sync(n)
+  bool retain = false;
   friend bool operator==(const ServiceRecord&, const ServiceRecord&) = default;
 };
 /// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.
@@ -226,6 +230,9 @@ struct Subscribe {
   static constexpr std::uint16_t kOperation = request_of(Operation::subscribe);
   static constexpr const char* kName = "SUBSCRIBE";
   std::string name;
+  std::uint32_t window = 0;  ///< of a service with sync(n): at most so many uncredited, n at most; 0: n
+  std::uint32_t depth = 1;   ///< newest messages that the hub holds for it
+  double rate_hz = 0.0;      ///< messages a second at most; 0: no bound
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Subscribe read(Fields& fields);
   friend bool operator==(const Subscribe&, const Subscribe&) = default;
@@ -238,6 +245,8 @@ struct SubscribeAnswer {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
+  std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
+  bool retain = false;
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static SubscribeAnswer read(Fields& fields);
   friend bool operator==(const SubscribeAnswer&, const SubscribeAnswer&) = default;
@@ -272,6 +281,8 @@ struct ServiceMoved {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
+  std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
+  bool retain = false;
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServiceMoved read(Fields& fields);
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;

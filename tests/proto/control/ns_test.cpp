@@ -30,6 +30,18 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/services", 6, Services{});
   expect_request("ns/subscribe", 7, Subscribe{"robot/odom"});
   expect_answer("ns/subscribe_answer", 7, SubscribeAnswer{kGroup, 3, 1, Delivery::latest});
+  Advertise offer;
+  offer.service = "map";
+  offer.message_type = 3;
+  offer.delivery = Delivery::sync;
+  offer.window = 2;
+  offer.retain = true;
+  expect_request("ns/advertise_sync", 12, offer);
+  expect_request("ns/subscribe_paced", 13, Subscribe{"robot/map", 1, 3, 2.5});
+  SubscribeAnswer paced{kGroup, 3, 0, Delivery::sync};
+  paced.window = 1;
+  paced.retain = true;
+  expect_answer("ns/subscribe_paced_answer", 13, paced);
   expect_request("ns/unsubscribe", 8, Unsubscribe{"robot/odom"});
   expect_answer("ns/unsubscribe_answer", 8, UnsubscribeAnswer{});
 }
@@ -74,7 +86,7 @@ TEST(NsMessages, BoundNames) {
 TEST(NsMessages, RefuseAChoiceThatAHubDoesNotKnow) {
   bitestream::Writer body;
   body.put_text(3, "odom");
-  body.put_u8(7, 2);
+  body.put_u8(7, 3);
   const auto advertise = decode<Advertise>(assemble_control({Advertise::kOperation, 1}, body));
   ASSERT_FALSE(advertise);
   EXPECT_EQ(advertise.error().sentence, "ADVERTISE has an unknown delivery");

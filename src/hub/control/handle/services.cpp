@@ -1,5 +1,8 @@
 #include "hub/control/handle/services.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/log.hpp"
 #include "hub/control/state/records.hpp"
 #include "proto/control/names.hpp"
@@ -17,6 +20,49 @@ GroupId group_id(const HandlerContext& context, std::uint32_t index) {
   return make_id<GroupId>(context.facts.id, index);
 }
 
+proto::Refusal out_of_range(std::string_view what, const std::string& range, std::string_view limit) {
+  return proto::Refusal{Status::limit, std::string{what} + " must be " + range + "; the hub's --limit " +
+                                           std::string{limit} + " bounds it"};
+}
+
+/// What is wrong with how a service wants to be delivered.
+std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer) {
+  const bool counted = offer.delivery == ns::Delivery::sync;
+  if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) {
+    return proto::Refusal{Status::bad_request,
+                          "a service that accepts data has no subscribers: leave out delivery sync(n) and retain"};
+  }
+  if (!counted && offer.window != 0) {
+    return proto::Refusal{Status::bad_request, "a window belongs to delivery sync(n): leave one of them out"};
+  }
+  if (counted && offer.window > limits.sync_window) {
+    return out_of_range("n of delivery sync(n)", "1 to " + std::to_string(limits.sync_window), "sync_window");
+  }
+  return std::nullopt;
+}
+
+Result<SubscriberTerms, proto::Refusal> terms_of(const Limits& limits, const ns::Subscribe& wanted) {
+  constexpr double kRateMin = 0.001;
+  if (wanted.window > limits.sync_window) {
+    return out_of_range("the window of a subscription", "1 to " + std::to_string(limits.sync_window), "sync_window");
+  }
+  if (wanted.depth < 1 || wanted.depth > limits.subscription_depth) {
+    return out_of_range("the depth of a subscription", "1 to " + std::to_string(limits.subscription_depth),
+                        "subscription_depth");
+  }
+  const auto rate_max = static_cast<double>(limits.subscription_rate_hz);
+  // Not a number is neither.
+  if (wanted.rate_hz != 0.0 && !(wanted.rate_hz >= kRateMin && wanted.rate_hz <= rate_max)) {
+    return out_of_range("the maximal rate of a subscription",
+                        "0.001 to " + std::to_string(limits.subscription_rate_hz) + " Hz", "subscription_rate_hz");
+  }
+  SubscriberTerms terms;
+  terms.window = wanted.window;
+  terms.depth = wanted.depth;
+  if (wanted.rate_hz != 0.0) terms.interval_us = static_cast<std::uint32_t>(std::ceil(1e6 / wanted.rate_hz));
+  return terms;
+}
+
 Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, const Session& session,
                                                       const ns::Advertise& offer) {
   if (session.name.empty()) {
@@ -27,12 +73,15 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
     return proto::Refusal{Status::bad_request, "'" + escaped(offer.service, kQuotedMax) +
                                                    "' is no name of a service: one part of A-Z a-z 0-9 . _ -"};
   }
+  if (auto refusal = fault_of(context.limits, offer)) return *refusal;
   ServiceTerms terms;
   terms.message_type = offer.message_type;
   terms.instance = offer.instance;
   terms.direction = static_cast<std::uint8_t>(offer.direction);
   terms.delivery = static_cast<std::uint8_t>(offer.delivery);
   terms.metadata = offer.metadata;
+  terms.window = offer.delivery == ns::Delivery::sync ? std::max(1u, offer.window) : 0;
+  terms.retain = offer.retain;
   const std::string full_name = proto::join_service_name(session.name, offer.service);
   // Only a session that came back had a group before; to anybody else it would be a way to pick one.
   const std::uint32_t former = session.came_back ? own_index(context.facts, offer.former_group).value_or(0) : 0;
@@ -90,7 +139,10 @@ proto::Payload handle_services(HandlerContext& context, const Request& request) 
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
   return answer_to<ns::Subscribe>(
       request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
-        const auto topic = context.membership.services().subscribe(request.session.index, wanted.name, context.effects);
+        const auto terms = terms_of(context.limits, wanted);
+        if (!terms) return terms.error();
+        const auto topic =
+            context.membership.services().subscribe(request.session.index, wanted.name, *terms, context.effects);
         if (!topic) return topic.error();
         ns::SubscribeAnswer answer;
         if (const std::optional<Service>& service = (*topic)->service) {
@@ -98,6 +150,8 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
           answer.message_type = service->terms.message_type;
           answer.instance = service->terms.instance;
           answer.delivery = static_cast<ns::Delivery>(service->terms.delivery);
+          answer.retain = service->terms.retain;
+          if (const auto pace = (*topic)->pace_of(request.session.index)) answer.window = pace->window;
         }
         return answer;
       });

@@ -42,6 +42,33 @@ struct ServiceMovedDue {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   std::uint8_t delivery = 0;
+  std::uint32_t window = 0;
+  bool retain = false;
+};
+/// What a subscriber asked for. 0: not.
+struct SubscriberTerms {
+  std::uint32_t window = 0;
+  std::uint32_t depth = 1;
+  std::uint32_t interval_us = 0;
+  friend bool operator==(const SubscriberTerms&, const SubscriberTerms&) = default;
+};
+/// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms` are in force.
+struct PaceDue {
+  std::uint32_t subscriber = 0;
+  std::uint32_t group = 0;
+  SubscriberTerms terms;
+  bool retained = false;  ///< it begins with the last message
+};
+/// A subscription that was paced ended; `group_gone`: so did the group.
+struct PaceEnded {
+  std::uint32_t subscriber = 0;
+  std::uint32_t group = 0;
+  bool group_gone = false;
+};
+/// A retained group is gone: its last message is kept no longer.
+struct RetainedDropped {
+  std::uint32_t provider = 0;
+  std::uint32_t group = 0;
 };
 /// Tell a provider that somebody came or went.
 struct SubscriberDue {
@@ -77,8 +104,8 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, SubscriberDue, CloseDue, StateDue,
-                            NameDecided, NodeNoted, ServiceNoted>;
+using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded,
+                            RetainedDropped, SubscriberDue, CloseDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

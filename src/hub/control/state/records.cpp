@@ -30,6 +30,8 @@ ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
   record.direction = static_cast<ns::Direction>(service.terms.direction);
   record.delivery = static_cast<ns::Delivery>(service.terms.delivery);
   record.metadata = service.terms.metadata;
+  record.window = service.terms.window;
+  record.retain = service.terms.retain;
   record.subscribers = static_cast<std::uint32_t>(topic.subscribers.size());
   record.hub_name = hub.name;
   return record;

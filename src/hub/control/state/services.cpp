@@ -5,6 +5,7 @@
 #include "base/check.hpp"
 #include "base/id_text.hpp"
 #include "proto/control/names.hpp"
+#include "proto/control/ns.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -30,12 +31,15 @@ ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t 
   event.message_type = service.terms.message_type;
   event.instance = service.terms.instance;
   event.delivery = service.terms.delivery;
+  event.retain = service.terms.retain;
   return event;
 }
 
 void tell_subscribers(const Topic& topic, ServiceMovedDue event, Effects& effects) {
   for (const std::uint32_t subscriber : topic.subscribers) {
     event.subscriber = subscriber;
+    const std::optional<SubscriberTerms> pace = event.new_group != 0 ? topic.pace_of(subscriber) : std::nullopt;
+    event.window = pace ? pace->window : 0;
     effects.emplace_back(event);
   }
 }
@@ -47,7 +51,7 @@ void note(ChangeKind kind, std::string_view full_name, const Service& service, E
 /// Do subscribers that know the one understand the other?
 bool same_stream(const ServiceTerms& a, const ServiceTerms& b) {
   return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
-         a.delivery == b.delivery;
+         a.delivery == b.delivery && a.window == b.window && a.retain == b.retain;
 }
 
 Failure bad_name(const char* fault) {
@@ -60,6 +64,17 @@ Failure limit_reached(std::string_view what, std::uint64_t limit, std::string_vi
 }
 
 }  // namespace
+
+std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
+  if (!service) return std::nullopt;
+  const auto asked = terms.find(subscriber);
+  SubscriberTerms pace = asked != terms.end() ? asked->second : SubscriberTerms{};
+  const bool counted = static_cast<proto::ns::Delivery>(service->terms.delivery) == proto::ns::Delivery::sync;
+  const std::uint32_t most = counted ? service->terms.window : 0;
+  pace.window = pace.window == 0 ? most : std::min(pace.window, most);
+  if (pace.window == 0 && pace.interval_us == 0 && !service->terms.retain) return std::nullopt;
+  return pace;
+}
 
 Services::Services(HubId hub, const Limits& limits, const IndexRange& groups)
     : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits), groups) {}
@@ -99,6 +114,7 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
     std::uint32_t old_group = 0;
     if (provided) {
       old_group = entry.service->group;
+      end_paces(entry, effects);
       groups_.erase(old_group);
       group_indices_.give_back(old_group, now);
     }
@@ -130,13 +146,14 @@ std::optional<Failure> Services::withdraw(std::uint32_t provider, std::uint32_t 
 }
 
 Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std::string_view full_name,
-                                                  Effects& effects) {
+                                                  const SubscriberTerms& terms, Effects& effects) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   Node& node = nodes_[node_index];
   const auto known = topics_.find(full_name);
   if (known != topics_.end()) {
     if (const auto old = find_topic(node.subscribes, known->second); old != node.subscribes.end()) {
       old->life = node.life;
+      change_terms(known->second, node_index, terms, effects);
       return &known->second;
     }
   }
@@ -148,8 +165,10 @@ Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std:
   node.subscribes.push_back({&entry, node.life});
   auto& list = entry.subscribers;
   list.insert(std::lower_bound(list.begin(), list.end(), node_index), node_index);
+  if (terms != SubscriberTerms{}) entry.terms[node_index] = terms;
   if (entry.service) {
     effects.emplace_back(GroupChanged{entry.service->group});
+    begin_pace(entry, node_index, effects);
     effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group, node_index,
                                        static_cast<std::uint32_t>(list.size()), true});
   }
@@ -253,11 +272,38 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
   }
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
   effects.emplace_back(GroupChanged{service.group});
+  for (const std::uint32_t subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
   note(ChangeKind::advertised, topic.full_name, service, effects);
+}
+
+void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects) {
+  const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
+  if (pace) effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain});
+}
+
+/// The topic's group is about to go.
+void Services::end_paces(const Topic& topic, Effects& effects) {
+  const Service& service = *topic.service;
+  for (const std::uint32_t subscriber : topic.subscribers) {
+    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, service.group, true});
+  }
+  if (service.terms.retain) effects.emplace_back(RetainedDropped{service.provider, service.group});
+}
+
+void Services::change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects) {
+  const std::optional<SubscriberTerms> before = topic.pace_of(subscriber);
+  topic.terms.erase(subscriber);
+  if (terms != SubscriberTerms{}) topic.terms[subscriber] = terms;
+  const std::optional<SubscriberTerms> after = topic.pace_of(subscriber);
+  if (before == after) return;
+  if (before.has_value() != after.has_value()) effects.emplace_back(GroupChanged{topic.service->group});
+  if (after) return begin_pace(topic, subscriber, effects);
+  effects.emplace_back(PaceEnded{subscriber, topic.service->group, false});
 }
 
 void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
   const Service service = *topic.service;
+  end_paces(topic, effects);
   topic.service.reset();
   groups_.erase(service.group);
   group_indices_.give_back(service.group, now);
@@ -270,6 +316,8 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
   auto& list = topic.subscribers;
   const auto place = std::lower_bound(list.begin(), list.end(), node);
   GIMNET_CHECK(place != list.end() && *place == node);
+  const bool paced = topic.pace_of(node).has_value();
+  topic.terms.erase(node);
 #ifdef GIMNET_BUG_LEFT_COUNTS_ITSELF
   const auto number = static_cast<std::uint32_t>(list.size());
   list.erase(place);
@@ -281,6 +329,7 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
 #ifndef GIMNET_BUG_LEFT_NOT_PUBLISHED
     effects.emplace_back(GroupChanged{topic.service->group});
 #endif
+    if (paced) effects.emplace_back(PaceEnded{node, topic.service->group, false});
     effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node, number, false});
   }
   forget_if_unused(topic);

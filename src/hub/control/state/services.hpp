@@ -28,6 +28,8 @@ struct ServiceTerms {
   std::uint8_t direction = 0;
   std::uint8_t delivery = 0;
   std::string metadata;
+  std::uint32_t window = 0;  ///< of sync(n)
+  bool retain = false;
 };
 
 struct Service {
@@ -40,7 +42,11 @@ struct Service {
 struct Topic {
   std::string_view full_name;
   std::optional<Service> service;
-  std::vector<std::uint32_t> subscribers;  ///< node indices, ascending
+  std::vector<std::uint32_t> subscribers;                    ///< node indices, ascending
+  std::unordered_map<std::uint32_t, SubscriberTerms> terms;  ///< of those that asked for something
+
+  /// What the shards hold that subscriber to; nothing if it simply gets everything.
+  [[nodiscard]] std::optional<SubscriberTerms> pace_of(std::uint32_t subscriber) const;
 };
 
 /// Services and subscriptions by full name; each service owns a group. Nodes are named by index, and what a node
@@ -66,7 +72,12 @@ class Services {
                                                 std::chrono::milliseconds now, Effects& effects);
   /// The topic, with or without a service yet. Errors: bad_request, limit.
   [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
-                                                        Effects& effects);
+                                                        const SubscriberTerms& terms, Effects& effects);
+  /// The same for all that comes.
+  [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
+                                                        Effects& effects) {
+    return subscribe(node, full_name, SubscriberTerms{}, effects);
+  }
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<Failure> unsubscribe(std::uint32_t node, std::string_view full_name, Effects& effects);
 
@@ -111,6 +122,9 @@ class Services {
   void forget_if_unused(Topic& topic);
   void forget_if_idle(std::uint32_t node);
   void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
+  static void end_paces(const Topic& topic, Effects& effects);
+  static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
+  void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects);
   void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
   void remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects);
 

@@ -43,6 +43,47 @@ TEST_F(ServiceRequestsTest, ANodeWithoutANameCannotAdvertise) {
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(nobody, ns::Advertise{.service = "odom"}).error().status, Status::bad_request);
 }
 
+TEST_F(ServiceRequestsTest, SyncAndRetainAreShownAndKeptToTheirLimits) {
+  const Node robot = join("robot");
+  ns::Advertise offer{.service = "map", .delivery = ns::Delivery::sync, .window = 1024, .retain = true};
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  const auto listed = ask<ns::ServicesAnswer>(robot, ns::Services{});
+  ASSERT_TRUE(listed);
+  EXPECT_EQ(listed->services[0].window, 1024u);
+  EXPECT_TRUE(listed->services[0].retain);
+  offer.window = 1025;
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::limit);
+  offer.delivery = ns::Delivery::stream;
+  offer.window = 1;
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
+  const ns::Advertise accepts{.service = "drive", .direction = ns::Direction::accepts, .retain = true};
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, accepts).error().status, Status::bad_request);
+}
+
+TEST_F(ServiceRequestsTest, ASubscriberMayWantLess) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  const auto wants = [&](ns::Subscribe wanted) {
+    wanted.name = "robot/map";
+    return ask<ns::SubscribeAnswer>(viewer, wanted);
+  };
+  EXPECT_EQ(wants({.window = 2})->window, 0u) << "nobody provides it yet";
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(
+      robot, ns::Advertise{.service = "map", .delivery = ns::Delivery::sync, .window = 4, .retain = true}));
+  EXPECT_EQ(wants({})->window, 4u);
+  EXPECT_EQ(wants({.window = 3})->window, 3u);
+  EXPECT_EQ(wants({.window = 1024, .depth = 64, .rate_hz = 1000.0})->window, 4u) << "at most what the service allows";
+  EXPECT_TRUE(wants({})->retain);
+  for (const ns::Subscribe& wrong :
+       {ns::Subscribe{.window = 1025}, ns::Subscribe{.depth = 0}, ns::Subscribe{.depth = 65},
+        ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = 0.0009}, ns::Subscribe{.rate_hz = -1.0}}) {
+    const auto answer = wants(wrong);
+    ASSERT_FALSE(answer);
+    EXPECT_EQ(answer.error().status, Status::limit);
+    EXPECT_NE(answer.error().sentence.find("must be"), std::string::npos);
+  }
+}
+
 TEST_F(ServiceRequestsTest, BadTermsAreRefused) {
   const Node robot = join("robot");
   for (const char* name : {"a/b", "", "a b", "*"}) {
@@ -53,7 +94,7 @@ TEST_F(ServiceRequestsTest, BadTermsAreRefused) {
   const auto direction = static_cast<ns::Direction>(2);
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .direction = direction}).error().status,
             Status::bad_request);
-  const auto delivery = static_cast<ns::Delivery>(2);
+  const auto delivery = static_cast<ns::Delivery>(3);
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .delivery = delivery}).error().status,
             Status::bad_request);
 }

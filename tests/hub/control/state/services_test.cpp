@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/control/ns.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -35,6 +37,15 @@ std::vector<std::string> words(const Effects& effects) {
     } else if (const auto* change = std::get_if<SubscriberDue>(&effect)) {
       result.push_back((change->joined ? "joined " : "left ") + std::to_string(change->subscriber) + " of " +
                        std::to_string(change->group) + ": " + std::to_string(change->subscribers_now));
+    } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
+      result.push_back("pace " + std::to_string(pace->subscriber) + " of " + std::to_string(pace->group) + ": " +
+                       std::to_string(pace->terms.window) + "/" + std::to_string(pace->terms.depth) +
+                       (pace->retained ? " retained" : ""));
+    } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
+      result.push_back("no pace " + std::to_string(ended->subscriber) + " of " + std::to_string(ended->group) +
+                       (ended->group_gone ? ", gone" : ""));
+    } else if (const auto* forgotten = std::get_if<RetainedDropped>(&effect)) {
+      result.push_back("forget " + std::to_string(forgotten->group));
     } else if (!std::holds_alternative<ServiceNoted>(effect)) {  // those are for watches_test.cpp
       result.emplace_back("other");
     }
@@ -248,6 +259,42 @@ TEST_F(ServicesTest, AGroupIdRestsBeforeItComesAgain) {
   advertise(kRobot, "robot/odom");
   EXPECT_FALSE(services_.withdraw(kRobot, 1, now_, effects_));
   EXPECT_EQ(advertise(kRobot, "robot/odom"), 2u);
+}
+
+ServiceTerms map_in_sync() {
+  ServiceTerms terms;
+  terms.delivery = static_cast<std::uint8_t>(proto::ns::Delivery::sync);
+  terms.window = 4;
+  terms.retain = true;
+  return terms;
+}
+
+TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
+  const SubscriberTerms wanted{.window = 2, .depth = 3};
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
+  EXPECT_THAT(take_words(), IsEmpty()) << "nobody provides it yet";
+  EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), 1u);
+  EXPECT_THAT(take_words(), ElementsAre("moved 2: 0->1", "group 1", "pace 2 of 1: 2/3 retained"));
+  EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 3 of 1: 4/1 retained", "joined 3 of 1: 2"));
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
+  EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", {.window = 9}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 4/1 retained")) << "at most what the service allows";
+  EXPECT_FALSE(services_.unsubscribe(kLogger, "robot/map", effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 3 of 1", "left 3 of 1: 1"));
+  EXPECT_FALSE(services_.withdraw(kRobot, 1, now_, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("no pace 2 of 1, gone", "forget 1", "group 1", "moved 2: 1->0"));
+}
+
+TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "group 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 2 of 1: 0/1"));
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1"));
 }
 
 }  // namespace
