@@ -54,6 +54,8 @@ class Witness final : public InboundHost {
     note("tell " + std::to_string(to) + " " + std::to_string(taken.message) + " " + std::to_string(taken.taken) + " " +
          std::to_string(taken.allowed));
   }
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group & 1; }
+  void on_message_lost(std::uint32_t) override {}
   void deliver(std::span<const Item> items) override {
     for (const Item& item : items) {
       nif_incoming in = incoming_of(item);

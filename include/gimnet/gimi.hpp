@@ -207,7 +207,7 @@ class Node {
   /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name is the same one.
   /// Errors: bad_name, limit, denied, timeout, not_connected.
   Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
-                                  Timeout timeout = Timeout{5000}) const;
+                                  Timeout timeout = Timeout{5000}, const PaceOptions& pace = {}) const;
 
   // ---- asking
 

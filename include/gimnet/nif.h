@@ -128,6 +128,9 @@ typedef struct nif_options {
    *  user's runtime folder while the node lives, so that the program has its id and name again at once when it crashed
    *  and is started anew (docs/nif.md, "Tokens"). Where the file cannot be had the node is connected all the same. */
   uint8_t no_token_file;
+  /** A message of a service with delivery sync(n) counts as taken when nif_receive() gave it out or the callback took
+   *  it. Not 0: only nif_credit() says so, but for what the callback answered NIF_DONE to. */
+  uint8_t credit_by_program;
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.
@@ -311,6 +314,7 @@ typedef struct nif_incoming {
   uint32_t message_type;
   uint32_t instance;
   uint32_t delivery;
+  uint32_t epoch;   /**< Of a GROUP message that counts in a window: for nif_credit(); else 0. */
   const char* text; /**< NUL-terminated, never NULL. Valid until: nif_release(). */
   void* storage;    /**< The library's; do not touch. */
 } nif_incoming;

@@ -46,7 +46,9 @@ nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** l
 void nif_free_nodes(nif_node_list* list);
 
 typedef enum nif_direction { NIF_PROVIDES = 0, NIF_ACCEPTS = 1 } nif_direction;
-typedef enum nif_delivery { NIF_STREAM_DELIVERY = 0, NIF_LATEST_DELIVERY = 1 } nif_delivery;
+/** What a subscriber gets: every message; only the newest of those that wait; or, of sync(n), at most n that it has not
+ *  taken, its hub holding the newest for it. */
+typedef enum nif_delivery { NIF_STREAM_DELIVERY = 0, NIF_LATEST_DELIVERY = 1, NIF_SYNC_DELIVERY = 2 } nif_delivery;
 
 /** A service to advertise. Its full name is `node name/name`. */
 typedef struct nif_service {
@@ -57,6 +59,8 @@ typedef struct nif_service {
   uint8_t direction;    /**< nif_direction. */
   uint8_t delivery;     /**< nif_delivery. */
   const char* metadata; /**< For people and tools; may be NULL. */
+  uint32_t window;      /**< n of NIF_SYNC_DELIVERY, 0: 1. At most the hub's limit, 1,024 unless it was set. */
+  uint8_t retain;       /**< Not 0: the hub keeps the last message (1 MiB) and gives it to each new subscriber first. */
 } nif_service;
 
 /** Declares a service; stores its group id in *group and, if subscribers is not NULL, how many subscribers wait for it
@@ -80,6 +84,8 @@ typedef struct nif_service_record {
   const char* name; /**< Full name. */
   const char* metadata;
   const char* hub_name;
+  uint32_t window; /**< n of NIF_SYNC_DELIVERY. */
+  uint8_t retain;
 } nif_service_record;
 
 typedef struct nif_service_list {
@@ -97,11 +103,30 @@ typedef struct nif_subscription {
   uint32_t message_type;
   uint32_t instance;
   uint32_t delivery; /**< nif_delivery. */
+  uint32_t window;   /**< In force: messages that may be untaken; 0: any number. */
+  uint32_t retain;   /**< 1: the last message comes first. */
 } nif_subscription;
+
+/** How much of a service a subscriber wants. Members that are 0 ask for nothing. */
+typedef struct nif_pace {
+  size_t struct_size; /**< sizeof(nif_pace). */
+  uint32_t window;    /**< Of sync(n): fewer than n untaken messages. */
+  uint32_t depth;     /**< Newest messages that the hub holds meanwhile; 0: 1, always the latest. At most 64. */
+  double rate_hz;     /**< Messages a second at most, the newest at each due time: 0.001..1,000. */
+} nif_pace;
 
 /** Subscribes to a service by its full name; it need not exist yet. The library subscribes again after every reconnect.
  *  subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
 nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms);
+
+/** The same with a pace; NULL: none. Also NIF_LIMIT: a number beyond the hub's limit. */
+nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
+                               nif_subscription* subscription, int32_t timeout_ms);
+
+/** With nif_options.credit_by_program: the program took so many messages of the group that came with this
+ *  nif_incoming.epoch. The hub is told at once, or, with `more`, when half of the window was taken: more is waiting to
+ *  be taken anyway. An epoch of 0, an earlier one, and groups without a window are ignored. */
+nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more);
 
 /** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. */
 nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);

@@ -104,6 +104,8 @@ class Message {
   MessageKey key_;
   std::uint32_t sequence_ = 0;
   Lane lane_ = Lane::normal;
+  std::uint32_t group_ = 0;
+  std::uint32_t epoch_ = 0;  ///< of a message that counts in a window
 };
 
 }  // namespace gimnet

@@ -60,6 +60,14 @@ enum class AtFullWindow : std::uint8_t {
   hold_latest,  ///< keep this one, in place of one that is kept already, and send it when there is room
 };
 
+/// How much of a service a subscriber wants. The program takes a message when it fetches it from the queue, or when the
+/// queue overwrites it.
+struct PaceOptions {
+  std::uint32_t window = 0;  ///< of Delivery::sync: fewer untaken messages than the service allows; 0: as it allows
+  std::uint32_t depth = 1;   ///< newest messages that the hub holds meanwhile; 1: always the latest. At most 64
+  double rate_hz = 0.0;      ///< messages a second at most, the newest at each due time, 0.001..1,000; 0: no bound
+};
+
 struct SendOptions {
   MessageKey key;
   Lane lane = Lane::normal;
@@ -77,6 +85,9 @@ struct PublishOptions {
   Lane lane = Lane::normal;
   bool timestamp = true;
   std::string metadata;  ///< for people and tools
+  std::uint32_t window = 1;  ///< of Delivery::sync: messages that a subscriber may not have taken
+  /// The hub keeps the last message, up to 1 MiB, and gives it to each new subscriber first.
+  bool retain = false;
 };
 
 /// A service that takes data, such as commands.

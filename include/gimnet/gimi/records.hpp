@@ -11,9 +11,10 @@
 
 namespace gimnet {
 
-/// How a service's messages wait for a slow subscriber: `stream` all of them in order, the oldest going when the queue
-/// is full; `latest` only the newest.
-enum class Delivery : std::uint8_t { stream = 0, latest = 1 };
+/// What a subscriber gets: `stream` every message, in order, the oldest going when its queue at the hub is full;
+/// `latest` only the newest of those that wait; `sync` at most a window of messages that it has not taken, its hub
+/// holding the newest meanwhile, so that each subscriber gets fresh ones at its own rate.
+enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// A service gives data to its subscribers, or takes data that others send to it.
 enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
@@ -40,6 +41,8 @@ struct ServiceRecord {
   std::uint32_t subscribers = 0;
   std::string metadata;
   std::string hub_name;
+  std::uint32_t window = 0;  ///< of delivery sync
+  bool retain = false;       ///< a new subscriber gets the last message first
 };
 
 struct HubRecord {

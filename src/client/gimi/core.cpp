@@ -62,7 +62,11 @@ std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in
 }  // namespace
 
 Core::Core(const NodeOptions& options)
-    : inbox_(options.queue_messages, options.receive_bytes, [this] { static_cast<void>(nif_deliver(node())); }),
+    : inbox_(
+          options.queue_messages, options.receive_bytes, [this] { static_cast<void>(nif_deliver(node())); },
+          [this](const TakenMessages& taken, bool more) {
+            static_cast<void>(nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
+          }),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
       services_(uplink_, inbox_),
       clerk_(uplink_, streams_),
@@ -97,6 +101,7 @@ nif_status Core::connect(const NodeOptions& options) {
   how.socket_receive_bytes = options.socket_receive_bytes;
   how.callback = &Core::on_incoming;
   how.user = this;
+  how.credit_by_program = 1;
   nif_node* node = nullptr;
   const nif_status status = nif_connect(&how, &node);
   if (status != NIF_OK) return status;
@@ -225,6 +230,8 @@ nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView
 nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
   if (service == nullptr) return verdict_of(place);
+  // After a break the hub gives the last message of a retained service again: it does not know who had it.
+  if (service->is_repeated(in.from, view.header.sequence)) return NIF_DONE;
   Message message = MessageAccess::make(in, view, service->shared_name());
   if (!inbox_.put(service->queue(), message, nullptr)) {
     MessageAccess::disown(message);

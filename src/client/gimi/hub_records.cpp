@@ -53,6 +53,21 @@ Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& p
   return records;
 }
 
+namespace {
+
+Delivery delivery_of(std::uint8_t delivery) {
+  switch (delivery) {
+    case NIF_LATEST_DELIVERY:
+      return Delivery::latest;
+    case NIF_SYNC_DELIVERY:
+      return Delivery::sync;
+    default:
+      return Delivery::stream;
+  }
+}
+
+}  // namespace
+
 Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern, Timeout timeout) {
   nif_service_list* list = nullptr;
   const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
@@ -65,11 +80,13 @@ Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::str
                        Peer{found.node_id},
                        {found.message_type, found.instance},
                        found.direction == NIF_ACCEPTS ? Direction::accepts : Direction::provides,
-                       found.delivery == NIF_LATEST_DELIVERY ? Delivery::latest : Delivery::stream,
+                       delivery_of(found.delivery),
                        found.group,
                        found.subscribers,
                        found.metadata,
-                       found.hub_name});
+                       found.hub_name,
+                       found.window,
+                       found.retain != 0});
   }
   return records;
 }

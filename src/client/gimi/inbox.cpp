@@ -16,21 +16,21 @@ Failure none(Timeout timeout) {
 
 MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
   MessageQueue* found = nullptr;
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     const auto place = by_key_.find(key);
     if (place != by_key_.end()) {
       found = place->second;
       if (options != nullptr) found->set(*options);
-      room = is_room_wanted(*found);
+      news = news_of(*found);
     } else {
       const QueueOptions unasked{unasked_messages_, AtFullQueue::overwrite_oldest};
       found = &queues_.emplace_back(*this, options != nullptr ? *options : unasked, bytes_max_);
       by_key_.emplace(key, found);
     }
   }
-  tell_room(room);
+  tell(news);
   return *found;
 }
 
@@ -52,8 +52,14 @@ bool Inbox::push(MessageQueue& queue, Message& message, Receipt* receipt) {
 }
 
 bool Inbox::put(MessageQueue& queue, Message& message, Receipt* receipt) {
-  const MutexLock lock(mutex_);
-  return push(queue, message, receipt);
+  News news;
+  {
+    const MutexLock lock(mutex_);
+    if (!push(queue, message, receipt)) return false;
+    news.taken = queue.take_taken();
+  }
+  tell(news);
+  return true;
 }
 
 bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
@@ -81,6 +87,14 @@ std::uint64_t Inbox::dropped() {
   return dropped_;
 }
 
+Inbox::News Inbox::news_of(MessageQueue& queue) { return {is_room_wanted(queue), !queue.empty(), queue.take_taken()}; }
+
+void Inbox::tell(const News& news) const {
+  if (news.room) on_room_();
+  if (!on_taken_) return;
+  for (const TakenMessages& taken : news.taken) on_taken_(taken, news.more);
+}
+
 bool Inbox::is_room_wanted(const MessageQueue& queue) {
   if (refusing_ != &queue || queue.refuses() || !queue.wants_more()) return false;
   refusing_ = nullptr;
@@ -90,7 +104,7 @@ bool Inbox::is_room_wanted(const MessageQueue& queue) {
 Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   std::optional<Message> message;
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     while (queue.empty()) {
@@ -99,9 +113,9 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
       static_cast<void>(queue.filled().wait_until(mutex_, deadline));
     }
     message = queue.pop();
-    room = is_room_wanted(queue);
+    news = news_of(queue);
   }
-  tell_room(room);
+  tell(news);
   return std::move(*message);
 }
 
@@ -116,7 +130,7 @@ MessageQueue* Inbox::first_waiting() {
 Outcome<Message> Inbox::receive_any(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   std::optional<Message> message;
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     MessageQueue* queue = nullptr;
@@ -128,54 +142,54 @@ Outcome<Message> Inbox::receive_any(Timeout timeout) {
       --any_waiters_;
     }
     message = queue->pop();
-    room = is_room_wanted(*queue);
+    news = news_of(*queue);
   }
-  tell_room(room);
+  tell(news);
   return std::move(*message);
 }
 
 std::optional<Message> Inbox::try_receive(MessageQueue& queue) {
   std::optional<Message> message;
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     message = queue.pop();
-    room = is_room_wanted(queue);
+    news = news_of(queue);
   }
-  tell_room(room);
+  tell(news);
   return message;
 }
 
 std::optional<Message> Inbox::take_newest(MessageQueue& queue) {
   std::optional<Message> message;
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     message = queue.pop_newest();
-    room = is_room_wanted(queue);
+    news = news_of(queue);
   }
-  tell_room(room);
+  tell(news);
   return message;
 }
 
 void Inbox::set(MessageQueue& queue, const QueueOptions& options) {
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     queue.set(options);
-    room = is_room_wanted(queue);
+    news = news_of(queue);
   }
-  tell_room(room);
+  tell(news);
 }
 
 void Inbox::resize(MessageQueue& queue, std::size_t messages) {
-  bool room = false;
+  News news;
   {
     const MutexLock lock(mutex_);
     queue.resize(messages);
-    room = is_room_wanted(queue);
+    news = news_of(queue);
   }
-  tell_room(room);
+  tell(news);
 }
 
 Inbox::Counts Inbox::counts(MessageQueue& queue) {

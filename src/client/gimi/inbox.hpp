@@ -28,9 +28,15 @@ class Inbox {
   /// Keys for which nobody asked that get a queue.
   static constexpr std::size_t kUnaskedKeysMax = 1024;
 
-  /// `on_room` is called without a lock when a queue that refused has room again.
-  Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room)
-      : unasked_messages_(unasked_messages), bytes_max_(bytes_max), on_room_(std::move(on_room)) {}
+  /// Called without a lock. `more`: others wait in the same queue.
+  using OnTaken = std::function<void(const TakenMessages& taken, bool more)>;
+  /// `on_room` is called without a lock when a queue that refused has room again; `on_taken` with what went out of a
+  /// queue and counts in a window.
+  Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room, OnTaken on_taken = {})
+      : unasked_messages_(unasked_messages),
+        bytes_max_(bytes_max),
+        on_room_(std::move(on_room)),
+        on_taken_(std::move(on_taken)) {}
 
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
@@ -65,13 +71,19 @@ class Inbox {
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
-  void tell_room(bool wanted) const {
-    if (wanted) on_room_();
-  }
+  /// What a change of a queue has to be told, without the lock.
+  struct News {
+    bool room = false;
+    bool more = false;
+    std::vector<TakenMessages> taken;
+  };
+  [[nodiscard]] News news_of(MessageQueue& queue) GIMNET_REQUIRES(mutex_);
+  void tell(const News& news) const GIMNET_EXCLUDES(mutex_);
 
   const std::size_t unasked_messages_;
   const std::size_t bytes_max_;
   const std::function<void()> on_room_;
+  const OnTaken on_taken_;
 
   Mutex mutex_;
   Condition any_;

@@ -30,6 +30,8 @@ void Message::swap(Message& other) noexcept {
   std::swap(key_, other.key_);
   std::swap(sequence_, other.sequence_);
   std::swap(lane_, other.lane_);
+  std::swap(group_, other.group_);
+  std::swap(epoch_, other.epoch_);
 }
 
 Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageView& view,
@@ -45,6 +47,8 @@ Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageVi
   message.key_ = {key.type, key.instance};
   message.sequence_ = view.header.sequence;
   message.lane_ = static_cast<Lane>(in.lane);
+  message.group_ = in.to;
+  message.epoch_ = in.epoch;
   return message;
 }
 

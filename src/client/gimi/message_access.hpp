@@ -14,6 +14,9 @@ struct MessageAccess {
   /// Takes over the storage of `in`, which is released with the message.
   [[nodiscard]] static Message make(const nif_incoming& in, const proto::gimi::MessageView& view,
                                     std::shared_ptr<const std::string> service);
+  /// The group and epoch in which it counts; epoch 0: in none.
+  [[nodiscard]] static std::uint32_t group_of(const Message& message) { return message.group_; }
+  [[nodiscard]] static std::uint32_t epoch_of(const Message& message) { return message.epoch_; }
   /// Gives the storage back to who holds `in`.
   static void disown(Message& message) { message.storage_ = nullptr; }
 };

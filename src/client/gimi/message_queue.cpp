@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "client/gimi/message_access.hpp"
 
 namespace gimnet::gimi {
 
@@ -31,20 +32,33 @@ std::optional<Message> MessageQueue::pop() {
   std::optional<Message> message(std::move(entries_.front().message));
   bytes_ -= message->size();
   entries_.pop_front();
+  count_taken(*message);
   return message;
 }
 
 std::optional<Message> MessageQueue::pop_newest() {
   if (entries_.empty()) return std::nullopt;
+  for (const Entry& entry : entries_) count_taken(entry.message);
   std::optional<Message> message(std::move(entries_.back().message));
   entries_.clear();
   bytes_ = 0;
   return message;
 }
 
+void MessageQueue::count_taken(const Message& message) {
+  const std::uint32_t epoch = MessageAccess::epoch_of(message);
+  if (epoch == 0) return;
+  const std::uint32_t group = MessageAccess::group_of(message);
+  if (taken_.empty() || taken_.back().group != group || taken_.back().epoch != epoch) {
+    taken_.push_back({group, epoch, 0});
+  }
+  ++taken_.back().count;
+}
+
 void MessageQueue::make_room(std::size_t messages) {
   while (entries_.size() > messages) {
     bytes_ -= entries_.front().message.size();
+    count_taken(entries_.front().message);
     entries_.pop_front();
     ++overwritten_;
   }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "gimnet/gimi/message.hpp"
@@ -12,6 +14,13 @@
 namespace gimnet::gimi {
 
 class Inbox;
+
+/// Messages of a group that went out of a queue, and count in a window.
+struct TakenMessages {
+  std::uint32_t group = 0;
+  std::uint32_t epoch = 0;
+  std::uint32_t count = 0;
+};
 
 /// Received messages of one key or subscription: a ring buffer, or one that refuses when it is full.
 /// Thread safety: guarded by the mutex of its Inbox, through which programs come to it.
@@ -32,6 +41,9 @@ class MessageQueue {
   [[nodiscard]] std::optional<Message> pop();
   [[nodiscard]] std::optional<Message> pop_newest();
 
+  /// What went out of it since the last call, popped or overwritten.
+  [[nodiscard]] std::vector<TakenMessages> take_taken() { return std::exchange(taken_, {}); }
+
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   /// REQUIRES: !empty().
@@ -46,6 +58,7 @@ class MessageQueue {
 
  private:
   void make_room(std::size_t messages);
+  void count_taken(const Message& message);
 
   struct Entry {
     Message message;
@@ -56,6 +69,7 @@ class MessageQueue {
   const std::size_t bytes_max_;
   QueueOptions options_;
   std::deque<Entry> entries_;
+  std::vector<TakenMessages> taken_;
   std::size_t bytes_ = 0;
   std::uint64_t received_ = 0;
   std::uint64_t overwritten_ = 0;

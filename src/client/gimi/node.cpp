@@ -110,8 +110,9 @@ Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options,
   return made;
 }
 
-Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options, Timeout timeout) const {
-  auto service = core_->services().subscribe(std::string(full_name), options, timeout);
+Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options, Timeout timeout,
+                                      const PaceOptions& pace) const {
+  auto service = core_->services().subscribe(std::string(full_name), options, pace, timeout);
   if (!service) return service.failure();
   return Subscription(
       {*service, [core = core_](gimi::SubscribedService* done) { core->services().unsubscribe(*done); }});

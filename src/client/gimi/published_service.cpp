@@ -17,7 +17,7 @@ Outcome<void> PublishedService::publish(BytesView data, More more) {
       return Failure{Status::refused, "cannot publish " + full_name_ + ": the hub refused the service after a break"};
     }
     sequence = ++sequence_;
-    if (subscribers_ == 0 && subscribers_known_) {
+    if (subscribers_ == 0 && subscribers_known_ && !options_.retain) {
       ++published_;
       return {};
     }

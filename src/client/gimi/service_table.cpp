@@ -60,6 +60,8 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
   nif_service service = description_of(name, options.key, options.metadata);
   service.direction = NIF_PROVIDES;
   service.delivery = static_cast<std::uint8_t>(options.delivery);
+  service.window = options.delivery == Delivery::sync ? options.window : 0;
+  service.retain = options.retain ? 1 : 0;
   std::uint32_t group = 0;
   std::uint32_t subscribers = 0;
   const nif_status status = nif_advertise(uplink_.node(), &service, &group, &subscribers, nif_timeout(timeout));
@@ -131,7 +133,7 @@ void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group)
 }
 
 Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
-                                                    Timeout timeout) {
+                                                    const PaceOptions& pace, Timeout timeout) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
   SubscribedService* service = nullptr;
@@ -142,7 +144,9 @@ Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name
   inbox_.set(service->queue(), options);
   if (service->handles == 0) {
     nif_subscription found{};
-    const nif_status status = nif_subscribe(uplink_.node(), full_name.c_str(), &found, nif_timeout(timeout));
+    const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
+    const nif_status status =
+        nif_subscribe_paced(uplink_.node(), full_name.c_str(), &wanted, &found, nif_timeout(timeout));
     if (status != NIF_OK) return failure_of(status, "subscribe " + full_name);
     const MutexLock lock(mutex_);
     set_group(*service, found.group);

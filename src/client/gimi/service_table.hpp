@@ -31,7 +31,8 @@ class ServiceTable {
   void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
 
   [[nodiscard]] Outcome<SubscribedService*> subscribe(const std::string& full_name, const QueueOptions& options,
-                                                      Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
+                                                      const PaceOptions& pace, Timeout timeout)
+      GIMNET_EXCLUDES(asking_, mutex_);
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
   void unsubscribe(SubscribedService& service) GIMNET_EXCLUDES(asking_, mutex_);
 

@@ -25,6 +25,11 @@ std::uint64_t SubscribedService::missed() {
   return missed_;
 }
 
+bool SubscribedService::is_repeated(std::uint32_t from, std::uint32_t sequence) {
+  const MutexLock lock(mutex_);
+  return from == provider_ && sequence == sequence_ && sequence != 0;
+}
+
 void SubscribedService::on_message(std::uint32_t from, std::uint32_t sequence) {
   const MutexLock lock(mutex_);
   const auto step = static_cast<std::int32_t>(sequence - sequence_);

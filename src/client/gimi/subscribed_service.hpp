@@ -26,6 +26,8 @@ class SubscribedService {
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
 
+  /// The message that came last from that provider comes once more.
+  [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   /// One of its messages is in the queue.
   void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   /// 0: there is no provider.

@@ -21,9 +21,9 @@ void Declarations::remove_service(GroupId group) {
   std::erase_if(services_, [group](const auto& entry) { return entry.second.group == group; });
 }
 
-void Declarations::add_subscription(const std::string& full_name, GroupId group) {
+void Declarations::add_subscription(const proto::ns::Subscribe& subscription, GroupId group) {
   const MutexLock lock(mutex_);
-  subscriptions_.insert_or_assign(full_name, group);
+  subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group});
 }
 
 void Declarations::remove_subscription(const std::string& full_name) {
@@ -34,7 +34,7 @@ void Declarations::remove_subscription(const std::string& full_name) {
 void Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   const MutexLock lock(mutex_);
   const auto found = subscriptions_.find(event.name);
-  if (found != subscriptions_.end()) found->second = event.new_group;
+  if (found != subscriptions_.end()) found->second.group = event.new_group;
 }
 
 void Declarations::declare_again() {
@@ -45,7 +45,7 @@ void Declarations::declare_again() {
   {
     const MutexLock lock(mutex_);
     for (const auto& [name, service] : services_) services_due_.push_back(name);
-    for (const auto& [name, group] : subscriptions_) subscriptions_due_.push_back(name);
+    for (const auto& [name, subscription] : subscriptions_) subscriptions_due_.push_back(name);
   }
   declaring_ = !services_due_.empty();
   outbound_.set_declaring(declaring_);
@@ -90,10 +90,17 @@ bool Declarations::declare_service(const std::string& service) {
 }
 
 bool Declarations::declare_subscription(const std::string& full_name) {
+  proto::ns::Subscribe request;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = subscriptions_.find(full_name);
+    if (found == subscriptions_.end()) return true;  // ended meanwhile
+    request = found->second.request;
+  }
   const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
     if (round == round_) on_subscribed(full_name, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Subscribe{full_name}), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(request), handler)) return false;
   ++under_way_;
   return true;
 }
@@ -130,7 +137,7 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     const MutexLock lock(mutex_);
     const auto found = subscriptions_.find(full_name);
     if (found != subscriptions_.end()) {
-      former = std::exchange(found->second, group);
+      former = std::exchange(found->second.group, group);
       changed = former != group;
     }
   }

@@ -24,7 +24,7 @@ class Declarations {
 
   void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
-  void add_subscription(const std::string& full_name, GroupId group) GIMNET_EXCLUDES(mutex_);
+  void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
   /// A new connection: declares everything again, a few requests at a time. Changes are put into `events` by later
@@ -45,6 +45,10 @@ class Declarations {
     proto::ns::Advertise request;
     GroupId group;
   };
+  struct Subscription {
+    proto::ns::Subscribe request;
+    GroupId group;
+  };
   void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
@@ -56,7 +60,7 @@ class Declarations {
 
   Mutex mutex_;
   std::map<std::string, Service> services_ GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node
-  std::map<std::string, GroupId> subscriptions_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::string, Subscription> subscriptions_ GIMNET_GUARDED_BY(mutex_);
 
   // The library's thread.
   std::deque<std::string> services_due_;

@@ -20,7 +20,7 @@ Record* make_event(nif_incoming_type type, std::string text) {
   return record.release();
 }
 
-Item item_of(Record* record, std::size_t bytes) { return {record, nullptr, 0, bytes + sizeof(Record)}; }
+Item item_of(Record* record, std::size_t bytes) { return {record, nullptr, 0, bytes + sizeof(Record), 0}; }
 
 Inbound::~Inbound() {
   for (const Item& item : batch_) item.storage->release();
@@ -166,15 +166,19 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     add_gap(view.header.src, reassembled.lost_messages,
             too_large ? proto::DropReason::too_large : proto::DropReason::cut_message);
   }
-  if (reassembled.state != proto::Reassembled::State::whole) return Verdict::going;
+  if (reassembled.state != proto::Reassembled::State::whole) {
+    if (view.header.kind == proto::Kind::group && view.ends_message()) host_.on_message_lost(view.header.dst);
+    return Verdict::going;
+  }
   if (reassembled.storage.empty()) {
     add_frame(view, frame);  // it came in one piece
     return Verdict::going;
   }
   auto record = std::make_unique<Record>();
-  record->incoming = incoming_of({nullptr, frame, arrival_ns_, 0});
+  record->incoming = incoming_of({nullptr, frame, arrival_ns_, 0, 0});
   record->payload = std::move(reassembled.storage);
   record->extensions.assign(view.extensions.begin(), view.extensions.end());
+  record->incoming.epoch = epoch_of(view.header);
   record->finish();
   ++counts_.messages;
   const std::size_t bytes = record->payload.size();
@@ -183,9 +187,13 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
 }
 
 void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
-  batch_.push_back({slab_, frame, arrival_ns_, view.header.frame_size()});
+  batch_.push_back({slab_, frame, arrival_ns_, view.header.frame_size(), epoch_of(view.header)});
   slab_->add_reference();
   ++counts_.messages;
+}
+
+std::uint32_t Inbound::epoch_of(const proto::FrameHeader& header) {
+  return header.kind == proto::Kind::group ? host_.epoch_for(header.dst) : 0;
 }
 
 void Inbound::add_record(Record* record, std::size_t bytes) {

@@ -31,6 +31,10 @@ class InboundHost {
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
+  /// What a message of that group is tagged with; 0: it does not count in a window.
+  [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;
+  /// A message of that group ended of which the program gets nothing.
+  virtual void on_message_lost(std::uint32_t group) = 0;
   /// What was received, in order; takes over the references.
   virtual void deliver(std::span<const Item> items) = 0;
 
@@ -94,6 +98,7 @@ class Inbound {
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   void add_record(Record* record, std::size_t bytes);
+  [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);
   void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
   void deliver();

@@ -110,7 +110,12 @@ nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, s
     if (found.options().callback != nullptr) {
       return fail(NIF_BAD_ARGUMENT, "cannot receive: everything is given to the callback");
     }
-    return found.received().pop({in, capacity}, *count, deadline_after(timeout_ms));
+    const nif_status status = found.received().pop({in, capacity}, *count, deadline_after(timeout_ms));
+    if (found.options().credit_by_program) return status;
+    for (std::size_t i = 0; i < *count; ++i) {
+      if (in[i].epoch != 0) found.credits().take(in[i].to, in[i].epoch, 1, i + 1 != *count);
+    }
+    return status;
   });
 }
 

@@ -164,7 +164,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     if (service == nullptr || service->struct_size < sizeof(nif_service) || group == nullptr) {
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is missing, or struct_size is wrong");
     }
-    if (service->direction > NIF_ACCEPTS || service->delivery > NIF_LATEST_DELIVERY) {
+    if (service->direction > NIF_ACCEPTS || service->delivery > NIF_SYNC_DELIVERY) {
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: direction or delivery is not one of its enumeration");
     }
     if (const nif_status status = check_name(service->name, "advertise"); status != NIF_OK) return status;
@@ -175,6 +175,8 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     request.direction = static_cast<ns::Direction>(service->direction);
     request.delivery = static_cast<ns::Delivery>(service->delivery);
     request.metadata = service->metadata != nullptr ? service->metadata : "";
+    request.window = service->window;
+    request.retain = service->retain != 0;
     if (!proto::valid_service_name(request.service)) {
       return fail(NIF_BAD_NAME, "cannot advertise '" + request.service + "': a service's name has one part");
     }
@@ -199,16 +201,37 @@ nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
 }
 
 nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms) {
+  return nif_subscribe_paced(node, full_name, nullptr, subscription, timeout_ms);
+}
+
+nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more) {
+  return gimnet::nif::with_node(node, [&](Node& found) -> nif_status {
+    found.credits().take(group, epoch, messages, more != 0);
+    return NIF_OK;
+  });
+}
+
+nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
+                               nif_subscription* subscription, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (pace != nullptr && pace->struct_size < sizeof(nif_pace)) {
+      return fail(NIF_BAD_ARGUMENT, "cannot subscribe: nif_pace.struct_size is not sizeof(nif_pace)");
+    }
     if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK) return status;
+    ns::Subscribe request{full_name};
+    if (pace != nullptr) {
+      request.window = pace->window;
+      request.depth = pace->depth != 0 ? pace->depth : 1;
+      request.rate_hz = pace->rate_hz;
+    }
     ns::SubscribeAnswer answer;
-    const nif_status status =
-        ask(found, ns::Subscribe{full_name}, answer, "subscribe", full_name, deadline_after(timeout_ms));
+    const nif_status status = ask(found, request, answer, "subscribe", full_name, deadline_after(timeout_ms));
     if (status != NIF_OK) return status;
-    found.declarations().add_subscription(full_name, answer.group);
+    found.declarations().add_subscription(request, answer.group);
     if (subscription != nullptr) {
-      *subscription = {answer.group.value(), answer.message_type, answer.instance,
-                       static_cast<std::uint32_t>(answer.delivery)};
+      *subscription = {answer.group.value(), answer.message_type,
+                       answer.instance,      static_cast<std::uint32_t>(answer.delivery),
+                       answer.window,        answer.retain ? 1u : 0u};
     }
     return NIF_OK;
   });

@@ -35,6 +35,7 @@ Node::Node(Options options)
       outbound_(options_.send, wake_),
       received_(options_.receive_queue_bytes, wake_),
       requests_(outbound_),
+      credits_(outbound_),
       declarations_(requests_, outbound_),
       inbound_(options_.reassembly, *this),
       tokens_(options_.name, options_.keep_token),
@@ -125,6 +126,7 @@ bool Node::take_over(Admitted admitted, bool first) {
     gap->incoming.reason = static_cast<std::uint32_t>(proto::DropReason::link_lost);
     push_event(gap);
   }
+  credits_.begin(session_.resumed);
   inbound_.begin(session_);
   confirmed_ = inbound_.taken();
   const auto space = inbound_.space();
@@ -160,10 +162,22 @@ bool Node::on_flow(const proto::flow::Message& message) {
 }
 
 void Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
+  if (kind == proto::Kind::ns && answer.header.operation == proto::ns::SubscribeAnswer::kOperation) {
+    // Before the first message behind it, which the program may take before it has seen this answer.
+    proto::Payload payload(proto::kControlHeaderSize);
+    store_le(payload.data(), answer.header.operation);
+    payload.insert(payload.end(), answer.body.begin(), answer.body.end());
+    const auto subscribed = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
+    if (subscribed) credits_.open(subscribed->group, subscribed->window);
+  }
   static_cast<void>(requests_.on_answer(kind, answer));
 }
 
-void Node::on_service_moved(const proto::ns::ServiceMoved& event) { declarations_.on_service_moved(event); }
+void Node::on_service_moved(const proto::ns::ServiceMoved& event) {
+  credits_.forget(event.old_group);
+  credits_.open(event.new_group, event.window);
+  declarations_.on_service_moved(event);
+}
 
 void Node::on_taken(std::uint32_t from, const proto::Taken& taken) { outbound_.on_taken(from, taken); }
 

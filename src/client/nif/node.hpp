@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "base/mutex.hpp"
+#include "client/nif/credit_book.hpp"
 #include "client/nif/declarations.hpp"
 #include "client/nif/dialer.hpp"
 #include "client/nif/hub_clock.hpp"
@@ -35,6 +36,7 @@ class Node final : private InboundHost {
   [[nodiscard]] RequestTable& requests() { return requests_; }
   [[nodiscard]] Declarations& declarations() { return declarations_; }
   [[nodiscard]] NameCache& names() { return names_; }
+  [[nodiscard]] CreditBook& credits() { return credits_; }
   [[nodiscard]] const Options& options() const { return options_; }
 
   [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
@@ -65,6 +67,8 @@ class Node final : private InboundHost {
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
   void send_taken(std::uint32_t to, const proto::Taken& taken) override;
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return credits_.epoch_for(group); }
+  void on_message_lost(std::uint32_t group) override { credits_.take(group, credits_.epoch_for(group), 1, false); }
   void deliver(std::span<const Item> items) override;
 
   // The library's thread, node_thread.cpp.
@@ -93,6 +97,7 @@ class Node final : private InboundHost {
   Outbound outbound_;
   ReceiveQueue received_;
   RequestTable requests_;
+  CreditBook credits_;
   Declarations declarations_;
   NameCache names_;
   HubClock clock_;

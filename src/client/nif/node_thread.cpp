@@ -154,6 +154,8 @@ void Node::call_back() {
       break;
     }
     received_.remove_first();
+    const bool taken = verdict == NIF_DONE || !options_.credit_by_program;
+    if (taken && in.kind == NIF_GROUP) credits_.take(in.to, in.epoch, 1, false);
     if (verdict == NIF_DONE) nif_release(&in);
   }
   if (busy) outbound_.set_library_busy(false);

@@ -78,6 +78,7 @@ Result<Options, Failure> read_options(const nif_options* options) {
   checked.keep_token = given.no_token_file == 0;
   checked.callback = given.callback;
   checked.user = given.user;
+  checked.credit_by_program = given.credit_by_program != 0;
   auto endpoints = endpoints_for(given.url != nullptr ? given.url : "");
   if (!endpoints) return endpoints.error();
   checked.endpoints = std::move(*endpoints);

@@ -33,6 +33,7 @@ struct Options {
   SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
   nif_callback callback = nullptr;
   void* user = nullptr;
+  bool credit_by_program = false;
 };
 
 /// `options` may be null. Errors: NIF_BAD_ARGUMENT, NIF_BAD_NAME.

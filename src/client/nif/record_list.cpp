@@ -53,6 +53,8 @@ nif_service_list* make_service_list(std::vector<proto::ns::ServiceRecord> record
     view.delivery = static_cast<std::uint8_t>(record.delivery);
     view.name = record.name.c_str();
     view.metadata = record.metadata.c_str();
+    view.window = record.window;
+    view.retain = record.retain ? 1 : 0;
     view.hub_name = record.hub_name.c_str();
     list->views.push_back(view);
   }

@@ -18,6 +18,7 @@ nif_incoming incoming_of(const Item& item) {
   in.policy = static_cast<std::uint8_t>(header.policy());
   in.flags = header.has(proto::kFlagReport) ? NIF_FLAG_REPORT : 0;
   in.arrival_ns = item.arrival_ns;
+  in.epoch = item.epoch;
   in.text = "";
   in.storage = item.storage;
   if (!parsed) return in;

@@ -87,7 +87,8 @@ struct Item {
   Storage* storage = nullptr;
   const std::byte* frame = nullptr;
   std::int64_t arrival_ns = 0;
-  std::size_t bytes = 0;  ///< of payload and header, for the queue's limit
+  std::size_t bytes = 0;    ///< of payload and header, for the queue's limit
+  std::uint32_t epoch = 0;  ///< of a message that counts in a window (CreditBook)
 };
 
 /// What nif_receive() gives out for it; the reference goes with it.

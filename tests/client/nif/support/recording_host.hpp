@@ -34,6 +34,8 @@ class RecordingHost final : public InboundHost {
   void on_taken(std::uint32_t, const proto::Taken& taken) override { taken_received.push_back(taken); }
   bool on_report(const proto::Report&) override { return false; }
   void send_taken(std::uint32_t, const proto::Taken& taken) override { taken_sent.push_back(taken); }
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group == counted_group ? 1 : 0; }
+  void on_message_lost(std::uint32_t group) override { lost_groups.push_back(group); }
   void deliver(std::span<const Item> delivered) override {
     for (const Item& item : delivered) items.push_back(incoming_of(item));
   }
@@ -54,6 +56,8 @@ class RecordingHost final : public InboundHost {
   std::vector<nif_incoming> items;
   std::vector<proto::flow::Message> flows;
   std::vector<std::uint16_t> answers;
+  std::vector<std::uint32_t> lost_groups;
+  std::uint32_t counted_group = 0;  ///< its messages count in a window
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;
 };

@@ -1,0 +1,51 @@
+#include "client/nif/credit_book.hpp"
+
+#include <algorithm>
+
+namespace gimnet::nif {
+
+void CreditBook::begin(bool resumed) {
+  const MutexLock lock(mutex_);
+  if (!resumed) ++epoch_;
+  for (auto& [group, account] : accounts_) {
+    if (!resumed) account.taken = account.told = 0;
+    if (account.taken != 0) tell(group, account);
+  }
+}
+
+void CreditBook::open(GroupId group, std::uint32_t window) {
+  if (group == GroupId{}) return;
+  const MutexLock lock(mutex_);
+  if (window == 0 && !accounts_.contains(group.value())) return;
+  accounts_[group.value()].window = window;
+  any_.store(true, std::memory_order_relaxed);  // a hint for this thread, which sets and reads it
+}
+
+void CreditBook::forget(GroupId group) {
+  const MutexLock lock(mutex_);
+  accounts_.erase(group.value());
+}
+
+std::uint32_t CreditBook::epoch_for(std::uint32_t group) {
+  if (!any_.load(std::memory_order_relaxed)) return 0;  // see open()
+  const MutexLock lock(mutex_);
+  return accounts_.contains(group) ? epoch_ : 0;
+}
+
+void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t messages, bool more) {
+  if (epoch == 0) return;
+  const MutexLock lock(mutex_);
+  const auto found = accounts_.find(group);
+  if (found == accounts_.end() || epoch != epoch_) return;
+  Account& account = found->second;
+  account.taken += messages;
+  const std::uint64_t enough = more ? std::max(1u, account.window / 2) : 1;
+  if (account.taken - account.told >= enough) tell(group, account);
+}
+
+void CreditBook::tell(std::uint32_t group, Account& account) {
+  // Not connected: the next WELCOME brings it.
+  if (outbound_.post(proto::flow::Credit{GroupId{group}, account.taken})) account.told = account.taken;
+}
+
+}  // namespace gimnet::nif

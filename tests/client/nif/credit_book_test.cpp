@@ -1,0 +1,167 @@
+#include "client/nif/credit_book.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "proto/control/ns.hpp"
+#include "proto/frame/fragment_header.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+
+// Through the whole library, with a hub that a test plays: what is credited when.
+
+namespace gimnet::nif {
+namespace {
+
+using test::connect_to;
+using test::Connected;
+using test::FakeConnection;
+using test::FakeHub;
+using test::make_welcome;
+
+constexpr std::uint32_t kGroup = (7u << 20) | 5;
+
+void answer_subscribe(FakeConnection& hub, std::uint32_t window, std::uint32_t group = kGroup) {
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub.next_request<proto::ns::Subscribe>(number));
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{group};
+  answer.delivery = proto::ns::Delivery::sync;
+  answer.window = window;
+  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+}
+
+void publish(FakeConnection& hub, std::uint32_t group = kGroup) {
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::group;
+  parts.header.src = test::kPeerId;
+  parts.header.dst = group;
+  hub.send(parts, "x");
+}
+
+std::uint64_t credited(FakeConnection& hub) {
+  const auto credit = hub.next_flow<proto::flow::Credit>();
+  EXPECT_TRUE(credit);
+  return credit && credit->group == GroupId{kGroup} ? credit->taken : 0;
+}
+
+nif_incoming take(nif_node* node, nif_incoming_type type = NIF_MESSAGE) {
+  nif_incoming in{};
+  do {
+    EXPECT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+    nif_release(&in);
+  } while (in.type != type);
+  return in;
+}
+
+void subscribe(Connected& connected, std::uint32_t window) {
+  std::thread asking([&] {
+    const nif_pace pace{sizeof pace, window, 0, 0.0};
+    nif_subscription got{};
+    EXPECT_EQ(nif_subscribe_paced(connected.node.get(), "peer/scan", &pace, &got, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(got.window, window);
+  });
+  answer_subscribe(connected.hub, window);
+  asking.join();
+}
+
+TEST(CreditBook, CreditsWhatTheProgramTook) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe(connected, 1);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    publish(connected.hub);
+    EXPECT_NE(take(connected.node.get()).epoch, 0u);
+    EXPECT_EQ(credited(connected.hub), i);
+  }
+}
+
+TEST(CreditBook, GathersWhileMoreWaits) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe(connected, 8);
+  for (int i = 0; i < 8; ++i) publish(connected.hub);
+  std::size_t taken = 0;
+  while (taken < 8) {
+    nif_incoming in[8];
+    std::size_t count = 0;
+    ASSERT_EQ(nif_receive_many(connected.node.get(), in, 8, &count, NIF_FOREVER), NIF_OK);
+    taken += count;
+    for (std::size_t i = 0; i < count; ++i) nif_release(&in[i]);
+  }
+  std::uint64_t total = 0;
+  while (total < 8) {
+    const std::uint64_t next = credited(connected.hub);
+    ASSERT_GT(next, total) << "totals grow";
+    total = next;
+  }
+  EXPECT_EQ(total, 8u);
+}
+
+TEST(CreditBook, AGroupWithoutAWindowIsNotCredited) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe(connected, 0);
+  publish(connected.hub);
+  EXPECT_EQ(take(connected.node.get()).epoch, 0u);
+}
+
+TEST(CreditBook, TheProgramMayCreditByItself) {
+  FakeHub hub;
+  nif_options options = test::default_options();
+  options.credit_by_program = 1;
+  Connected connected = connect_to(hub, options, make_welcome());
+  subscribe(connected, 2);
+  publish(connected.hub);
+  const nif_incoming in = take(connected.node.get());
+  EXPECT_EQ(nif_credit(connected.node.get(), in.to, in.epoch + 1, 1, 0), NIF_OK) << "another epoch";
+  EXPECT_EQ(nif_credit(connected.node.get(), kGroup + 1, in.epoch, 1, 0), NIF_OK) << "another group";
+  EXPECT_EQ(nif_credit(connected.node.get(), in.to, in.epoch, 1, 0), NIF_OK);
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
+TEST(CreditBook, CreditsAnEndOfWhichNothingCanBeGivenOut) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe(connected, 1);
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::group;
+  parts.header.src = test::kPeerId;
+  parts.header.dst = kGroup;
+  parts.fragment = proto::FragmentHeader{9, 2, 4};
+  connected.hub.send(parts, "cd");
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
+TEST(CreditBook, ANewSessionBeginsAtZero) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe(connected, 2);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+  connected.hub.close();
+  connected.hub = hub.admit(make_welcome());
+  answer_subscribe(connected.hub, 2);
+  static_cast<void>(take(connected.node.get(), NIF_CONNECTED));
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
+TEST(CreditBook, AResumedOneRepeatsItsTotals) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome(1 << 20);
+  Connected connected = connect_to(hub, test::default_options("robot"), welcome);
+  subscribe(connected, 2);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+  connected.hub.close();
+  welcome.resumed = true;
+  connected.hub = hub.admit(welcome);
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::nif
