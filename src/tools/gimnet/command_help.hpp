@@ -45,6 +45,8 @@ Examples:
   gimnet pub robot/odom < lines             the node robot provides the service odom
   gimnet pub robot/odom --rate 40 --wait 1 < lines
   gimnet pub robot/pose --delivery latest < lines
+  gimnet pub robot/camera --delivery sync:2 < lines
+  gimnet pub robot/map --retain < lines     who comes late gets the last line
 )";
 
 inline constexpr const char* kEchoAbout = R"(Print the messages of services. A service need not exist yet.
@@ -53,6 +55,7 @@ Examples:
   gimnet echo robot/odom
   gimnet echo 'robot/*' --seconds 10        all services of robot, those that come meanwhile too
   gimnet echo robot/odom -n 10 --raw
+  gimnet echo robot/odom --rate 2           the newest, twice a second
   gimnet echo robot/odom --json | jq .age_us
 )";
 

@@ -1,8 +1,11 @@
 #include "tools/gimnet/command_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "tools/gimnet/command_help.hpp"
 
@@ -57,14 +60,30 @@ void add_recv(CLI::App& app, Options& options) {
   add_printing(recv, options);
 }
 
+/// `stream`, `latest`, `sync` or `sync:N`.
+void read_delivery(const std::string& word, Options& options) {
+  constexpr std::string_view kSync = "sync:";
+  if (word == "stream" || word == "latest" || word == "sync") {
+    options.delivery = word == "stream" ? Delivery::stream : word == "latest" ? Delivery::latest : Delivery::sync;
+    return;
+  }
+  options.delivery = Delivery::sync;
+  const char* end = word.data() + word.size();
+  const char* begin = word.data() + std::min(kSync.size(), word.size());
+  const auto [read, error] = std::from_chars(begin, end, options.window);
+  if (word.starts_with(kSync) && error == std::errc{} && read == end && options.window != 0) return;
+  throw CLI::ValidationError("--delivery", "'" + word + "' is none of stream, latest, sync and sync:N");
+}
+
 void add_pub(CLI::App& app, Options& options) {
-  static const std::map<std::string, Delivery> kDeliveries{{"stream", Delivery::stream}, {"latest", Delivery::latest}};
   CLI::App& pub = *app.add_subcommand("pub", help::kPubAbout);
   pub.add_option("service", options.target, "full name: node/service")->required()->check(not_empty());
   pub.add_option("--name", options.name, "name of this node, default: the service's name up to its last /")
       ->check(not_empty());
-  pub.add_option("--delivery", options.delivery, "stream: all messages; latest: only the newest waits")
-      ->transform(CLI::CheckedTransformer(kDeliveries).description(""));
+  pub.add_option_function<std::string>(
+      "--delivery", [&options](const std::string& word) { read_delivery(word, options); },
+      "stream: all messages; latest: only the newest waits; sync:N: at most N that a subscriber has not taken");
+  pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
       ->check(CLI::Range(0.001, 1e6));
   pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, a whole number");
@@ -77,6 +96,10 @@ void add_echo(CLI::App& app, Options& options) {
   echo.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
       ->required()
       ->check(not_empty());
+  echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1");
+  echo.add_option("--depth", options.pace.depth, "newest messages that the hub holds meanwhile, 1 to 64, default 1");
+  echo.add_option("--rate", options.pace.rate_hz, "messages a second at most, 0.001 to 1000, default all")
+      ->check(CLI::Range(0.001, 1e3));
   add_printing(echo, options);
 }
 

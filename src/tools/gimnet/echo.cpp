@@ -6,7 +6,7 @@ namespace gimnet::tool {
 
 ExitCode run_echo(Session& session) {
   if (const auto ending = session.join({})) return *ending;
-  Subscriptions subscriptions(session.node(), session.options().target);
+  Subscriptions subscriptions(session.node(), session.options().target, session.options().pace);
   if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   return print_messages(session, [&](Timeout timeout) { return subscriptions.receive(timeout); });

@@ -37,6 +37,9 @@ struct Options {
   std::size_t subscribers = 0;
   std::size_t bytes_max = std::size_t{64} << 20;
   Delivery delivery = Delivery::stream;
+  std::uint32_t window = 1;  ///< of delivery sync
+  bool retain = false;
+  PaceOptions pace;  ///< of what is subscribed
   Lane lane = Lane::normal;
   MessageKey key;
 };

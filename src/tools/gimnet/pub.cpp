@@ -51,6 +51,8 @@ ExitCode run_pub(Session& session) {
   if (const auto ending = session.join(how)) return *ending;
   PublishOptions service;
   service.delivery = options.delivery;
+  service.window = options.window;
+  service.retain = options.retain;
   service.lane = options.lane;
   service.key = options.key;
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);

@@ -6,7 +6,10 @@ namespace gimnet::tool {
 namespace {
 
 const char* text_of(Direction direction) { return direction == Direction::accepts ? "accepts" : "provides"; }
-const char* text_of(Delivery delivery) { return delivery == Delivery::latest ? "latest" : "stream"; }
+std::string delivery_of(const ServiceRecord& service) {
+  if (service.delivery == Delivery::sync) return "sync:" + std::to_string(service.window);
+  return service.delivery == Delivery::latest ? "latest" : "stream";
+}
 
 std::string json_of(const std::vector<ServiceRecord>& services) {
   JsonWriter json;
@@ -14,7 +17,8 @@ std::string json_of(const std::vector<ServiceRecord>& services) {
   for (const ServiceRecord& service : services) {
     json.begin_object().member("name", service.name).member("node", service.node.text());
     json.member("type", service.key.type).member("instance", service.key.instance);
-    json.member("direction", text_of(service.direction)).member("delivery", text_of(service.delivery));
+    json.member("direction", text_of(service.direction)).member("delivery", delivery_of(service));
+    json.member("retain", service.retain);
     json.member("group", service.group_id).member("subscribers", service.subscribers);
     json.member("metadata", service.metadata).member("hub", service.hub_name).end_object();
   }
@@ -26,7 +30,7 @@ std::string table_of(const std::vector<ServiceRecord>& services, Paint paint) {
   for (const ServiceRecord& service : services) {
     table.add({service.name, service.node.text(),
                std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
-               text_of(service.direction), text_of(service.delivery), std::to_string(service.subscribers),
+               text_of(service.direction), delivery_of(service), std::to_string(service.subscribers),
                service.metadata});
   }
   return table.text(paint);

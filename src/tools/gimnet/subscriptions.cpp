@@ -10,6 +10,8 @@ namespace {
 
 /// Messages of one service that wait in this process; then it stops reading from the hub.
 constexpr std::size_t kQueueMessages = 4096;
+/// How long subscribing may take.
+constexpr Timeout kSubscribe{5'000};
 /// How often the hub is asked for services that are new.
 constexpr Timeout kLookAgain{1'000};
 
@@ -18,7 +20,7 @@ constexpr Timeout kLookAgain{1'000};
 Outcome<void> Subscriptions::open() { return is_pattern(word_) ? look_again() : subscribe(word_); }
 
 Outcome<void> Subscriptions::subscribe(const std::string& service) {
-  auto subscription = node_.subscribe(service, {kQueueMessages, AtFullQueue::stop_reading});
+  auto subscription = node_.subscribe(service, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
   if (!subscription) return subscription.failure();
   all_.insert_or_assign(service, std::move(*subscription));
   return {};

@@ -17,7 +17,8 @@ namespace gimnet::tool {
 class Subscriptions {
  public:
   /// `node` must outlive it.
-  Subscriptions(Node& node, std::string word) : node_(node), word_(std::move(word)) {}
+  Subscriptions(Node& node, std::string word, const PaceOptions& pace = {})
+      : node_(node), word_(std::move(word)), pace_(pace) {}
 
   /// Subscribes to what is there. Errors: as Node::subscribe() and Node::services().
   [[nodiscard]] Outcome<void> open();
@@ -36,6 +37,7 @@ class Subscriptions {
 
   Node& node_;
   std::string word_;
+  PaceOptions pace_;
   std::map<std::string, Subscription, std::less<>> all_;
   std::int64_t looked_ns_ = 0;
 };

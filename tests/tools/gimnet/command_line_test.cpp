@@ -44,6 +44,18 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"recv", "--name", "B", "-n", "1000", "--raw"}).count, 1000u);
   EXPECT_EQ(options({"pub", "robot/odom", "--delivery", "latest", "--rate", "2.5"}).delivery, Delivery::latest);
   EXPECT_EQ(options({"pub", "a/b", "--wait", "3"}).subscribers, 3u);
+  const Options sync = options({"pub", "a/b", "--delivery", "sync:3", "--retain"});
+  EXPECT_EQ(sync.delivery, Delivery::sync);
+  EXPECT_EQ(sync.window, 3u);
+  EXPECT_TRUE(sync.retain);
+  EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync"}).window, 1u);
+  const Options paced = options({"echo", "a/*", "--window", "2", "--depth", "4", "--rate", "0.5"});
+  EXPECT_EQ(paced.pace.window, 2u);
+  EXPECT_EQ(paced.pace.depth, 4u);
+  EXPECT_EQ(paced.pace.rate_hz, 0.5);
+  for (const char* wrong : {"sync:", "sync:0", "sync:x", "sync:2x", "fast"}) {
+    EXPECT_NE(refusal({"pub", "a/b", "--delivery", wrong}).find("none of stream, latest, sync"), std::string::npos);
+  }
   EXPECT_EQ(options({"echo", "robot/odom", "-n", "2"}).target, "robot/odom");
   EXPECT_EQ(options({"ping", "B", "-c", "1000", "-i", "0.001"}).pings, 1000u);
   EXPECT_EQ(options({"services", "robot/*"}).target, "robot/*");
