@@ -54,7 +54,8 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(paced.pace.depth, 4u);
   EXPECT_EQ(paced.pace.rate_hz, 0.5);
   for (const char* wrong : {"sync:", "sync:0", "sync:x", "sync:2x", "fast"}) {
-    EXPECT_NE(refusal({"pub", "a/b", "--delivery", wrong}).find("none of stream, latest, sync"), std::string::npos);
+    EXPECT_NE(refusal({"pub", "a/b", "--delivery", wrong}).find("is no value for --delivery: stream"),
+              std::string::npos);
   }
   EXPECT_EQ(options({"echo", "robot/odom", "-n", "2"}).target, "robot/odom");
   EXPECT_EQ(options({"ping", "B", "-c", "1000", "-i", "0.001"}).pings, 1000u);
