@@ -67,7 +67,9 @@ class Allocation : public ::testing::Test {
     while (frames < frames_wanted) round(frames);
     EXPECT_EQ(allocations, 0u) << "in " << frames << " frames";
     EXPECT_TRUE(rig.ledger().exact());
-    EXPECT_EQ(rig.ledger().dropped, 0u);
+    // Paced subscribers that credit nothing get nothing more: what is held is replaced by the newest.
+    EXPECT_EQ(rig.ledger().dropped, rig.dropped(proto::DropReason::replaced));
+    EXPECT_EQ(rig.ledger().dropped != 0, paced);
   }
   void add(FakeNode& from, std::uint32_t dst, const std::string& payload, const testing::FrameSpec& spec = {}) {
     if (written.empty() || written.back().first != &from) written.push_back({&from, {}});
@@ -80,6 +82,7 @@ class Allocation : public ::testing::Test {
   std::vector<std::pair<FakeNode*, std::vector<std::byte>>> written;
   std::vector<Ready> ready[2];
   std::vector<std::byte> trash;
+  bool paced = false;
 };
 
 TEST_F(Allocation, NoneForAMillionFramesToOneAndInTurns) {
@@ -101,6 +104,22 @@ TEST_F(Allocation, NoneForAReadThatSpeaksToThousands) {
   for (std::size_t i = 0; i < kRecipients; ++i) nodes.push_back(&rig.join(0));
   for (const FakeNode* node : nodes) add(sender, node->id.value(), "");
   run(3 * kRecipients);
+}
+
+TEST_F(Allocation, NoneForPacedSubscriptionsAndARetainedGroup) {
+  paced = true;
+  for (std::size_t i = 0; i < 8; ++i) nodes.push_back(&rig.join(i % 2));
+  rig.publish_paced_group(1, nodes[0]->id, nodes, true);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const PaceTerms terms{.window = i % 3 == 0 ? 2u : 0u, .depth = 3, .interval_us = i % 3 == 1 ? 1'000'000u : 0u};
+    rig.pace(*nodes[i], 1, terms, true);
+  }
+  rig.settle();
+  for (int i = 0; i < 20; ++i) {
+    add(*nodes[0], HubRig::group(1), "small", {.kind = proto::Kind::group});
+    add(*nodes[0], HubRig::group(1), std::string(3'000, 'm'), {.kind = proto::Kind::group, .lane = 2});
+  }
+  run(20'000);
 }
 
 TEST_F(Allocation, NoneForFanOut) {
