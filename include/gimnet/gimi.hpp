@@ -221,6 +221,20 @@ class Node {
   Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000}) const;
+  Outcome<std::vector<RouteRecord>> hub_routes(Timeout timeout = Timeout{5000}) const;
+
+  // ---- changing the hub, for those who joined as administrators; everybody else is denied
+
+  /// Ends the session of a node, which is told `reason` and does not come back by itself. Errors: not_found, denied.
+  Outcome<void> kick(Peer node, std::string_view reason = {}, Timeout timeout = Timeout{5000}) const;
+  /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument.
+  Outcome<void> reassign(Peer node, Peer new_id, Timeout timeout = Timeout{5000}) const;
+  /// The hub writes what waits, says goodbye to everybody, and ends.
+  Outcome<void> drain_hub(Timeout timeout = Timeout{5000}) const;
+  /// The hub reads its configuration again. Errors: bad_argument (it is wrong, and nothing was changed), denied.
+  Outcome<std::vector<HubChange>> reload_hub(Timeout timeout = Timeout{5000}) const;
+  /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
+  Outcome<std::string> set_hub_log_level(std::string_view level, Timeout timeout = Timeout{5000}) const;
 
   /// Sends a small message to the library of another node, which answers by itself. The round trip in ns.
   /// Errors: timeout (lost, or late), not_delivered (no such node, no way to it), closed.

@@ -131,12 +131,16 @@ typedef struct nif_options {
   /** A message of a service with delivery sync(n) counts as taken when nif_receive() gave it out or the callback took
    *  it. Not 0: only nif_credit() says so, but for what the callback answered NIF_DONE to. */
   uint8_t credit_by_program;
+  /** Not 0: join as an administrator, who may change the hub: over its Unix socket, as root or as the user that runs
+   * it. Anybody else is refused, NIF_DENIED. */
+  uint8_t administrator;
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.
  *  Returns when the hub admitted the node, or failed: NIF_BAD_ARGUMENT (URL, options), NIF_NO_HUB, NIF_TIMEOUT,
- *  NIF_BAD_VERSION, NIF_NAME_TAKEN, NIF_BAD_NAME, NIF_HUB_FULL, NIF_REFUSED, NIF_PROTOCOL, NIF_NO_MEMORY, NIF_LIMIT
- * (too many handles), NIF_SYSTEM. On failure *node is NULL. options may be NULL: all defaults. */
+ *  NIF_BAD_VERSION, NIF_DENIED (administrator), NIF_NAME_TAKEN, NIF_BAD_NAME, NIF_HUB_FULL, NIF_REFUSED, NIF_PROTOCOL,
+ * NIF_NO_MEMORY, NIF_LIMIT (too many handles), NIF_SYSTEM. On failure *node is NULL. options may be NULL: all defaults.
+ */
 nif_status nif_connect(const nif_options* options, nif_node** node);
 
 /** Leaves for good: writes what still waits (for at most one second), says GOODBYE, so that name and id are free at

@@ -135,7 +135,17 @@ nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeou
 
 /** Kinds for nif_request(); the operations are in docs/protocol.md, sections 8 and 9. */
 enum { NIF_NS = 17, NIF_CTRL = 18 };
-enum { NIF_CTRL_HUB_INFO = 1, NIF_CTRL_STATISTICS = 2, NIF_CTRL_CONNECTIONS = 3 };
+enum {
+  NIF_CTRL_HUB_INFO = 1,
+  NIF_CTRL_STATISTICS = 2,
+  NIF_CTRL_CONNECTIONS = 3,
+  NIF_CTRL_KICK = 4,
+  NIF_CTRL_REASSIGN = 5,
+  NIF_CTRL_DRAIN = 6,
+  NIF_CTRL_RELOAD = 7,
+  NIF_CTRL_LOG_LEVEL = 8,
+  NIF_CTRL_ROUTES = 9
+};
 
 /** An answer of the hub as it came. Belongs to the caller until nif_free_reply(). */
 typedef struct nif_reply {

@@ -19,7 +19,7 @@ constexpr std::int64_t kLinesPerSecond = 100;
 constexpr std::int64_t kBurst = 200;
 constexpr std::array<std::string_view, 5> kNames{"error", "warning", "info", "debug", "off"};
 
-constinit std::atomic<LogLevel> log_level{LogLevel::info};
+constinit std::atomic<LogLevel> level_now{LogLevel::info};
 
 struct Writer {
   std::mutex mutex;
@@ -53,10 +53,11 @@ bool parse_log_level(std::string_view name, LogLevel& level) {
 }
 
 // relaxed: the level stands alone, it publishes nothing.
-void set_log_level(LogLevel level) { log_level.store(level, std::memory_order_relaxed); }
+void set_log_level(LogLevel level) { level_now.store(level, std::memory_order_relaxed); }
+LogLevel log_level() { return level_now.load(std::memory_order_relaxed); }  // relaxed: as above
 
 bool log_enabled(LogLevel level) {
-  const LogLevel most = log_level.load(std::memory_order_relaxed);  // relaxed: as above
+  const LogLevel most = log_level();
   return most != LogLevel::off && level <= most;
 }
 

@@ -13,6 +13,7 @@ enum class LogLevel : std::uint8_t { error = 0, warning = 1, info = 2, debug = 3
 
 /// Lines above this level are not written. `off` silences all. Default: info. Thread safety: any thread.
 void set_log_level(LogLevel level);
+[[nodiscard]] LogLevel log_level();
 [[nodiscard]] bool log_enabled(LogLevel level);
 
 /// Writes one line with time and level to standard error: one event, for people. Control characters and broken text

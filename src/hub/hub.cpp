@@ -5,6 +5,7 @@
 
 #include "base/clock.hpp"
 #include "hub/config/folders.hpp"
+#include "hub/config/reloader.hpp"
 #include "hub/config/start_state.hpp"
 #include "hub/control/conductor.hpp"
 #include "hub/control/conductor_loop.hpp"
@@ -61,6 +62,8 @@ class Shards final : public ShardProxy {
 struct Ground {
   explicit Ground(const HubOptions& options)
       : quiescence(options.shards), budget(options.limits.budget_bytes), inbox(options.shards) {
+    // As many as a reload may allow: what is not used costs nothing.
+    const std::uint64_t nodes_most = find_limit("nodes")->most;
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
       mailboxes.push_back(std::make_unique<Mailbox>(
@@ -68,7 +71,7 @@ struct Ground {
           *wakers.back()));
       counters.push_back(std::make_unique<ShardCounters>());
       readable.push_back(counters.back().get());
-      queues.push_back(std::make_unique<QueueGauges>(options.limits.nodes));
+      queues.push_back(std::make_unique<QueueGauges>(nodes_most));
       readable_queues.push_back(queues.back().get());
     }
   }
@@ -120,25 +123,30 @@ HubFacts facts_of(const HubOptions& options) {
 
 /// In the order in which they need each other: shards end before the conductor frees what they look at.
 struct Hub::Parts {
-  Parts(const HubOptions& given, StartState from, std::vector<std::unique_ptr<Listener>> listeners)
+  Parts(const HubOptions& given, const ConfigSources& sources, StartState from,
+        std::vector<std::unique_ptr<Listener>> listeners)
       : options(given),
+        reloader(sources, given),
+        limits(given.limits),
         state_folder(std::move(from.folder)),
         ground(options),
         shared(ground.shared(options)),
         shards(shared, {.spin = options.spin}),
-        conductor(facts_of(options), options.placement, options.limits,
+        conductor(facts_of(options), options.placement, limits,
                   Conductor::Wiring{shards,
                                     {ground.nodes, ground.groups, ground.quiescence},
                                     ground.readable,
                                     from.start,
                                     keep_state(),
                                     ground.readable_queues,
-                                    &ground.refusals}) {
+                                    &ground.refusals,
+                                    [this] { return reloader.read_again(); },
+                                    [this](LogLevel level) { reloader.note_log_level(level); }}) {
     for (const auto& listener : listeners) {
       addresses += (addresses.empty() ? "" : " ") + listener->url().text();
     }
-    loop = std::make_unique<ConductorLoop>(
-        ConductorLoop::Wiring{conductor, ground.inbox, options.limits, ground.refusals}, std::move(listeners));
+    loop = std::make_unique<ConductorLoop>(ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals},
+                                           std::move(listeners));
   }
 
   Conductor::KeepState keep_state() {
@@ -147,6 +155,8 @@ struct Hub::Parts {
   }
 
   const HubOptions options;
+  Reloader reloader;
+  Limits limits;  ///< the conductor's; each shard has its own
   const std::unique_ptr<StateFolder> state_folder;
   Ground ground;
   const HubShared shared;
@@ -160,7 +170,7 @@ Hub::Hub(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 
 Hub::~Hub() { parts_->shards.stop(); }
 
-Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options) {
+Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigSources& sources) {
   const Result<std::vector<ListenUrl>> urls = addresses_for(options);
   if (!urls) return urls.error();
   std::vector<std::unique_ptr<Listener>> listeners;
@@ -173,7 +183,7 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options) {
   const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
   Result<StartState> state = start_state({options.state_dir, options.id, urls->front(), wall});
   if (!state) return state.error();
-  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, std::move(*state), std::move(listeners))));
+  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }

@@ -5,6 +5,7 @@
 
 #include "base/result.hpp"
 #include "hub/config/hub_options.hpp"
+#include "hub/config/sources.hpp"
 
 namespace gimnet::hub {
 
@@ -12,8 +13,9 @@ namespace gimnet::hub {
 /// Thread safety: made, run and destroyed by one thread, which is the conductor's while it runs.
 class Hub {
  public:
-  /// Listens, and starts the shards. Errors: a sentence that says what could not be had.
-  [[nodiscard]] static Result<std::unique_ptr<Hub>> start(const HubOptions& options);
+  /// Listens, and starts the shards. `sources` is where the options came from, to be read again at SIGHUP. Errors: a
+  /// sentence that says what could not be had.
+  [[nodiscard]] static Result<std::unique_ptr<Hub>> start(const HubOptions& options, const ConfigSources& sources = {});
   ~Hub();
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;

@@ -28,7 +28,7 @@ int run(const hub::CommandLine& line) {
   for (const std::string& warning : line.warnings) log_warning(warning);
   raise_descriptor_limit();
   std::signal(SIGPIPE, SIG_IGN);
-  const auto hub = hub::Hub::start(options);
+  const auto hub = hub::Hub::start(options, line.sources);
   if (!hub) {
     std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
     return 1;

@@ -48,6 +48,14 @@ class Operations(unittest.TestCase):
         self.assertGreater(len(in_force), 20)
         self.assertEqual(documented_limits(), in_force)
 
+    def test_documents_what_a_reload_changes(self):
+        told = subprocess.run([self.tcphub, "--help-limits"], check=True, capture_output=True, text=True,
+                              timeout=20).stdout
+        in_force = re.search(r"^A reload changes: (.*)\. The others", told, re.MULTILINE)[1].split(", ")
+        text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+        documented = re.search(r"and of the limits\n\n((?:    .*\n)+)", text)[1]
+        self.assertEqual(re.findall(r"\w+", documented), in_force)
+
     def test_documents_every_key(self):
         text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
         documented = set(re.findall(r"^\| ([a-z_]+) \| `--", text, re.MULTILINE))

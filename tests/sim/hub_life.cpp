@@ -60,7 +60,8 @@ HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& st
                [this](ShardIndex shard, const hub::ShardCommand& command) { checks_.before_it_leaves(shard, command); },
                around.is_slow}),
       checks_({nodes_, groups_, shards_, kHub, setting.plan.limits}, model_),
-      conductor_(facts(setting), hub::Placement::spread, setting.plan.limits,
+      limits_(setting.plan.limits),
+      conductor_(facts(setting), hub::Placement::spread, limits_,
                  hub::Conductor::Wiring{shards_, {nodes_, groups_, quiescence_}, readable_, start, around.keep_state}) {
   checks_.watch(conductor_);
   shards_.believe(model_);

@@ -60,6 +60,7 @@ class HubLife {
   Model model_;
   SimShards shards_;
   Checks checks_;
+  hub::Limits limits_;
   hub::Conductor conductor_;
 };
 

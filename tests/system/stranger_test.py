@@ -303,6 +303,17 @@ class Administration(Case):
         self.assertIn("accepted", fields(shards[0][2]))
         records = [fields(record) for record in every(made.ask(CTRL, 3), 3)]
         self.assertEqual([(record[1], record[2], record[4]) for record in records], [(made.id, "one", "tcp")])
+        routes = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
+        self.assertEqual([(record[1], record[3], record[4]) for record in routes], [(5, 5, 0)])
+
+    def test_changing_is_denied_to_nodes(self):
+        made = self.stranger(self.hub(), "one")
+        for operation, body in ((4, u32(3, made.id)), (5, u32(3, made.id) + u32(4, made.id + 1)), (6, b""), (7, b""),
+                                (8, put(3, TEXT, "debug"))):
+            with self.assertRaises(Denied) as denied:
+                made.ask(CTRL, operation, body)
+            self.assertEqual(denied.exception.args[0], 5)
+            self.assertIn("Unix socket", denied.exception.args[1])
 
 
 class Gimi(Case):
@@ -326,7 +337,7 @@ class ZDocument(unittest.TestCase):
     """Runs last: unittest sorts by name."""
 
     # What one stranger at one hub cannot make happen, or has to wait long for: other tests do.
-    ELSEWHERE = {("GOODBYE", code) for code in (0, 1, 2, 3, 7, 9, 10, 12, 13, 14, 15, 16)} | {
+    ELSEWHERE = {("GOODBYE", code) for code in (0, 1, 2, 3, 7, 9, 10, 12, 13, 14, 15, 16, 17)} | {
         ("reason", code) for code in (3, 4, 5, 7, 8, 9, 10, 11, 12, 14, 15, 16, 17, 18, 19, 20)} | {
         ("status", code) for code in (4, 5, 6)}
 

@@ -39,6 +39,10 @@ void check_requests(Bytes payload) {
   fuzz::check_message<ctrl::HubInfo>(payload);
   fuzz::check_message<ctrl::Statistics>(payload);
   fuzz::check_message<ctrl::Connections>(payload);
+  fuzz::check_message<ctrl::Kick>(payload);
+  fuzz::check_message<ctrl::Reassign>(payload);
+  fuzz::check_message<ctrl::Reload>(payload);
+  fuzz::check_message<ctrl::SetLogLevel>(payload);
 }
 
 /// A list that was accepted has an id in each record.
@@ -70,6 +74,9 @@ void check_answers(Bytes payload) {
   if (fuzz::check_answer<ns::ServicesAnswer>(payload)) check_records(payload);
   if (fuzz::check_answer<ctrl::StatisticsAnswer>(payload)) check_records(payload);
   if (fuzz::check_answer<ctrl::ConnectionsAnswer>(payload)) check_records(payload);
+  if (fuzz::check_answer<ctrl::RoutesAnswer>(payload)) check_records(payload);
+  if (fuzz::check_answer<ctrl::ReloadAnswer>(payload)) check_records(payload);
+  fuzz::check_answer<ctrl::SetLogLevelAnswer>(payload);
 }
 
 }  // namespace

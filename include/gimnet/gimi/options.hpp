@@ -35,6 +35,8 @@ struct NodeOptions {
   bool keep_token = true;
   /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
   std::optional<std::uint8_t> shard;
+  /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it. Else: denied.
+  bool administrator = false;
   std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, up to 1 GiB
   std::size_t receive_bytes = std::size_t{16} << 20;      ///< may wait unread when a queue holds the reading back
   std::size_t queue_messages = kQueueMessagesDefault;     ///< size of queues that nobody asked for

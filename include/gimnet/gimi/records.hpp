@@ -65,6 +65,23 @@ struct ShardCounts {
   std::vector<std::pair<std::string, std::uint64_t>> counters;
 };
 
+/// A key of the hub's configuration whose value is another one now, as its file writes them.
+struct HubChange {
+  std::string key;
+  std::string from;
+  std::string to;
+  bool needs_restart = false;  ///< `from` stays in force until then
+};
+
+/// A hub that this hub knows, itself among them.
+struct RouteRecord {
+  std::uint32_t hub_id = 0;
+  std::string name;
+  std::uint32_t next_hop = 0;
+  std::uint32_t cost = 0;
+  std::uint32_t nodes = 0;
+};
+
 struct ConnectionRecord {
   Peer node;
   std::string name;

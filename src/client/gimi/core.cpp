@@ -96,6 +96,7 @@ nif_status Core::connect(const NodeOptions& options) {
   how.no_token_file = options.keep_token ? 0 : 1;
   if (options.resume) how.resume = *options.resume ? NIF_RESUME_ON : NIF_RESUME_OFF;
   if (options.shard) how.shard_plus_one = static_cast<std::uint8_t>(*options.shard + 1);
+  how.administrator = options.administrator ? 1 : 0;
   how.receive_queue_bytes = options.receive_bytes;
   how.message_bytes_max = std::min(options.message_bytes_max + kHeaderRoom, NIF_MESSAGE_BYTES_MAX);
   how.socket_receive_bytes = options.socket_receive_bytes;

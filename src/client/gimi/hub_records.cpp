@@ -18,6 +18,21 @@ proto::bitestream::Writer body_of(const Request& request) {
   return body;
 }
 
+Status status_of(std::uint16_t wire) {
+  switch (static_cast<proto::Status>(wire)) {
+    case proto::Status::denied:
+      return Status::denied;
+    case proto::Status::not_found:
+      return Status::not_found;
+    case proto::Status::taken:
+      return Status::taken;
+    case proto::Status::bad_request:
+      return Status::bad_argument;
+    default:
+      return Status::refused;
+  }
+}
+
 /// Asks the hub and reads its answer.
 template <class Answer, class Request>
 Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing, Timeout timeout) {
@@ -28,8 +43,7 @@ Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& d
   if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
   if (reply->status != 0) {
-    const bool denied = reply->status == static_cast<std::uint16_t>(proto::Status::denied);
-    return Failure{denied ? Status::denied : Status::refused, "cannot " + doing + ": " + reply->sentence};
+    return Failure{status_of(reply->status), "cannot " + doing + ": " + reply->sentence};
   }
   proto::Fields fields({static_cast<const std::byte*>(reply->content), reply->size}, Answer::kName);
   Answer answer = Answer::read(fields);
@@ -125,6 +139,56 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout t
     }
     if (!page->more || page->connections.empty()) return records;
   }
+}
+
+Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout) {
+  const auto answer =
+      ask<proto::ctrl::RoutesAnswer>(node, proto::ctrl::Routes{}, "ask the hub for its routes", timeout);
+  if (!answer) return answer.failure();
+  std::vector<RouteRecord> routes;
+  for (const auto& route : answer->routes) {
+    routes.push_back({route.hub.value(), route.hub_name, route.next_hop.value(), route.cost, route.nodes});
+  }
+  return routes;
+}
+
+Outcome<void> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout) {
+  const proto::ctrl::Kick request{NodeId{peer.id}, std::string(reason)};
+  const auto answer = ask<proto::ctrl::KickAnswer>(node, request, "kick " + peer.text(), timeout);
+  if (!answer) return answer.failure();
+  return {};
+}
+
+Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout) {
+  const proto::ctrl::Reassign request{NodeId{peer.id}, NodeId{new_id.id}};
+  const std::string doing = "give " + peer.text() + " the id " + new_id.text();
+  const auto answer = ask<proto::ctrl::ReassignAnswer>(node, request, doing, timeout);
+  if (!answer) return answer.failure();
+  return {};
+}
+
+Outcome<void> drain_hub(nif_node* node, Timeout timeout) {
+  const auto answer = ask<proto::ctrl::DrainAnswer>(node, proto::ctrl::Drain{}, "drain the hub", timeout);
+  if (!answer) return answer.failure();
+  return {};
+}
+
+Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout) {
+  const std::string doing = "have the hub read its configuration again";
+  auto answer = ask<proto::ctrl::ReloadAnswer>(node, proto::ctrl::Reload{}, doing, timeout);
+  if (!answer) return answer.failure();
+  std::vector<HubChange> changes;
+  for (auto& change : answer->changes) {
+    changes.push_back({std::move(change.key), std::move(change.from), std::move(change.to), change.needs_restart});
+  }
+  return changes;
+}
+
+Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level, Timeout timeout) {
+  const proto::ctrl::SetLogLevel request{std::string(level)};
+  const auto answer = ask<proto::ctrl::SetLogLevelAnswer>(node, request, "set the hub's log level", timeout);
+  if (!answer) return answer.failure();
+  return answer->before;
 }
 
 }  // namespace gimnet::gimi

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gimnet/gimi/outcome.hpp"
@@ -19,5 +20,14 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout);
 /// All pages; `timeout` for each.
 [[nodiscard]] Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout timeout);
+
+[[nodiscard]] Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout);
+
+// For administrators.
+[[nodiscard]] Outcome<void> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout);
+[[nodiscard]] Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout);
+[[nodiscard]] Outcome<void> drain_hub(nif_node* node, Timeout timeout);
+[[nodiscard]] Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout);
+[[nodiscard]] Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level, Timeout timeout);
 
 }  // namespace gimnet::gimi

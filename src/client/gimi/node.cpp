@@ -149,6 +149,24 @@ Outcome<std::vector<ConnectionRecord>> Node::hub_connections(Timeout timeout) co
   return gimi::ask_connections(core_->node(), timeout);
 }
 
+Outcome<std::vector<RouteRecord>> Node::hub_routes(Timeout timeout) const {
+  return gimi::ask_routes(core_->node(), timeout);
+}
+
+Outcome<void> Node::kick(Peer node, std::string_view reason, Timeout timeout) const {
+  return gimi::kick(core_->node(), node, reason, timeout);
+}
+Outcome<void> Node::reassign(Peer node, Peer new_id, Timeout timeout) const {
+  return gimi::reassign(core_->node(), node, new_id, timeout);
+}
+Outcome<void> Node::drain_hub(Timeout timeout) const { return gimi::drain_hub(core_->node(), timeout); }
+Outcome<std::vector<HubChange>> Node::reload_hub(Timeout timeout) const {
+  return gimi::reload_hub(core_->node(), timeout);
+}
+Outcome<std::string> Node::set_hub_log_level(std::string_view level, Timeout timeout) const {
+  return gimi::set_hub_log_level(core_->node(), level, timeout);
+}
+
 Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) const {
   return core_->ping(to, timeout, lane, echo);
 }

@@ -59,6 +59,8 @@ nif_status status_of(proto::GoodbyeCode code) {
     case proto::GoodbyeCode::hub_full:
     case proto::GoodbyeCode::no_memory:
       return NIF_HUB_FULL;
+    case proto::GoodbyeCode::not_allowed:
+      return NIF_DENIED;
     case proto::GoodbyeCode::replaced:
       return NIF_REPLACED;
     default:

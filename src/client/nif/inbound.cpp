@@ -35,6 +35,11 @@ Inbound::Verdict Inbound::malformed(std::string why) {
 void Inbound::begin(const Session& session) {
   filled_ = parsed_ = 0;
   if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
+  if (!session.resumed) {
+    former_id_ = 0;
+  } else if (session.id != id_) {
+    former_id_ = id_;
+  }
   id_ = session.id;
   confirm_bytes_ = session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
   unconfirmed_bytes_ = 0;
@@ -124,7 +129,7 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
     case proto::Kind::unicast:
 #if !defined(GIMNET_BUG_NIF_TAKES_ALL_UNICAST)
       // Never to another node than the one addressed, whatever the hub thinks.
-      if (view.header.dst != id_) break;
+      if (!is_for_this_node(view.header.dst)) break;
 #endif
       return take_message(view, frame);
     case proto::Kind::group:
@@ -135,7 +140,7 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
     case proto::Kind::taken: {
       const auto taken = proto::decode_taken(view.payload);
       if (!taken) return malformed("TAKEN is too short");
-      if (view.header.dst != id_) break;
+      if (!is_for_this_node(view.header.dst)) break;
       host_.on_taken(view.header.src, *taken);
       return Verdict::going;
     }

@@ -103,12 +103,15 @@ class Inbound {
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
   void deliver();
 
+  [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const { return dst == id_ || (dst == former_id_ && dst != 0); }
+
   InboundHost& host_;
   MessageAssembler assembler_;
   Slab* slab_ = nullptr;
   std::size_t filled_ = 0;
   std::size_t parsed_ = 0;
   std::uint32_t id_ = 0;
+  std::uint32_t former_id_ = 0;  ///< that of the frames which waited while the node was given another one; 0: none
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;
   std::uint64_t confirm_bytes_ = UINT64_MAX;

@@ -45,6 +45,7 @@ Node::~Node() = default;
 
 proto::Hello Node::hello() const {
   proto::Hello hello;
+  hello.role = options_.administrator ? proto::Role::admin : proto::Role::node;
   hello.name = options_.name;
   hello.description = options_.description;
   hello.token = session_.token;

@@ -194,7 +194,10 @@ void Node::on_goodbye(const proto::Goodbye& goodbye) {
 
 void Node::disconnect(std::string why, proto::GoodbyeCode code) {
   const bool replaced = code == proto::GoodbyeCode::replaced;
-  const bool again = options_.reconnect && !replaced;
+  const bool kicked = code == proto::GoodbyeCode::kicked;
+  // Who was given another id is not told to go: it comes back whatever else it does at a break.
+  const bool renumbered = code == proto::GoodbyeCode::renumbered;
+  const bool again = (options_.reconnect || renumbered) && !replaced && !kicked;
   outbound_.detach(again);
   socket_.close();
   requests_.fail_all();
@@ -208,7 +211,11 @@ void Node::disconnect(std::string why, proto::GoodbyeCode code) {
   Record* event = make_event(replaced ? NIF_SESSION_REPLACED : NIF_DISCONNECTED, std::move(why));
   event->incoming.reason = static_cast<std::uint32_t>(code);
   push_event(event);
-  if (!again && !replaced) end(NIF_NOT_CONNECTED);
+  if (kicked) {
+    end(NIF_REFUSED);
+  } else if (!again && !replaced) {
+    end(NIF_NOT_CONNECTED);
+  }
   call_back();
 }
 

@@ -73,6 +73,7 @@ Result<Options, Failure> read_options(const nif_options* options) {
   if (auto failure = read_identity(given, checked)) return std::move(*failure);
   if (auto failure = read_limits(given, checked)) return std::move(*failure);
   if (given.connect_timeout_ms != 0) checked.connect_timeout_ms = given.connect_timeout_ms;
+  checked.administrator = given.administrator != 0;
   checked.wait_for_hub = given.wait_for_hub != 0;
   checked.reconnect = given.no_reconnect == 0;
   checked.keep_token = given.no_token_file == 0;

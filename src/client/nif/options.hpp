@@ -26,6 +26,7 @@ struct Options {
   bool reconnect = true;
   bool resume = false;
   bool keep_token = true;  ///< over a crash; of nodes with a name only
+  bool administrator = false;
   std::optional<std::uint16_t> shard;
   SendQueue::Limits send;
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;

@@ -59,6 +59,8 @@ nif_status Outbound::not_connected() const {
         return fail(NIF_CLOSED, "the handle was closed");
       case NIF_REPLACED:
         return fail(NIF_REPLACED, "another connection took this session over");
+      case NIF_REFUSED:
+        return fail(NIF_REFUSED, "an administrator of the hub ended this session; nif_last_error() has their words");
       default:
         return fail(end_status_, "the connection broke, and nif_options.no_reconnect is set");
     }

@@ -15,6 +15,8 @@ nif_status end_answer(nif_status status) {
   switch (status) {
     case NIF_REPLACED:
       return fail(NIF_REPLACED, "another connection took this session over");
+    case NIF_REFUSED:
+      return fail(NIF_REFUSED, "an administrator of the hub ended this session; nif_last_error() has their words");
     case NIF_CLOSED:
       return fail(NIF_CLOSED, "the handle was closed");
     default:

@@ -47,7 +47,7 @@ SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.gene
 
 }  // namespace
 
-Conductor::Conductor(HubFacts facts, Placement placement, const Limits& limits, Wiring wiring)
+Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring)
     : facts_(std::move(facts)),
       limits_(limits),
       wiring_(std::move(wiring)),
@@ -151,12 +151,13 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_, limits_, membership_,    watches_,         wiring_.counters,
-                         now,    effects, wiring_.queues, wiring_.refusals, &name_counters_};
+  HandlerContext context{facts_,         limits_,          membership_,     watches_, wiring_.counters, now, effects,
+                         wiring_.queues, wiring_.refusals, &name_counters_, this};
   const Request request{*session, view->header, payload};
   const NodeId dst{proto::load_header(event.frame.data()).dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
   const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
+  const ShardIndex shard = session->place.shard;
   const proto::Payload answer = handle(context, request);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
 #ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
@@ -167,9 +168,9 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
 #ifndef GIMNET_BUG_ANSWER_TO_ANY_CONNECTION
   command.attachment = event.attachment;
 #endif
-  command.frame = control_frame(kind, node_id(*session), facts_.id, answer);
+  command.frame = control_frame(kind, event.node, facts_.id, answer);
   command.answers = 1;
-  wiring_.shards.send(session->place.shard, std::move(command));
+  wiring_.shards.send(shard, std::move(command));
 #ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
   carry_out(effects, now);
 #endif
@@ -229,8 +230,31 @@ void Conductor::drain() {
   }
 }
 
+Reloading Conductor::reload() {
+  Reloading reloading;
+  if (wiring_.read_again) reloading = wiring_.read_again();
+  if (!wiring_.read_again) reloading.faults.emplace_back("this hub has no configuration that could be read again");
+  for (const std::string& fault : reloading.faults) log_error(fault);
+  if (!reloading.faults.empty()) {
+    log_error("the configuration was not read again: the former one stays in force, whole");
+    return reloading;
+  }
+  limits_ = reloading.limits;
+  for (std::size_t i = 0; i < facts_.shards; ++i) {
+    wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, LimitsCommand{reloading.limits});
+  }
+  set_log_level(reloading.log_level);
+  log_info(reload_summary(reloading));
+  return reloading;
+}
+
+void Conductor::log_level_set(LogLevel level) {
+  if (wiring_.note_log_level) wiring_.note_log_level(level);
+}
+
 Session* Conductor::find(const SessionRef& ref, NodeId node) {
-  Session* session = membership_.sessions().find(index_of(node));
+  // The shard may have said it before it heard of a new id.
+  Session* session = membership_.sessions().find(membership_.sessions().present_index(index_of(node)));
   if (session == nullptr || session->place.generation != ref.generation) return nullptr;
   return session;
 }
@@ -287,6 +311,12 @@ void Conductor::carry_out_one(const GroupChanged& effect) { publisher_.publish_g
 
 void Conductor::carry_out_one(const SessionEnded& effect) {
   wiring_.shards.send(effect.place.shard, ReleaseCommand{ref_of(effect.place)});
+}
+
+void Conductor::carry_out_one(const RenumberDue& effect) {
+  watches_.connection_ended(effect.former);
+  wiring_.shards.send(effect.place.shard,
+                      RenumberCommand{ref_of(effect.place), make_id<NodeId>(facts_.id, effect.index), effect.sentence});
 }
 
 void Conductor::carry_out_one(const ServiceMovedDue& effect) {

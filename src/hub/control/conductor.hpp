@@ -8,6 +8,7 @@
 #include <span>
 
 #include "hub/control/acceptor.hpp"
+#include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/hub_state.hpp"
@@ -26,7 +27,7 @@ namespace gimnet::hub {
 /// The control plane of a hub: admits peers, answers control requests, publishes tables, commands the shards. The event
 /// loop around it is conductor_loop.hpp; here are neither sockets to wait for nor clocks.
 /// Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters outlive it.
-class Conductor {
+class Conductor final : private Administration {
  public:
   /// Keeps the state where it outlives the hub. "" when it is safe there, or why it is not.
   using KeepState = std::function<std::string(const HubState&)>;
@@ -38,8 +39,11 @@ class Conductor {
     KeepState keep_state{};                          ///< or none: in memory only
     std::span<const QueueGauges* const> queues{};    ///< one per shard, or none
     const RefusalCounters* refusals = nullptr;       ///< or none
+    ReadAgain read_again{};                          ///< or none: the configuration stays as it is
+    std::function<void(LogLevel)> note_log_level{};  ///< told of levels that were set by request; or none
   };
-  Conductor(HubFacts facts, Placement placement, const Limits& limits, Wiring wiring);
+  /// `limits` is what the conductor's thread goes by; reload() changes it.
+  Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring);
 
   /// The two clocks at one moment.
   struct Moment {
@@ -62,6 +66,12 @@ class Conductor {
   /// To be called after events were taken, and again as long as there is more.
   [[nodiscard]] bool serve_watches(std::chrono::milliseconds now);
 
+  /// Reads the configuration again. With faults nothing changes; else all that may change does, here at once and on
+  /// each shard before its next turn. Says in the log what came of it.
+  Reloading reload() override;
+
+  /// Somebody who may asked for the end of the hub.
+  [[nodiscard]] bool drain_wanted() const { return drain_wanted_; }
   /// Nobody new is admitted, and the shards say GOODBYE to everybody once what waits is written.
   void drain();
   [[nodiscard]] bool drained() const { return draining_ && shards_to_drain_ == 0; }
@@ -79,10 +89,14 @@ class Conductor {
   [[nodiscard]] Session* find(const SessionRef& ref, NodeId node);
   [[nodiscard]] NodeId node_id(const Session& session) const;
 
+  void want_drain() override { drain_wanted_ = true; }
+  void log_level_set(LogLevel level) override;
+
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
   void carry_out_one(const NodeChanged& effect);
   void carry_out_one(const GroupChanged& effect);
   void carry_out_one(const SessionEnded& effect);
+  void carry_out_one(const RenumberDue& effect);
   void carry_out_one(const ServiceMovedDue& effect);
   void carry_out_one(const PaceDue& effect);
   void carry_out_one(const PaceEnded& effect);
@@ -96,7 +110,7 @@ class Conductor {
 
   // Immutable after construction
   const HubFacts facts_;
-  const Limits& limits_;
+  Limits& limits_;
   const Wiring wiring_;
   // The conductor's thread only
   Membership membership_;
@@ -107,6 +121,7 @@ class Conductor {
   std::optional<std::chrono::milliseconds> keep_again_at_;  ///< it could not be kept
   /// After a restart: until then nodes that are not back yet count as away.
   std::optional<std::chrono::milliseconds> returns_until_;
+  bool drain_wanted_ = false;
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;
 };

@@ -71,7 +71,8 @@ struct ConductorLoop::Impl {
         strangers_watch(context, strangers.descriptor()),
         inbox_watch(context, parts.inbox.waker().descriptor()),
         timer(context),
-        signals(context, SIGTERM, SIGINT) {
+        signals(context, SIGTERM, SIGINT),
+        reloads(context, SIGHUP) {
     for (auto& listener : listeners) {
       doors.push_back(std::make_unique<Door>(context, std::move(listener), parts));
     }
@@ -109,6 +110,7 @@ struct ConductorLoop::Impl {
     wiring.inbox.drain(kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
     serve_watches();
     arm_timer();
+    if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
     if (wiring.conductor.drained()) context.stop();
     if (wiring.inbox.empty()) {
       wiring.inbox.waker().prepare_to_sleep();
@@ -176,6 +178,14 @@ struct ConductorLoop::Impl {
     });
   }
 
+  void watch_reloads() {
+    reloads.async_wait([this](const error_code& error, int) {
+      if (error) return;
+      static_cast<void>(wiring.conductor.reload());
+      watch_reloads();
+    });
+  }
+
   void begin_drain() {
     stopping = true;
     doors.clear();
@@ -198,6 +208,7 @@ struct ConductorLoop::Impl {
   std::optional<milliseconds> armed;  ///< when the timer fires
   std::optional<asio::steady_timer> drain_deadline;
   asio::signal_set signals;
+  asio::signal_set reloads;
   std::vector<std::unique_ptr<Door>> doors;
   bool stopping = false;
   bool serving_watches = false;  ///< a piece of it is posted
@@ -212,6 +223,7 @@ void ConductorLoop::run() {
   for (auto& door : impl_->doors) impl_->watch_door(*door);
   impl_->watch_strangers();
   impl_->watch_signals();
+  impl_->watch_reloads();
   impl_->take_events();
   impl_->context.run();
 }

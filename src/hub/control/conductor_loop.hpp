@@ -12,9 +12,8 @@
 namespace gimnet::hub {
 
 /// The conductor's thread: waits for strangers, for what shards hand over, for deadlines and for signals, and drives a
-/// Conductor with them. SIGTERM or SIGINT drains the hub; a second one ends it at once.
-/// Thread safety: constructed, run and destroyed by one thread. Lifetime: what it is wired to outlives
-/// it.
+/// Conductor with them. SIGHUP has the configuration read again; SIGTERM or SIGINT drains the hub; a second one ends it
+/// at once. Thread safety: constructed, run and destroyed by one thread. Lifetime: what it is wired to outlives it.
 class ConductorLoop {
  public:
   struct Wiring {

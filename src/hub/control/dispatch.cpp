@@ -3,6 +3,7 @@
 #include <array>
 
 #include "hub/control/handle/admin.hpp"
+#include "hub/control/handle/administer.hpp"
 #include "hub/control/handle/names.hpp"
 #include "hub/control/handle/services.hpp"
 #include "hub/control/handle/watch.hpp"
@@ -44,6 +45,12 @@ constexpr std::array kTable{
     Entry{Kind::ctrl, ctrl::HubInfo::kOperation, everybody, handle_hub_info},
     Entry{Kind::ctrl, ctrl::Statistics::kOperation, everybody, handle_statistics},
     Entry{Kind::ctrl, ctrl::Connections::kOperation, everybody, handle_connections},
+    Entry{Kind::ctrl, ctrl::Routes::kOperation, everybody, handle_routes},
+    Entry{Kind::ctrl, ctrl::Kick::kOperation, admins, handle_kick},
+    Entry{Kind::ctrl, ctrl::Reassign::kOperation, admins, handle_reassign},
+    Entry{Kind::ctrl, ctrl::Drain::kOperation, admins, handle_drain},
+    Entry{Kind::ctrl, ctrl::Reload::kOperation, admins, handle_reload},
+    Entry{Kind::ctrl, ctrl::SetLogLevel::kOperation, admins, handle_log_level},
 };
 
 Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
@@ -58,7 +65,8 @@ proto::Payload handle_unknown(HandlerContext&, const Request& request) {
 
 Handler handler_for(Role role, Kind kind, std::uint16_t operation) {
   for (const Entry& entry : kTable) {
-    if (entry.kind == kind && entry.operation == operation && (entry.roles & mask_of(role)) != 0) return entry.handler;
+    if (entry.kind != kind || entry.operation != operation) continue;
+    return (entry.roles & mask_of(role)) != 0 ? entry.handler : handle_denied;
   }
   return handle_unknown;
 }

@@ -14,7 +14,11 @@ TablePublisher::~TablePublisher() {
 void TablePublisher::publish_node(std::uint32_t index, const Membership& membership) {
   const Session* session = membership.sessions().find(index);
   NodePlace place;
-  if (session != nullptr) place = NodePlace{session->place.shard, session->place.slot, session->place.generation};
+  if (session != nullptr) {
+    place = NodePlace{session->place.shard, session->place.slot, session->place.generation};
+  } else if (membership.sessions().present_index(index) != index) {
+    place = NodePlace::renumbered();
+  }
   tables_.nodes.publish(index, place);
 }
 

@@ -33,6 +33,7 @@ void Attacher::attach(AttachCommand command) {
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};
   connection.ingress.node = connection.node;
+  connection.ingress.former_node = connection.former_node;
   connection.posted_shards = ~std::uint64_t{0};
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);

@@ -9,6 +9,7 @@
 
 #include "base/ids.hpp"
 #include "hub/data/fanout/paced_subscription.hpp"
+#include "hub/limits.hpp"
 #include "hub/transport/transport.hpp"
 #include "proto/control/link.hpp"
 
@@ -94,6 +95,19 @@ struct ForgetRetainedCommand {
   GroupId group;
 };
 
+/// The session's node has another id. Its connection, if it has one, is told so with GOODBYE `renumbered`; frames that
+/// it sent under the former id are taken for its own until it has come back and confirmed them.
+struct RenumberCommand {
+  SessionRef session;
+  NodeId node;
+  std::string sentence;
+};
+
+/// What the shard goes by from its next turn on.
+struct LimitsCommand {
+  Limits limits;
+};
+
 /// Say GOODBYE `draining` to everybody after what waits was written, or at the deadline; then answer DrainedEvent.
 struct DrainCommand {
   std::uint64_t deadline_ms = 0;  ///< from now
@@ -102,8 +116,9 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand = std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, PaceCommand,
-                                  EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
+using ShardCommand =
+    std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, RenumberCommand, LimitsCommand,
+                 PaceCommand, EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor --------------------------------------------------------------------------------------------
 

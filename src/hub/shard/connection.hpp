@@ -48,6 +48,7 @@ struct Connection : Recipient {
   bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
   bool must_confirm = false;    ///< nothing more can be written before its CONFIRM: read even if held
   bool gauged = false;          ///< its queue gauge is not 0
+  NodeId former_node;           ///< under which it may still send; 0: none
   bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
   bool draining = false;        ///< closes once everything is written
   std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first

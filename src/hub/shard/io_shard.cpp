@@ -195,6 +195,13 @@ void IoShard::execute(ShardCommand& command) {
                    }
                  },
                  [&](ReleaseCommand& release) { closer_.release(release.session); },
+                 [&](RenumberCommand& renumber) {
+                   if (Connection* connection = state_.find(renumber.session)) {
+                     connection->former_node = std::exchange(connection->node, renumber.node);
+                     closer_.close(*connection, proto::GoodbyeCode::renumbered, std::move(renumber.sentence));
+                   }
+                 },
+                 [&](const LimitsCommand& changed) { state_.limits = changed.limits; },
                  [&](PaceCommand& pace) { begin_pace(pace); },
                  [&](EndPaceCommand& end) {
                    if (Connection* connection = state_.find(end.session)) {

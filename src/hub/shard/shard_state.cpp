@@ -13,7 +13,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       pieces(budget),
       drops(tally, hub_shared.limits.report_interval_ms),
       signals(*this),
-      egress{.limits = hub_shared.limits,
+      egress{.limits = limits,
              .pool = pool,
              .pieces = pieces,
              .budget = budget,
@@ -26,7 +26,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       retained(hub_shared.nodes, hub_shared.groups, fanout, pacer),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
       receive_buffer(pool, tally, hub_shared.limits.partial_bytes),
-      gate(hub_shared.limits, tally) {}
+      gate(limits, tally) {}
 
 Connection* ShardState::find(SessionRef session) const {
   if (session.slot.value() >= connections.size()) return nullptr;

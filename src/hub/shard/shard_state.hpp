@@ -47,7 +47,7 @@ struct ShardState {
 
   const ShardIndex self;
   const HubShared& shared;
-  const Limits& limits;
+  Limits limits;  ///< this shard's own: changed between two steps of its work
   ShardCounters& counters;
   QueueGauges& queues;
   Tally tally;

@@ -112,4 +112,86 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
   return answer;
 }
 
+void RoutesAnswer::write(bitestream::Writer& writer) const {
+  for (const RouteRecord& record : routes) {
+    writer.begin_nested(3);
+    writer.put_u16(1, record.hub.value());
+    put_clean_text(writer, 2, record.hub_name, kNameBytesMax);
+    writer.put_u16(3, record.next_hop.value());
+    writer.put_u32(4, record.cost);
+    writer.put_u32(5, record.nodes);
+    writer.end_nested();
+  }
+}
+RoutesAnswer RoutesAnswer::read(Fields& fields) {
+  RoutesAnswer answer;
+  answer.routes = fields.records<RouteRecord>(3, "record", [](Fields& record) {
+    RouteRecord route;
+    route.hub = HubId{record.required_number<std::uint16_t>(1, "hub id")};
+    route.hub_name = record.text(2, "hub name", kNameBytesMax);
+    route.next_hop = HubId{record.number<std::uint16_t>(3, "next hop", 0)};
+    route.cost = record.number<std::uint32_t>(4, "cost", 0);
+    route.nodes = record.number<std::uint32_t>(5, "number of nodes", 0);
+    return route;
+  });
+  return answer;
+}
+
+void Kick::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, node.value());
+  put_clean_text(writer, 4, reason, kRemarkBytesMax);
+}
+Kick Kick::read(Fields& fields) {
+  Kick kick;
+  kick.node = NodeId{fields.required_number<std::uint32_t>(3, "node id")};
+  kick.reason = fields.text(4, "reason", kRemarkBytesMax);
+  return kick;
+}
+
+void Reassign::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, node.value());
+  writer.put_u32(4, new_node.value());
+}
+Reassign Reassign::read(Fields& fields) {
+  Reassign reassign;
+  reassign.node = NodeId{fields.required_number<std::uint32_t>(3, "node id")};
+  reassign.new_node = NodeId{fields.required_number<std::uint32_t>(4, "new node id")};
+  return reassign;
+}
+
+std::size_t page_bytes_max(const ChangeRecord& record) {
+  return kRecordOverhead + record.key.size() + record.from.size() + record.to.size();
+}
+
+void ReloadAnswer::write(bitestream::Writer& writer) const {
+  for (const ChangeRecord& record : changes) {
+    writer.begin_nested(3);
+    put_clean_text(writer, 1, record.key, kRemarkBytesMax);
+    put_clean_text(writer, 2, record.from, kRemarkBytesMax);
+    put_clean_text(writer, 3, record.to, kRemarkBytesMax);
+    writer.put_bool(4, record.needs_restart);
+    writer.end_nested();
+  }
+  writer.put_bool(4, more);
+}
+ReloadAnswer ReloadAnswer::read(Fields& fields) {
+  ReloadAnswer answer;
+  answer.changes = fields.records<ChangeRecord>(3, "record", [](Fields& record) {
+    ChangeRecord change;
+    change.key = record.required_text(1, "key", kRemarkBytesMax);
+    change.from = record.text(2, "value before", kRemarkBytesMax);
+    change.to = record.text(3, "value now", kRemarkBytesMax);
+    change.needs_restart = record.flag(4, "need of a restart", false);
+    return change;
+  });
+  answer.more = fields.flag(4, "more", false);
+  return answer;
+}
+
+void SetLogLevel::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, level, kRemarkBytesMax); }
+SetLogLevel SetLogLevel::read(Fields& fields) { return {fields.required_text(3, "level", kRemarkBytesMax)}; }
+
+void SetLogLevelAnswer::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, before, kRemarkBytesMax); }
+SetLogLevelAnswer SetLogLevelAnswer::read(Fields& fields) { return {fields.text(3, "level before", kRemarkBytesMax)}; }
+
 }  // namespace gimnet::proto::ctrl

@@ -14,7 +14,17 @@
 
 namespace gimnet::proto::ctrl {
 
-enum class Operation : std::uint16_t { hub_info = 1, statistics = 2, connections = 3 };
+enum class Operation : std::uint16_t {
+  hub_info = 1,
+  statistics = 2,
+  connections = 3,
+  kick = 4,
+  reassign = 5,
+  drain = 6,
+  reload = 7,
+  log_level = 8,
+  routes = 9,
+};
 
 [[nodiscard]] constexpr std::uint16_t request_of(Operation operation) { return static_cast<std::uint16_t>(operation); }
 [[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
@@ -117,6 +127,146 @@ struct ConnectionsAnswer {
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ConnectionsAnswer read(Fields& fields);
   friend bool operator==(const ConnectionsAnswer&, const ConnectionsAnswer&) = default;
+};
+
+// ROUTES: the hubs that this one knows, itself among them, and the way to each
+
+struct Routes {
+  static constexpr std::uint16_t kOperation = request_of(Operation::routes);
+  static constexpr const char* kName = "ROUTES";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static Routes read(Fields&) { return {}; }
+  friend bool operator==(const Routes&, const Routes&) = default;
+};
+
+struct RouteRecord {
+  HubId hub;
+  std::string hub_name;
+  HubId next_hop;          ///< itself for the own hub
+  std::uint32_t cost = 0;  ///< 0 for the own hub
+  std::uint32_t nodes = 0;
+  friend bool operator==(const RouteRecord&, const RouteRecord&) = default;
+};
+
+struct RoutesAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::routes);
+  static constexpr const char* kName = "answer to ROUTES";
+  std::vector<RouteRecord> routes;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static RoutesAnswer read(Fields& fields);
+  friend bool operator==(const RoutesAnswer&, const RoutesAnswer&) = default;
+};
+
+// What follows changes the hub: for administrators only, `denied` to everybody else.
+
+// KICK: ends a node's session, its connection with GOODBYE `kicked`
+
+struct Kick {
+  static constexpr std::uint16_t kOperation = request_of(Operation::kick);
+  static constexpr const char* kName = "KICK";
+  NodeId node;
+  std::string reason;  ///< told to the node; at most 256 bytes
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Kick read(Fields& fields);
+  friend bool operator==(const Kick&, const Kick&) = default;
+};
+
+struct KickAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::kick);
+  static constexpr const char* kName = "answer to KICK";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static KickAnswer read(Fields&) { return {}; }
+  friend bool operator==(const KickAnswer&, const KickAnswer&) = default;
+};
+
+// REASSIGN: a node goes on under another id of the same hub
+
+struct Reassign {
+  static constexpr std::uint16_t kOperation = request_of(Operation::reassign);
+  static constexpr const char* kName = "REASSIGN";
+  NodeId node;
+  NodeId new_node;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static Reassign read(Fields& fields);
+  friend bool operator==(const Reassign&, const Reassign&) = default;
+};
+
+struct ReassignAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::reassign);
+  static constexpr const char* kName = "answer to REASSIGN";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static ReassignAnswer read(Fields&) { return {}; }
+  friend bool operator==(const ReassignAnswer&, const ReassignAnswer&) = default;
+};
+
+// DRAIN: the hub ends as at SIGTERM
+
+struct Drain {
+  static constexpr std::uint16_t kOperation = request_of(Operation::drain);
+  static constexpr const char* kName = "DRAIN";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static Drain read(Fields&) { return {}; }
+  friend bool operator==(const Drain&, const Drain&) = default;
+};
+
+struct DrainAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::drain);
+  static constexpr const char* kName = "answer to DRAIN";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static DrainAnswer read(Fields&) { return {}; }
+  friend bool operator==(const DrainAnswer&, const DrainAnswer&) = default;
+};
+
+// RELOAD: the hub reads its configuration again
+
+struct Reload {
+  static constexpr std::uint16_t kOperation = request_of(Operation::reload);
+  static constexpr const char* kName = "RELOAD";
+  void write(bitestream::Writer&) const {}
+  [[nodiscard]] static Reload read(Fields&) { return {}; }
+  friend bool operator==(const Reload&, const Reload&) = default;
+};
+
+/// A key whose value is another one now. Keys and values as a configuration file has them.
+struct ChangeRecord {
+  std::string key;
+  std::string from;
+  std::string to;
+  bool needs_restart = false;  ///< the value in force is still `from`
+  friend bool operator==(const ChangeRecord&, const ChangeRecord&) = default;
+};
+
+/// As page_bytes_max(ConnectionRecord).
+[[nodiscard]] std::size_t page_bytes_max(const ChangeRecord& record);
+
+struct ReloadAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::reload);
+  static constexpr const char* kName = "answer to RELOAD";
+  std::vector<ChangeRecord> changes;
+  bool more = false;  ///< there were more than fit in a frame
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static ReloadAnswer read(Fields& fields);
+  friend bool operator==(const ReloadAnswer&, const ReloadAnswer&) = default;
+};
+
+// LOG_LEVEL: until the next reload or start
+
+struct SetLogLevel {
+  static constexpr std::uint16_t kOperation = request_of(Operation::log_level);
+  static constexpr const char* kName = "LOG_LEVEL";
+  std::string level;  ///< error, warning, info, debug or off
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static SetLogLevel read(Fields& fields);
+  friend bool operator==(const SetLogLevel&, const SetLogLevel&) = default;
+};
+
+struct SetLogLevelAnswer {
+  static constexpr std::uint16_t kOperation = answer_of(Operation::log_level);
+  static constexpr const char* kName = "answer to LOG_LEVEL";
+  std::string before;
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static SetLogLevelAnswer read(Fields& fields);
+  friend bool operator==(const SetLogLevelAnswer&, const SetLogLevelAnswer&) = default;
 };
 
 }  // namespace gimnet::proto::ctrl

@@ -14,6 +14,7 @@ Examples:
   gimnet hz 'robot/*'                       how often do its services send, and how evenly?
   gimnet ping B                             how far away is B?
   gimnet nodes; gimnet services; gimnet status --json
+  gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
 
 Data goes to standard output, words to standard error. Ends with 0 done, 1 failed, 2 wrong arguments, 3 cannot connect,
 4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 130 and 143 by signal.

@@ -154,6 +154,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_meter(app, "bw", help::kBwAbout, options);
   add_ping(app, options);
   add_lists(app, options);
+  add_ctl(app, options.ctl);
   for (CLI::App* command : app.get_subcommands({})) command->fallthrough();
 }
 

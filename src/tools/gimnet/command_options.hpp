@@ -13,7 +13,7 @@ class App;
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 10> kCommands{{{"send", Command::send},
+inline constexpr std::array<std::pair<std::string_view, Command>, 11> kCommands{{{"send", Command::send},
                                                                                  {"recv", Command::recv},
                                                                                  {"pub", Command::pub},
                                                                                  {"echo", Command::echo},
@@ -22,7 +22,8 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 10> kCommands{
                                                                                  {"ping", Command::ping},
                                                                                  {"nodes", Command::nodes},
                                                                                  {"services", Command::services},
-                                                                                 {"status", Command::status}}};
+                                                                                 {"status", Command::status},
+                                                                                 {"ctl", Command::ctl}}};
 
 /// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each option's description
 /// says its unit, range and default: it is what a wrong value is answered with.

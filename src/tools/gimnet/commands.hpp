@@ -17,5 +17,6 @@ namespace gimnet::tool {
 [[nodiscard]] ExitCode run_nodes(Session& session);
 [[nodiscard]] ExitCode run_services(Session& session);
 [[nodiscard]] ExitCode run_status(Session& session);
+[[nodiscard]] ExitCode run_ctl(Session& session);
 
 }  // namespace gimnet::tool

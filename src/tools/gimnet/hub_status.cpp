@@ -97,6 +97,16 @@ Ledger ledger_of(const Counters& counters) {
   return ledger;
 }
 
+std::string json_of(const std::vector<ConnectionRecord>& connections) {
+  JsonWriter json;
+  write(json, connections);
+  return json.str() + "\n";
+}
+
+std::string text_of(const std::vector<ConnectionRecord>& connections, Paint paint) {
+  return connections_table(connections, paint);
+}
+
 std::string json_of(const HubStatus& status) {
   const Counters counters = summed(status.shards);
   JsonWriter json;

@@ -38,5 +38,8 @@ struct Ledger {
 /// One object and a newline.
 [[nodiscard]] std::string json_of(const HubStatus& status);
 [[nodiscard]] std::string text_of(const HubStatus& status, Paint paint = Paint{});
+/// The same for connections alone: a list of objects, a table.
+[[nodiscard]] std::string json_of(const std::vector<ConnectionRecord>& connections);
+[[nodiscard]] std::string text_of(const std::vector<ConnectionRecord>& connections, Paint paint = Paint{});
 
 }  // namespace gimnet::tool

@@ -33,6 +33,8 @@ ExitCode run(const Options& options) {
       return run_services(session);
     case Command::status:
       return run_status(session);
+    case Command::ctl:
+      return run_ctl(session);
   }
   return ExitCode::usage;
 }

@@ -6,10 +6,11 @@
 #include <string>
 
 #include "gimnet/gimi.hpp"
+#include "tools/gimnet/ctl_options.hpp"
 
 namespace gimnet::tool {
 
-enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, status };
+enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, status, ctl };
 
 /// When to print colours: on a terminal, unless NO_COLOR says no.
 enum class Colour : std::uint8_t { automatic, always, never };
@@ -42,6 +43,7 @@ struct Options {
   PaceOptions pace;  ///< of what is subscribed
   Lane lane = Lane::normal;
   MessageKey key;
+  CtlOptions ctl;
 };
 
 }  // namespace gimnet::tool

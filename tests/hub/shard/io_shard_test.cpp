@@ -254,5 +254,50 @@ TEST(IoShard, RunsOnAThreadOfItsOwnUntilItIsStopped) {
   EXPECT_GE(rig.sum(&ShardCounters::turns), 1u);
 }
 
+TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
+  HubRig rig(1);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  const std::uint32_t former = b.id.value();
+  rig.nodes().publish(400, NodePlace{b.shard, b.session.slot, b.session.generation});
+  rig.nodes().publish(index_of(b.id), NodePlace::renumbered());
+  b.id = make_id<NodeId>(rig.hub(), 400);
+  rig.command(0, RenumberCommand{b.session, b.id, "another id"});
+  rig.settle();
+  ASSERT_TRUE(b.goodbye);
+  EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::renumbered);
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(detached->node, b.id);
+  rig.send(a, former, "old", {.flags = proto::kFlagReport});
+  rig.send(a, b.id.value(), "new");
+  rig.settle();
+  EXPECT_EQ(rig.dropped(proto::DropReason::renumbered), 1u);
+  rig.rejoin(b, {.resume = true});
+  rig.settle();
+  EXPECT_EQ(b.texts(), (std::vector<std::string>{"new"}));
+  // What it had sent before it knew is taken for its own.
+  rig.send(b, a.id.value(), "late", {.src = former});
+  rig.settle();
+  EXPECT_EQ(a.texts(), (std::vector<std::string>{"late"}));
+  EXPECT_EQ(a.frames.back().header.src, b.id.value());
+  EXPECT_TRUE(rig.ledger().exact());
+}
+
+TEST(IoShard, GoesByNewLimitsFromTheNextTurnOn) {
+  HubRig rig(1);
+  FakeNode& a = rig.join(0);
+  Limits limits;
+  limits.requests = 1;
+  rig.command(0, LimitsCommand{limits});
+  rig.settle();
+  for (int i = 0; i < 2; ++i) {
+    rig.send(a, 0, std::string(4, '\1'), {.kind = proto::Kind::ctrl});
+  }
+  rig.settle();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, proto::GoodbyeCode::too_many_requests);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -46,6 +46,22 @@ TEST(CtrlMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ctrl/connections", 3, Connections{NodeId{0x00700010}, 2});
   expect_answer("ctrl/connections_answer", 3,
                 ConnectionsAnswer{{{NodeId{0x00700011}, "robot", 1, "tcp", "127.0.0.1:40000", true, 4096}}, false});
+  expect_request("ctrl/routes", 9, Routes{});
+  expect_answer("ctrl/routes_answer", 9, RoutesAnswer{{{HubId{7}, "lab", HubId{7}, 0, 3}}});
+}
+
+TEST(CtrlMessages, ThatChangeTheHubAreAsTheVectorsSay) {
+  expect_request("ctrl/kick", 4, Kick{NodeId{0x00700012}, "it stands in the way"});
+  expect_answer("ctrl/kick_answer", 4, KickAnswer{});
+  expect_request("ctrl/reassign", 5, Reassign{NodeId{0x00700012}, NodeId{0x00700064}});
+  expect_answer("ctrl/reassign_answer", 5, ReassignAnswer{});
+  expect_request("ctrl/drain", 6, Drain{});
+  expect_answer("ctrl/drain_answer", 6, DrainAnswer{});
+  expect_request("ctrl/reload", 7, Reload{});
+  expect_answer("ctrl/reload_answer", 7,
+                ReloadAnswer{{{"limits.nodes", "10", "20", false}, {"shards", "1", "2", true}}, false});
+  expect_request("ctrl/log_level", 8, SetLogLevel{"debug"});
+  expect_answer("ctrl/log_level_answer", 8, SetLogLevelAnswer{"info"});
 }
 
 TEST(CtrlMessages, SkipCountersThatAreNotNumbers) {

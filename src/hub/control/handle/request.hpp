@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "hub/control/hub_facts.hpp"
+#include "hub/control/reloading.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/watches.hpp"
 #include "hub/limits.hpp"
@@ -15,6 +16,17 @@
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
+
+/// What a request may have done to the hub as a whole.
+class Administration {
+ public:
+  virtual ~Administration() = default;
+  /// Reads the configuration again; what may change has changed when this returns.
+  virtual Reloading reload() = 0;
+  /// The hub ends as at SIGTERM, once the answer is on its way.
+  virtual void want_drain() = 0;
+  virtual void log_level_set(LogLevel level) = 0;
+};
 
 /// What handlers work on. Valid until: the handler returns.
 struct HandlerContext {
@@ -28,6 +40,7 @@ struct HandlerContext {
   std::span<const QueueGauges* const> queues{};  ///< one per shard, or none
   const RefusalCounters* refusals = nullptr;     ///< or none
   const NameCounters* names = nullptr;           ///< or none
+  Administration* administration = nullptr;      ///< or none
 };
 
 /// A request of kind NS or CTRL. Valid until: the handler returns.

@@ -33,6 +33,14 @@ struct CloseDue {
   proto::GoodbyeCode code{};
   std::string sentence;
 };
+/// Tell the shard that the session's node has another id, by index, and that its connection is to learn it: GOODBYE
+/// `renumbered`, after which the node comes back with its token.
+struct RenumberDue {
+  Place place;
+  std::uint32_t former = 0;
+  std::uint32_t index = 0;
+  std::string sentence;
+};
 /// Tell a subscriber that a service has another group id. Groups and nodes are named by index here; 0: none.
 struct ServiceMovedDue {
   std::uint32_t subscriber = 0;
@@ -104,8 +112,9 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect = std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded,
-                            RetainedDropped, SubscriberDue, CloseDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
+using Effect =
+    std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded, RetainedDropped,
+                 SubscriberDue, CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

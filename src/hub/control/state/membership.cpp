@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
+#include "base/id_text.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -130,6 +131,40 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.group_count);
 }
 
+std::optional<Failure> Membership::renumber(Session& session, std::uint32_t index, milliseconds now, Effects& effects) {
+  if (index == kHubIndex || index >= kEveryIndex) {
+    return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to 1048574"};
+  }
+  const std::uint32_t former = session.index;
+  if (!sessions_.renumber(session, index, now)) {
+    const Session* holder = sessions_.find(index);
+    const std::string id = to_string(make_id<NodeId>(hub_of(sessions_.node_id(session)), index));
+    const std::string held = holder == nullptr || holder->name.empty() ? "" : " '" + holder->name + "'";
+    return Failure{proto::Status::taken,
+                   holder != nullptr ? "the id " + id + " is that of another node" + held + "; choose a free one"
+                                     : "the id " + id +
+                                           " rests, since a node had it a moment ago; choose another "
+                                           "one, or try again in a minute"};
+  }
+  const NameStanding standing =
+      directory_.is_provisional(session.name) ? NameStanding::provisional : NameStanding::final;
+  directory_.remove(session.name);
+  if (!session.name.empty()) directory_.put(session.name, index, standing);
+  for (Redeclaring& due : redeclaring_) {
+    if (due.index == former && due.generation == session.place.generation) due.index = index;
+  }
+  // The new id leads to the node before the old one says that it moved.
+  effects.emplace_back(NodeChanged{index});
+  effects.emplace_back(NodeChanged{former});
+  effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name, {}});
+  effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
+  services_.node_renumbered(former, index, effects);
+  effects.emplace_back(RenumberDue{session.place, former, index,
+                                   "an administrator gave this node the id " + to_string(sessions_.node_id(session)) +
+                                       "; come back with the token"});
+  return std::nullopt;
+}
+
 void Membership::tick(milliseconds now, Effects& effects) {
   while (Session* expired = sessions_.next_expired(now)) end(*expired, now, effects);
   while (!redeclaring_.empty() && redeclaring_.front().until <= now) {
@@ -193,6 +228,7 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
 void Membership::end(Session& session, milliseconds now, Effects& effects) {
   services_.node_left(session.index, now, effects);
   directory_.remove(session.name);
+  const std::vector<std::uint32_t> former = sessions_.former_indices(session);
 #ifndef GIMNET_BUG_LEFT_NODE_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{session.index});
 #endif
@@ -200,6 +236,7 @@ void Membership::end(Session& session, milliseconds now, Effects& effects) {
   effects.emplace_back(SessionEnded{session.place});
 #endif
   if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name, {}});
+  for (const std::uint32_t index : former) effects.emplace_back(NodeChanged{index});
   sessions_.end(session, now);
 }
 

@@ -57,6 +57,11 @@ class Membership {
   /// tells its node who did it and what to do.
   void kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects);
 
+  /// The session's node goes on under another index, with name, services, subscriptions and token. Errors: taken (held,
+  /// or at rest), bad_request (no index of a node). nullopt: done.
+  [[nodiscard]] std::optional<Failure> renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now,
+                                                Effects& effects);
+
   /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
   /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
   [[nodiscard]] Durable durable() const;

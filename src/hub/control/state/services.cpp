@@ -228,6 +228,31 @@ void Services::node_renamed(std::uint32_t node_index, milliseconds now, Effects&
   forget_if_idle(node_index);
 }
 
+void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index, Effects& effects) {
+  auto node = nodes_.extract(node_index);
+  if (node.empty()) return;
+  node.key() = new_index;
+  const Node& moved = nodes_.insert(std::move(node)).position->second;
+  for (const Declared& declared : moved.provides) {
+    declared.topic->service->provider = new_index;
+    effects.emplace_back(GroupChanged{declared.topic->service->group});
+    note(ChangeKind::changed, declared.topic->full_name, *declared.topic->service, effects);
+  }
+  for (const Declared& declared : moved.subscribes) {
+    Topic& entry = *declared.topic;
+    auto& list = entry.subscribers;
+    list.erase(std::lower_bound(list.begin(), list.end(), node_index));
+    list.insert(std::lower_bound(list.begin(), list.end(), new_index), new_index);
+    if (!entry.service) continue;
+    // First the one that comes: a provider that hears of no subscribers stops.
+    const auto count = static_cast<std::uint32_t>(list.size());
+    for (const bool joined : {true, false}) {
+      effects.emplace_back(
+          SubscriberDue{entry.service->provider, entry.service->group, joined ? new_index : node_index, count, joined});
+    }
+  }
+}
+
 void Services::node_left(std::uint32_t node_index, milliseconds now, Effects& effects) {
   node_returned(node_index);
   drop_undeclared(node_index, now, effects);

@@ -87,6 +87,8 @@ class Services {
   void drop_undeclared(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
   /// Withdraws what the node provides: it has another name now.
   void node_renamed(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  /// The node goes on under another index, with what it declared.
+  void node_renumbered(std::uint32_t node, std::uint32_t new_node, Effects& effects);
   /// The node's session is over.
   void node_left(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
 

@@ -43,8 +43,12 @@ void Sessions::renew_token(Session& session, milliseconds wall) const {
 Sessions::Claim Sessions::claim(const Presented& presented) {
   const std::optional<SessionToken> token = read_token(presented.token);
   if (!token) return {};
-  Session* holder = find(token->index);
-  const bool holds = holder != nullptr && holder->number == token->number;
+  const auto moved = renumbered_.find(token->index);
+  Session* holder = find(present_index(token->index));
+  const SessionNumber number = moved != renumbered_.end() ? moved->second.number
+                               : holder != nullptr        ? holder->number
+                                                          : 0;
+  const bool holds = holder != nullptr && number == token->number;
   const std::string_view name = holds ? std::string_view{holder->token_name} : presented.name;
   // The proof comes first: what else is wrong with a token is nobody's business who cannot show one.
   if (!is_genuine(presented.token, {hub_, name, presented.identity}, secret_)) return {};
@@ -87,6 +91,7 @@ std::optional<Refusal> Sessions::full_refusal() const {
 Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                        milliseconds now) {
   const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
+  renumbered_.erase(index);
   Session& session = sessions_[index];
   session.index = index;
   session.number = number;
@@ -99,8 +104,12 @@ Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<
 void Sessions::remember_kicked(const Session& session) {
   spend_token(session);
   if (limits_.kicked_tokens == 0) return;
-  while (kicked_.size() >= limits_.kicked_tokens) kicked_.erase(kicked_.begin());
-  kicked_.push_back({session.index, session.number, session.token_expiry});
+  std::vector<SessionToken> tokens{{session.index, session.number, session.token_expiry}};
+  for (const std::uint32_t former : former_indices(session)) {
+    tokens.push_back({former, renumbered_.at(former).number, session.token_expiry});
+  }
+  kicked_.insert(kicked_.end(), tokens.begin(), tokens.end());
+  while (kicked_.size() > limits_.kicked_tokens) kicked_.erase(kicked_.begin());
 }
 
 void Sessions::attach(Session& session, milliseconds now) {
@@ -118,7 +127,51 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
   away.push_back({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment});
 }
 
+bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
+  if (!indices_.take_free(index, now)) return false;
+  const std::uint32_t former = session.index;
+  renumbered_.erase(index);
+  for (auto& [earlier, moved] : renumbered_) {
+    if (moved.index == former) moved.index = index;
+  }
+  renumbered_[former] = {index, session.number};
+  for (std::deque<Away>* list : {&away_named_, &away_nameless_}) {
+    for (Away& away : *list) {
+      if (away.index == former && away.generation == session.place.generation) away.index = index;
+    }
+  }
+  // The session stays where it is in memory: others hold references to it.
+  auto node = sessions_.extract(former);
+  node.key() = index;
+  sessions_.insert(std::move(node));
+  session.index = index;
+  // Not older than any that had this index before.
+  session.number = ++last_number_;
+  floor_.raise(index, session.number);
+  indices_.give_back(former, now);
+  return true;
+}
+
+std::uint32_t Sessions::present_index(std::uint32_t index) const {
+  const auto found = renumbered_.find(index);
+  return found == renumbered_.end() ? index : found->second.index;
+}
+
+std::vector<std::uint32_t> Sessions::former_indices(const Session& session) const {
+  std::vector<std::uint32_t> former;
+  for (const auto& [earlier, moved] : renumbered_) {
+    if (moved.index == session.index) former.push_back(earlier);
+  }
+  return former;
+}
+
+void Sessions::spend_token(const Session& session) {
+  floor_.raise(session.index, session.number + 1);
+  for (const std::uint32_t former : former_indices(session)) floor_.raise(former, renumbered_.at(former).number + 1);
+}
+
 void Sessions::end(Session& session, milliseconds now) {
+  for (const std::uint32_t former : former_indices(session)) renumbered_.erase(former);
   if (session.connected) --connected_;
   const std::uint32_t index = session.index;
   slots_.give_back(session.place);

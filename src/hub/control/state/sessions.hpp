@@ -106,10 +106,18 @@ class Sessions {
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
   void begin_grace(Session& session, std::chrono::milliseconds now);
   /// Tokens of the session count as none from now on.
-  void spend_token(const Session& session) { floor_.raise(session.index, session.number + 1); }
+  void spend_token(const Session& session);
   /// The same, also after a restart, for as long as limits.kicked_tokens allows.
   void remember_kicked(const Session& session);
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
+  /// The session goes on under another index; the former one rests, and leads here until somebody else has it.
+  /// False: the index is held, rests, or is none.
+  [[nodiscard]] bool renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
+  /// Under which index a node goes on that had this one: the same, unless renumber() gave it another.
+  [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
+  /// The indices that the session's node had before.
+  [[nodiscard]] std::vector<std::uint32_t> former_indices(const Session& session) const;
+
   /// The session is over: its slot is free at once, its index after it has rested.
   void end(Session& session, std::chrono::milliseconds now);
 
@@ -131,6 +139,11 @@ class Sessions {
   [[nodiscard]] const IndexPool& indices() const { return indices_; }
 
  private:
+  /// Where a session went, and the number that its tokens had when it was there.
+  struct Moved {
+    std::uint32_t index = 0;
+    SessionNumber number = 0;
+  };
   struct Away {
     std::chrono::milliseconds until;
     std::uint32_t index;
@@ -155,6 +168,7 @@ class Sessions {
   std::vector<SessionToken> kicked_;  ///< the latest last
   SlotPool slots_;
   std::map<std::uint32_t, Session> sessions_;
+  std::map<std::uint32_t, Moved> renumbered_;  ///< by former index
   // Both in the order of `until`, since all grace times are equal. Apart, so that a nameless one is found at once.
   std::deque<Away> away_named_;
   std::deque<Away> away_nameless_;

@@ -5,6 +5,7 @@
 namespace gimnet::hub {
 namespace {
 
+constexpr std::size_t kSourceOffset = 8;
 constexpr std::size_t kLaneOffset = 15;
 /// A node that used up its share of lane 0 gets it back after so long below it.
 constexpr std::uint64_t kDemotionMs = 1'000;
@@ -13,6 +14,14 @@ constexpr std::uint64_t kLane0WindowMs = 100;
 Admission refuse(IngressState& state, proto::FrameError error) {
   state.error = error;
   return Admission::malformed;
+}
+
+void write_source(std::byte* run, const proto::RunView& view, std::uint32_t source) {
+  for (std::uint32_t done = 0; done < view.size;) {
+    const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
+    store_le(run + done + kSourceOffset, source);
+    done += frame;
+  }
 }
 
 /// Shortens the run to the frames before the first that has no room for its key.
@@ -32,13 +41,17 @@ void keep_frames_with_key(proto::RunView& view) {
 }  // namespace
 
 Admission IngressGate::admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
-  const proto::FrameHeader header = proto::load_header(view.bytes);
+  proto::FrameHeader header = proto::load_header(view.bytes);
   const auto attributes = load_le<std::uint32_t>(view.bytes + 12);
 #if defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
   if (attributes != state.admitted_attributes) {
 #else
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
 #endif
+    if (state.former_node != NodeId{} && header.src == state.former_node.value()) {
+      header.src = state.node.value();
+      write_source(run, view, header.src);
+    }
     if (const Admission refused = check(state, header, view); refused != Admission::data) return refused;
     const bool plain = proto::may_form_run(header) && !header.has(proto::kFlagKeyed);
     state.admitted_attributes = plain ? attributes : IngressState::kNoneAdmitted;

@@ -28,7 +28,7 @@ void NodeTable::publish(std::uint32_t index, NodePlace place) {
   const std::uint64_t word = place.exists()
                                  ? (static_cast<std::uint64_t>(place.generation) << 32) |
                                        (static_cast<std::uint64_t>(place.shard.value()) << 24) | place.slot.value()
-                                 : 0;
+                                 : place.slot.value();
   words_[index].store(word, std::memory_order_release);            // pairs with the acquire load in find()
   std::uint64_t shards = shards_.load(std::memory_order_relaxed);  // relaxed: this thread wrote it
   if (before.exists() && --nodes_by_shard_[before.shard.value()] == 0) {

@@ -17,6 +17,9 @@ struct NodePlace {
   std::uint32_t generation = 0;
 
   [[nodiscard]] bool exists() const { return generation != 0; }
+  /// The place of a node that goes on under another index.
+  [[nodiscard]] static NodePlace renumbered() { return {ShardIndex{0}, ConnectionSlot{1}, 0}; }
+  [[nodiscard]] bool is_renumbered() const { return generation == 0 && slot.value() != 0; }
   friend bool operator==(const NodePlace&, const NodePlace&) = default;
 };
 /// Slots fit in 24 bits beside shard (8) and generation (32) in one atomic word.
@@ -34,7 +37,7 @@ class NodeTable {
   NodeTable& operator=(const NodeTable&) = delete;
 
   /// REQUIRES: index < 2^20, place.slot < kSlotsMax, place.shard < kShardsMax. A place with generation 0 clears the
-  /// entry.
+  /// entry, or says that the node was renumbered.
   void publish(std::uint32_t index, NodePlace place);
 
   /// REQUIRES: index < 2^20. Generation 0 when no session has that index.

@@ -74,6 +74,7 @@ void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId no
 }
 
 proto::DropReason Router::why_absent(NodeId node) const {
+  if (place_of(node).is_renumbered()) return proto::DropReason::renumbered;
   const bool returns = hub_of(node) == hub_ && nodes_.may_return(index_of(node));
   return returns ? proto::DropReason::away : proto::DropReason::no_such_node;
 }

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,10 +53,13 @@ class TestConductor {
                                       return keep_error;
                                     },
                                     {},
-                                    &refusals}) {}
+                                    &refusals,
+                                    [this] { return read_again ? read_again() : Reloading{}; },
+                                    [this](LogLevel level) { noted_level = level; }}) {}
 
   std::optional<proto::Goodbye> try_join(const proto::Hello& hello) {
     Stranger stranger;
+    stranger.may_administer = may_administer;
     stranger.transport = std::make_unique<NoTransport>();
     stranger.peer = PeerInfo{"tcp", "127.0.0.1:5000"};
     stranger.identity = identity;
@@ -121,6 +125,9 @@ class TestConductor {
     return result;
   }
 
+  bool may_administer = false;  ///< those who join
+  ReadAgain read_again;         ///< what RELOAD comes to
+  std::optional<LogLevel> noted_level;
   Limits limits;
   NodeTable nodes;
   GroupTable groups;

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/log.hpp"
+#include "hub/limits.hpp"
+
+namespace gimnet::hub {
+
+/// What reading the configuration again came to. A value type.
+struct Reloading {
+  /// A key whose value is another one now, as a configuration file has them.
+  struct Change {
+    std::string key;
+    std::string from;
+    std::string to;
+    bool needs_restart = false;  ///< `from` stays in force
+  };
+
+  std::vector<std::string> faults;  ///< a line each; where there is one, nothing changes
+  std::vector<Change> changes;
+  Limits limits;  ///< to be in force: those that need a restart are as before
+  LogLevel log_level = LogLevel::info;
+};
+
+/// Reads the configuration again, from where it came. Thread safety: the conductor's thread only.
+using ReadAgain = std::function<Reloading()>;
+
+/// One line for the log: the keys that changed, and those that need a restart.
+[[nodiscard]] std::string reload_summary(const Reloading& reloading);
+
+}  // namespace gimnet::hub

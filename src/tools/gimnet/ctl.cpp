@@ -1,0 +1,162 @@
+#include <charconv>
+#include <optional>
+#include <string>
+
+#include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/hub_status.hpp"
+#include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/table.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+constexpr std::uint32_t kHubShift = 20;
+
+std::string json_of(const std::vector<RouteRecord>& routes) {
+  JsonWriter json;
+  json.begin_array();
+  for (const RouteRecord& route : routes) {
+    json.begin_object().member("hub_id", route.hub_id).member("name", route.name);
+    json.member("next_hop", route.next_hop).member("cost", route.cost).member("nodes", route.nodes).end_object();
+  }
+  return json.end_array().str() + "\n";
+}
+
+std::string table_of(const std::vector<RouteRecord>& routes) {
+  Table table({"HUB", "NAME", "NEXT", "COST", "NODES"});
+  for (const RouteRecord& route : routes) {
+    table.add({std::to_string(route.hub_id), route.name, std::to_string(route.next_hop), std::to_string(route.cost),
+               std::to_string(route.nodes)});
+  }
+  return table.text();
+}
+
+std::string json_of(const std::vector<HubChange>& changes) {
+  JsonWriter json;
+  json.begin_array();
+  for (const HubChange& change : changes) {
+    json.begin_object().member("key", change.key).member("from", change.from).member("to", change.to);
+    json.member("needs_restart", change.needs_restart).end_object();
+  }
+  return json.end_array().str() + "\n";
+}
+
+std::string text_of(const std::vector<HubChange>& changes) {
+  if (changes.empty()) return "nothing changed\n";
+  std::string text;
+  for (const HubChange& change : changes) {
+    text += change.key + ": " + change.from + " -> " + change.to + (change.needs_restart ? " (needs a restart)" : "") +
+            "\n";
+  }
+  return text;
+}
+
+/// `7.17`, or `17` for the hub that `node` lives on.
+std::optional<Peer> parse_new_id(const std::string& text, Peer node) {
+  if (const auto id = Peer::parse(text)) return id;
+  std::uint32_t index = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (error != std::errc{} || end != text.data() + text.size() || index >= 1u << kHubShift) return std::nullopt;
+  return Peer{(node.id >> kHubShift << kHubShift) | index};
+}
+
+/// What a command that only changes something says when it is done.
+ExitCode done(Session& session, const Outcome<void>& outcome, const std::string& text) {
+  if (!outcome) return session.fail(outcome.failure());
+  if (session.options().json) {
+    session.output().write("{\"done\":true}\n");
+  } else {
+    session.output().write(text + "\n");
+  }
+  return session.finish();
+}
+
+ExitCode connections(Session& session) {
+  const auto found = session.node().hub_connections();
+  if (!found) return session.fail(found.failure());
+  session.output().write(session.options().json ? tool::json_of(*found) : tool::text_of(*found, session.paint()));
+  return session.finish();
+}
+
+ExitCode routes(Session& session) {
+  const auto found = session.node().hub_routes();
+  if (!found) return session.fail(found.failure());
+  session.output().write(session.options().json ? json_of(*found) : table_of(*found));
+  return session.finish();
+}
+
+ExitCode kick(Session& session) {
+  const CtlOptions& ctl = session.options().ctl;
+  const auto peer = session.find(ctl.node);
+  if (!peer) return session.code();
+  return done(session, session.node().kick(*peer, ctl.reason), "kicked " + peer->text());
+}
+
+ExitCode reassign(Session& session) {
+  const CtlOptions& ctl = session.options().ctl;
+  const auto peer = session.find(ctl.node);
+  if (!peer) return session.code();
+  const auto new_id = parse_new_id(ctl.new_id, *peer);
+  if (!new_id) {
+    say("'" + ctl.new_id + "' is no id: write HUB.NUMBER, for example " + peer->text());
+    return ExitCode::usage;
+  }
+  return done(session, session.node().reassign(*peer, *new_id), peer->text() + " is " + new_id->text() + " now");
+}
+
+ExitCode reload(Session& session) {
+  const auto changes = session.node().reload_hub();
+  if (!changes) {
+    // The configuration is wrong, not the command line.
+    const bool wrong = changes.failure().status == Status::bad_argument;
+    const ExitCode code = session.fail(changes.failure());
+    return wrong && code == ExitCode::usage ? ExitCode::failed : code;
+  }
+  session.output().write(session.options().json ? json_of(*changes) : text_of(*changes));
+  return session.finish();
+}
+
+ExitCode log(Session& session) {
+  const std::string& level = session.options().ctl.level;
+  const auto before = session.node().set_hub_log_level(level);
+  if (!before) {
+    const ExitCode code = session.fail(before.failure());
+    return before.failure().status == Status::bad_argument ? ExitCode::usage : code;
+  }
+  return done(session, {}, "log level " + level + ", before " + *before);
+}
+
+bool only_reads(CtlAction action) { return action == CtlAction::connections || action == CtlAction::routes; }
+
+}  // namespace
+
+ExitCode run_ctl(Session& session) {
+  const CtlAction action = session.options().ctl.action;
+  NodeOptions how;
+  how.administrator = !only_reads(action);
+  // It asks once: coming back by itself would have it wait for a hub that it has just ended.
+  how.reconnect = false;
+  if (const auto ending = session.join(how)) {
+    if (*ending == ExitCode::denied) say("changing needs the hub's Unix socket: --hub unix:/PATH");
+    return *ending;
+  }
+  switch (action) {
+    case CtlAction::connections:
+      return connections(session);
+    case CtlAction::routes:
+      return routes(session);
+    case CtlAction::kick:
+      return kick(session);
+    case CtlAction::reassign:
+      return reassign(session);
+    case CtlAction::drain:
+      return done(session, session.node().drain_hub(), "draining");
+    case CtlAction::reload:
+      return reload(session);
+    case CtlAction::log:
+      return log(session);
+  }
+  return ExitCode::usage;
+}
+
+}  // namespace gimnet::tool

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace gimnet::tool {
+
+enum class CtlAction : std::uint8_t { connections, routes, kick, reassign, drain, reload, log };
+
+/// What `gimnet ctl` is to do. Thread safety: immutable once read.
+struct CtlOptions {
+  CtlAction action = CtlAction::connections;
+  std::string node;    ///< kick, reassign: name or id
+  std::string new_id;  ///< reassign
+  std::string reason;  ///< kick
+  std::string level;   ///< log
+};
+
+/// Declares `ctl` and its actions; `options` outlives the parsing.
+void add_ctl(CLI::App& app, CtlOptions& options);
+
+}  // namespace gimnet::tool

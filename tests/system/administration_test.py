@@ -1,0 +1,181 @@
+#!/usr/bin/env python3
+"""A hub is configured and administered while it runs: gimnet ctl, SIGHUP, configuration files. Real processes."""
+
+import json
+import os
+import pathlib
+import signal
+import tempfile
+import unittest
+
+from support.processes import GIMNET, TCPHUB, Hub, Process, run_gimnet, start_recv
+from support.waiting import wait_until
+
+
+class Case(unittest.TestCase):
+    def hub(self, *arguments, **how):
+        hub = Hub(self, *arguments, **how)
+        self.admin = f"unix:{hub.socket_path}"
+        return hub
+
+    def ctl(self, *words, url=None):
+        process = Process([GIMNET, "--hub", url or self.admin, "ctl", *words])
+        self.addCleanup(process.end)
+        process.code = process.wait()
+        return process
+
+    def id_of(self, hub, name):
+        return next((node["id"] for node in hub.nodes() if node["name"] == name), None)
+
+
+class Ctl(Case):
+    def test_a_kicked_node_is_told_why_and_does_not_come_back(self):
+        hub = self.hub()
+        receiver = start_recv(self, hub, "B")
+        former = self.id_of(hub, "B")
+        self.assertEqual(self.ctl("kick", "B", "--reason", "it stands in the way").code, 0)
+        wait_until(lambda: "it stands in the way" in receiver.err, "the words of the kick")
+        self.assertIsNone(self.id_of(hub, "B"))
+        # The name is free, and the token that the first one left counts as none.
+        start_recv(self, hub, "B")
+        self.assertNotEqual(self.id_of(hub, "B"), former)
+
+    def test_a_node_goes_on_under_another_id(self):
+        hub = self.hub()
+        receiver = start_recv(self, hub, "B", "-n", "2")
+        former = self.id_of(hub, "B")
+        self.assertEqual(run_gimnet(hub, "send", "B", data=b"one\n").code, 0)
+        self.assertEqual(self.ctl("reassign", "B", "7.500").code, 0)
+        wait_until(lambda: any(node["id"] == "7.500" and node["connected"] for node in hub.nodes()), "B as 7.500")
+        self.assertEqual(self.id_of(hub, "B"), "7.500")
+        old = run_gimnet(hub, "send", former, data=b"lost\n")
+        self.assertEqual(old.code, 1)
+        self.assertIn("renumbered", old.err)
+        self.assertGreater(hub.counter("dropped.renumbered"), 0)
+        self.assertEqual(run_gimnet(hub, "send", "7.500", data=b"two\n").code, 0)
+        self.assertEqual((receiver.wait(), receiver.out), (0, b"one\ntwo\n"))
+
+    def test_only_administrators_change_and_everybody_reads(self):
+        hub = self.hub()
+        start_recv(self, hub, "B")
+        for words in (("kick", "B"), ("reassign", "B", "7.9"), ("drain",), ("reload",), ("log", "debug")):
+            denied = self.ctl(*words, url=hub.url)
+            self.assertEqual(denied.code, 6, denied.err)
+            self.assertIn("--hub unix:", denied.err)
+        self.assertIsNotNone(self.id_of(hub, "B"))
+        connections = json.loads(self.ctl("connections", "--json", url=hub.url).out)
+        self.assertIn("B", [connection["name"] for connection in connections])
+        self.assertIn(b"TRANSPORT", self.ctl("connections", url=hub.url).out)
+        self.assertEqual(json.loads(self.ctl("routes", "--json", url=hub.url).out)[0]["hub_id"], 7)
+
+    def test_each_mistake_has_its_words_and_its_exit_code(self):
+        hub = self.hub()
+        start_recv(self, hub, "B")
+        for code, part, words in ((4, "there is no node 'C'", ("kick", "C")), (4, "7.99", ("kick", "7.99")),
+                                  (2, "is no id", ("reassign", "B", "x")), (1, "another node", ("reassign", "B", "7.1")),
+                                  (2, "did you mean debug?", ("log", "debgu"))):
+            refused = self.ctl(*words)
+            self.assertEqual(refused.code, code, (words, refused.err))
+            self.assertIn(part, refused.err)
+        self.assertEqual(self.ctl().code, 2)
+        self.assertEqual(self.ctl("kick").code, 2)
+
+    def test_drain_ends_the_hub_as_sigterm_does(self):
+        hub = self.hub()
+        start_recv(self, hub, "B")
+        self.assertEqual(self.ctl("drain").code, 0)
+        self.assertEqual(hub.process.wait(), 0)
+        self.assertIn("draining, asked for by", hub.process.err)
+
+    def test_the_log_level_changes_at_once(self):
+        hub = self.hub("--log-level", "error")
+        start_recv(self, hub, "B")
+        self.assertEqual(hub.process.err.count("joined"), 0)
+        self.assertIn(b"before error", self.ctl("log", "info").out)
+        start_recv(self, hub, "C")
+        wait_until(lambda: "'C' joined" in hub.process.err, "the line about C")
+
+
+class Reload(Case):
+    def configured(self, text):
+        folder = tempfile.TemporaryDirectory(prefix="gimnet-config-")
+        self.addCleanup(folder.cleanup)
+        self.file = pathlib.Path(folder.name, "hub.toml")
+        self.file.write_text(text)
+        return self.hub("--config", str(self.file))
+
+    def test_what_may_change_changes_and_the_rest_is_named(self):
+        hub = self.configured("[limits]\nservices_per_node = 10\n")
+        self.file.write_text("log_level = 'debug'\nplacement = 'spread'\n"
+                             "[limits]\nservices_per_node = 0\nframe_bytes = 70000\n")
+        reloaded = self.ctl("reload")
+        self.assertEqual(reloaded.code, 0, reloaded.err)
+        lines = reloaded.out.decode().splitlines()
+        self.assertIn("limits.services_per_node: 10 -> 0", lines)
+        self.assertIn("limits.frame_bytes: 65536 -> 70000 (needs a restart)", lines)
+        self.assertIn('log_level: "info" -> "debug"', lines)
+        self.assertFalse([line for line in lines if line.startswith("placement")], "a flag is stronger than the file")
+        refused = run_gimnet(hub, "pub", "robot/odom", data=b"x\n")
+        self.assertEqual(refused.code, 1)
+        self.assertIn("services_per_node", refused.err)
+
+    def test_a_bad_file_changes_nothing(self):
+        hub = self.configured("[limits]\nservices_per_node = 0\n")
+        self.file.write_text("shrads = 2\n[limits]\nservices_per_node = 5\n")
+        refused = self.ctl("reload")
+        self.assertEqual(refused.code, 1)
+        self.assertIn(f"{self.file}:1:1: there is no key 'shrads'", refused.err)
+        self.assertIn("stays in force", refused.err)
+        wait_until(lambda: "there is no key 'shrads'" in hub.process.err, "the same words in the log")
+        self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)
+        self.file.unlink()
+        self.assertEqual(self.ctl("reload").code, 1)
+        self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)
+
+    def test_sighup_reads_it_again(self):
+        hub = self.configured("[limits]\nservices_per_node = 10\n")
+        receiver = start_recv(self, hub, "B", "-n", "1")
+        self.file.write_text("[limits]\nservices_per_node = 0\n")
+        hub.process.signal(signal.SIGHUP)
+        wait_until(lambda: "changed limits.services_per_node from 10 to 0" in hub.process.err, "the reload in the log")
+        self.file.write_text("=\n")
+        hub.process.signal(signal.SIGHUP)
+        wait_until(lambda: "stays in force" in hub.process.err, "the refusal in the log")
+        self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)
+        self.assertEqual(run_gimnet(hub, "send", "B", data=b"still here\n").code, 0)
+        self.assertEqual((receiver.wait(), receiver.out), (0, b"still here\n"))
+
+
+class Start(unittest.TestCase):
+    def run_hub(self, *arguments, env=None):
+        process = Process([TCPHUB, *arguments], env=env)
+        self.addCleanup(process.end)
+        process.code = process.wait()
+        return process
+
+    def test_a_wrong_file_is_told_line_by_line_and_nothing_starts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "hub.toml")
+            pathlib.Path(path).write_text("shards = '2'\n\n[limits]\ngrace_ms = '30s'\n  nods = 3\n")
+            for arguments in (("--check-config", "--config", path), ("--config", path)):
+                refused = self.run_hub(*arguments)
+                self.assertEqual((refused.code, refused.out), (2, b""))
+                places = [":".join(line.split(":")[1:3]) for line in refused.err.splitlines()]
+                self.assertEqual(places, ["1:10", "4:12", "5:3"])
+
+    def test_every_source_is_shown_with_what_came_from_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "hub.toml")
+            path.write_text("shards = 1\nhub_id = 3\n")
+            pathlib.Path(folder, "conf.d").mkdir()
+            pathlib.Path(folder, "conf.d", "10.toml").write_text("hub_id = 4\nhub_name = 'hall'\n")
+            shown = self.run_hub("--print-config", "--config", str(path), "--hub-name", "yard",
+                                 env={"TCPHUB_LIMITS_NODES": "9"}).out.decode().splitlines()
+            for line in (f"shards = 1  # {path}:1", f"hub_id = 4  # {folder}/conf.d/10.toml:1",
+                         'hub_name = "yard"  # flag --hub-name', "nodes = 9  # environment TCPHUB_LIMITS_NODES",
+                         "insecure = false  # default"):
+                self.assertIn(line, shown)
+
+
+if __name__ == "__main__":
+    unittest.main()
