@@ -45,6 +45,11 @@ class Witness final : public InboundHost {
     FUZZ_MUST(!requests_.on_answer(kind, answer));
   }
   void on_service_moved(const proto::ns::ServiceMoved& event) override { note("moved " + event.name); }
+  bool on_watch_events(const proto::ns::WatchEvents& events) override {
+    note("watched " + std::to_string(events.watch));
+    return true;
+  }
+  void on_name_decided(const std::string& name, bool lost) override { note((lost ? "lost " : "kept ") + name); }
   void on_taken(std::uint32_t from, const proto::Taken& taken) override {
     note("taken " + std::to_string(taken.message));
     outbound_.on_taken(from, taken);

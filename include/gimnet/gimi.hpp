@@ -37,6 +37,7 @@ class MessageQueue;
 class SendStream;
 class PublishedService;
 class SubscribedService;
+class WatchQueue;
 }  // namespace gimi
 
 /// Messages that were received and wait: a ring buffer for one (type, instance), or for one subscription.
@@ -132,6 +133,21 @@ class Subscription {
   std::shared_ptr<gimi::SubscribedService> service_;
 };
 
+/// What there is and what changes under a pattern of names. What is not taken waits at the hub, which tells a watch
+/// that is too far behind all from the start again. Copies are the same watch; with the last one it ends.
+class Watch {
+ public:
+  /// Takes the next event. Waits if there is none. Errors: timeout, closed.
+  Outcome<WatchEvent> receive(Timeout timeout = kForever) const;
+  /// Takes the next event; nothing if there is none.
+  [[nodiscard]] std::optional<WatchEvent> try_receive() const;
+
+ private:
+  friend class Node;
+  explicit Watch(std::shared_ptr<gimi::WatchQueue> queue) : queue_(std::move(queue)) {}
+  std::shared_ptr<gimi::WatchQueue> queue_;
+};
+
 /// How the connection is at one moment.
 struct NodeState {
   Peer peer;  ///< changes only if a session could not be taken up again after a break
@@ -209,7 +225,20 @@ class Node {
   Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
                                   Timeout timeout = Timeout{5000}, const PaceOptions& pace = {}) const;
 
+  // ---- the own name
+
+  /// Takes another name in place of the one this node has. Id and subscriptions stay; services end under their former
+  /// full names and begin under the new ones. Errors: taken, bad_name, timeout, not_connected.
+  Outcome<void> take_name(std::string_view name, Timeout timeout = Timeout{5000}) const;
+  /// Goes on without a name, and without services until it takes one. Errors: not_found, timeout, not_connected.
+  Outcome<void> give_name_back(Timeout timeout = Timeout{5000}) const;
+
   // ---- asking
+
+  /// Watches the nodes and services that match the pattern as nodes() does: first what is there, then what changes. It
+  /// goes on over reconnects. Errors: bad_name, bad_argument, limit, timeout, not_connected.
+  Outcome<Watch> watch(std::string_view pattern = {}, const WatchOptions& options = {},
+                       Timeout timeout = Timeout{5000}) const;
 
   /// A node by its name, or by its id as text. Errors: not_found, bad_name, timeout, not_connected.
   Outcome<Peer> find(std::string_view name, Timeout timeout = Timeout{5000}) const;

@@ -37,6 +37,7 @@
 
 #include "gimnet/nif_names.h"
 #include "gimnet/nif_status.h"
+#include "gimnet/nif_watch.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -286,7 +287,14 @@ typedef enum nif_incoming_type {
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
    *  it; reason: nif_status)]. Send to the new id from now on. */
-  NIF_OWN_SERVICE_MOVED = 9
+  NIF_OWN_SERVICE_MOVED = 9,
+  /** Something that a watch of this node is about [watched; text and reason: why the hub ended it, if
+   * NIF_WATCH_ENDED]. */
+  NIF_WATCHED = 10,
+  /** The own name is final: all hubs agreed [text: name]. Comes only after a provisional one. */
+  NIF_NAME_CONFIRMED = 11,
+  /** The own name went to a rival; the node goes on without one [text: name, from: who has it]. */
+  NIF_NAME_LOST = 12
 } nif_incoming_type;
 
 /** Bits of nif_incoming.flags of a NIF_CONNECTED. */
@@ -318,9 +326,10 @@ typedef struct nif_incoming {
   uint32_t message_type;
   uint32_t instance;
   uint32_t delivery;
-  uint32_t epoch;   /**< Of a GROUP message that counts in a window: for nif_credit(); else 0. */
-  const char* text; /**< NUL-terminated, never NULL. Valid until: nif_release(). */
-  void* storage;    /**< The library's; do not touch. */
+  uint32_t epoch;             /**< Of a GROUP message that counts in a window: for nif_credit(); else 0. */
+  const nif_watched* watched; /**< Of a NIF_WATCHED, else NULL. Valid until: nif_release(). */
+  const char* text;           /**< NUL-terminated, never NULL. Valid until: nif_release(). */
+  void* storage;              /**< The library's; do not touch. */
 } nif_incoming;
 
 /** Takes the next message or event. NIF_TIMEOUT: none within timeout_ms. What was received before the connection broke

@@ -58,7 +58,7 @@ struct Limits {
   std::uint64_t retained_bytes = 1ull << 20;
   std::uint64_t page_records = 256;
   std::uint64_t scan_records = 4'096;
-  std::uint64_t watches_per_node = 64;
+  std::uint64_t watches_per_node = 16;
   std::uint64_t watches = 16'384;
   std::uint64_t watch_changes = 65'536;
   std::uint64_t watch_bytes = 16ull << 20;

@@ -79,7 +79,6 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
   stranger.peer = {"tcp", "10.0.0.1:" + std::to_string(newcomer.wire->number)};
   const milliseconds now = setting_.agenda.now_ms();
   shards_.forget_sent();
-  NodeId admitted;
   stranger.identity = newcomer.identity;
   const std::int64_t wall = wall_ns(setting_);
   const auto refusal = conductor_.admit(stranger, newcomer.hello, {now, wall});
@@ -97,12 +96,9 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
     }
     require(attach != nullptr, Checker::seam, "somebody is let in, and no shard is given the connection");
     model_.admitted(hello, *attach, now);
-    admitted = attach->node;
     newcomer.wire->session = model_.session_of(index_of(attach->node));
   }
   checks_.after_step(setting_.agenda.now_ms());
-  // The table has it already, and its shard may still have the one before it in its slot.
-  if (admitted != NodeId{}) shards_.send_now(admitted);
   return refusal;
 }
 

@@ -90,14 +90,6 @@ void SimShards::take_mail(std::size_t index) {
   }
 }
 
-void SimShards::send_now(NodeId node) {
-  proto::FrameHeader header;
-  header.dst = node.value();
-  header.src = node.value();
-  const auto shard = static_cast<std::size_t>(setting_.random.below(shards_.size()));
-  route(shard, frame_of(header, {}), false);
-}
-
 void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
   const proto::FrameHeader header = proto::load_header(frame.data());
   switch (header.kind) {

@@ -67,8 +67,6 @@ class SimShards final : public hub::ShardProxy {
   void has_something(Wire& wire);
   /// Nothing is heard of the node from now on, or again.
   void set_mute(const WirePointer& wire, bool mute);
-  /// A frame for that node comes at this very moment, on any shard: nobody can be kept from guessing an id.
-  void send_now(NodeId node);
   /// The hub's process is gone, and with it its ends of all connections.
   void die();
 

@@ -99,6 +99,12 @@ struct AcceptOptions {
   std::string metadata;
 };
 
+/// What a watch is about.
+struct WatchOptions {
+  bool nodes = true;
+  bool services = true;
+};
+
 /// Whether more messages follow at once: those marked so are written together with the next one that is not. A program
 /// that stops there calls Node::flush().
 enum class More : std::uint8_t { no, yes };

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -43,6 +45,36 @@ struct ServiceRecord {
   std::string hub_name;
   std::uint32_t window = 0;  ///< of delivery sync
   bool retain = false;       ///< a new subscriber gets the last message first
+};
+
+/// What a watch tells.
+enum class Change : std::uint8_t {
+  snapshot_begins = 0,  ///< what was told before is void: at first, and when the watch was too far behind
+  present = 1,          ///< part of the snapshot
+  snapshot_ends = 2,    ///< all that is there was told; changes follow
+  joined = 3,
+  left = 4,  ///< a node, for good: only its id, name and hub id are told
+  away = 5,  ///< a node whose connection broke: its grace time runs
+  back = 6,
+  renamed = 7,
+  changed = 8,  ///< something else of the record
+  advertised = 9,
+  withdrawn = 10,  ///< a service: only its name, group id and node are told
+  ended = 255,     ///< after a reconnect the hub did not take the watch again; `why` tells
+};
+/// "joined" and so on; "unknown" for a change of a later version. Static.
+[[nodiscard]] std::string_view change_text(Change change);
+
+/// A node or a service that is there or changed, or neither for what is about the watch itself.
+struct WatchEvent {
+  Change change = Change::snapshot_begins;
+  std::optional<NodeRecord> node;
+  std::optional<ServiceRecord> service;
+  std::string former_name;  ///< of a node that was renamed
+  std::uint32_t hub_id = 0;
+  std::uint64_t epoch = 0;    ///< of the hub's versions: another one after it was started again
+  std::uint64_t version = 0;  ///< of the hub's names and services after this change
+  std::string why;            ///< of Change::ended
 };
 
 struct HubRecord {

@@ -69,6 +69,7 @@ Core::Core(const NodeOptions& options)
           }),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
       services_(uplink_, inbox_),
+      watches_(uplink_),
       clerk_(uplink_, streams_),
       reconnects_(options.reconnect) {}
 
@@ -119,6 +120,7 @@ void Core::close() {
   inbox_.close();
   streams_.close();
   services_.close();
+  watches_.close();
   pings_.close();
   static_cast<void>(nif_close(node()));
 }
@@ -187,6 +189,8 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_OWN_SERVICE_MOVED:
       services_.on_own_service_moved(in.text, in.group);
       return NIF_DONE;
+    case NIF_WATCHED:
+      return watches_.on_watched(in) ? NIF_DONE : NIF_NOT_NOW;
     default:
       return NIF_DONE;
   }

@@ -12,6 +12,7 @@
 #include "client/gimi/service_table.hpp"
 #include "client/gimi/stream_table.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/gimi/watch_table.hpp"
 
 namespace gimnet::gimi {
 
@@ -31,6 +32,7 @@ class Core {
   [[nodiscard]] Inbox& inbox() { return inbox_; }
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
+  [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] Outcome<std::int64_t> ping(Peer to, Timeout timeout, Lane lane, BytesView echo);
 
  private:
@@ -52,6 +54,7 @@ class Core {
   Inbox inbox_;
   StreamTable streams_;
   ServiceTable services_;
+  WatchTable watches_;
   PingTable pings_;
   Clerk clerk_;
   const bool reconnects_;

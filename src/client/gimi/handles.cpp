@@ -1,4 +1,7 @@
+#include <array>
+
 #include "client/gimi/core.hpp"
+#include "client/gimi/watch_table.hpp"
 #include "gimnet/gimi.hpp"
 
 // The handles of gimnet/gimi.hpp: each leads to its part of a Core, which it keeps alive.
@@ -41,5 +44,17 @@ bool Subscription::exists() const { return service_->exists(); }
 Outcome<void> Subscription::wait_until_exists(Timeout timeout) const { return service_->wait_until_exists(timeout); }
 const std::string& Subscription::name() const { return service_->name(); }
 std::uint64_t Subscription::missed() const { return service_->missed(); }
+
+Outcome<WatchEvent> Watch::receive(Timeout timeout) const { return queue_->receive(timeout); }
+std::optional<WatchEvent> Watch::try_receive() const { return queue_->try_receive(); }
+
+std::string_view change_text(Change change) {
+  static constexpr std::array<std::string_view, 11> kTexts{
+      "snapshot begins", "present", "snapshot ends", "joined",   "left", "away", "back",
+      "renamed",         "changed", "advertised",    "withdrawn"};
+  const auto index = static_cast<std::size_t>(change);
+  if (change == Change::ended) return "ended";
+  return index < kTexts.size() ? kTexts[index] : "unknown";
+}
 
 }  // namespace gimnet

@@ -53,20 +53,6 @@ Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& d
 
 }  // namespace
 
-Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern, Timeout timeout) {
-  nif_node_list* list = nullptr;
-  const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
-  const nif_status status = nif_list_nodes(node, wanted, &list, nif_timeout(timeout));
-  if (status != NIF_OK) return failure_of(status, "list the nodes");
-  const std::unique_ptr<nif_node_list, void (*)(nif_node_list*)> owner(list, &nif_free_nodes);
-  std::vector<NodeRecord> records;
-  for (const nif_node_record& found : std::span(list->records, list->count)) {
-    records.push_back({Peer{found.id}, found.name, found.hub_id, found.hub_name, found.connected != 0,
-                       found.description, found.place, found.joined_ms, found.services});
-  }
-  return records;
-}
-
 namespace {
 
 Delivery delivery_of(std::uint8_t delivery) {
@@ -82,6 +68,36 @@ Delivery delivery_of(std::uint8_t delivery) {
 
 }  // namespace
 
+NodeRecord record_of(const nif_node_record& found) {
+  return {Peer{found.id},    found.name,  found.hub_id,    found.hub_name, found.connected != 0,
+          found.description, found.place, found.joined_ms, found.services};
+}
+
+ServiceRecord record_of(const nif_service_record& found) {
+  return {found.name,
+          Peer{found.node_id},
+          {found.message_type, found.instance},
+          found.direction == NIF_ACCEPTS ? Direction::accepts : Direction::provides,
+          delivery_of(found.delivery),
+          found.group,
+          found.subscribers,
+          found.metadata,
+          found.hub_name,
+          found.window,
+          found.retain != 0};
+}
+
+Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern, Timeout timeout) {
+  nif_node_list* list = nullptr;
+  const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
+  const nif_status status = nif_list_nodes(node, wanted, &list, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "list the nodes");
+  const std::unique_ptr<nif_node_list, void (*)(nif_node_list*)> owner(list, &nif_free_nodes);
+  std::vector<NodeRecord> records;
+  for (const nif_node_record& found : std::span(list->records, list->count)) records.push_back(record_of(found));
+  return records;
+}
+
 Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern, Timeout timeout) {
   nif_service_list* list = nullptr;
   const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
@@ -89,19 +105,7 @@ Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::str
   if (status != NIF_OK) return failure_of(status, "list the services");
   const std::unique_ptr<nif_service_list, void (*)(nif_service_list*)> owner(list, &nif_free_services);
   std::vector<ServiceRecord> records;
-  for (const nif_service_record& found : std::span(list->records, list->count)) {
-    records.push_back({found.name,
-                       Peer{found.node_id},
-                       {found.message_type, found.instance},
-                       found.direction == NIF_ACCEPTS ? Direction::accepts : Direction::provides,
-                       delivery_of(found.delivery),
-                       found.group,
-                       found.subscribers,
-                       found.metadata,
-                       found.hub_name,
-                       found.window,
-                       found.retain != 0});
-  }
+  for (const nif_service_record& found : std::span(list->records, list->count)) records.push_back(record_of(found));
   return records;
 }
 

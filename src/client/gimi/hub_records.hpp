@@ -30,4 +30,8 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout);
 [[nodiscard]] Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level, Timeout timeout);
 
+/// A record of the C API.
+[[nodiscard]] NodeRecord record_of(const nif_node_record& found);
+[[nodiscard]] ServiceRecord record_of(const nif_service_record& found);
+
 }  // namespace gimnet::gimi

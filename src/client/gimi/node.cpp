@@ -118,6 +118,26 @@ Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOpt
       {*service, [core = core_](gimi::SubscribedService* done) { core->services().unsubscribe(*done); }});
 }
 
+Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {
+  const std::string text(name);
+  const nif_status status = nif_register(core_->node(), text.c_str(), nullptr, nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "take the name '" + text + "'");
+  return {};
+}
+
+Outcome<void> Node::give_name_back(Timeout timeout) const {
+  const nif_status status = nif_unregister(core_->node(), nif_timeout(timeout));
+  if (status != NIF_OK) return failure_of(status, "give the name back");
+  return {};
+}
+
+Outcome<Watch> Node::watch(std::string_view pattern, const WatchOptions& options, Timeout timeout) const {
+  auto begun = core_->watches().watch(std::string(pattern), options, timeout);
+  if (!begun) return begun.failure();
+  return Watch({begun->queue.get(),
+                [core = core_, begun = *begun](gimi::WatchQueue*) { core->watches().unwatch(begun.number); }});
+}
+
 Outcome<Peer> Node::find(std::string_view name, Timeout timeout) const {
   if (const auto id = Peer::parse(name)) return *id;
   Peer peer;

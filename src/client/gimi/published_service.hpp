@@ -10,8 +10,8 @@
 
 namespace gimnet::gimi {
 
-/// An own service that provides data. Thread safety: any thread; nothing that is called from the library's thread waits
-/// for a thread that publishes.
+/// An own service that provides data; its full name is the one it was advertised under. Thread safety: any thread;
+/// nothing that is called from the library's thread waits for a thread that publishes.
 class PublishedService {
  public:
   PublishedService(Uplink& uplink, std::string name, std::string full_name, const PublishOptions& options)

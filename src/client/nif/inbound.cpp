@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "client/nif/watch_table.hpp"
+
 namespace gimnet::nif {
 namespace {
 
@@ -282,10 +284,45 @@ Inbound::Verdict Inbound::take_event(const proto::ControlView& event, std::span<
       add_subscriber(NIF_SUBSCRIBER_LEFT, *left);
       return Verdict::going;
     }
+    case proto::ns::Operation::watch_events:
+      return take_watch_events(payload);
+    case proto::ns::Operation::name_confirmed:
+    case proto::ns::Operation::name_lost:
+      return take_name_event(static_cast<proto::ns::Operation>(event.header.operation), payload);
     default:
       ++counts_.ignored;
       return Verdict::going;
   }
+}
+
+Inbound::Verdict Inbound::take_watch_events(std::span<const std::byte> payload) {
+  const auto events = proto::decode<proto::ns::WatchEvents>(payload);
+  if (!events) return malformed(events.error().sentence);
+  if (!host_.on_watch_events(*events)) return Verdict::going;
+  for (const proto::ns::Change& change : events->changes) {
+    // Changes are small beside what the queue has to keep of each.
+    add_record(make_watched(*events, change), sizeof(proto::ns::Change));
+  }
+  return Verdict::going;
+}
+
+Inbound::Verdict Inbound::take_name_event(proto::ns::Operation operation, std::span<const std::byte> payload) {
+  const bool lost = operation == proto::ns::Operation::name_lost;
+  proto::ns::NameLost event;
+  if (lost) {
+    auto read = proto::decode<proto::ns::NameLost>(payload);
+    if (!read) return malformed(read.error().sentence);
+    event = std::move(*read);
+  } else {
+    auto read = proto::decode<proto::ns::NameConfirmed>(payload);
+    if (!read) return malformed(read.error().sentence);
+    event.name = std::move(read->name);
+  }
+  host_.on_name_decided(event.name, lost);
+  Record* record = make_event(lost ? NIF_NAME_LOST : NIF_NAME_CONFIRMED, event.name);
+  record->incoming.from = event.holder.value();
+  add_record(record, event.name.size());
+  return Verdict::going;
 }
 
 Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {

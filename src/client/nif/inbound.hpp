@@ -12,7 +12,8 @@
 #include "client/nif/storage.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/control/link.hpp"
-#include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
+#include "proto/control/ns_watch.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "proto/frame/report.hpp"
@@ -27,6 +28,10 @@ class InboundHost {
   [[nodiscard]] virtual bool on_flow(const proto::flow::Message& message) = 0;
   virtual void on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
   virtual void on_service_moved(const proto::ns::ServiceMoved& event) = 0;
+  /// True: the program is to have it.
+  [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
+  /// The own name is final, or (`lost`) a rival's.
+  virtual void on_name_decided(const std::string& name, bool lost) = 0;
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
@@ -95,6 +100,8 @@ class Inbound {
   [[nodiscard]] Verdict take_link(const proto::FrameView& view);
   [[nodiscard]] Verdict take_names(const proto::FrameView& view);
   [[nodiscard]] Verdict take_event(const proto::ControlView& event, std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_watch_events(std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_name_event(proto::ns::Operation operation, std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   void add_record(Record* record, std::size_t bytes);

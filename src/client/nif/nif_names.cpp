@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/id_text.hpp"
-#include "client/nif/answer_status.hpp"
 #include "client/nif/api.hpp"
+#include "client/nif/ask.hpp"
 #include "client/nif/record_list.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
@@ -20,6 +20,9 @@ namespace proto = gimnet::proto;
 using gimnet::GroupId;
 using gimnet::NodeId;
 using gimnet::steady_now_ns;
+using gimnet::nif::ask;
+using gimnet::nif::check_name;
+using gimnet::nif::check_pattern;
 using gimnet::nif::Deadline;
 using gimnet::nif::deadline_after;
 using gimnet::nif::fail;
@@ -28,38 +31,6 @@ using gimnet::nif::Node;
 using gimnet::nif::with_waiting_node;
 
 namespace {
-
-nif_status refused(const char* what, const std::string& about, const proto::Refusal& refusal) {
-  const std::string why = refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
-  return fail(gimnet::nif::status_of(refusal.status), std::string("cannot ") + what + " '" + about + "': " + why);
-}
-
-/// Asks, and reads the answer. `what` and `about` are for the sentence.
-template <class Answer, class Request>
-nif_status ask(Node& node, const Request& request, Answer& answer, const char* what, const std::string& about,
-               Deadline deadline) {
-  proto::Payload payload;
-  const nif_status status = node.requests().ask(proto::Kind::ns, proto::encode(request), payload, deadline);
-  if (status != NIF_OK) return status;
-  auto decoded = proto::decode_answer<Answer>(payload);
-  if (!decoded) return refused(what, about, decoded.error());
-  answer = std::move(*decoded);
-  return NIF_OK;
-}
-
-nif_status check_name(const char* name, const char* what) {
-  if (name == nullptr) return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
-  const char* fault = proto::name_fault(name);
-  if (fault == nullptr) return NIF_OK;
-  return fail(NIF_BAD_NAME, std::string("cannot ") + what + " '" + name + "': " + fault);
-}
-
-nif_status check_pattern(const char* pattern) {
-  if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
-  return fail(NIF_BAD_NAME, std::string("cannot list '") + pattern +
-                                "': it is not a pattern: parts are separated by one /, and one is letters, digits, "
-                                "'.', '_', '-', or * for any one part, or ** for any number of them");
-}
 
 nif_status impossible_answer() { return fail(NIF_PROTOCOL, "the hub's answer is not in ascending order"); }
 
@@ -71,14 +42,16 @@ nif_status list_pages(Node& node, Request request, std::vector<Record> Answer::*
     Answer answer;
     const nif_status status = ask(node, request, answer, "list", request.pattern, deadline);
     if (status != NIF_OK) return status;
+    auto last = request.after;
     for (Record& record : answer.*page) {
       // Ascending, or a hub could page for ever.
-      if (!(request.after < id_of(record))) return impossible_answer();
-      request.after = id_of(record);
+      if (!(last < id_of(record))) return impossible_answer();
+      last = id_of(record);
       records.push_back(std::move(record));
     }
     if (!answer.more) return NIF_OK;
-    if ((answer.*page).empty()) return impossible_answer();
+    if (answer.next < last || !(request.after < answer.next)) return impossible_answer();
+    request.after = answer.next;
   }
 }
 

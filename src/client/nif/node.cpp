@@ -37,8 +37,10 @@ Node::Node(Options options)
       requests_(outbound_),
       credits_(outbound_),
       declarations_(requests_, outbound_),
+      watches_(requests_),
       inbound_(options_.reassembly, *this),
       tokens_(options_.name, options_.keep_token),
+      name_(options_.name),
       epoch_(random_bits() | 1) {}
 
 Node::~Node() = default;
@@ -46,7 +48,7 @@ Node::~Node() = default;
 proto::Hello Node::hello() const {
   proto::Hello hello;
   hello.role = options_.administrator ? proto::Role::admin : proto::Role::node;
-  hello.name = options_.name;
+  hello.name = name_;
   hello.description = options_.description;
   hello.token = session_.token;
   hello.epoch = epoch_;
@@ -133,7 +135,10 @@ bool Node::take_over(Admitted admitted, bool first) {
   const auto space = inbound_.space();
   if (space.size() < admitted.rest.size()) return false;
   std::copy(admitted.rest.begin(), admitted.rest.end(), space.begin());
-  if (!first) declarations_.declare_again();
+  if (!first) {
+    declarations_.declare_again();
+    watches_.declare_again();
+  }
   const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), wall_now_ns());
   return verdict == Inbound::Verdict::going;
 }
@@ -178,6 +183,36 @@ void Node::on_service_moved(const proto::ns::ServiceMoved& event) {
   credits_.forget(event.old_group);
   credits_.open(event.new_group, event.window);
   declarations_.on_service_moved(event);
+}
+
+bool Node::on_watch_events(const proto::ns::WatchEvents& events) { return watches_.on_events(events); }
+
+void Node::on_name_decided(const std::string&, bool lost) {
+  if (!lost) return;
+  set_name("", session_.token);
+  take_new_name();
+}
+
+void Node::set_name(const std::string& name, std::vector<std::byte> token) {
+  {
+    const MutexLock lock(mutex_);
+    copy_text(info_.name, sizeof info_.name, name);
+    info_.token_kept = 0;
+    new_name_ = NewName{name, std::move(token)};
+  }
+  wake_.raise();
+}
+
+void Node::take_new_name() {
+  {
+    const MutexLock lock(mutex_);
+    if (!new_name_) return;
+    name_ = std::move(new_name_->name);
+    session_.token = std::move(new_name_->token);
+    new_name_.reset();
+  }
+  tokens_.forget();  // a program that is started again asks for its first name, which that token is not for
+  declarations_.declare_again();
 }
 
 void Node::on_taken(std::uint32_t from, const proto::Taken& taken) { outbound_.on_taken(from, taken); }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -19,6 +20,7 @@
 #include "client/nif/receive_queue.hpp"
 #include "client/nif/request_table.hpp"
 #include "client/nif/token_store.hpp"
+#include "client/nif/watch_table.hpp"
 
 namespace gimnet::nif {
 
@@ -35,8 +37,11 @@ class Node final : private InboundHost {
   [[nodiscard]] ReceiveQueue& received() { return received_; }
   [[nodiscard]] RequestTable& requests() { return requests_; }
   [[nodiscard]] Declarations& declarations() { return declarations_; }
+  [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] NameCache& names() { return names_; }
   [[nodiscard]] CreditBook& credits() { return credits_; }
+  /// The hub registered this node under another name, "" for none. The library's thread declares the services anew.
+  void set_name(const std::string& name, std::vector<std::byte> token) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] const Options& options() const { return options_; }
 
   [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
@@ -64,6 +69,8 @@ class Node final : private InboundHost {
   [[nodiscard]] bool on_flow(const proto::flow::Message& message) override;
   void on_answer(proto::Kind kind, const proto::ControlView& answer) override;
   void on_service_moved(const proto::ns::ServiceMoved& event) override;
+  [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
+  void on_name_decided(const std::string& name, bool lost) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
   void send_taken(std::uint32_t to, const proto::Taken& taken) override;
@@ -86,6 +93,7 @@ class Node final : private InboundHost {
   void leave();
 
   [[nodiscard]] proto::Hello hello() const;
+  void take_new_name() GIMNET_EXCLUDES(mutex_);
   /// False: the hub's counts are impossible.
   [[nodiscard]] bool take_over(Admitted admitted, bool first);
   void set_last_error(std::string sentence) GIMNET_EXCLUDES(mutex_);
@@ -99,6 +107,7 @@ class Node final : private InboundHost {
   RequestTable requests_;
   CreditBook credits_;
   Declarations declarations_;
+  WatchTable watches_;
   NameCache names_;
   HubClock clock_;
   std::thread thread_;
@@ -110,6 +119,11 @@ class Node final : private InboundHost {
   Mutex mutex_;
   nif_info info_ GIMNET_GUARDED_BY(mutex_){};
   std::string last_error_ GIMNET_GUARDED_BY(mutex_);
+  struct NewName {
+    std::string name;
+    std::vector<std::byte> token;
+  };
+  std::optional<NewName> new_name_ GIMNET_GUARDED_BY(mutex_);  ///< given while connected, not seen to yet
   Inbound::Counts inbound_counts_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t bytes_received_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t read_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
@@ -119,6 +133,7 @@ class Node final : private InboundHost {
   TokenStore tokens_;
   Socket socket_;
   Session session_;
+  std::string name_;  ///< to ask for
   Backoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;

@@ -70,9 +70,11 @@ void Node::turn() {
   if (!socket_.open()) return;
   if (!ready.readable) on_timers(now, reading);
   if (socket_.open()) {
+    take_new_name();
     declarations_.go_on();
-    const auto events = declarations_.take_events();
-    received_.push(events);
+    watches_.go_on();
+    received_.push(declarations_.take_events());
+    received_.push(watches_.take_events());
   }
   call_back();
 }
@@ -169,6 +171,7 @@ void Node::redial() {
     call_back();
   }
   if (closing_.load()) return;
+  take_new_name();
   auto admitted = admit(options_.endpoints, options_.socket, hello(), steady_now_ns() + kRedialNs, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;

@@ -112,6 +112,10 @@ bool RequestTable::ask_later(proto::Kind kind, const proto::Payload& payload, Ha
   return false;
 }
 
+void RequestTable::tell(proto::Kind kind, const proto::Payload& payload) {
+  static_cast<void>(outbound_.post(request_frame(kind, payload, proto::kNoRequest)));
+}
+
 bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer) {
   Handler handler;
   proto::Payload payload(proto::kControlHeaderSize + answer.body.size());

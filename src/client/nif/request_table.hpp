@@ -30,6 +30,9 @@ class RequestTable {
   [[nodiscard]] bool ask_later(proto::Kind kind, const proto::Payload& payload, Handler handler)
       GIMNET_EXCLUDES(mutex_);
 
+  /// Sends a request whose answer nobody waits for: it has number 0. Nothing happens while not connected.
+  void tell(proto::Kind kind, const proto::Payload& payload);
+
   /// False: nobody asked for it.
   bool on_answer(proto::Kind kind, const proto::ControlView& answer) GIMNET_EXCLUDES(mutex_);
   /// The connection broke: no answer will come.

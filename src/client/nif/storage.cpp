@@ -43,5 +43,6 @@ extern "C" void nif_release(nif_incoming* in) {
   in->storage = nullptr;
   in->payload = nullptr;
   in->extensions = nullptr;
+  in->watched = nullptr;
   in->text = "";
 }

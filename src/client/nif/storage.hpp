@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <new>
 #include <string>
 #include <vector>
@@ -59,6 +60,15 @@ class Slab final : public Storage {
   std::byte* const bytes_;
 };
 
+/// What a NIF_WATCHED tells, and what it points to.
+struct WatchedChange {
+  WatchedChange() = default;
+  WatchedChange(const WatchedChange&) = delete;
+  WatchedChange& operator=(const WatchedChange&) = delete;
+  virtual ~WatchedChange() = default;
+  nif_watched view{};
+};
+
 /// One thing that is not a frame in a slab: an event, or a message put together from fragments.
 class Record final : public Storage {
  public:
@@ -66,10 +76,12 @@ class Record final : public Storage {
   std::string text;
   ByteBuffer payload;
   std::vector<std::byte> extensions;
+  std::unique_ptr<WatchedChange> watched;
 
   /// Points the members of `incoming` at what is stored here.
   void finish() {
     incoming.text = text.c_str();
+    if (watched) incoming.watched = &watched->view;
     if (!payload.empty()) {
       incoming.payload = payload.data();
       incoming.size = payload.size();

@@ -106,12 +106,16 @@ ReverseAnswer ReverseAnswer::read(Fields& fields) {
   return answer;
 }
 
-void List::write(bitestream::Writer& writer) const { write_page_request(writer, pattern, after.value(), records_max); }
+void List::write(bitestream::Writer& writer) const {
+  write_page_request(writer, pattern, after.value(), records_max);
+  if (connected_only) writer.put_bool(6, true);
+}
 List List::read(Fields& fields) {
   List list;
   list.pattern = fields.text(3, "pattern", kNameBytesMax);
   list.after = read_id<NodeId>(fields, 4, "node id to continue after");
   list.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  list.connected_only = fields.flag(6, "connected only", false);
   return list;
 }
 
@@ -152,11 +156,13 @@ void ListAnswer::write(bitestream::Writer& writer) const {
     writer.end_nested();
   }
   writer.put_bool(4, more);
+  if (more) writer.put_u32(5, next.value());
 }
 ListAnswer ListAnswer::read(Fields& fields) {
   ListAnswer answer;
   answer.nodes = fields.records<NodeRecord>(3, "record", read_node_record);
   answer.more = fields.flag(4, "more", false);
+  if (answer.more) answer.next = read_required_id<NodeId>(fields, 5, "node id to continue after");
   return answer;
 }
 
@@ -252,11 +258,13 @@ void ServicesAnswer::write(bitestream::Writer& writer) const {
     writer.end_nested();
   }
   writer.put_bool(4, more);
+  if (more) writer.put_u32(5, next.value());
 }
 ServicesAnswer ServicesAnswer::read(Fields& fields) {
   ServicesAnswer answer;
   answer.services = fields.records<ServiceRecord>(3, "record", read_service_record);
   answer.more = fields.flag(4, "more", false);
+  if (answer.more) answer.next = read_required_id<GroupId>(fields, 5, "group id to continue after");
   return answer;
 }
 

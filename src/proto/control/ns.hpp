@@ -102,6 +102,7 @@ struct List {
   std::string pattern;  ///< empty: all
   NodeId after;         ///< continue after this one; 0: from the start
   std::uint32_t records_max = kPageRecordsDefault;
+  bool connected_only = false;  ///< none within their grace time
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static List read(Fields& fields);
   friend bool operator==(const List&, const List&) = default;
@@ -128,8 +129,9 @@ void write_record(bitestream::Writer& writer, const NodeRecord& record);
 struct ListAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::list);
   static constexpr const char* kName = "answer to LIST";
-  std::vector<NodeRecord> nodes;
+  std::vector<NodeRecord> nodes;  ///< may be none though there are more
   bool more = false;
+  NodeId next;  ///< if there are more: continue after this one
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ListAnswer read(Fields& fields);
   friend bool operator==(const ListAnswer&, const ListAnswer&) = default;
@@ -217,8 +219,9 @@ void write_record(bitestream::Writer& writer, const ServiceRecord& record);
 struct ServicesAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::services);
   static constexpr const char* kName = "answer to SERVICES";
-  std::vector<ServiceRecord> services;
+  std::vector<ServiceRecord> services;  ///< may be none though there are more
   bool more = false;
+  GroupId next;  ///< if there are more: continue after this one
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServicesAnswer read(Fields& fields);
   friend bool operator==(const ServicesAnswer&, const ServicesAnswer&) = default;

@@ -47,8 +47,13 @@ WatchAnswer WatchAnswer::read(Fields& fields) { return {fields.flag(3, "snapshot
 void Unwatch::write(bitestream::Writer& writer) const { writer.put_u32(3, watch); }
 Unwatch Unwatch::read(Fields& fields) { return {fields.required_number<std::uint32_t>(3, "watch")}; }
 
-void WatchTaken::write(bitestream::Writer& writer) const { writer.put_u32(3, frames); }
-WatchTaken WatchTaken::read(Fields& fields) { return {fields.number<std::uint32_t>(3, "number of frames", 1)}; }
+void WatchTaken::write(bitestream::Writer& writer) const {
+  writer.put_u32(3, watch);
+  writer.put_u32(4, frames);
+}
+WatchTaken WatchTaken::read(Fields& fields) {
+  return {fields.required_number<std::uint32_t>(3, "watch"), fields.number<std::uint32_t>(4, "number of frames", 1)};
+}
 
 void write_change(bitestream::Writer& writer, const Change& change) {
   writer.begin_nested(3);

@@ -56,11 +56,12 @@ struct UnwatchAnswer {
   friend bool operator==(const UnwatchAnswer&, const UnwatchAnswer&) = default;
 };
 
-// WATCH_TAKEN: so many WATCH_EVENTS were taken, of all watches of this node together; the hub may send as many more.
+// WATCH_TAKEN: so many WATCH_EVENTS of that watch were taken; the hub may send as many more.
 
 struct WatchTaken {
   static constexpr std::uint16_t kOperation = request_of(Operation::watch_taken);
   static constexpr const char* kName = "WATCH_TAKEN";
+  std::uint32_t watch = 0;
   std::uint32_t frames = 1;
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static WatchTaken read(Fields& fields);

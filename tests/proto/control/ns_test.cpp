@@ -51,6 +51,7 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
   list.nodes = {{kNode, "robot/base", HubId{7}, "lab", true, "a robot", "127.0.0.1:40000", 1500, 2},
                 {NodeId{0x00700013}, "robot/laser", HubId{7}, "lab", false, "a robot", "127.0.0.1:40000", 1500, 2}};
   list.more = true;
+  list.next = NodeId{0x00700013};
   expect_answer("ns/list_answer", 3, list);
 
   ServicesAnswer services;
@@ -109,12 +110,12 @@ TEST(NsMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   node.hub_name.assign(kNameBytesMax, 'h');
   node.description.assign(kDescriptionBytesMax, 'd');
   node.place.assign(kRemarkBytesMax, 'p');
-  EXPECT_LE(size_of(ListAnswer{{node}, false}) - size_of(ListAnswer{}), page_bytes_max(node));
+  EXPECT_LE(size_of(ListAnswer{{node}, false, {}}) - size_of(ListAnswer{}), page_bytes_max(node));
   ServiceRecord service;
   service.name.assign(kNameBytesMax, 'n');
   service.metadata.assign(kMetadataBytesMax, 'm');
   service.hub_name.assign(kNameBytesMax, 'h');
-  EXPECT_LE(size_of(ServicesAnswer{{service}, false}) - size_of(ServicesAnswer{}), page_bytes_max(service));
+  EXPECT_LE(size_of(ServicesAnswer{{service}, false, {}}) - size_of(ServicesAnswer{}), page_bytes_max(service));
 }
 
 }  // namespace

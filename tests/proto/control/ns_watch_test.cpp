@@ -38,7 +38,7 @@ TEST(NsWatchMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   test::expect_answer("ns/watch_answer", 11, WatchAnswer{true});
   test::expect_request("ns/unwatch", 12, Unwatch{1});
   test::expect_answer("ns/unwatch_answer", 12, UnwatchAnswer{});
-  test::expect_request("ns/watch_taken", 13, WatchTaken{2});
+  test::expect_request("ns/watch_taken", 13, WatchTaken{1, 2});
   test::expect_answer("ns/watch_taken_answer", 13, WatchTakenAnswer{});
   test::expect_request("ns/watch_events", 0, events_of_the_vector());
 }

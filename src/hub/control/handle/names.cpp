@@ -1,8 +1,8 @@
 #include "hub/control/handle/names.hpp"
 
 #include "base/log.hpp"
+#include "hub/control/state/listing.hpp"
 #include "hub/control/state/records.hpp"
-#include "proto/control/names.hpp"
 #include "proto/control/ns_register.hpp"
 
 namespace gimnet::hub {
@@ -14,20 +14,25 @@ namespace ns = proto::ns;
 constexpr std::size_t kQuotedMax = 60;
 
 Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const ns::List& wanted) {
-  if (!wanted.pattern.empty() && !proto::valid_pattern(wanted.pattern)) {
+  const auto pattern = proto::Pattern::parse(wanted.pattern);
+  if (!wanted.pattern.empty() && !pattern) {
     return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
                                                    "' is no pattern: write a name in which a part may be * or **"};
   }
+  const Listed listed =
+      list_nodes(context.membership, {pattern ? &*pattern : nullptr, index_of(wanted.after), wanted.connected_only,
+                                      context.limits.page_records, context.limits.scan_records});
   ns::ListAnswer answer;
+  answer.more = listed.more;
+  answer.next = listed.more ? make_id<NodeId>(context.facts.id, listed.next) : NodeId{};
   PageBudget budget(context.limits, wanted.records_max);
   const HubTitle title{context.facts.id, context.facts.name};
-  const auto& all = context.membership.sessions().all();
-  for (auto entry = all.upper_bound(index_of(wanted.after)); entry != all.end(); ++entry) {
-    const Session& session = entry->second;
-    if (!wanted.pattern.empty() && !proto::matches(wanted.pattern, session.name)) continue;
+  for (const std::uint32_t index : listed.indices) {
+    const Session& session = *context.membership.sessions().find(index);
     ns::NodeRecord record = record_of(title, session, context.membership.services(), context.now);
     if (!budget.take(ns::page_bytes_max(record))) {
       answer.more = true;
+      answer.next = answer.nodes.empty() ? wanted.after : answer.nodes.back().node;
       break;
     }
     answer.nodes.push_back(std::move(record));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/log.hpp"
+#include "hub/control/state/listing.hpp"
 #include "hub/control/state/records.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
@@ -92,20 +93,24 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
 }
 
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {
-  if (!wanted.pattern.empty() && !proto::valid_pattern(wanted.pattern)) {
+  const auto pattern = proto::Pattern::parse(wanted.pattern);
+  if (!wanted.pattern.empty() && !pattern) {
     return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
                                                    "' is no pattern: write a full name in which a part may be * or **"};
   }
+  const Listed listed =
+      list_services(context.membership.services(), {pattern ? &*pattern : nullptr, index_of(wanted.after), false,
+                                                    context.limits.page_records, context.limits.scan_records});
   ns::ServicesAnswer answer;
+  answer.more = listed.more;
+  answer.next = listed.more ? group_id(context, listed.next) : GroupId{};
   PageBudget budget(context.limits, wanted.records_max);
   const HubTitle title{context.facts.id, context.facts.name};
-  const auto& groups = context.membership.services().groups();
-  for (auto entry = groups.upper_bound(index_of(wanted.after)); entry != groups.end(); ++entry) {
-    const Topic& topic = *entry->second;
-    if (!wanted.pattern.empty() && !proto::matches(wanted.pattern, topic.full_name)) continue;
-    ns::ServiceRecord record = record_of(title, topic);
+  for (const std::uint32_t index : listed.indices) {
+    ns::ServiceRecord record = record_of(title, *context.membership.services().find_group(index));
     if (!budget.take(ns::page_bytes_max(record))) {
       answer.more = true;
+      answer.next = answer.services.empty() ? wanted.after : answer.services.back().group;
       break;
     }
     answer.services.push_back(std::move(record));

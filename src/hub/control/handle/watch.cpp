@@ -21,7 +21,7 @@ proto::Payload handle_unwatch(HandlerContext& context, const Request& request) {
 
 proto::Payload handle_watch_taken(HandlerContext& context, const Request& request) {
   return answer_to<ns::WatchTaken>(request, [&](const ns::WatchTaken& taken) {
-    context.watches.taken(request.session.index, taken.frames);
+    context.watches.taken(request.session.index, taken);
     return Result<ns::WatchTakenAnswer, proto::Refusal>(ns::WatchTakenAnswer{});
   });
 }

@@ -54,6 +54,9 @@ struct Topic {
 /// Thread safety: none. Limits: services_per_node, subscriptions_per_node.
 class Services {
  public:
+  /// In the order of names, which no choice of names can make slow, and which finds at once all that begin alike.
+  using Topics = std::map<std::string, Topic, std::less<>>;
+
   Services(HubId hub, const Limits& limits, const IndexRange& groups = {});
 
   struct Advertised {
@@ -96,16 +99,13 @@ class Services {
   [[nodiscard]] const Topic* find_group(std::uint32_t group) const;
   /// Topics with a service, by ascending group index.
   [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
+  [[nodiscard]] const Topics& by_name() const { return topics_; }
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
   [[nodiscard]] IndexPool& group_indices() { return group_indices_; }
   [[nodiscard]] const IndexPool& group_indices() const { return group_indices_; }
 
  private:
-  struct Hash {
-    using is_transparent = void;
-    std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-  };
   struct Declared {
     Topic* topic = nullptr;
     std::uint32_t life = 0;
@@ -116,7 +116,6 @@ class Services {
     std::vector<Declared> provides;
     std::vector<Declared> subscribes;
   };
-  using Topics = std::unordered_map<std::string, Topic, Hash, std::equal_to<>>;
 
   /// Takes out of `list` what was not declared in that life.
   [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list, std::uint32_t life);

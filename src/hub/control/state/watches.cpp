@@ -12,20 +12,17 @@ using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
 constexpr std::size_t kQuotedMax = 60;
-/// A page is full at this size. The longest change has about 5 KiB, so that no frame has more than 13.
-constexpr std::size_t kPageBytes = 8 * 1024;
-constexpr std::size_t kFrameBytesMost = 16 * 1024;
-constexpr std::size_t kUnderWayMost = 8;
-
-/// What watching may put into a node's control queue leaves the other half to answers.
-std::size_t under_way_most(const Limits& limits) {
-  return std::clamp<std::size_t>(limits.control_bytes / 2 / kFrameBytesMost, 1, kUnderWayMost);
-}
+/// A page is full at this size; the longest change has about 5 KiB, so that no frame has more than 10.
+constexpr std::size_t kPageBytes = 4 * 1024;
+/// Of one watch, and of a node's together: what waits for a node that takes nothing leaves room for its answers. One
+/// frame each watch may always have, so that none waits for another.
+constexpr std::size_t kUnderWayMost = 4;
+constexpr std::size_t kUnderWayTogether = 12;
 
 }  // namespace
 
 Watches::Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits)
-    : hub_(std::move(hub)), limits_(limits), under_way_most_(under_way_most(limits)), journal_(epoch, limits) {}
+    : hub_(std::move(hub)), limits_(limits), journal_(epoch, limits) {}
 
 void Watches::note(const NodeNoted& noted, const Membership& membership, milliseconds now) {
   ns::Change change;
@@ -74,7 +71,7 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
   if (old == watcher.watches.end() &&
       (watcher.watches.size() >= limits_.watches_per_node || watches_ >= limits_.watches)) {
     const bool own = watcher.watches.size() >= limits_.watches_per_node;
-    if (watcher.watches.empty() && watcher.under_way == 0) watchers_.erase(node);
+    if (watcher.watches.empty()) watchers_.erase(node);
     const std::string limit = own ? "watches_per_node" : "watches";
     return Failure{Status::limit, (own ? "a node may have " + std::to_string(limits_.watches_per_node)
                                        : "this hub takes " + std::to_string(limits_.watches)) +
@@ -86,6 +83,7 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
     watch.seen = watch.told = wanted.version;
   }
   if (old != watcher.watches.end()) {
+    watch.under_way = old->under_way;  // what is on its way will be answered
     *old = std::move(watch);
   } else {
     watcher.watches.push_back(std::move(watch));
@@ -95,19 +93,29 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
 }
 
 std::optional<Failure> Watches::unwatch(std::uint32_t node, std::uint32_t number) {
+  const auto unknown = [number] {
+    return Failure{Status::not_found, "this node has no watch " + std::to_string(number)};
+  };
   const auto found = watchers_.find(node);
-  const bool known = found != watchers_.end() && std::erase_if(found->second.watches, [number](const Watch& watch) {
-                                                   return watch.number == number;
-                                                 }) > 0;
-  if (!known) return Failure{Status::not_found, "this node has no watch " + std::to_string(number)};
+  if (found == watchers_.end()) return unknown();
+  Watcher& watcher = found->second;
+  const auto watch = std::ranges::find(watcher.watches, number, &Watch::number);
+  if (watch == watcher.watches.end()) return unknown();
+  watcher.under_way -= watch->under_way;
+  watcher.watches.erase(watch);
   --watches_;
+  if (watcher.watches.empty()) watchers_.erase(found);
   return std::nullopt;
 }
 
-void Watches::taken(std::uint32_t node, std::uint32_t frames) {
+void Watches::taken(std::uint32_t node, const ns::WatchTaken& taken) {
   const auto found = watchers_.find(node);
   if (found == watchers_.end()) return;
-  found->second.under_way -= std::min<std::size_t>(frames, found->second.under_way);
+  const auto watch = std::ranges::find(found->second.watches, taken.watch, &Watch::number);
+  if (watch == found->second.watches.end()) return;
+  const std::size_t frames = std::min<std::size_t>(taken.frames, watch->under_way);
+  watch->under_way -= frames;
+  found->second.under_way -= frames;
 }
 
 void Watches::connection_ended(std::uint32_t node) {
@@ -131,10 +139,9 @@ bool Watches::serve(const Membership& membership, milliseconds now, const Send& 
 /// True: the work for this turn is done, and this node has more.
 bool Watches::serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send) {
   for (std::size_t idle = 0; idle < watcher.watches.size();) {
-    if (watcher.under_way >= under_way_most_) return false;
     watcher.next = (watcher.next + 1) % watcher.watches.size();
     Watch& watch = watcher.watches[watcher.next];
-    if (is_idle(watch)) {
+    if (is_idle(watcher, watch)) {
       ++idle;
       continue;
     }
@@ -143,13 +150,17 @@ bool Watches::serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const 
     Page page = next_page(watch, turn);
     if (page.empty()) continue;
     ++watcher.under_way;
+    ++watch.under_way;
     send(node, finish(watch, std::move(page)));
   }
   return false;
 }
 
-bool Watches::is_idle(const Watch& watch) const {
-  return watch.phase == Phase::live && watch.seen == journal_.version();
+/// Nothing to tell, or not the time to tell it.
+bool Watches::is_idle(const Watcher& watcher, const Watch& watch) const {
+  if (watch.phase == Phase::live && watch.seen == journal_.version()) return true;
+  if (watch.under_way == 0) return false;
+  return watch.under_way >= kUnderWayMost || watcher.under_way >= kUnderWayTogether;
 }
 
 void Watches::begin(Watch& watch) {

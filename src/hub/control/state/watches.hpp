@@ -17,7 +17,7 @@ namespace gimnet::hub {
 /// Who watches which names and services, and how much of it each has been told. A watch is a place in the journal: one
 /// that fell off its end is told the present state from the start again. Each serve() does a bounded piece of work,
 /// and each node takes part in it in turn.
-/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records, control_bytes.
+/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records.
 class Watches {
  public:
   Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits);
@@ -30,8 +30,8 @@ class Watches {
   [[nodiscard]] Result<proto::ns::WatchAnswer, Failure> watch(std::uint32_t node, const proto::ns::Watch& wanted);
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<Failure> unwatch(std::uint32_t node, std::uint32_t watch);
-  /// The node took so many WATCH_EVENTS: it may have as many more.
-  void taken(std::uint32_t node, std::uint32_t frames);
+  /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
+  void taken(std::uint32_t node, const proto::ns::WatchTaken& taken);
   /// The node's connection ended, and its watches with it.
   void connection_ended(std::uint32_t node);
 
@@ -52,14 +52,15 @@ class Watches {
     std::uint8_t subjects = proto::ns::kWatchAll;
     std::optional<proto::Pattern> pattern;  ///< nothing: all
     Phase phase = Phase::begin;
-    std::uint32_t cursor = 0;  ///< index of the last node or group that the snapshot looked at
-    std::uint64_t seen = 0;    ///< version up to which changes were looked at
-    std::uint64_t told = 0;    ///< version of the last events
+    std::uint32_t cursor = 0;   ///< index of the last node or group that the snapshot looked at
+    std::uint64_t seen = 0;     ///< version up to which changes were looked at
+    std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
+    std::uint64_t told = 0;     ///< version of the last events
   };
   struct Watcher {
     std::vector<Watch> watches;
     std::size_t next = 0;       ///< whose turn it is
-    std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
+    std::size_t under_way = 0;  ///< of all its watches
   };
   /// One WATCH_EVENTS that is being written.
   struct Page {
@@ -74,7 +75,7 @@ class Watches {
   };
 
   [[nodiscard]] bool serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send);
-  [[nodiscard]] bool is_idle(const Watch& watch) const;
+  [[nodiscard]] bool is_idle(const Watcher& watcher, const Watch& watch) const;
   void begin(Watch& watch);
   [[nodiscard]] Page next_page(Watch& watch, Turn& turn);
   void add_changes(Watch& watch, Page& page, Turn& turn) const;
@@ -88,7 +89,6 @@ class Watches {
 
   const HubTitle hub_;
   const Limits& limits_;
-  const std::size_t under_way_most_;
   Journal journal_;
   std::map<std::uint32_t, Watcher> watchers_;
   std::uint32_t last_served_ = 0;

@@ -31,6 +31,8 @@ class RecordingHost final : public InboundHost {
   }
   void on_answer(proto::Kind, const proto::ControlView& answer) override { answers.push_back(answer.header.request); }
   void on_service_moved(const proto::ns::ServiceMoved&) override {}
+  [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
+  void on_name_decided(const std::string& name, bool lost) override { decided = (lost ? "lost " : "kept ") + name; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override { taken_received.push_back(taken); }
   bool on_report(const proto::Report&) override { return false; }
   void send_taken(std::uint32_t, const proto::Taken& taken) override { taken_sent.push_back(taken); }
@@ -58,6 +60,7 @@ class RecordingHost final : public InboundHost {
   std::vector<std::uint16_t> answers;
   std::vector<std::uint32_t> lost_groups;
   std::uint32_t counted_group = 0;  ///< its messages count in a window
+  std::string decided;
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;
 };

@@ -157,5 +157,108 @@ TEST_F(NamesTest, AnUnreadableRequestIsABadOne) {
   EXPECT_TRUE(shards.all<CloseCommand>().empty());
 }
 
+/// Nothing but the listed characters makes a name: no other alphabet, no control character, no empty or dotted way up
+/// that could mean something else in a path, and nothing that a log line could not hold.
+TEST_F(NamesTest, NamesOutsideTheRulesAreRefusedInWords) {
+  const Node robot = join("robot");
+  const std::vector<std::string> bad{"",
+                                     "/",
+                                     "/a",
+                                     "a/",
+                                     "a//b",
+                                     "*",
+                                     "a/"
+                                     "*",
+                                     "**",
+                                     "a b",
+                                     "a#b",
+                                     "a+b",
+                                     "a\nb",
+                                     "a\rb",
+                                     "\x1b[31ma",
+                                     "%s%n",
+                                     "a\tb",
+                                     "\xc3\xa4",
+                                     "\xd0\xb0",
+                                     "\xe2\x80\xae"
+                                     "a",
+                                     "\xef\xbb\xbf"
+                                     "a",
+                                     std::string(256, 'a'),
+                                     std::string("a\0b", 3)};
+  for (const std::string& name : bad) {
+    const auto refused = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name});
+    ASSERT_FALSE(refused) << name;
+    EXPECT_EQ(refused.error().status, Status::bad_request) << name;
+    EXPECT_EQ(refused.error().sentence.find_first_of("\n\r\x1b"), std::string::npos) << name;
+  }
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{robot.id})->name, "robot");
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{std::string(255, 'a')})) << "the longest";
+}
+
+TEST_F(NamesTest, ADeepNameIsRefusedHoweverDeep) {
+  const Node robot = join("robot");
+  std::string name = "a";
+  for (int i = 1; i < 16; ++i) name += "/a";
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name})) << "16 parts";
+  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name + "/a"}).error().status, Status::bad_request);
+  proto::bitestream::Writer separators;
+  separators.put_text(3, std::string(60'000, '/'));
+  send_frame(robot, proto::Kind::ns, proto::assemble_control({ns::RegisterName::kOperation, 7}, separators));
+  const auto& answer = std::get<SendControlCommand>(shards.sent.back().command);
+  EXPECT_EQ(proto::decode_answer<ns::RegisterNameAnswer>(payload_of(answer)).error().status, Status::bad_request);
+}
+
+/// Claims of one name, however they come: there is one holder at any time, and the other is told who it is.
+TEST_F(NamesTest, OneOfTwoClaimantsHasTheName) {
+  const Node first = join("first");
+  const Node second = join("second");
+  ASSERT_TRUE(ask<ns::RegisterNameAnswer>(first, ns::RegisterName{"robot"}));
+  const auto refused = ask<ns::RegisterNameAnswer>(second, ns::RegisterName{"robot"});
+  EXPECT_EQ(refused.error().status, Status::taken);
+  EXPECT_NE(refused.error().sentence.find("127.0.0.1:5000"), std::string::npos) << refused.error().sentence;
+  EXPECT_EQ(ask<ns::ResolveAnswer>(second, ns::Resolve{"robot"})->node, first.id);
+  EXPECT_EQ(ask<ns::ResolveAnswer>(first, ns::Resolve{"second"})->node, second.id);
+}
+
+/// Taking and giving back a name for ever leaves nothing behind.
+TEST_F(NamesTest, ChangingTheNameForEverKeepsNothing) {
+  limits.watch_changes = 1'000;
+  const Node robot = join("robot");
+  for (int i = 0; i < 20'000; ++i) {
+    ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{i % 2 == 0 ? "a" : "b"}));
+    ASSERT_TRUE(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}));
+    shards.sent.clear();
+  }
+  EXPECT_EQ(conductor.membership().directory().size(), 0u);
+  EXPECT_EQ(conductor.membership().services().topics(), 0u);
+}
+
+TEST_F(NamesTest, ListsConnectedNodesOnlyIfTold) {
+  const Node robot = join("robot");
+  const Node away = join("away");
+  detach(away);
+  EXPECT_EQ(list(robot, ns::List{}), (std::vector<std::string>{"robot", "away"}));
+  EXPECT_EQ(list(robot, ns::List{.connected_only = true}), (std::vector<std::string>{"robot"}));
+}
+
+/// A pattern that fits few of many is answered piece by piece, so that nobody waits for it.
+TEST_F(NamesTest, APatternThatFitsNobodyIsAnsweredInPieces) {
+  limits.scan_records = 64;
+  const Node first = join("node-0");
+  for (int i = 1; i < 300; ++i) join("node-" + std::to_string(i));
+  NodeId after{};
+  int pages = 0;
+  for (bool more = true; more; ++pages) {
+    ASSERT_LT(pages, 10);
+    const auto answer = ask<ns::ListAnswer>(first, ns::List{.pattern = "*/nobody", .after = after});
+    ASSERT_TRUE(answer);
+    EXPECT_TRUE(answer->nodes.empty());
+    more = answer->more;
+    after = answer->next;
+  }
+  EXPECT_EQ(pages, 5);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -162,5 +162,32 @@ TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
   EXPECT_EQ(seen, 40u);
 }
 
+TEST_F(ServicesTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
+  const Node robot = join("robot");
+  EXPECT_TRUE(ask<ns::ServicesAnswer>(robot, ns::Services{})->services.empty());
+  for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
+    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(i)})) << i;
+    if (i + 1 == 1 || i + 1 == 100) {
+      EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/*"})->services.size(), i + 1);
+    }
+  }
+  EXPECT_EQ(conductor.membership().services().services_of(index_of(robot.id)), 1'024u);
+  const auto one_more = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "one-more"});
+  ASSERT_FALSE(one_more);
+  EXPECT_EQ(one_more.error().status, Status::limit);
+  EXPECT_NE(one_more.error().sentence.find("1024 services"), std::string::npos) << one_more.error().sentence;
+  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s7"})) << "one that is there already";
+}
+
+TEST_F(ServicesTest, SubscriptionsAreRefusedBeyondTheLimit) {
+  const Node viewer = join("viewer");
+  for (std::uint64_t i = 0; i < limits.subscriptions_per_node; ++i) {
+    ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)})) << i;
+  }
+  EXPECT_EQ(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}).error().status, Status::limit);
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"nobody/s0"}));
+  EXPECT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}));
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -69,10 +69,10 @@ TEST_F(WatchHandlerTest, WhatIsNotTakenIsNotFollowedByMore) {
     join("robot-" + std::to_string(i));
     static_cast<void>(conductor.serve_watches(now));
   }
-  EXPECT_EQ(events<ns::WatchEvents>().size(), 8u);
-  ASSERT_TRUE(ask<ns::WatchTakenAnswer>(viewer, ns::WatchTaken{1}));
+  EXPECT_EQ(events<ns::WatchEvents>().size(), 4u);
+  ASSERT_TRUE(ask<ns::WatchTakenAnswer>(viewer, ns::WatchTaken{1, 1}));
   static_cast<void>(conductor.serve_watches(now));
-  EXPECT_EQ(events<ns::WatchEvents>().size(), 9u);
+  EXPECT_EQ(events<ns::WatchEvents>().size(), 5u);
   ASSERT_TRUE(ask<ns::UnwatchAnswer>(viewer, ns::Unwatch{1}));
   EXPECT_EQ(ask<ns::UnwatchAnswer>(viewer, ns::Unwatch{1}).error().status, Status::not_found);
 }

@@ -59,7 +59,7 @@ class WatchesTest : public ::testing::Test {
   }
   void serve() {
     while (watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
-      EXPECT_LE(payload.size(), 16u * 1024);
+      EXPECT_LE(payload.size(), 10u * 1024);
       const auto events = proto::decode<ns::WatchEvents>(payload);
       ASSERT_TRUE(events) << events.error().sentence;
       waiting[node].push_back(*events);
@@ -72,7 +72,7 @@ class WatchesTest : public ::testing::Test {
     for (serve(); !waiting[session.index].empty(); serve()) {
       const ns::WatchEvents events = waiting[session.index].front();
       waiting[session.index].pop_front();
-      watches.taken(session.index, 1);
+      watches.taken(session.index, {events.watch, 1});
       for (const Change& change : events.changes) told.push_back(text_of(change));
     }
     return told;
@@ -164,7 +164,7 @@ TEST_F(WatchesTest, FollowEachOtherWithoutAGap) {
       EXPECT_TRUE(first || events.after == version);
       for (const Change& change : events.changes) EXPECT_LE(change.version, events.version);
       version = events.version;
-      watches.taken(viewer.index, 1);
+      watches.taken(viewer.index, {1, 1});
     }
   }
   EXPECT_EQ(version, watches.journal().version());
@@ -198,7 +198,7 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
         }
       }
     }));
-    watches.taken(viewer.index, 1);
+    watches.taken(viewer.index, {1, 1});
     if (!robots.empty()) {
       end(*robots[(static_cast<std::size_t>(step) * 7919) % robots.size()], true);
       robots.erase(robots.begin() +
@@ -227,11 +227,33 @@ TEST_F(WatchesTest, ASlowWatcherIsSentLittleAndCostsNobodyElse) {
     join("robot-" + std::to_string(i));
     EXPECT_EQ(take(fast), Texts{"joined robot-" + std::to_string(i)});
   }
-  EXPECT_EQ(waiting[slow.index].size(), 8u);
+  EXPECT_EQ(waiting[slow.index].size(), 4u);
   // What was kept for it comes when it takes.
   const Texts late = take(slow);
   EXPECT_EQ(late.back(), "joined robot-999");
   EXPECT_EQ(watches.resyncs(), 0u);
+}
+
+TEST_F(WatchesTest, NoWatchOfANodeWaitsForAnother) {
+  Session& viewer = join("viewer");
+  for (std::uint32_t number = 1; number <= 16; ++number) ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
+  for (int i = 0; i < 20; ++i) {
+    join("robot-" + std::to_string(i));
+    serve();
+  }
+  // One of each, and no more than 12 together beyond that.
+  EXPECT_EQ(waiting[viewer.index].size(), 16u);
+  std::set<std::uint32_t> told;
+  for (const ns::WatchEvents& events : waiting[viewer.index]) told.insert(events.watch);
+  EXPECT_EQ(told.size(), 16u);
+  for (int i = 0; i < 100; ++i) {
+    waiting[viewer.index].clear();
+    watches.taken(viewer.index, {7, 1});
+    join("late-" + std::to_string(i));
+    serve();
+    ASSERT_EQ(waiting[viewer.index].size(), 1u);
+    EXPECT_EQ(waiting[viewer.index].front().watch, 7u);
+  }
 }
 
 TEST_F(WatchesTest, WhoIsTooFarBehindBeginsAgain) {

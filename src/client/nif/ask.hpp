@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "client/nif/answer_status.hpp"
+#include "client/nif/node.hpp"
+#include "proto/control/names.hpp"
+#include "proto/control/ns.hpp"
+
+// Questions about names, as the functions of the C API ask them.
+
+namespace gimnet::nif {
+
+inline nif_status refused(const char* what, const std::string& about, const proto::Refusal& refusal) {
+  const std::string why = refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
+  return fail(status_of(refusal.status), std::string("cannot ") + what + " '" + about + "': " + why);
+}
+
+/// Asks, and reads the answer. `what` and `about` are for the sentence.
+template <class Answer, class Request>
+nif_status ask(Node& node, const Request& request, Answer& answer, const char* what, const std::string& about,
+               Deadline deadline) {
+  proto::Payload payload;
+  const nif_status status = node.requests().ask(proto::Kind::ns, proto::encode(request), payload, deadline);
+  if (status != NIF_OK) return status;
+  auto decoded = proto::decode_answer<Answer>(payload);
+  if (!decoded) return refused(what, about, decoded.error());
+  answer = std::move(*decoded);
+  return NIF_OK;
+}
+
+inline nif_status check_name(const char* name, const char* what) {
+  if (name == nullptr) return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
+  const char* fault = proto::name_fault(name);
+  if (fault == nullptr) return NIF_OK;
+  return fail(NIF_BAD_NAME, std::string("cannot ") + what + " '" + name + "': " + fault);
+}
+
+inline nif_status check_pattern(const char* pattern) {
+  if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
+  return fail(NIF_BAD_NAME, std::string("cannot look for '") + pattern +
+                                "': it is not a pattern: parts are separated by one /, and one is letters, digits, "
+                                "'.', '_', '-', or * for any one part, or ** for any number of them");
+}
+
+}  // namespace gimnet::nif

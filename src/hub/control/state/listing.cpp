@@ -1,0 +1,81 @@
+#include "hub/control/state/listing.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+namespace gimnet::hub {
+namespace {
+
+/// Takes the first `most` of what was found.
+Listed first_of(std::vector<std::uint32_t> indices, std::size_t most) {
+  std::ranges::sort(indices);
+  Listed listed;
+  listed.more = indices.size() > most;
+  if (listed.more) indices.resize(most);
+  if (listed.more) listed.next = indices.back();
+  listed.indices = std::move(indices);
+  return listed;
+}
+
+/// By name: all whose names begin as the pattern does, if those are few. `wanted` says the index of an entry that is to
+/// be listed, or 0. Nothing: they are too many.
+template <class ByName, class Wanted>
+std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& request, Wanted wanted) {
+  if (request.pattern == nullptr || request.pattern->beginning().empty()) return std::nullopt;
+  const std::string_view beginning = request.pattern->beginning();
+  std::vector<std::uint32_t> found;
+  std::size_t work = request.work;
+  for (auto entry = by_name.lower_bound(beginning); entry != by_name.end(); ++entry) {
+    if (!entry->first.starts_with(beginning)) break;
+    if (work-- == 0) return std::nullopt;
+    if (!request.pattern->matches(entry->first)) continue;
+    const std::uint32_t index = wanted(entry->second);
+    if (index > request.after) found.push_back(index);
+  }
+  return first_of(std::move(found), request.most);
+}
+
+/// By id, from where the last piece ended.
+template <class ById, class Wanted>
+Listed list_by_id(const ById& by_id, const ListingRequest& request, Wanted wanted) {
+  Listed listed;
+  std::size_t work = request.work;
+  for (auto entry = by_id.upper_bound(request.after); entry != by_id.end(); ++entry) {
+    if (work == 0 || listed.indices.size() == request.most) {
+      listed.more = true;
+      break;
+    }
+    --work;
+    listed.next = entry->first;
+    if (wanted(entry->second)) listed.indices.push_back(entry->first);
+  }
+  if (!listed.more) listed.next = 0;
+  return listed;
+}
+
+}  // namespace
+
+Listed list_nodes(const Membership& membership, const ListingRequest& request) {
+  const auto& sessions = membership.sessions();
+  const auto by_name =
+      list_by_name(membership.directory().names(), request, [&](const Directory::Holder& holder) -> std::uint32_t {
+        return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
+      });
+  if (by_name) return *by_name;
+  return list_by_id(sessions.all(), request, [&](const Session& session) {
+    if (request.connected_only && !session.connected) return false;
+    return request.pattern == nullptr || (!session.name.empty() && request.pattern->matches(session.name));
+  });
+}
+
+Listed list_services(const Services& services, const ListingRequest& request) {
+  const auto by_name = list_by_name(services.by_name(), request, [](const Topic& topic) -> std::uint32_t {
+    return topic.service ? topic.service->group : 0;
+  });
+  if (by_name) return *by_name;
+  return list_by_id(services.groups(), request, [&](const Topic* topic) {
+    return request.pattern == nullptr || request.pattern->matches(topic->full_name);
+  });
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "hub/control/state/membership.hpp"
+#include "proto/control/pattern.hpp"
+
+// Which nodes and services fit a pattern, in ascending order of their ids and in bounded pieces of work: what LIST and
+// SERVICES page through. What joins or leaves between two pages neither hides nor repeats anything else.
+// Thread safety: pure functions.
+
+namespace gimnet::hub {
+
+/// A piece of a listing.
+struct Listed {
+  std::vector<std::uint32_t> indices;  ///< ascending; of nodes or groups
+  bool more = false;
+  std::uint32_t next = 0;  ///< if there is more: continue after this index
+};
+
+struct ListingRequest {
+  const proto::Pattern* pattern = nullptr;  ///< nullptr: all, those without a name too
+  std::uint32_t after = 0;                  ///< continue after this index
+  bool connected_only = false;              ///< of nodes: none within their grace time
+  std::size_t most = 0;                     ///< indices in this piece
+  std::size_t work = 0;                     ///< nodes or services that may be looked at
+};
+
+[[nodiscard]] Listed list_nodes(const Membership& membership, const ListingRequest& request);
+[[nodiscard]] Listed list_services(const Services& services, const ListingRequest& request);
+
+}  // namespace gimnet::hub
