@@ -85,7 +85,7 @@ class WrongForGimnet(unittest.TestCase):
         self.assertIn("Examples:", tool.err)
 
     def test_help_begins_with_examples(self):
-        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["hz"], ["bw"], ["ping"], ["nodes"], ["services"], ["status"]):
+        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["hz"], ["bw"], ["ping"], ["nodes"], ["services"], ["watch"], ["status"]):
             tool = run(GIMNET, *command, "--help")
             self.assertEqual((tool.code, tool.err), (0, ""), command)
             text = tool.out.decode()

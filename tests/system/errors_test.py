@@ -40,7 +40,7 @@ WRONG_WORDS = [
     (USAGE, ["'64MB' is no value for --max-size: largest message taken, in bytes"],
      ["recv", "--name", "B", "--max-size", "64MB"]),
     (USAGE, ["'0' is no value for -c,--count: how many, 1 to 1000000000"], ["ping", "B", "-c", "0"]),
-    (USAGE, ["'0' is no value for -n,--count: end after that many messages, 1 or more"], ["echo", "a/b", "-n", "0"]),
+    (USAGE, ["'0' is no value for -n,--count: end after that many messages or events, 1 or more"], ["echo", "a/b", "-n", "0"]),
     (USAGE, ["'2min' is no value for --seconds: end after that many seconds"], ["bw", "a/b", "--seconds", "2min"]),
     (USAGE, ["'1s' is no value for --window: seconds"], ["hz", "a/b", "--window", "1s"]),
     (USAGE, ["'-1' is no value for --type: message type, a whole number"], ["send", "B", "--type", "-1"]),

@@ -157,6 +157,52 @@ class Lists(unittest.TestCase):
         self.assertIn("gimnet tool", [node["description"] for node in everybody])
 
 
+class Watches(unittest.TestCase):
+    def events(self, watch):
+        return [(event["change"], event.get("node", event.get("service", {})).get("name"))
+                for event in map(json.loads, watch.out.splitlines())]
+
+    def test_who_comes_and_goes(self):
+        hub = Hub(self)
+        start_recv(self, hub, "early")
+        watch = start_gimnet(self, hub, "watch", "**", "--json")
+        wait_until(lambda: ("snapshot_ends", None) in self.events(watch), "what is there already")
+        pub = start_gimnet(self, hub, "pub", "robot/odom", stdin=subprocess.PIPE)
+        wait_until(lambda: ("advertised", "robot/odom") in self.events(watch), "the new service")
+        pub.feed(b"")
+        self.assertEqual(pub.wait(), 0)
+        wait_until(lambda: ("left", "robot") in self.events(watch), "the end of the node")
+        watch.signal(2)
+        self.assertEqual(watch.wait(), 130, watch.err)
+        seen = self.events(watch)
+        self.assertEqual(seen[:3], [("snapshot_begins", None), ("present", "early"), ("snapshot_ends", None)])
+        wanted = [("joined", "robot"), ("advertised", "robot/odom"), ("withdrawn", "robot/odom"), ("left", "robot")]
+        self.assertEqual([event for event in seen if event in wanted], wanted)
+
+    def test_waiting_for_a_node(self):
+        hub = Hub(self)
+        nobody = run_gimnet(hub, "watch", "robot", "-n", "1", "--seconds", "0.1")
+        self.assertEqual(nobody.code, 5)
+        self.assertIn("waited 0.1 s for an event of robot: none came", nobody.err)
+        waiting = start_gimnet(self, hub, "watch", "robot", "-n", "1")
+        start_recv(self, hub, "robot")
+        self.assertEqual(waiting.wait(), 0, waiting.err)
+        self.assertIn(b"node robot 7.", waiting.out)
+        again = run_gimnet(hub, "watch", "robot", "-n", "1")
+        self.assertEqual(again.code, 0)
+        self.assertIn(b"  present     node robot 7.", again.out)
+
+    def test_its_own_looks_are_left_out_unless_asked_for(self):
+        hub = Hub(self)
+        quiet = start_gimnet(self, hub, "watch", "--json")
+        everybody = start_gimnet(self, hub, "watch", "--all", "--json")
+        wait_until(lambda: b"gimnet tool" in everybody.out, "at least its own")
+        Client(self, hub).join("robot")
+        for watch in (quiet, everybody):
+            wait_until(lambda watch=watch: b'"robot"' in watch.out, "who came after it")
+        self.assertNotIn(b"gimnet tool", quiet.out)
+
+
 class Pings(unittest.TestCase):
     def test_every_node_answers(self):
         hub = Hub(self, shards=2)

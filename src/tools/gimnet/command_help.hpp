@@ -13,6 +13,7 @@ Examples:
   gimnet echo robot/odom -n 10              print ten messages of robot/odom
   gimnet hz 'robot/*'                       how often do its services send, and how evenly?
   gimnet ping B                             how far away is B?
+  gimnet watch                              who comes and goes?
   gimnet nodes; gimnet services; gimnet status --json
   gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
 
@@ -101,6 +102,16 @@ inline constexpr const char* kServicesAbout = R"(List the services.
 Examples:
   gimnet services
   gimnet services 'robot/*' --json
+)";
+
+inline constexpr const char* kWatchAbout =
+    R"(Tell which nodes and services are there, and who comes and goes from then on.
+
+Examples:
+  gimnet watch
+  gimnet watch 'robot/**' --changes         only what changes
+  gimnet watch robot -n 1 --seconds 10      wait for robot: ends with 0 when it is there, else with 5
+  gimnet watch --json | jq .change
 )";
 
 inline constexpr const char* kStatusAbout = R"(Show what the hub counted.

@@ -31,7 +31,7 @@ void add_lane(CLI::App& command, Options& options) {
 }
 
 void add_bounds(CLI::App& command, Options& options) {
-  command.add_option("-n,--count", options.count, "end after that many messages, 1 or more")
+  command.add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62));
   command.add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
       ->check(CLI::Range(0.001, 1e9));
@@ -131,6 +131,11 @@ void add_lists(CLI::App& app, Options& options) {
   nodes.add_flag("--all", options.all, "those of gimnet itself, too");
   CLI::App& services = *app.add_subcommand("services", help::kServicesAbout);
   services.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
+  CLI::App& watch = *app.add_subcommand("watch", help::kWatchAbout);
+  watch.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
+  watch.add_flag("--all", options.all, "those of gimnet itself, too");
+  watch.add_flag("--changes", options.changes, "only what changes, not what is there already");
+  add_bounds(watch, options);
   app.add_subcommand("status", help::kStatusAbout);
 }
 

@@ -13,7 +13,7 @@ class App;
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 11> kCommands{{{"send", Command::send},
+inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{{{"send", Command::send},
                                                                                  {"recv", Command::recv},
                                                                                  {"pub", Command::pub},
                                                                                  {"echo", Command::echo},
@@ -22,6 +22,7 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 11> kCommands{
                                                                                  {"ping", Command::ping},
                                                                                  {"nodes", Command::nodes},
                                                                                  {"services", Command::services},
+                                                                                 {"watch", Command::watch},
                                                                                  {"status", Command::status},
                                                                                  {"ctl", Command::ctl}}};
 

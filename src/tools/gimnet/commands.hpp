@@ -16,6 +16,7 @@ namespace gimnet::tool {
 [[nodiscard]] ExitCode run_ping(Session& session);
 [[nodiscard]] ExitCode run_nodes(Session& session);
 [[nodiscard]] ExitCode run_services(Session& session);
+[[nodiscard]] ExitCode run_watch(Session& session);
 [[nodiscard]] ExitCode run_status(Session& session);
 [[nodiscard]] ExitCode run_ctl(Session& session);
 

@@ -31,6 +31,8 @@ ExitCode run(const Options& options) {
       return run_nodes(session);
     case Command::services:
       return run_services(session);
+    case Command::watch:
+      return run_watch(session);
     case Command::status:
       return run_status(session);
     case Command::ctl:

@@ -1,6 +1,7 @@
 #include "tools/gimnet/commands.hpp"
-#include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/record_json.hpp"
 #include "tools/gimnet/table.hpp"
+#include "tools/gimnet/watch_report.hpp"
 
 namespace gimnet::tool {
 namespace {
@@ -8,12 +9,7 @@ namespace {
 std::string json_of(const std::vector<NodeRecord>& nodes) {
   JsonWriter json;
   json.begin_array();
-  for (const NodeRecord& node : nodes) {
-    json.begin_object().member("id", node.node.text()).member("name", node.name);
-    json.member("hub", node.hub_name).member("hub_id", node.hub_id).member("connected", node.connected);
-    json.member("description", node.description).member("place", node.place);
-    json.member("joined_ms", node.joined_ms).member("services", node.services).end_object();
-  }
+  for (const NodeRecord& node : nodes) write(json, node);
   return json.end_array().str() + "\n";
 }
 
@@ -27,9 +23,6 @@ std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
   }
   return table.text(paint);
 }
-
-/// A look by this tool, which nobody looks for.
-bool is_tool(const NodeRecord& node) { return node.name.empty() && node.description == kToolDescription; }
 
 }  // namespace
 

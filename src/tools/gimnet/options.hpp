@@ -10,7 +10,7 @@
 
 namespace gimnet::tool {
 
-enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, status, ctl };
+enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, watch, status, ctl };
 
 /// When to print colours: on a terminal, unless NO_COLOR says no.
 enum class Colour : std::uint8_t { automatic, always, never };
@@ -28,6 +28,7 @@ struct Options {
   std::string file;
   bool raw = false;
   bool all = false;
+  bool changes = false;
   std::uint64_t count = 0;  ///< 0: no end
   double seconds = 0.0;     ///< 0: no end
   double window_s = 5.0;

@@ -1,27 +1,14 @@
 #include "tools/gimnet/commands.hpp"
-#include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/record_json.hpp"
 #include "tools/gimnet/table.hpp"
 
 namespace gimnet::tool {
 namespace {
 
-const char* text_of(Direction direction) { return direction == Direction::accepts ? "accepts" : "provides"; }
-std::string delivery_of(const ServiceRecord& service) {
-  if (service.delivery == Delivery::sync) return "sync:" + std::to_string(service.window);
-  return service.delivery == Delivery::latest ? "latest" : "stream";
-}
-
 std::string json_of(const std::vector<ServiceRecord>& services) {
   JsonWriter json;
   json.begin_array();
-  for (const ServiceRecord& service : services) {
-    json.begin_object().member("name", service.name).member("node", service.node.text());
-    json.member("type", service.key.type).member("instance", service.key.instance);
-    json.member("direction", text_of(service.direction)).member("delivery", delivery_of(service));
-    json.member("retain", service.retain);
-    json.member("group", service.group_id).member("subscribers", service.subscribers);
-    json.member("metadata", service.metadata).member("hub", service.hub_name).end_object();
-  }
+  for (const ServiceRecord& service : services) write(json, service);
   return json.end_array().str() + "\n";
 }
 

@@ -85,9 +85,11 @@ ExitCode Session::finish() {
 ExitCode Session::finish_stream(const Bounds& bounds, std::uint64_t messages) {
   const ExitCode code = finish();
   if (code != ExitCode::done || !output_.ok() || !bounds.late() || !bounds.missed(messages)) return code;
-  const std::string wanted = options_.count == 0 ? "a message" : std::to_string(options_.count) + " messages";
-  return fail({Status::timeout, "waited " + decimal(options_.seconds) + " s for " + wanted + " of " +
-                                    (options_.target.empty() ? "others" : options_.target) + ": " +
+  const bool events = options_.command == Command::watch;
+  const std::string one = events ? "an event" : "a message";
+  const std::string many = std::to_string(options_.count) + (events ? " events" : " messages");
+  return fail({Status::timeout, "waited " + decimal(options_.seconds) + " s for " + (options_.count < 2 ? one : many) +
+                                    " of " + (options_.target.empty() ? "anybody" : options_.target) + ": " +
                                     (messages == 0 ? "none" : "only " + std::to_string(messages)) + " came"});
 }
 

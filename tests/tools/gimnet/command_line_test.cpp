@@ -89,7 +89,7 @@ TEST(CommandLine, SaysWhatAnOptionTakes) {
 }
 
 TEST(CommandLine, ReadsTheBoundsOfWhatGoesOn) {
-  for (const char* command : {"echo", "hz", "bw"}) {
+  for (const char* command : {"echo", "hz", "bw", "watch"}) {
     const Options read = options({command, "robot/*", "-n", "5", "--seconds", "2.5"});
     EXPECT_EQ(read.count, 5u);
     EXPECT_EQ(read.seconds, 2.5);

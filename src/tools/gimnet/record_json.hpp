@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "gimnet/gimi/records.hpp"
+#include "tools/gimnet/json_writer.hpp"
+
+namespace gimnet::tool {
+
+/// Writes a record as an object, everywhere with the same members.
+void write(JsonWriter& json, const NodeRecord& node);
+void write(JsonWriter& json, const ServiceRecord& service);
+
+[[nodiscard]] const char* text_of(Direction direction);
+/// As `pub --delivery` takes it.
+[[nodiscard]] std::string delivery_of(const ServiceRecord& service);
+
+}  // namespace gimnet::tool
