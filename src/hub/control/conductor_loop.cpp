@@ -63,10 +63,7 @@ struct ConductorLoop::Impl {
   Impl(const Wiring& parts, std::vector<std::unique_ptr<Listener>> listeners)
       : wiring(parts),
         strangers(
-            parts.limits,
-            [this](Stranger& stranger, const proto::Hello& hello) {
-              return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
-            },
+            parts.limits, [this](Stranger& stranger, const proto::Hello& hello) { return admit(stranger, hello); },
             parts.refusals),
         strangers_watch(context, strangers.descriptor()),
         inbox_watch(context, parts.inbox.waker().descriptor()),
@@ -95,10 +92,24 @@ struct ConductorLoop::Impl {
     });
   }
 
+  /// What the shards told before this HELLO was sent holds already: a name that was given back is free.
+  std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello) {
+    const std::size_t events = stopping ? 0 : kEventsABatch;  // draining ends in take_events()
+    wiring.inbox.drain(events, [this](ShardEvent event) {
+      if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
+        leaving.push_back(std::move(farewell->transport));  // the waiting room is busy with this stranger
+      } else {
+        wiring.conductor.on_event(std::move(event), now());
+      }
+    });
+    return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
+  }
+
   void watch_strangers() {
     strangers_watch.wait([this] {
       while (strangers.serve(now())) {
       }
+      for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
       serve_watches();
       arm_timer();
       watch_strangers();
@@ -202,6 +213,7 @@ struct ConductorLoop::Impl {
   const Wiring wiring;
   asio::io_context context{1};
   WaitingRoom strangers;
+  std::vector<std::unique_ptr<Transport>> leaving;  ///< to be seen off by `strangers`
   Watch strangers_watch;
   Watch inbox_watch;
   asio::steady_timer timer;

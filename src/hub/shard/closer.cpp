@@ -20,8 +20,9 @@ void Closer::on_broken(Connection& connection) {
 }
 
 void Closer::on_goodbye(Connection& connection, proto::GoodbyeCode code, std::string sentence) {
-  detach(connection, false);
+  // Before the socket is closed: a node that has seen that may have its name again at once.
   tell(connection, true, code, std::move(sentence));
+  detach(connection, false);
 }
 
 void Closer::fence(Connection& connection) {
