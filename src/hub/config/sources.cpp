@@ -118,7 +118,7 @@ void read_one(const std::string& path, ReadConfiguration& read) {
   TomlFile toml = read_toml(file.text, path);
   Faults faults = std::move(toml.faults);
   for (const Given& given : toml.keys) apply(read.configuration, given, faults);
-  std::ranges::stable_sort(faults, {}, [](const Fault& fault) { return position_in(fault.place); });
+  std::ranges::sort(faults, {}, [](const Fault& fault) { return std::pair{position_in(fault.place), fault.sentence}; });
   if (faults.size() > kConfigFaultsMax) faults.resize(kConfigFaultsMax);
   read.faults.insert(read.faults.end(), faults.begin(), faults.end());
 }

@@ -206,7 +206,7 @@ TomlFile read_toml(std::string_view text, const std::string& name) {
       all.push_back(found(outer + "." + std::string{inner_key.str()}, inner_key, inner_node, name));
     }
   }
-  std::ranges::stable_sort(all, [](const Found& a, const Found& b) {
+  std::ranges::sort(all, [](const Found& a, const Found& b) {
     return std::pair{a.at.line, a.at.column} < std::pair{b.at.line, b.at.column};
   });
   for (Found& each : all) file.keys.push_back(std::move(each.given));
