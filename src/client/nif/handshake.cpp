@@ -150,7 +150,11 @@ Handshake::State Handshake::take_welcome(const proto::Welcome& welcome) {
   }
   session_.hub_taken = session_.resumed ? welcome.taken : 0;
   session_.hub_resume_bytes = welcome.resume_buffer_bytes;
-  session_.earlier_goodbye = welcome.last_goodbye_sentence;
+  session_.earlier_goodbye.clear();
+  if (!welcome.last_goodbye_sentence.empty()) {
+    const auto code = static_cast<proto::GoodbyeCode>(welcome.last_goodbye_code);
+    session_.earlier_goodbye = proto::goodbye_name(code) + (": " + welcome.last_goodbye_sentence);
+  }
   return State::welcome;
 }
 
