@@ -130,6 +130,12 @@ void Model::judge_control(const Asked& asked, std::uint16_t operation) {
 
 namespace {
 
+/// A page speaks of all up to this index.
+template <class Answer>
+std::uint32_t last_of_page(const Answer& answer) {
+  return answer.more ? index_of(answer.next) : UINT32_MAX;
+}
+
 /// How many records a page may have.
 std::size_t page_size(const hub::Limits& limits, std::uint32_t wanted) {
   return std::clamp<std::size_t>(wanted, 1, limits.page_records);
@@ -146,14 +152,12 @@ void Model::judge_list(const Asked& asked) {
   const std::size_t room = page_size(limits_, wanted->records_max);
   require(answer->nodes.size() <= room, Checker::limits, "LIST is answered with more records than a page has");
   auto record = answer->nodes.begin();
-  bool more = false;
-  for (auto entry = sessions_.upper_bound(index_of(wanted->after)); entry != sessions_.end(); ++entry) {
+  const std::uint32_t last = last_of_page(*answer);
+  for (auto entry = sessions_.upper_bound(index_of(wanted->after)); entry != sessions_.end() && entry->first <= last;
+       ++entry) {
     const Session& session = entry->second;
     if (!wanted->pattern.empty() && !proto::matches(wanted->pattern, session.name)) continue;
-    if (static_cast<std::size_t>(record - answer->nodes.begin()) == room) {
-      more = true;
-      break;
-    }
+    if (wanted->connected_only && !session.connected) continue;
     require(record != answer->nodes.end(), Checker::answers, "LIST leaves out a node");
     require(record->node == id(entry->first) && record->name == session.name &&
                 record->connected == session.connected && record->description == session.description &&
@@ -162,9 +166,9 @@ void Model::judge_list(const Asked& asked) {
             Checker::answers, "LIST says of a node what is not so");
     ++record;
   }
-  require(record == answer->nodes.end() && answer->more == more, Checker::answers,
-          "LIST has a node too many, or is wrong about there being more");
-  if (more) census_.add(Happening::page_continued);
+  require(record == answer->nodes.end(), Checker::answers, "LIST has a node too many");
+  require(!answer->more || last > index_of(wanted->after), Checker::answers, "LIST does not get on");
+  if (answer->more) census_.add(Happening::page_continued);
 }
 
 void Model::judge_service_list(const Asked& asked) {
@@ -176,15 +180,12 @@ void Model::judge_service_list(const Asked& asked) {
   const std::size_t room = page_size(limits_, wanted->records_max);
   require(answer->services.size() <= room, Checker::limits, "SERVICES is answered with more records than a page has");
   auto record = answer->services.begin();
-  bool more = false;
-  for (auto entry = groups_.upper_bound(index_of(wanted->after)); entry != groups_.end(); ++entry) {
+  const std::uint32_t last = last_of_page(*answer);
+  for (auto entry = groups_.upper_bound(index_of(wanted->after)); entry != groups_.end() && entry->first <= last;
+       ++entry) {
     const auto& [full_name, topic] = *entry->second;
     const Service& service = *topic.service;
     if (!wanted->pattern.empty() && !proto::matches(wanted->pattern, full_name)) continue;
-    if (static_cast<std::size_t>(record - answer->services.begin()) == room) {
-      more = true;
-      break;
-    }
     require(record != answer->services.end(), Checker::answers, "SERVICES leaves out a service");
     require(record->group == group_id(entry->first) && record->name == full_name &&
                 record->node == id(service.provider) && record->message_type == service.terms.message_type &&
@@ -193,8 +194,8 @@ void Model::judge_service_list(const Asked& asked) {
             Checker::answers, "SERVICES says of a service what is not so");
     ++record;
   }
-  require(record == answer->services.end() && answer->more == more, Checker::answers,
-          "SERVICES has a service too many, or is wrong about there being more");
+  require(record == answer->services.end(), Checker::answers, "SERVICES has a service too many");
+  require(!answer->more || last > index_of(wanted->after), Checker::answers, "SERVICES does not get on");
 }
 
 void Model::judge_connections(const Asked& asked) {

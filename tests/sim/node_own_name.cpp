@@ -34,7 +34,7 @@ void SimNode::watch() {
 /// Sooner or later, so that the hub holds changes back and has to begin again. Never a request too many.
 void SimNode::say_taken() {
   if (untaken_ == 0 || !is_up() || link().open.size() >= around_.setting.plan.limits.requests) return;
-  ask(ns::WatchTaken{untaken_}, {});
+  ask(ns::WatchTaken{kWatch, untaken_}, {});
   untaken_ = 0;
 }
 

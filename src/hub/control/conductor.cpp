@@ -169,6 +169,9 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   command.attachment = event.attachment;
 #endif
   command.frame = control_frame(kind, event.node, facts_.id, answer);
+#ifdef GIMNET_BUG_ANSWER_NAMES_THE_SLOT
+  command.frame = control_frame(kind, make_id<NodeId>(facts_.id, event.session.slot.value() + 1), facts_.id, answer);
+#endif
   command.answers = 1;
   wiring_.shards.send(shard, std::move(command));
 #ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
@@ -388,10 +391,9 @@ bool Conductor::serve_watches(milliseconds now) {
 
 void Conductor::send_event(const Session& session, const proto::Payload& payload) {
   if (!session.connected) return;  // it declares again when it is back, and learns what is true then
-  SendControlCommand command;
-  command.session = ref_of(session.place);
-  command.frame = control_frame(proto::Kind::ns, node_id(session), facts_.id, payload);
-  wiring_.shards.send(session.place.shard, std::move(command));
+  auto frame = control_frame(proto::Kind::ns, node_id(session), facts_.id, payload);
+  wiring_.shards.send(session.place.shard,
+                      SendControlCommand{.session = ref_of(session.place), .frame = std::move(frame)});
 }
 
 }  // namespace gimnet::hub

@@ -29,11 +29,7 @@ Place SlotPool::take_on(ShardIndex index) {
   ++shard.held;
   // One count for all slots: it comes round after 2^32 sessions, long after the last frame for the earlier holder.
   if (++last_generation_ == 0) ++last_generation_;
-#ifdef GIMNET_BUG_SLOT_KEEPS_GENERATION
-  return Place{index, ConnectionSlot{slot}, slot + 1};
-#else
   return Place{index, ConnectionSlot{slot}, last_generation_};
-#endif
 }
 
 void SlotPool::give_back(const Place& place) {
