@@ -162,7 +162,7 @@ TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
   EXPECT_EQ(seen, 40u);
 }
 
-TEST_F(ServicesTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
+TEST_F(ServiceRequestsTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
   const Node robot = join("robot");
   EXPECT_TRUE(ask<ns::ServicesAnswer>(robot, ns::Services{})->services.empty());
   for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
@@ -179,7 +179,7 @@ TEST_F(ServicesTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
   EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s7"})) << "one that is there already";
 }
 
-TEST_F(ServicesTest, SubscriptionsAreRefusedBeyondTheLimit) {
+TEST_F(ServiceRequestsTest, SubscriptionsAreRefusedBeyondTheLimit) {
   const Node viewer = join("viewer");
   for (std::uint64_t i = 0; i < limits.subscriptions_per_node; ++i) {
     ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)})) << i;

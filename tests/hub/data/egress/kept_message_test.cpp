@@ -25,7 +25,7 @@ TEST(KeptMessage, KeepsSmallFramesInMemoryOfItsOwn) {
   EXPECT_EQ(message.bytes(), run.size);
   message.for_each([&](const hub::Run& piece) { EXPECT_NE(piece.buffer.get(), run.buffer.get()); });
   EXPECT_EQ(bytes_of(message), std::string(reinterpret_cast<const char*>(run.bytes), run.size));
-  EXPECT_EQ(rig.pool.pinned_bytes(), 1024u);
+  EXPECT_EQ(rig.pool.pinned_bytes(), 256u);
   message.clear();
   EXPECT_TRUE(message.empty());
   EXPECT_EQ(rig.pool.pinned_bytes(), 0u) << "what is not kept is not charged";

@@ -45,7 +45,8 @@ class EgressRig {
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
     proto::FrameHeader header;
     header.length = static_cast<std::uint32_t>(payload.size());
-    header.dst = 7u << 20 | 99;
+    const bool for_this_connection = frame.kind == proto::Kind::flow || frame.kind == proto::Kind::link;
+    header.dst = for_this_connection ? 0 : 7u << 20 | 99;
     header.src = 7u << 20 | frame.src;
     header.kind = frame.kind;
     header.flags = frame.flags;

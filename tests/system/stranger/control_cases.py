@@ -1,0 +1,156 @@
+"""Sections 8 and 9 of docs/protocol.md: names, services, administration."""
+
+import struct
+
+from stranger.bitestream import TEXT, U16, U8, every, fields, put
+from stranger.case import Case
+from stranger.client import CTRL, NS, Denied, Refused, Stranger, u32
+
+
+class Names(Case):
+    def test_resolve_reverse_list(self):
+        hub = self.hub()
+        one, two = self.stranger(hub, "a/one"), self.stranger(hub, "a/two")
+        self.assertEqual(one.resolve("a/two"), two.id)
+        self.assertEqual(fields(one.ask(NS, 4, u32(3, two.id)))[3], "a/two")
+        with self.assertRaises(Denied) as denied:
+            one.resolve("a/three")
+        self.assertEqual(denied.exception.args[0], 3)
+        self.assertIn("a/three", denied.exception.args[1])
+        names, after = [], b""
+        while True:
+            page = one.ask(NS, 5, put(3, TEXT, "a/*") + after + u32(5, 1))
+            records = [fields(record) for record in every(page, 3)]
+            names += [record[2] for record in records]
+            if not fields(page).get(4):
+                break
+            after = u32(4, fields(page)[5])
+        self.assertEqual(names, ["a/one", "a/two"])
+
+    def test_a_service_from_advertise_to_withdraw(self):
+        hub = self.hub()
+        robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
+        group = robot.advertise("scan", delivery=put(7, U8, 1), metadata=put(8, TEXT, "360 beams"))[3]
+        found = [fields(record) for record in every(viewer.ask(NS, 9, put(3, TEXT, "**")), 3)]
+        self.assertEqual([(r[1], r[2], r[3], r[7], r[8]) for r in found],
+                         [(group, "robot/scan", robot.id, 1, "360 beams")])
+        self.assertEqual(viewer.subscribe("robot/scan")[3], group)
+        joined = robot.event(33)
+        self.assertEqual((joined[3], joined[4], joined[5]), (group, viewer.id, 1))
+        viewer.ask(NS, 11, put(3, TEXT, "robot/scan"))
+        left = robot.event(34)
+        self.assertEqual((left[3], left[4], left.get(5, 0)), (group, viewer.id, 0))
+        robot.ask(NS, 8, u32(3, group))
+
+    def test_refusals(self):
+        hub = self.hub()
+        nameless, robot = self.stranger(hub), self.stranger(hub, "robot")
+        for who, operation, body, status in ((nameless, 7, put(3, TEXT, "odom"), 2), (robot, 999, b"", 1),
+                                             (robot, 3, put(3, U16, 5), 2), (robot, 8, u32(3, 1), 3)):
+            with self.assertRaises(Denied) as denied:
+                who.ask(NS, operation, body)
+            self.assertEqual(denied.exception.args[0], status, denied.exception)
+            self.assertTrue(denied.exception.args[1])
+
+
+    def test_a_name_is_taken_changed_and_given_back(self):
+        hub = self.hub()
+        one, two = self.stranger(hub), self.stranger(hub)
+        answer = fields(one.ask(NS, 1, put(3, TEXT, "robot")))
+        self.assertEqual((answer[3], answer.get(4, False)), ("robot", False))
+        with self.assertRaises(Denied) as denied:
+            two.ask(NS, 1, put(3, TEXT, "robot"))
+        self.assertEqual(denied.exception.args[0], 4)
+        one.close()
+        again = self.stranger(hub, "robot", token=answer[5])
+        self.assertEqual((again.id, again.welcome[18]), (one.id, "robot"))
+        again.ask(NS, 2)
+        self.assertEqual(fields(two.ask(NS, 1, put(3, TEXT, "robot")))[3], "robot")
+
+    def watched(self, who, watch, wanted):
+        """(kind, name) of the changes until `wanted` is among them; each WATCH_EVENTS is answered and follows the last."""
+        found, version = [], None
+        while wanted not in found:
+            got = who.wait(lambda frame: frame.kind == NS and frame.body[:4] == struct.pack("<HH", 37, 0)).body[4:]
+            events = fields(got)
+            self.assertEqual((events[4], events[5]), (watch, 7))
+            self.assertIn(events.get(7, 0), (version, events.get(7, 0) if version is None else None))
+            version = events.get(8, 0)
+            who.ask(NS, 13, u32(3, watch) + u32(4, 1))
+            for change in every(got, 3):
+                change = fields(change)
+                record = fields(change.get(4) or change.get(5) or [])
+                found.append((change.get(1, 0), record.get(2, "")))
+        return found
+
+    def test_a_watch_from_its_snapshot_to_its_end(self):
+        hub = self.hub()
+        robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
+        robot.advertise("odom")
+        self.assertTrue(fields(viewer.ask(NS, 6, u32(3, 5) + put(4, TEXT, "robot/**") + put(5, U8, 3))).get(3))
+        self.assertEqual(self.watched(viewer, 5, (2, "")), [(0, ""), (1, "robot"), (1, "robot/odom"), (2, "")])
+        group = robot.advertise("scan")[3]
+        self.assertEqual(self.watched(viewer, 5, (9, "robot/scan")), [(9, "robot/scan")])
+        robot.ask(NS, 8, u32(3, group))
+        self.watched(viewer, 5, (10, "robot/scan"))
+        self.stranger(hub, "robot/arm").leave()
+        self.assertEqual(self.watched(viewer, 5, (4, "robot/arm")), [(3, "robot/arm"), (4, "robot/arm")])
+        viewer.ask(NS, 12, u32(3, 5))
+
+
+class Administration(Case):
+    def test_reading(self):
+        hub = self.hub(shards=2, hub_id=5)
+        made = self.stranger(hub, "one")
+        info = fields(made.ask(CTRL, 1))
+        self.assertEqual((info[3], info[6], info[8]), (5, 2, 1))
+        shards = [fields(record) for record in every(made.ask(CTRL, 2), 3)]
+        self.assertEqual({0, 1} - {record[1] for record in shards}, set())
+        self.assertIn("accepted", fields(shards[0][2]))
+        records = [fields(record) for record in every(made.ask(CTRL, 3), 3)]
+        self.assertEqual([(record[1], record[2], record[4]) for record in records], [(made.id, "one", "tcp")])
+        routes = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
+        self.assertEqual([(record[1], record[3], record[4]) for record in routes], [(5, 5, 0)])
+
+    def test_changing_is_denied_to_nodes(self):
+        made = self.stranger(self.hub(), "one")
+        for operation, body in ((4, u32(3, made.id)), (5, u32(3, made.id) + u32(4, made.id + 1)), (6, b""), (7, b""),
+                                (8, put(3, TEXT, "debug"))):
+            with self.assertRaises(Denied) as denied:
+                made.ask(CTRL, operation, body)
+            self.assertEqual(denied.exception.args[0], 5)
+            self.assertIn("Unix socket", denied.exception.args[1])
+
+
+    def test_routes(self):
+        hub = self.hub(hub_id=5)
+        made = self.stranger(hub, "one")
+        routes = [fields(record) for record in every(made.ask(CTRL, 9), 3)]
+        self.assertEqual([(route[1], route.get(4, 0), route[5]) for route in routes], [(5, 0, 1)])
+
+    def test_changing_is_for_administrators(self):
+        hub = self.hub()
+        one, two = self.stranger(hub, "one"), self.stranger(hub, "two")
+        for operation, body in ((4, u32(3, two.id)), (5, u32(3, two.id) + u32(4, 7 << 20 | 500)), (6, b""), (7, b""),
+                                (8, put(3, TEXT, "debug"))):
+            with self.assertRaises(Denied) as denied:
+                one.ask(CTRL, operation, body)
+            self.assertEqual(denied.exception.args[0], 5)
+        admin = Stranger(f"unix:{hub.socket_path}")
+        self.addCleanup(admin.close)
+        admin.join(role=2)
+        self.assertTrue(fields(admin.ask(CTRL, 8, put(3, TEXT, "warning")))[3])
+        admin.ask(CTRL, 7)
+        admin.ask(CTRL, 5, u32(3, two.id) + u32(4, 7 << 20 | 500))
+        self.assertEqual(self.goodbye(two), 17)
+        again = self.stranger(hub, "two", token=two.welcome[2])
+        self.assertEqual(again.id, 7 << 20 | 500)
+        admin.ask(CTRL, 4, u32(3, one.id) + put(4, TEXT, "enough"))
+        self.assertEqual(self.goodbye(one), 15)
+        admin.ask(CTRL, 6)
+        self.assertEqual(self.goodbye(again), 7)
+
+    def goodbye(self, who):
+        with self.assertRaises(Refused) as refused:
+            who.wait(lambda got: False)
+        return refused.exception.args[0]
