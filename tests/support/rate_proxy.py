@@ -102,12 +102,12 @@ class RateProxy:
         try:
             while piece := source.recv(PIECE_BYTES):
                 pace.wait(len(piece))
-                sink.sendall(piece)
-                with self._lock:
+                with self._lock:  # before it is handed on: who has received bytes finds them counted
                     if pace is self.down:
                         self.down_bytes += len(piece)
                     else:
                         self.up_bytes += len(piece)
+                sink.sendall(piece)
         except OSError:
             pass
         with self._lock:
