@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/clock.hpp"
 #include "base/result.hpp"
 #include "tools/demo/hub_counters.hpp"
 #include "tools/demo/messages.hpp"
@@ -29,6 +30,9 @@ class NodePort {
   };
 
   virtual ~NodePort() = default;
+
+  /// The time in ns since 1970: the clock of everything that is said through this port.
+  [[nodiscard]] virtual std::int64_t now_ns() const { return wall_now_ns(); }
 
   /// Sends a message to all subscribers of an own service. Errors: the connection ended for good.
   [[nodiscard]] virtual std::optional<Error> publish(Service service, std::span<const std::byte> payload) = 0;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "base/clock.hpp"
-
 namespace gimnet::demo {
 
 void Robot::publish(Service service, const Bytes& bytes) {
@@ -38,9 +36,9 @@ std::int64_t Robot::wait_ns(std::int64_t now_ns) const {
 }
 
 std::optional<Error> Robot::step() {
-  const Result<std::optional<NodePort::Event>> event = port_.receive(wait_ns(wall_now_ns()));
+  const Result<std::optional<NodePort::Event>> event = port_.receive(wait_ns(port_.now_ns()));
   if (!event) return event.error();
-  const std::int64_t now_ns = wall_now_ns();
+  const std::int64_t now_ns = port_.now_ns();
   if (*event) handle(**event, now_ns);
   if (!source_) {
     if (!port_.heard()) return std::nullopt;

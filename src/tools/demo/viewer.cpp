@@ -23,7 +23,7 @@ Viewer::Viewer(NodePort& port, Terminal* terminal, ViewerOptions options)
     : port_(port),
       terminal_(terminal),
       options_(std::move(options)),
-      monitor_(wall_now_ns(), !options_.own_robot),
+      monitor_(port.now_ns(), !options_.own_robot),
       driver_(options_.autopilot),
       writer_(options_.style) {}
 
@@ -114,7 +114,7 @@ void Viewer::report_progress(std::int64_t now_ns) {
 
 std::optional<Error> Viewer::step(std::int64_t wait_ns) {
   const Result<std::optional<NodePort::Event>> event = port_.receive(wait_ns);
-  const std::int64_t now_ns = wall_now_ns();
+  const std::int64_t now_ns = port_.now_ns();
   if (!event) return event.error();
   if (*event) take(**event);
   while (const std::optional<DriveCommand> command = driver_.next(monitor_, now_ns)) {
@@ -136,7 +136,7 @@ bool Viewer::time_is_over() const {
   const bool unattended = terminal_ == nullptr || options_.seconds;
   if (unattended && monitor_.info() && monitor_.info()->ended) return true;
   if (!options_.seconds || first_heard_ns_ == 0) return false;
-  return static_cast<double>(wall_now_ns() - first_heard_ns_) * 1e-9 >= *options_.seconds;
+  return static_cast<double>(port_.now_ns() - first_heard_ns_) * 1e-9 >= *options_.seconds;
 }
 
 std::optional<Error> Viewer::run() {
@@ -149,7 +149,7 @@ std::optional<Error> Viewer::run() {
                                options_.hub_url, kFirstSign_ns / 1'000'000'000)};
     }
   }
-  ended_ns_ = wall_now_ns();
+  ended_ns_ = port_.now_ns();
   return finish();
 }
 
@@ -181,7 +181,7 @@ std::optional<Error> Viewer::finish() {
 }
 
 RunRecord Viewer::record() const {
-  const std::int64_t end_ns = ended_ns_ != 0 ? ended_ns_ : wall_now_ns();
+  const std::int64_t end_ns = ended_ns_ != 0 ? ended_ns_ : port_.now_ns();
   const double seconds = first_heard_ns_ == 0 ? 0.0 : static_cast<double>(end_ns - first_heard_ns_) * 1e-9;
   return {options_.hub_url, seconds, commands_, driver_.corners_reached(), finished_, options_.own_robot};
 }

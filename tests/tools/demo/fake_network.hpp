@@ -4,12 +4,12 @@
 #include <functional>
 #include <optional>
 
-#include "base/clock.hpp"
 #include "tools/demo/node_port.hpp"
 
 namespace gimnet::demo {
 
-/// A robot's and a viewer's end without a hub between them, on one thread: whoever would wait lets the other work.
+/// A robot's and a viewer's end without a hub between them, on one thread and with a clock of their own: whoever would
+/// wait lets the other work, and if there is none, the time passes.
 class FakeNetwork {
  public:
   /// One end; what it sends arrives in the other's queue.
@@ -25,9 +25,14 @@ class FakeNetwork {
       network_.sent(Service::kDrive, payload, network_.to_robot);
       return network_.broken;
     }
-    Result<std::optional<Event>> receive(std::int64_t) override {
+    [[nodiscard]] std::int64_t now_ns() const override { return network_.now_ns; }
+    Result<std::optional<Event>> receive(std::int64_t wait_ns) override {
       if (network_.broken) return *network_.broken;
-      if (queue->empty() && when_idle) when_idle();
+      if (queue->empty() && when_idle) {
+        when_idle();
+      } else if (queue->empty()) {
+        network_.now_ns += wait_ns;
+      }
       if (queue->empty()) return std::optional<Event>();
       Event event = queue->front();
       queue->pop_front();
@@ -53,6 +58,7 @@ class FakeNetwork {
   Port viewer{*this};
   std::deque<NodePort::Event> to_robot;
   std::deque<NodePort::Event> to_viewer;
+  std::int64_t now_ns = 1'700'000'000'000'000'000;
   bool heard = true;
   /// Loses each n-th message; 0: none.
   std::uint64_t lose_each = 0;
@@ -67,7 +73,7 @@ class FakeNetwork {
       return;
     }
     ++counters.delivered;
-    queue.push_back({service, Bytes(payload.begin(), payload.end()), wall_now_ns()});
+    queue.push_back({service, Bytes(payload.begin(), payload.end()), now_ns});
   }
 };
 
