@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -85,6 +87,7 @@ class Node final : private InboundHost {
   void on_timers(std::int64_t now, bool reading);
   [[nodiscard]] Deadline next_timer(bool reading, std::int64_t last_write_ns) const;
   void call_back();
+  [[nodiscard]] std::size_t call_back_with(std::span<const Item> items);
   void confirm();
   void redial();
   void disconnect(std::string why, proto::GoodbyeCode code);
@@ -141,8 +144,9 @@ class Node final : private InboundHost {
   std::int64_t last_tick_ns_ = 0;
   bool was_reading_ = true;
   bool ended_ = false;
-  bool held_ = false;          ///< the callback said NIF_NOT_NOW ...
-  std::uint32_t held_at_ = 0;  ///< ... after so many deliver_again()
+  std::array<Item, 64> in_hand_;  ///< taken out of the receive queue under one lock, for the callback
+  bool held_ = false;             ///< the callback said NIF_NOT_NOW ...
+  std::uint32_t held_at_ = 0;     ///< ... after so many deliver_again()
 };
 
 }  // namespace gimnet::nif

@@ -140,14 +140,24 @@ void Node::on_timers(std::int64_t now, bool reading) {
 /// Gives the program what waits, as long as it takes it.
 void Node::call_back() {
   if (options_.callback == nullptr) return;
-  std::uint32_t calls = deliver_calls_.load();
-  if (held_ && calls == held_at_) return;
+  if (held_ && deliver_calls_.load() == held_at_) return;
   held_ = false;
-  nif_incoming in;
-  bool busy = false;
-  while (!closing_.load() && received_.peek(in)) {
-    if (!busy) outbound_.set_library_busy(busy = true);
-    calls = deliver_calls_.load();
+  std::size_t count = in_hand_.size();
+  while (!held_ && !closing_.load() && count == in_hand_.size()) {
+    count = received_.take(in_hand_);
+    outbound_.set_library_busy(true);
+    const std::span<const Item> taken(in_hand_.data(), count);
+    received_.give_back(taken.subspan(call_back_with(taken)));
+    outbound_.set_library_busy(false);
+  }
+}
+
+/// Returns how many the program took; fewer than there are if it has no room (`held_`), or the node closes.
+std::size_t Node::call_back_with(std::span<const Item> items) {
+  std::size_t taken = 0;
+  while (taken < items.size() && !closing_.load()) {
+    nif_incoming in = incoming_of(items[taken]);
+    const std::uint32_t calls = deliver_calls_.load();
     const nif_verdict verdict = options_.callback(options_.user, &in);
     if (verdict == NIF_NOT_NOW) {
       if (deliver_calls_.load() != calls) continue;  // room came while it was asked
@@ -155,12 +165,12 @@ void Node::call_back() {
       held_at_ = calls;
       break;
     }
-    received_.remove_first();
-    const bool taken = verdict == NIF_DONE || !options_.credit_by_program;
-    if (taken && in.kind == NIF_GROUP) credits_.take(in.to, in.epoch, 1, false);
+    ++taken;
+    const bool credited = verdict == NIF_DONE || !options_.credit_by_program;
+    if (credited && in.epoch != 0) credits_.take(in.to, in.epoch, 1, false);
     if (verdict == NIF_DONE) nif_release(&in);
   }
-  if (busy) outbound_.set_library_busy(false);
+  return taken;
 }
 
 void Node::redial() {

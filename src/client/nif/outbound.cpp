@@ -50,11 +50,13 @@ bool Outbound::write_once() {
 
 void Outbound::write_rounds(bool by_library) {
   writing_ = true;
+  // What came during the write of a burst is gathered again, after a look at what can be read.
+  const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
-  while (rounds < kWriteRoundsMax && state_ == State::connected && write_once()) ++rounds;
+  while (rounds < rounds_max && state_ == State::connected && write_once()) ++rounds;
   writing_ = false;
   last_write_ns_ = steady_now_ns();
-  const bool more = rounds == kWriteRoundsMax && !queue_.all_written();
+  const bool more = rounds == rounds_max && !queue_.all_written();
   // The library's thread sees for itself that the kernel is full: waking it would only make it try again at once.
   if (more || (!by_library && (full_ || broken_))) wake_library();
   if (state_ != State::connected) changed_.notify_all();  // detach() waits for the writer
@@ -86,6 +88,7 @@ bool Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte>
 bool Outbound::post(std::span<const std::byte> frame) {
   const MutexLock lock(mutex_);
   if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame)) return false;
+  count_appended(kBurstBytes);  // before all messages: what gathers does not wait for more
   write_or_leave(false);
   return true;
 }
@@ -99,6 +102,7 @@ bool Outbound::post(const proto::flow::Message& message) {
 bool Outbound::post_data(std::span<const std::byte> frame, std::uint8_t lane) {
   const MutexLock lock(mutex_);
   if (state_ != State::connected || !put_frame(queue_.append(lane, frame.size()), frame)) return false;
+  count_appended(kBurstBytes);
   write_or_leave(false);
   return true;
 }
@@ -151,11 +155,6 @@ void Outbound::end(nif_status status) {
   state_ = State::ended;
   end_status_ = status;
   changed_.notify_all();
-}
-
-void Outbound::set_library_busy(bool busy) {
-  const MutexLock lock(mutex_);
-  library_busy_ = busy;
 }
 
 void Outbound::set_declaring(bool declaring) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -70,7 +71,7 @@ class Outbound {
   };
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
   /// While a callback of the program runs, senders do not leave writing to the library's thread.
-  void set_library_busy(bool busy) GIMNET_EXCLUDES(mutex_);
+  void set_library_busy(bool busy) { library_busy_.store(busy, std::memory_order_relaxed); }  // see library_busy_
   /// GROUP messages wait until the services are declared again.
   void set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
 
@@ -83,6 +84,11 @@ class Outbound {
   bool on_report(const proto::FrameHeader& header, proto::DropReason reason) GIMNET_EXCLUDES(mutex_);
 
  private:
+  /// A send that follows the last write, or the send before, within this time is part of a burst.
+  static constexpr std::int64_t kQuickNs = 3'000;
+  /// So much of a burst is gathered for one write.
+  static constexpr std::size_t kBurstBytes = 64 * 1024;
+
   enum class State : std::uint8_t { away, connected, ended };
   /// A fragmented message whose sender is in send().
   struct InProgress {
@@ -114,6 +120,8 @@ class Outbound {
                                std::uint32_t size, bool report) GIMNET_REQUIRES(mutex_);
   void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
+  void count_appended(std::size_t bytes) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool gather_burst() GIMNET_REQUIRES(mutex_);
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
   void wake_library() GIMNET_REQUIRES(mutex_);
@@ -141,9 +149,12 @@ class Outbound {
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
   bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
   bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool library_busy_ GIMNET_GUARDED_BY(mutex_) = false;
   std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t quick_sends_ GIMNET_GUARDED_BY(mutex_) = 0;
+  /// No partner: a sender that sees it late leaves a message to a callback that has just begun, as with any lock.
+  std::atomic<bool> library_busy_{false};
+  /// Written under the lock, read by gather_burst() without.
+  std::atomic<std::uint64_t> appended_bytes_{0};
 
   std::uint64_t messages_sent_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t bytes_sent_ GIMNET_GUARDED_BY(mutex_) = 0;

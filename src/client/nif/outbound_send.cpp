@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "client/nif/outbound.hpp"
 #include "proto/frame/fragmenter.hpp"
@@ -10,11 +12,11 @@
 namespace gimnet::nif {
 namespace {
 
+/// No longer than this is a burst gathered for one write.
+constexpr std::int64_t kGatherNsMax = 100'000;
 /// With NIF_FLAG_MORE this much is written anyway.
 constexpr std::size_t kHeldBytesMax = 64 * 1024;
-/// A send that follows the last write within this time is part of a burst ...
-constexpr std::int64_t kQuickNs = 3'000;
-/// ... and after so many of them in a row gathering them pays for the wake-up of the library's thread.
+/// After so many quick sends in a row gathering them pays for the wake-up of the library's thread.
 constexpr std::uint32_t kQuickSends = 4;
 /// How long the receiver of a message may leave its window closed before it is asked whether it is still there.
 constexpr std::int64_t kProbeNs = 1'000'000'000;
@@ -32,11 +34,38 @@ bool Outbound::in_burst() {
   return quick_sends_ == kQuickSends;
 }
 
+void Outbound::count_appended(std::size_t bytes) {
+  // Partner: gather_burst(), to which any recent value is good enough.
+  appended_bytes_.store(appended_bytes_.load(std::memory_order_relaxed) + bytes, std::memory_order_relaxed);
+}
+
+/// The library's thread, woken because of a burst: lets messages gather as long as they come one right after the other,
+/// so that a write takes hundreds of them along. It gives its processor to whoever wants it and does not sleep: when
+/// they stop coming they are written at once. False: there is no burst, or enough of it.
+bool Outbound::gather_burst() {
+  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= kBurstBytes || waiting_ > 0) return false;
+  const std::uint64_t enough =
+      appended_bytes_.load(std::memory_order_relaxed) + kBurstBytes - queue_.unsent_bytes();  // see count_appended()
+  mutex_.unlock();
+  std::uint64_t appended = 0;
+  const std::int64_t begin = steady_now_ns();
+  for (std::int64_t now = begin, last = begin; now - last < kQuickNs && now - begin < kGatherNsMax;
+       now = steady_now_ns()) {
+    const std::uint64_t before = std::exchange(appended, appended_bytes_.load(std::memory_order_relaxed));  // the same
+    if (appended >= enough) break;
+    if (appended != before) last = now;
+    std::this_thread::yield();
+  }
+  mutex_.lock();
+  return true;
+}
+
 void Outbound::write_or_leave(bool more) {
   if (state_ != State::connected || writing_ || broken_) return;
   if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
-  if (!library_busy_) {
-    if (full_) return;  // the library's thread waits for the kernel
+  if (!library_busy_.load(std::memory_order_relaxed)) {       // see there
+    if (full_) return;                                        // the library's thread waits for the kernel
+    if (wake_raised_ && quick_sends_ == kQuickSends) return;  // it comes, and takes this along
     if (in_burst()) {
       wake_library();
       return;
@@ -152,6 +181,8 @@ nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader>
                           : queue_.append(header.lane, bytes);
   if (memory.empty()) return fail(NIF_NO_MEMORY, "no memory for the message");
   message.write_frame(memory, id_, fragment, offset, size, report);
+  // What is urgent ends the gathering.
+  count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes : bytes);
   return NIF_OK;
 }
 

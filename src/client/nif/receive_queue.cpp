@@ -86,20 +86,17 @@ nif_status ReceiveQueue::pop(std::span<nif_incoming> in, std::size_t& count, Dea
   return NIF_OK;
 }
 
-bool ReceiveQueue::peek(nif_incoming& in) {
-  Item first;
-  {
-    const MutexLock lock(mutex_);
-    if (items_.empty()) return false;
-    first = items_.front();
-  }
-  in = incoming_of(first);
-  return true;
+std::size_t ReceiveQueue::take(std::span<Item> items) {
+  const MutexLock lock(mutex_);
+  const std::size_t count = std::min(items.size(), items_.size());
+  for (Item& item : items.first(count)) item = take_first();
+  return count;
 }
 
-void ReceiveQueue::remove_first() {
+void ReceiveQueue::give_back(std::span<const Item> items) {
   const MutexLock lock(mutex_);
-  static_cast<void>(take_first());
+  if (!items.empty()) items_.insert(items_.begin(), items.begin(), items.end());
+  for (const Item& item : items) bytes_ += cost(item);
   after_removal();
 }
 

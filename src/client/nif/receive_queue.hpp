@@ -32,10 +32,11 @@ class ReceiveQueue {
   [[nodiscard]] nif_status pop(std::span<nif_incoming> in, std::size_t& count, Deadline deadline)
       GIMNET_EXCLUDES(mutex_);
 
-  /// For a consumer that may find that it has no room itself: looks at the first, and removes it afterwards.
+  /// For a consumer that may find that it has no room itself: takes out what waits, as far as it fits into `items`;
+  /// returns how many. Then it gives back those that it could not see to, maybe none, which are first again.
   /// REQUIRES: one consumer, and it does not pop().
-  [[nodiscard]] bool peek(nif_incoming& in) GIMNET_EXCLUDES(mutex_);
-  void remove_first() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::size_t take(std::span<Item> items) GIMNET_EXCLUDES(mutex_);
+  void give_back(std::span<const Item> items) GIMNET_EXCLUDES(mutex_);
 
   /// Nothing more will come: when it is empty, pop() answers `status`.
   void end(nif_status status) GIMNET_EXCLUDES(mutex_);

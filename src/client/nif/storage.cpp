@@ -3,12 +3,18 @@
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::nif {
+namespace {
+
+/// Nothing stands between header and payload, as in most frames: they need not be taken apart again.
+bool is_plain(const proto::FrameHeader& header) {
+  return header.kind != proto::Kind::list && !header.has(proto::kFlagExt | proto::kFlagFragment | proto::kFlagKeyed);
+}
+
+}  // namespace
 
 nif_incoming incoming_of(const Item& item) {
   if (item.frame == nullptr) return static_cast<Record*>(item.storage)->incoming;
-  // The frame was checked when it was taken, so its own length bounds it and it parses again.
   const proto::FrameHeader header = proto::load_header(item.frame);
-  const auto parsed = proto::parse_frame({item.frame, header.frame_size()}, proto::Origin::hub);
   nif_incoming in{};
   in.type = NIF_MESSAGE;
   in.from = header.src;
@@ -21,6 +27,13 @@ nif_incoming incoming_of(const Item& item) {
   in.epoch = item.epoch;
   in.text = "";
   in.storage = item.storage;
+  if (is_plain(header)) {
+    in.payload = item.frame + proto::kHeaderSize;
+    in.size = header.length;
+    return in;
+  }
+  // The frame was checked when it was taken, so its own length bounds it and it parses again.
+  const auto parsed = proto::parse_frame({item.frame, header.frame_size()}, proto::Origin::hub);
   if (!parsed) return in;
   in.payload = parsed->payload.data();
   in.size = parsed->payload.size();

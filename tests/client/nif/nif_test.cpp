@@ -221,5 +221,58 @@ TEST(Nif, CallbackMayRefuseAndIsCalledAgain) {
   EXPECT_EQ(state.taken.load(), 2);
 }
 
+struct HesitantState {
+  std::atomic<std::uint32_t> taken{0};
+  std::uint32_t refused = 0;  ///< the library's thread
+};
+
+/// Has no room for every 10th message when it is asked for the first time.
+nif_verdict hesitate(void* user, const nif_incoming* in) {
+  auto* const state = static_cast<HesitantState*>(user);
+  if (in->type != NIF_MESSAGE) return NIF_DONE;
+  const std::uint32_t next = state->taken.load();
+  EXPECT_EQ(payload_of(*in), std::to_string(next)) << "nothing overtakes what was refused";
+  if (next % 10 == 9 && state->refused != next) {
+    state->refused = next;
+    return NIF_NOT_NOW;
+  }
+  state->taken.fetch_add(1);
+  return NIF_DONE;
+}
+
+TEST(Nif, WhatACallbackRefusesStaysInOrder) {
+  constexpr std::uint32_t kMessages = 500;
+  FakeHub hub;
+  HesitantState state;
+  nif_options options = default_options();
+  options.callback = hesitate;
+  options.user = &state;
+  Connected connected = connect_to(hub, options, make_welcome());
+  for (std::uint32_t i = 0; i < kMessages; ++i) connected.hub.send_unicast(kPeerId, kOwnId, std::to_string(i));
+  while (state.taken.load() < kMessages) {
+    EXPECT_EQ(nif_deliver(connected.node.get()), NIF_OK);
+    std::this_thread::yield();
+  }
+}
+
+TEST(Nif, TheEndOfABurstIsWrittenWithoutAFurtherCall) {
+  constexpr int kBursts = 50;
+  constexpr int kMessages = 300;
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  int next = 0;
+  for (int burst = 0; burst < kBursts; ++burst) {
+    for (int i = 0; i < kMessages; ++i) {
+      const std::string text = std::to_string(burst * kMessages + i);
+      ASSERT_EQ(nif_send_to(connected.node.get(), kPeerId, text.data(), text.size()), NIF_OK);
+    }
+    for (int i = 0; i < kMessages; ++i) {
+      const auto frame = connected.hub.next_message();
+      ASSERT_TRUE(frame) << next;
+      ASSERT_EQ(frame->payload(), std::to_string(next++));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test

@@ -98,19 +98,39 @@ TEST(ReceiveQueue, WaitersGetWhatComesOrTheEnd) {
   EXPECT_EQ(queue.pop(std::span(&in, 1), count, kNever), NIF_CLOSED);
 }
 
-TEST(ReceiveQueue, AConsumerMayLookFirst) {
+TEST(ReceiveQueue, AConsumerMayGiveBackWhatItHasNoRoomFor) {
   WakeSignal wake;
-  ReceiveQueue queue(1000, wake);
-  nif_incoming in;
-  EXPECT_FALSE(queue.peek(in));
-  push(queue, "a");
-  push(queue, "b");
-  ASSERT_TRUE(queue.peek(in));
+  ReceiveQueue queue(1u << 20, wake);
+  std::array<Item, 3> items;
+  EXPECT_EQ(queue.take(items), 0u);
+  for (const char* text : {"a", "b", "c", "d"}) push(queue, text, 100);
+  const std::size_t bytes = queue.bytes();
+  ASSERT_EQ(queue.take(items), 3u) << "as many as fit";
+  EXPECT_LT(queue.bytes(), bytes);
+  nif_incoming in = incoming_of(items[0]);
   EXPECT_STREQ(in.text, "a");
-  queue.remove_first();
   nif_release(&in);
-  ASSERT_TRUE(queue.peek(in));
-  EXPECT_STREQ(in.text, "b");
+  queue.give_back(std::span(items).subspan(1));
+  for (const char* text : {"b", "c", "d"}) EXPECT_EQ(pop(queue), text);
+  EXPECT_EQ(queue.bytes(), 0u);
+}
+
+TEST(ReceiveQueue, ThereIsRoomOnlyForWhatIsNotGivenBack) {
+  WakeSignal wake;
+  const std::size_t cost = 100 + sizeof(Item);
+  ReceiveQueue queue(2 * cost, wake);
+  for (int i = 0; i < 2; ++i) push(queue, "x", 100);
+  EXPECT_FALSE(queue.has_room());
+  std::array<Item, 2> items;
+  ASSERT_EQ(queue.take(items), 2u);
+  queue.give_back(items);
+  EXPECT_FALSE(queue.has_room());
+  EXPECT_EQ(queue.stops(), 1u) << "it is still the same stop";
+  ASSERT_EQ(queue.take(items), 2u);
+  queue.give_back({});
+  EXPECT_TRUE(wait_for(Socket(), false, false, wake, 0).woken);
+  EXPECT_TRUE(queue.has_room());
+  for (Item& item : items) item.storage->release();
 }
 
 TEST(ReceiveQueue, ItsDescriptorFollowsWhetherSomethingWaits) {
