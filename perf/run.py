@@ -73,7 +73,7 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
         return ["valgrind"]
     if arguments.against is not None:
         return []
-    packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
+    packages = [package for name in chosen_subjects(arguments) for package in catalogue.PACKAGES.get(name, ())]
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
 

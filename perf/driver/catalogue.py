@@ -4,6 +4,7 @@ import pathlib
 import re
 import subprocess
 
+from driver.library import CLIENTS
 from driver.rivals import RIVALS, Rival, find_program
 from driver.subjects import NullRelay, Subject, TcpHub, allowed_cpus
 from driver.suite import Case
@@ -11,7 +12,8 @@ from driver.suite import Case
 HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": ["--spin"]}
 RIVAL_CLASSES = {rival.name: rival for rival in RIVALS}
 SUBJECTS = ("null", *HUBS, *RIVAL_CLASSES)
-PACKAGES = {"nats": "nats-server", "mosquitto": "mosquitto", "redis": "redis-server", "zeromq": "libzmq3-dev"}
+PACKAGES = {"nats": ("nats-server", "libnats-dev"), "mosquitto": ("mosquitto", "libmosquitto-dev"),
+            "redis": ("redis-server",), "zeromq": ("libzmq3-dev",)}
 NOT_OF_TOPICS = {"list_100": "it has no lists of recipients",
                  "broadcast_100": "it has no broadcast; a topic to which all subscribe is fan_out_100"}
 
@@ -24,15 +26,20 @@ def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
         return None
     if case.transport not in RIVAL_CLASSES[name].transports:
         return "it has no Unix socket"
+    if case.spec.roles is not None and not (build / "bin" / CLIENTS[name]).exists():
+        return f"{CLIENTS[name]} was not built: no library (package {PACKAGES[name][1]})"
     return NOT_OF_TOPICS.get(case.scenario) or RIVAL_CLASSES[name].why_absent(build)
 
 
 def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list[str]) -> Subject:
     cpus = allowed_cpus()
+    if case.spec.roles is not None and not case.spec.one_cpu:
+        # Programs and hub run where the system puts them.
+        return RIVAL_CLASSES[name](build, cpus) if name in RIVAL_CLASSES else TcpHub(build, cpus, hub_arguments, name)
     if name == "null":
         return NullRelay(build, cpus[0], case.spec.relay_mode)
     if name in RIVAL_CLASSES:
-        return RIVAL_CLASSES[name](build, cpus[0])
+        return RIVAL_CLASSES[name](build, cpus[:1])
     # A second shard gets a processor of its own where the generator leaves one.
     own = cpus[: max(1, min(2, len(cpus) - 1))] if name == "tcphub_2_shards" else cpus[:1]
     return TcpHub(build, own, [*HUBS[name], *hub_arguments], name)

@@ -26,6 +26,10 @@ nothing on disk, no passwords, TCP_NODELAY; nats-server; mosquitto at QoS 0; red
 proxy that drops nothing. One raw generator speaks each one's protocol, so that every subject sees the same client. `tcphub_2_shards` has
 a second shard, on a processor of its own where the generator leaves one; `tcphub_spinning` is started with `--spin`.
 
+**Libraries** (`perf/library`): two programs and a hub, each a process; the programs use the library that comes with the hub, in the same way and in its favour: NIF with its callback
+and without resume; nats.c, which gathers bursts by itself and sends single messages at once (`SendAsap`); libmosquitto at QoS 0 with its loop in the main
+thread, so that no publish wakes another one. Cost is that of all three processes.
+
 | scenario | what happens |
 | --- | --- |
 | one_to_one | one node sends to another |
@@ -41,12 +45,31 @@ a second shard, on a processor of its own where the generator leaves one; `tcphu
 | idle_10000 | 10,000 nodes that say nothing but keep-alives |
 | connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
 | join_under_load | the time until 1,000 nodes have joined while one_to_one goes on, and what is left of its rate |
+| library_burst | one program sends to another as fast as its library takes it, at most 16,384 messages or 2 MiB under way |
+| library_round_trip | a program answers each message of another; processes run where the system puts them |
+| library_round_trip_one_cpu | the same on one processor: the software's path without idle wake-ups |
 """
 
 
 def with_derived(rows: list[dict]) -> list[dict]:
     """Adds the figures that need two rows."""
-    return with_rivals(with_idle_latency(with_null_seconds(rows)))
+    return with_libraries(with_rivals(with_idle_latency(with_null_seconds(rows))))
+
+
+def with_libraries(rows: list[dict]) -> list[dict]:
+    """How a library with its hub does beside the best of the others over TCP: rates, and system time of all processes."""
+    derived = []
+    for row in rows:
+        rivals = [other for other in rows if other["scenario"] == row["scenario"] and other["size"] == row["size"]
+                  and other["transport"] == "tcp" and other["subject"] != "tcphub" and "system_ns_per_message" in other]
+        extra = {}
+        if row["subject"] == "tcphub" and rivals:
+            extra["rate_over_best"] = row["messages_per_second"] / max(other["messages_per_second"] for other in rivals)
+            extra["cpu_over_best"] = row["cpu_ns_per_message"] / min(other["cpu_ns_per_message"] for other in rivals)
+            if least := min(other["system_ns_per_message"] for other in rivals):
+                extra["system_over_best"] = row["system_ns_per_message"] / least
+        derived.append(row | extra)
+    return derived
 
 
 def with_rivals(rows: list[dict]) -> list[dict]:
@@ -119,6 +142,17 @@ def other_figures(rows: list[dict]) -> str:
     return table(["subject", "transport", "scenario", "figure", "median"], lines)
 
 
+def library_figures(rows: list[dict]) -> str:
+    """CPU of both programs and the hub, apart."""
+    parts = ["sender_user", "sender_system", "receiver_user", "receiver_system", "hub_user", "hub_system", "system"]
+    titles = ["subject", "transport", "scenario", "size", "messages/s", *(f"{part.replace('_', ' ')} ns" for part in parts[:-1]),
+              "all system ns", "all CPU ns"]
+    lines = [[row["subject"], row["transport"], row["scenario"], str(row["size"]), shown(row["messages_per_second"]),
+              *(shown(row[f"{part}_ns_per_message"]) for part in parts), shown(row["cpu_ns_per_message"])]
+             for row in rows if "system_ns_per_message" in row]
+    return table(titles, lines)
+
+
 def make_document(result: dict, pictures: list[str] | None = None) -> str:
     """`pictures`: links in Markdown."""
     rows = with_derived(result["results"])
@@ -140,4 +174,7 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000.", "",
         table([title for _, title in COLUMNS], [cells(row) for row in rows]), "",
         other_figures(rows), "",
+        "## Libraries", "",
+        "Processor time a message of the two programs and of the hub; in round trips each way is a message.", "",
+        library_figures(rows), "",
         *[f"No row: {line}." for line in absence_lines(result.get("absent", []))], ""])

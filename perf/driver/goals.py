@@ -51,6 +51,14 @@ GOALS = (
     Goal("stalled_subscriber", 1024, "tcp", "rate_kept", None, 0.95, at_least=True),
     Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 2048, 1024),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
+    Goal("library_burst", 16, "tcp", "rate_over_best", None, 2, at_least=True),
+    Goal("library_burst", 16, "unix", "rate_over_best", None, 2, at_least=True),
+    Goal("library_burst", 16, "tcp", "system_over_best", None, 0.5),
+    Goal("library_burst", 16, "unix", "system_over_best", None, 0.5),
+    Goal("library_round_trip", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
+    Goal("library_round_trip", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
+    Goal("library_round_trip_one_cpu", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
+    Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
 )
 
 FIELD_TITLES = {
@@ -62,4 +70,6 @@ FIELD_TITLES = {
     "rate_kept": "of the healthy subscriber's rate kept",
     "rss_bytes_per_connection": "resident bytes a connection",
     "seconds_over_null": "seconds longer than the null relay",
+    "rate_over_best": "messages/s, times the best other library on TCP",
+    "system_over_best": "system CPU a message, times the best other library on TCP",
 }

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass, field
 
 from driver.catalogue import make_subject, why_absent
+from driver.library import run_pair
 from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
 from driver.suite import Case, Plan
 
@@ -41,6 +42,9 @@ def say(text: str) -> None:
 
 
 def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
+    if case.spec.roles is not None:
+        with subject:
+            return run_pair(subject, case, settings)
     cpus = allowed_cpus()
     command = [str(settings.build / "bin" / "load_generator"), "--wire", subject.wire, "--scenario", case.scenario,
                "--size", str(case.size), "--seconds", str(settings.seconds),
@@ -105,7 +109,7 @@ def run_cases(plan: Plan, settings: Settings) -> list[Outcome]:
     """Cases with the same baseline are one group, whose subjects take turns: null relay, hub, others, null relay, ..."""
     groups: dict[Case, list[tuple[Case, tuple[str, ...]]]] = {}
     for case, subjects in plan.items():
-        groups.setdefault(case.baseline or case, []).append((case, subjects))
+        groups.setdefault(case.group, []).append((case, subjects))
     outcomes = []
     for baseline, members in groups.items():
         group = make_group(baseline, members, settings.build)

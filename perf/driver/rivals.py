@@ -32,8 +32,8 @@ class Rival(Subject):
     prints_ready = False
     starts_max = 3
 
-    def __init__(self, build: pathlib.Path, cpu: int):
-        super().__init__(build, [cpu])
+    def __init__(self, build: pathlib.Path, cpus: list[int]):
+        super().__init__(build, cpus)
         self._port = 0
 
     @classmethod
@@ -92,7 +92,7 @@ class Mosquitto(Rival):
     def command(self, folder: str) -> list[str]:
         lines = ["per_listener_settings false", f"listener {self._port} 127.0.0.1", f"listener 0 {folder}/socket",
                  "allow_anonymous true", "persistence false", "set_tcp_nodelay true", "sys_interval 0",
-                 "connection_messages false", "log_type error", "log_dest stderr"]
+                 "connection_messages false", "log_type error", "log_dest stderr", "max_queued_messages 0"]
         if os.geteuid() == 0:
             lines.append("user root")  # or it gives its rights up, and cannot make its socket in the folder
         pathlib.Path(folder, "mosquitto.conf").write_text("\n".join(lines) + "\n")
@@ -122,9 +122,6 @@ class ZeroMq(Subject):
 
     name = "zeromq"
     wire = "zmtp"
-
-    def __init__(self, build: pathlib.Path, cpu: int):
-        super().__init__(build, [cpu])
 
     @classmethod
     def why_absent(cls, build: pathlib.Path) -> str | None:

@@ -16,7 +16,11 @@ class Scenario:
     one_cpu: bool = False  # generator on the subject's processor
     sizes: tuple[int, ...] = (16,)
     transports: tuple[str, ...] = ("tcp", "unix")
+    roles: tuple[str, str] | None = None  # of two programs that talk by means of a library, the answering one first
 
+
+# Hubs whose own library is measured with them.
+WITH_LIBRARY = ("tcphub", "nats", "mosquitto")
 
 SCENARIOS = {
     "one_to_one": Scenario(sizes=SIZES),
@@ -37,6 +41,9 @@ SCENARIOS = {
     "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", transports=("tcp",)),
     "connect_10000": Scenario(metric="seconds", transports=("tcp",)),
     "join_under_load": Scenario(metric="seconds", transports=("tcp",)),
+    "library_burst": Scenario(relay_mode=None, roles=("receiver", "sender"), sizes=(16, 1024)),
+    "library_round_trip": Scenario(relay_mode=None, metric="p50_us", roles=("echo", "pinger")),
+    "library_round_trip_one_cpu": Scenario(relay_mode=None, metric="p50_us", one_cpu=True, roles=("echo", "pinger")),
 }
 
 
@@ -59,6 +66,17 @@ class Case:
             return None
         return Case(self.spec.baseline or self.scenario, self.size, self.transport)
 
+    @property
+    def group(self) -> "Case":
+        """Cases of one group take turns: those that are compared with each other."""
+        if self.spec.roles is not None:
+            return Case(self.scenario, self.size, "tcp")  # with the other libraries' TCP
+        return self.baseline or self
+
+    def among(self, subjects: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of the subjects that it is about."""
+        return tuple(name for name in subjects if self.spec.roles is None or name in WITH_LIBRARY)
+
     def __str__(self) -> str:
         return f"{self.scenario} {self.size} B {self.transport}"
 
@@ -74,7 +92,7 @@ OURS = ("null", "tcphub")
 
 
 def whole_plan(subjects: tuple[str, ...]) -> Plan:
-    return {case: subjects for case in whole_cases()}
+    return {case: case.among(subjects) for case in whole_cases()}
 
 
 # What every subject is measured in, also in a quick run.
@@ -107,7 +125,8 @@ def smoke_cases() -> list[Case]:
     """Every scenario once, the basic ones in every size class and on both transports."""
     cases = [Case(name, spec.sizes[0], "tcp") for name, spec in SCENARIOS.items()]
     cases += [Case("one_to_one", size, transport) for size in (4096, 65536) for transport in ("tcp", "unix")]
-    cases += [Case("in_turns", 65536, "tcp"), Case("fan_out_10", 65536, "unix"), Case("ping_one_cpu", 16, "unix")]
+    cases += [Case("in_turns", 65536, "tcp"), Case("fan_out_10", 65536, "unix"), Case("ping_one_cpu", 16, "unix"),
+              Case("library_burst", 16, "unix"), Case("library_round_trip", 16, "unix")]
     return cases
 
 
@@ -122,6 +141,8 @@ def smoke_plan(subjects: tuple[str, ...]) -> Plan:
     def among(case: Case, name: str) -> bool:
         if name == "tcphub_spinning" and case.spec.one_cpu:
             return False  # it would take the generator's time
+        if case.spec.roles is not None:
+            return name in WITH_LIBRARY
         return name == "tcphub" or case in (SMOKE_OF_NULL if name == "null" else SMOKE_OF_OTHERS)
 
     return {case: tuple(name for name in subjects if among(case, name)) for case in smoke_cases()}
@@ -129,6 +150,7 @@ def smoke_plan(subjects: tuple[str, ...]) -> Plan:
 
 def chosen_plan(scenarios: list[str], sizes: list[int], transports: list[str], subjects: tuple[str, ...]) -> Plan:
     """The scenarios asked for, in the sizes asked for, which may be others than usual."""
-    return {Case(name, size, transport): subjects for name in scenarios or SCENARIOS
-            for transport in SCENARIOS[name].transports if not transports or transport in transports
-            for size in sizes or SCENARIOS[name].sizes}
+    cases = [Case(name, size, transport) for name in scenarios or SCENARIOS
+             for transport in SCENARIOS[name].transports if not transports or transport in transports
+             for size in sizes or SCENARIOS[name].sizes]
+    return {case: case.among(subjects) for case in cases}

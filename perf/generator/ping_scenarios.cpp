@@ -105,12 +105,6 @@ void connect(Engine& engine, std::size_t count) {
   }
 }
 
-double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
-  if (sorted_ns.empty()) return 0;
-  const auto index = static_cast<std::size_t>(share * static_cast<double>(sorted_ns.size()));
-  return static_cast<double>(sorted_ns[std::min(index, sorted_ns.size() - 1)]) / 1000.0;
-}
-
 /// Round trips one after the other, at least `interval` from one beginning to the next.
 Findings measure(Engine& engine, const RunOptions& options, PingPair& pair, std::chrono::nanoseconds interval) {
   for (std::size_t count = 0; count < kWarmUpCount; ++count) {
@@ -138,18 +132,10 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair, std:
     wrong += engine.client(index).inbox.wrong();
     lost += engine.client(index).inbox.lost();
   }
-  std::sort(round_trips_ns.begin(), round_trips_ns.end());
   const auto count = static_cast<double>(round_trips_ns.size());
 
   Findings findings;
-  findings.add("p10_us", percentile_us(round_trips_ns, 0.1));
-  findings.add("p25_us", percentile_us(round_trips_ns, 0.25));
-  findings.add("p50_us", percentile_us(round_trips_ns, 0.5));
-  findings.add("p75_us", percentile_us(round_trips_ns, 0.75));
-  findings.add("p90_us", percentile_us(round_trips_ns, 0.9));
-  findings.add("p99_us", percentile_us(round_trips_ns, 0.99));
-  findings.add("p999_us", percentile_us(round_trips_ns, 0.999));
-  findings.add("max_us", percentile_us(round_trips_ns, 1));
+  add_percentiles(findings, round_trips_ns);
   findings.add("messages_per_second", 2 * count / seconds);
   findings.add("messages", 2 * count);
   findings.add("cpu_ns_per_message", cpu_ns / (2 * count));

@@ -30,6 +30,28 @@ std::int64_t cpu_time_ns(pid_t process) {
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
+CpuMeter::CpuMeter(pid_t process) : process_(process), begin_(read(process)) {}
+
+CpuMeter::Reading CpuMeter::read(pid_t process) {
+  Reading reading{.all_ns = cpu_time_ns(process)};
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string word;
+  std::getline(file, word, ')');  // the name may hold anything else
+  // proc(5): utime and stime are the 14th and 15th field, the name is the second.
+  for (int skipped = 3; skipped < 14; ++skipped) file >> word;
+  if (!(file >> reading.user_ticks >> reading.system_ticks)) fail("the measured process is gone");
+  return reading;
+}
+
+CpuMeter::Used CpuMeter::used() const {
+  const Reading now = read(process_);
+  const auto all_ns = static_cast<double>(now.all_ns - begin_.all_ns);
+  const auto user = static_cast<double>(now.user_ticks - begin_.user_ticks);
+  const auto system = static_cast<double>(now.system_ticks - begin_.system_ticks);
+  const double system_share = user + system > 0 ? system / (user + system) : 0;
+  return {.user_ns = all_ns * (1 - system_share), .system_ns = all_ns * system_share};
+}
+
 std::int64_t resident_bytes(pid_t process) { return status_bytes(process, "VmRSS:"); }
 
 std::int64_t peak_resident_bytes(pid_t process) { return status_bytes(process, "VmHWM:"); }

@@ -10,6 +10,28 @@ namespace gimnet::perf {
 
 /// User and system time of the whole process, in nanoseconds.
 [[nodiscard]] std::int64_t cpu_time_ns(pid_t process);
+/// What a process has used since this was made, user and system time apart. The sum is exact; their ratio is the
+/// kernel's, which looks 100 times a second.
+class CpuMeter {
+ public:
+  struct Used {
+    double user_ns = 0;
+    double system_ns = 0;
+  };
+  explicit CpuMeter(pid_t process);
+  [[nodiscard]] Used used() const;
+
+ private:
+  struct Reading {
+    std::int64_t all_ns = 0;
+    std::int64_t user_ticks = 0;
+    std::int64_t system_ticks = 0;
+  };
+  [[nodiscard]] static Reading read(pid_t process);
+
+  pid_t process_;
+  Reading begin_;
+};
 /// Resident memory in bytes.
 [[nodiscard]] std::int64_t resident_bytes(pid_t process);
 /// The most that was resident at any time since its start, in bytes.

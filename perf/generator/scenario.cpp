@@ -1,5 +1,6 @@
 #include "generator/scenario.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -44,7 +45,25 @@ constexpr Named kScenarios[] = {
     {"join_under_load", join_under_load},
 };
 
+double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
+  if (sorted_ns.empty()) return 0;
+  const auto index = static_cast<std::size_t>(share * static_cast<double>(sorted_ns.size()));
+  return static_cast<double>(sorted_ns[std::min(index, sorted_ns.size() - 1)]) / 1000.0;
+}
+
 }  // namespace
+
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns) {
+  std::sort(round_trips_ns.begin(), round_trips_ns.end());
+  findings.add("p10_us", percentile_us(round_trips_ns, 0.1));
+  findings.add("p25_us", percentile_us(round_trips_ns, 0.25));
+  findings.add("p50_us", percentile_us(round_trips_ns, 0.5));
+  findings.add("p75_us", percentile_us(round_trips_ns, 0.75));
+  findings.add("p90_us", percentile_us(round_trips_ns, 0.9));
+  findings.add("p99_us", percentile_us(round_trips_ns, 0.99));
+  findings.add("p999_us", percentile_us(round_trips_ns, 0.999));
+  findings.add("max_us", percentile_us(round_trips_ns, 1));
+}
 
 std::string Findings::json() const {
   std::string text = "{";

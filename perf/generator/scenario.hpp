@@ -32,6 +32,9 @@ class Findings {
   std::vector<std::pair<std::string, double>> values_;
 };
 
+/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`. Sorts them.
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns);
+
 /// Adds what the subject itself says that it dropped and kept, and `ledger_gap`: what its account does not explain.
 void add_ledger(Engine& engine, Findings& findings);
 

@@ -36,11 +36,16 @@ class Suite(unittest.TestCase):
     def test_in_turns_is_compared_with_one_to_one(self):
         self.assertEqual(suite.Case("in_turns", 16, "tcp").baseline, suite.Case("one_to_one", 16, "tcp"))
 
-    def test_quick_measures_every_goal(self):
-        quick = set(suite.quick_cases())
+    def test_quick_measures_every_goal_of_the_hub(self):
+        quick, whole = set(suite.quick_cases()), set(suite.whole_cases())
         for goal in GOALS:
-            self.assertIn(suite.Case(goal.scenario, goal.size, goal.transport), quick)
+            case = suite.Case(goal.scenario, goal.size, goal.transport)
+            self.assertIn(case, whole if case.spec.roles is not None else quick)
 
+    def test_libraries_are_measured_where_a_hub_has_one(self):
+        plan = suite.whole_plan(catalogue.SUBJECTS)
+        self.assertEqual(plan[suite.Case("library_burst", 16, "tcp")], ("tcphub", "nats", "mosquitto"))
+        self.assertEqual(suite.smoke_plan(("null", "tcphub"))[suite.Case("library_burst", 16, "tcp")], ("tcphub",))
 
     def test_quick_compares_every_subject_in_three_cases(self):
         plan = suite.quick_plan(catalogue.SUBJECTS)
@@ -81,6 +86,16 @@ class Subjects(unittest.TestCase):
         self.assertEqual([(each.subject, each.case.scenario, each.is_absent) for each in group],
                          [("null", "fan_out_100", False), ("tcphub", "list_100", False), ("nats", "list_100", True)])
 
+    def test_a_library_s_transports_take_turns_with_the_other_libraries(self):
+        tcp, unix = suite.Case("library_burst", 16, "tcp"), suite.Case("library_burst", 16, "unix")
+        self.assertEqual(unix.group, tcp)
+        for name in ("tcphub", "nats"):
+            (self.build / "bin" / catalogue.CLIENTS[name]).touch()
+        group = make_group(unix.group, [(case, ("tcphub", "nats", "mosquitto")) for case in (tcp, unix)], self.build)
+        self.assertEqual([(each.subject, each.case.transport) for each in group],
+                         [(name, transport) for transport in ("tcp", "unix") for name in ("tcphub", "nats", "mosquitto")])
+        self.assertIn("libmosquitto-dev", group[2].error)
+
     def test_another_hub_s_failure_is_not_ours(self):
         case = suite.Case("one_to_one", 16, "tcp")
         self.assertEqual(run.judge([Outcome("nats", case, [], "it died")], [], is_smoke=False), 0)
@@ -97,7 +112,7 @@ class Subjects(unittest.TestCase):
     def test_packages_are_those_of_the_subjects(self):
         arguments = run.parse_arguments(["--only", "nats", "--quick"])
         self.assertEqual(run.chosen_subjects(arguments), ("null", "nats"))
-        self.assertEqual(run.needed_packages(arguments), ["nats-server"])
+        self.assertEqual(run.needed_packages(arguments), ["nats-server", "libnats-dev"])
         self.assertEqual(run.needed_packages(run.parse_arguments(["--subjects", "tcphub"])), [])
 
 
@@ -232,6 +247,15 @@ class Document(unittest.TestCase):
         case = suite.Case("connect_10000", 16, "tcp")
         rows = with_derived(make_rows([outcome("null", case, [0.25]), outcome("tcphub", case, [0.75])]))
         self.assertEqual(rows[1]["seconds_over_null"], 0.5)
+
+    def test_derives_how_a_library_does_beside_the_best_other_one(self):
+        def row(subject, transport, rate, system):
+            return {"subject": subject, "scenario": "library_burst", "transport": transport, "size": 16,
+                    "messages_per_second": rate, "cpu_ns_per_message": 2 * system, "system_ns_per_message": system}
+        rows = with_derived([row("tcphub", "unix", 6e6, 20), row("nats", "tcp", 2e6, 100), row("mosquitto", "tcp", 1e6, 50),
+                             row("mosquitto", "unix", 9e6, 1)])
+        self.assertEqual((rows[0]["rate_over_best"], rows[0]["system_over_best"]), (3, 0.4))
+        self.assertNotIn("rate_over_best", rows[1])
 
     def test_a_limit_itself_is_met(self):
         goal = Goal("one_to_one", 16, "tcp", "ratio_to_null", 2.0, 1.25)
