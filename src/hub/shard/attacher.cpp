@@ -2,6 +2,8 @@
 
 #include <sys/random.h>
 
+#include <utility>
+
 #include "hub/shard/control_frame.hpp"
 #include "hub/shard/flusher.hpp"
 #include "hub/shard/reader.hpp"
@@ -47,6 +49,13 @@ void Attacher::attach(AttachCommand command) {
     return;
   }
   welcome(connection, command.welcome, gap);
+}
+
+void Attacher::renumber(Connection& connection, NodeId node) {
+  connection.former_node = std::exchange(connection.node, node);
+  // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold the new one anew.
+  connection.holds = 0;
+  state_.signals.arm(connection);
 }
 
 Connection& Attacher::session_of(const AttachCommand& command) {

@@ -11,6 +11,8 @@ class Attacher {
   Attacher(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
 
   void attach(AttachCommand command);
+  /// The session goes on under another id. Its connection is to be closed next: it comes back under the new one.
+  void renumber(Connection& connection, NodeId node);
 
  private:
   [[nodiscard]] Connection& session_of(const AttachCommand& command);

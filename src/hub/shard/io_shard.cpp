@@ -197,7 +197,7 @@ void IoShard::execute(ShardCommand& command) {
                  [&](ReleaseCommand& release) { closer_.release(release.session); },
                  [&](RenumberCommand& renumber) {
                    if (Connection* connection = state_.find(renumber.session)) {
-                     connection->former_node = std::exchange(connection->node, renumber.node);
+                     attacher_.renumber(*connection, renumber.node);
                      closer_.close(*connection, proto::GoodbyeCode::renumbered, std::move(renumber.sentence));
                    }
                  },

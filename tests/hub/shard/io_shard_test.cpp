@@ -259,10 +259,7 @@ TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0, {.resume = true});
   const std::uint32_t former = b.id.value();
-  rig.nodes().publish(400, NodePlace{b.shard, b.session.slot, b.session.generation});
-  rig.nodes().publish(index_of(b.id), NodePlace::renumbered());
-  b.id = make_id<NodeId>(rig.hub(), 400);
-  rig.command(0, RenumberCommand{b.session, b.id, "another id"});
+  rig.renumber(b, 400);
   rig.settle();
   ASSERT_TRUE(b.goodbye);
   EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::renumbered);
@@ -282,6 +279,31 @@ TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
   EXPECT_EQ(a.texts(), (std::vector<std::string>{"late"}));
   EXPECT_EQ(a.frames.back().header.src, b.id.value());
   EXPECT_TRUE(rig.ledger().exact());
+}
+
+// Whoever held it releases the id that it had, which leads to nobody.
+TEST(IoShard, AHeldNodeThatIsRenumberedIsReadAgain) {
+  Limits limits;
+  limits.lane1_bytes = 64 * 1024;
+  limits.reserve_bytes = 32 * 1024;
+  HubRig rig(2, limits);
+  FakeNode& flooder = rig.join(0, {.resume = true});
+  FakeNode& slow = rig.join(1);
+  FakeNode& other = rig.join(1);
+  slow.pipe.set_room(0);
+  flooder.pipe.plan_receives(std::vector<std::size_t>(100'000, 4'096));
+  for (int i = 0; i < 300; ++i) rig.send(flooder, slow.id.value(), std::string(1'000, 'x'));
+  rig.settle_without_reading();
+  ASSERT_EQ(rig.connection(flooder)->holds, 1u);
+  rig.renumber(flooder, 400);
+  rig.settle_without_reading();
+  rig.rejoin(flooder, {.resume = true});
+  slow.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_EQ(rig.connection(flooder)->holds, 0u);
+  rig.send(flooder, other.id.value(), "still there");
+  rig.settle();
+  EXPECT_THAT(other.texts(), ElementsAre("still there"));
 }
 
 TEST(IoShard, GoesByNewLimitsFromTheNextTurnOn) {

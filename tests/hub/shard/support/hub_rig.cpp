@@ -153,6 +153,13 @@ void HubRig::release(FakeNode& node) {
   command(node.shard.value(), ReleaseCommand{node.session});
 }
 
+void HubRig::renumber(FakeNode& node, std::uint32_t index) {
+  nodes_.publish(index, {node.shard, node.session.slot, node.session.generation});
+  nodes_.publish(index_of(node.id), NodePlace::renumbered());
+  node.id = make_id<NodeId>(hub(), index);
+  command(node.shard.value(), RenumberCommand{node.session, node.id, "another id"});
+}
+
 void HubRig::command(std::size_t shard, ShardCommand command) { shards_[shard]->send(std::move(command)); }
 
 void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members) {

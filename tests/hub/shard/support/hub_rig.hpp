@@ -97,6 +97,8 @@ class HubRig {
   /// Another connection for its session; its counts tell what it took so far.
   void rejoin(FakeNode& node, const JoinSpec& spec = {});
   void release(FakeNode& node);
+  /// Gives the node another id. Its connection is closed in the next turn.
+  void renumber(FakeNode& node, std::uint32_t index);
   void command(std::size_t shard, ShardCommand command);
   /// Makes `provider` the owner of a group with these members.
   void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members);
