@@ -38,9 +38,10 @@ void Inbound::begin(const Session& session) {
   filled_ = parsed_ = 0;
   if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
   if (!session.resumed) {
-    former_id_ = 0;
+    former_ids_.clear();
   } else if (session.id != id_) {
-    former_id_ = id_;
+    if (former_ids_.size() == kFormerIdsMax) former_ids_.erase(former_ids_.begin());
+    former_ids_.push_back(id_);
   }
   id_ = session.id;
   confirm_bytes_ = session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -90,6 +91,9 @@ class Inbound {
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
  private:
+  /// Frames for the one before these wait no more: the hub begins anew before it gives a node so many ids.
+  static constexpr std::size_t kFormerIdsMax = 16;
+
   [[nodiscard]] Verdict malformed(std::string why);
   [[nodiscard]] Verdict take_run(const proto::RunView& run);
   [[nodiscard]] Verdict take_frame(const proto::FrameView& view, const std::byte* frame);
@@ -110,7 +114,9 @@ class Inbound {
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
   void deliver();
 
-  [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const { return dst == id_ || (dst == former_id_ && dst != 0); }
+  [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const {
+    return dst == id_ || std::find(former_ids_.begin(), former_ids_.end(), dst) != former_ids_.end();
+  }
 
   InboundHost& host_;
   MessageAssembler assembler_;
@@ -118,7 +124,8 @@ class Inbound {
   std::size_t filled_ = 0;
   std::size_t parsed_ = 0;
   std::uint32_t id_ = 0;
-  std::uint32_t former_id_ = 0;  ///< that of the frames which waited while the node was given another one; 0: none
+  /// Ids of this epoch before id_: frames which waited while the node was given another one are for them.
+  std::vector<std::uint32_t> former_ids_;
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;
   std::uint64_t confirm_bytes_ = UINT64_MAX;

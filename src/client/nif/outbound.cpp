@@ -114,6 +114,8 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
     const auto skipped = queue_.resume_from(session.hub_taken);
     if (!skipped) return std::nullopt;
     missing = *skipped;
+    // What was queued under an id that the node does not have any more, which the hub need not remember.
+    if (session.id != id_) queue_.set_source(session.id);
   } else {
     queue_.restart(session.id);
     ++epochs_;

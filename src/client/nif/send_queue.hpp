@@ -81,6 +81,8 @@ class SendQueue {
   [[nodiscard]] std::optional<std::uint64_t> resume_from(std::uint64_t peer_taken);
   /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait stay.
   void restart(std::uint32_t src);
+  /// All that goes out from now on, again or for the first time, is from this node id. After resume_from().
+  void set_source(std::uint32_t src);
   /// Everything that waits and everything unconfirmed goes. Returns frames that waited.
   std::uint64_t drop_all();
 
@@ -103,7 +105,6 @@ class SendQueue {
   void stage_first(Runs& from);
   void finish(FrameRun run);
   void return_staged();
-  void set_source(std::uint32_t src);
 
   const Limits limits_;
   bool resume_ = false;

@@ -35,7 +35,7 @@ void Attacher::attach(AttachCommand command) {
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};
   connection.ingress.node = connection.node;
-  connection.ingress.former_node = connection.former_node;
+  connection.ingress.former_nodes = connection.former_nodes;
   connection.posted_shards = ~std::uint64_t{0};
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
@@ -52,7 +52,12 @@ void Attacher::attach(AttachCommand command) {
 }
 
 void Attacher::renumber(Connection& connection, NodeId node) {
-  connection.former_node = std::exchange(connection.node, node);
+  connection.ingress.former_nodes = {};
+  if (connection.former_nodes.size() == kFormerNodesMax) {
+    connection.former_nodes.erase(connection.former_nodes.begin());
+    if (connection.resume) connection.resume->hub_epoch = random_epoch();
+  }
+  connection.former_nodes.push_back(std::exchange(connection.node, node));
   // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold the new one anew.
   connection.holds = 0;
   state_.signals.arm(connection);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "hub/data/egress/gather_writer.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
@@ -39,18 +40,22 @@ struct Progress {
   std::uint64_t rate_since_ms = 0;
 };
 
+/// Former ids of a session that count as its own. A node that was renumbered more often without having begun anew
+/// begins anew: it may hold frames under an id that is forgotten, and would be refused for them at each return.
+inline constexpr std::size_t kFormerNodesMax = 8;
+
 /// A session on its shard, and its connection while it has one. Thread safety: one shard.
 struct Connection : Recipient {
   std::unique_ptr<Transport> transport;  ///< nullptr: away
   std::uint32_t attachment = 0;
   Interest armed;
-  bool blocked = false;         ///< the transport took less than was offered: wait for it
-  bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
-  bool must_confirm = false;    ///< nothing more can be written before its CONFIRM: read even if held
-  bool gauged = false;          ///< its queue gauge is not 0
-  NodeId former_node;           ///< under which it may still send; 0: none
-  bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
-  bool draining = false;        ///< closes once everything is written
+  bool blocked = false;              ///< the transport took less than was offered: wait for it
+  bool waits_for_room = false;       ///< not read: a shard that it sends to has too much to do
+  bool must_confirm = false;         ///< nothing more can be written before its CONFIRM: read even if held
+  bool gauged = false;               ///< its queue gauge is not 0
+  std::vector<NodeId> former_nodes;  ///< under which it may still send, the latest last
+  bool missed_resume = false;        ///< RESUME had no place: it would stay paused for ever
+  bool draining = false;             ///< closes once everything is written
   std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
   std::uint32_t holds = 0;                          ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;                       ///< that are unanswered

@@ -265,6 +265,27 @@ TEST(Inbound, AResumedConnectionGoesOn) {
   EXPECT_EQ(receiving.host.texts(), (std::vector<std::string>{"abcdef"}));
 }
 
+TEST(Inbound, TakesWhatWaitedUnderEveryIdThatItHadInThisEpoch) {
+  Receiving receiving;
+  Session session = receiving.session();
+  session.resume = session.resumed = true;
+  for (const std::uint32_t id : {kOwnId + 100, kOwnId + 200}) {
+    session.id = id;
+    receiving.inbound.begin(session);
+  }
+  std::vector<std::byte> bytes;
+  for (const std::uint32_t dst : {0u, 100u, 200u, 300u}) {
+    add_frame(bytes, from_peer(proto::Kind::unicast, kOwnId + dst), std::to_string(dst));
+  }
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.host.texts(), (std::vector<std::string>{"0", "100", "200"}));
+  EXPECT_EQ(receiving.inbound.counts().ignored, 1u);
+  session.resumed = false;
+  receiving.inbound.begin(session);
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.inbound.counts().ignored, 4u) << "a new epoch is under one id";
+}
+
 TEST(Inbound, ConfirmationIsDueAfterAQuarterOfTheHubsBuffer) {
   Receiving receiving;
   Session session = receiving.session();

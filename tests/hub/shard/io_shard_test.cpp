@@ -306,6 +306,35 @@ TEST(IoShard, AHeldNodeThatIsRenumberedIsReadAgain) {
   EXPECT_THAT(other.texts(), ElementsAre("still there"));
 }
 
+// A client may send again under any of them what was not confirmed.
+TEST(IoShard, EveryIdThatANodeHadCountsAsItsOwnUpToTheLimit) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  std::vector<std::uint32_t> former;
+  for (std::size_t i = 0; i < kFormerNodesMax; ++i) {
+    former.push_back(b.id.value());
+    rig.renumber(b, static_cast<std::uint32_t>(400 + i));
+    rig.settle();
+    rig.rejoin(b, {.resume = true});
+    ASSERT_TRUE(b.welcome && b.welcome->resumed) << i;
+  }
+  for (const std::uint32_t src : former) rig.send(b, a.id.value(), "late", {.src = src});
+  rig.settle();
+  EXPECT_THAT(a.frames, SizeIs(kFormerNodesMax));
+  EXPECT_FALSE(b.goodbye);
+  // One more: what it would send again under the first id is given up, instead of refused at each return.
+  rig.renumber(b, 500);
+  rig.settle();
+  rig.rejoin(b, {.resume = true});
+  ASSERT_TRUE(b.welcome);
+  EXPECT_FALSE(b.welcome->resumed);
+  rig.send(b, a.id.value(), "forgotten", {.src = former[0]});
+  rig.settle();
+  ASSERT_TRUE(b.goodbye);
+  EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::wrong_source);
+}
+
 TEST(IoShard, GoesByNewLimitsFromTheNextTurnOn) {
   HubRig rig(1);
   FakeNode& a = rig.join(0);

@@ -24,6 +24,10 @@ void write_source(std::byte* run, const proto::RunView& view, std::uint32_t sour
   }
 }
 
+bool is_former(const IngressState& state, NodeId source) {
+  return std::find(state.former_nodes.begin(), state.former_nodes.end(), source) != state.former_nodes.end();
+}
+
 /// Shortens the run to the frames before the first that has no room for its key.
 void keep_frames_with_key(proto::RunView& view) {
   std::uint32_t size = 0;
@@ -48,7 +52,7 @@ Admission IngressGate::admit(IngressState& state, std::byte* run, proto::RunView
 #else
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
 #endif
-    if (state.former_node != NodeId{} && header.src == state.former_node.value()) {
+    if (is_former(state, NodeId{header.src})) {
       header.src = state.node.value();
       write_source(run, view, header.src);
     }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "base/ids.hpp"
 #include "hub/data/tally.hpp"
@@ -27,7 +28,8 @@ struct IngressState {
   static constexpr std::uint64_t kNoneAdmitted = ~std::uint64_t{0};
 
   NodeId node;
-  NodeId former_node;  ///< its id before it was renumbered, under which it sends again what was not confirmed; 0: none
+  /// Ids that it had before it was renumbered, under which it sends again what was not confirmed. Its session's.
+  std::span<const NodeId> former_nodes;
   std::uint64_t admitted_attributes = kNoneAdmitted;  ///< kind, flags, hops and lane of the last plain data run
   std::uint64_t lane0_bytes = 0;                      ///< since lane0_since_ms
   std::uint64_t lane0_since_ms = 0;

@@ -53,7 +53,8 @@ TEST_F(IngressGateTest, LooksAtTheSourceOfEveryFrame) {
 }
 
 TEST_F(IngressGateTest, ARenumberedNodesFormerSourceBecomesItsPresentOne) {
-  state.former_node = NodeId{7u << 20 | 2};
+  const std::array former{NodeId{7u << 20 | 9}, NodeId{7u << 20 | 2}};
+  state.former_nodes = former;
   auto two = EgressRig::bytes("x", {.src = 2});
   const auto second = EgressRig::bytes("yy", {.src = 2});
   two.insert(two.end(), second.begin(), second.end());
