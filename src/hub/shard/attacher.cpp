@@ -57,6 +57,7 @@ void Attacher::renumber(Connection& connection, NodeId node) {
     connection.former_nodes.erase(connection.former_nodes.begin());
     if (connection.resume) connection.resume->hub_epoch = random_epoch();
   }
+  state_.retained.renumber_provider(connection.node, node);
   connection.former_nodes.push_back(std::exchange(connection.node, node));
   // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold the new one anew.
   connection.holds = 0;

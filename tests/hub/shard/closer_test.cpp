@@ -106,6 +106,23 @@ TEST(Closer, AReleasedSessionTakesEverythingWithIt) {
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
 }
 
+// What its shard kept for its services is found by the id that it has now, not by the one under which it sent it.
+TEST(Closer, ARenumberedProvidersLastMessagesGoWithIt) {
+  HubRig rig;
+  FakeNode& provider = rig.join(0, {.resume = true});
+  rig.publish_paced_group(5, provider.id, {}, true);
+  rig.send(provider, HubRig::group(5), std::string(5'000, 'L'), {.kind = proto::Kind::group});
+  rig.settle();
+  ASSERT_EQ(rig.state(0).retained.groups(), 1u);
+  rig.renumber(provider, 400);
+  rig.settle();
+  rig.withdraw_group(5);
+  rig.release(provider);
+  rig.settle();
+  EXPECT_EQ(rig.state(0).retained.groups(), 0u);
+  EXPECT_EQ(rig.state(0).pool.pinned_bytes(), 0u);
+}
+
 // The slot goes to another session; a frame that waited or still comes for the old one is not for it.
 TEST(Closer, ASlotIsReusedWithoutItsPast) {
   HubRig rig(2);

@@ -114,9 +114,9 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
     std::uint32_t old_group = 0;
     if (provided) {
       old_group = entry.service->group;
-      end_paces(entry, effects);
       groups_.erase(old_group);
       group_indices_.give_back(old_group, now);
+      end_group(entry, effects);
     }
     open_group(entry, Service{*group, provider, terms}, old_group, effects);
   }
@@ -291,7 +291,6 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
   topic.service = service;
   groups_[service.group] = &topic;
   if (old_group != 0) {
-    effects.emplace_back(GroupChanged{old_group});
     effects.emplace_back(
         ServiceNoted{ChangeKind::withdrawn, old_group, service.provider, std::string{topic.full_name}});
   }
@@ -306,9 +305,11 @@ void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects&
   if (pace) effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain});
 }
 
-/// The topic's group is about to go.
-void Services::end_paces(const Topic& topic, Effects& effects) {
+/// The topic's group is gone. First from the table: a frame that is read before the provider's shard forgets the last
+/// message would make it anew, for ever.
+void Services::end_group(const Topic& topic, Effects& effects) {
   const Service& service = *topic.service;
+  effects.emplace_back(GroupChanged{service.group});
   for (const std::uint32_t subscriber : topic.subscribers) {
     if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, service.group, true});
   }
@@ -328,11 +329,10 @@ void Services::change_terms(Topic& topic, std::uint32_t subscriber, const Subscr
 
 void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
   const Service service = *topic.service;
-  end_paces(topic, effects);
+  end_group(topic, effects);
   topic.service.reset();
   groups_.erase(service.group);
   group_indices_.give_back(service.group, now);
-  effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
   note(ChangeKind::withdrawn, topic.full_name, service, effects);
 }

@@ -123,7 +123,7 @@ class Services {
   void forget_if_unused(Topic& topic);
   void forget_if_idle(std::uint32_t node);
   void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
-  static void end_paces(const Topic& topic, Effects& effects);
+  static void end_group(const Topic& topic, Effects& effects);
   static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
   void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects);
   void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);

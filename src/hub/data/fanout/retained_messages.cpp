@@ -78,6 +78,12 @@ void RetainedMessages::forget_provider(NodeId provider) {
   boost::unordered::erase_if(entries_, [&](const auto& each) { return each.second->provider == provider; });
 }
 
+void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
+  for (const auto& [group, entry] : entries_) {
+    if (entry->provider == former) entry->provider = provider;
+  }
+}
+
 void RetainedMessages::on_start_wanted(const GroupStart& start) {
   // What was routed before this moment is under way before the start.
   fanout_.post_all();

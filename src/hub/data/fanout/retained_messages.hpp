@@ -34,6 +34,8 @@ class RetainedMessages {
   void forget(GroupId group);
   /// The provider's session is over.
   void forget_provider(NodeId provider);
+  /// The provider goes on under another id.
+  void renumber_provider(NodeId former, NodeId provider);
   /// A subscriber on whatever shard wants to begin.
   void on_start_wanted(const GroupStart& start);
   [[nodiscard]] std::size_t groups() const { return entries_.size(); }
