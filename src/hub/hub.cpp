@@ -149,7 +149,7 @@ struct Hub::Parts {
                                            std::move(listeners));
   }
 
-  Conductor::KeepState keep_state() {
+  StateKeeper::Keep keep_state() {
     if (state_folder == nullptr) return {};
     return [this](const HubState& state) { return state_folder->write(state); };
   }

@@ -20,7 +20,7 @@ class HubLife {
     Network& network;
     std::function<void()> conductor_wanted;
     std::function<bool(std::uint32_t node)> is_slow;
-    hub::Conductor::KeepState keep_state;
+    hub::StateKeeper::Keep keep_state;
   };
   HubLife(Setting& setting, const Around& around, const hub::HubStart& start, Past past);
 

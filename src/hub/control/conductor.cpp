@@ -17,9 +17,6 @@ using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
-/// How long after the state could not be kept it is tried again.
-constexpr milliseconds kKeepAgainAfter{1'000};
-
 std::string title(NodeId node, const Session& session) {
   return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
 }
@@ -54,9 +51,10 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       membership_(sessions_options(facts_, placement, wiring_.start), limits),
       watches_(HubTitle{facts_.id, facts_.name}, epoch_of(wiring_.start), limits),
       publisher_(facts_.id, facts_.shards, wiring_.tables),
-      state_(wiring_.start.state) {
+      keeper_(wiring_.start.state, wiring_.keep_state),
+      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
-  if (state_.boot > 1) {
+  if (wiring_.start.state.boot > 1) {
     wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
     returns_until_ = facts_.started + milliseconds{limits_.grace_ms};
   }
@@ -76,7 +74,7 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   request.wall = milliseconds{moment.wall_ns / 1'000'000};
   Effects effects;
   const auto joined = membership_.join(request, moment.now, effects);
-  carry_out(effects, moment.now);
+  runner_.carry_out(effects, moment.now);
   if (!joined) return joined.error();
   attach(stranger, hello, *joined, moment);
   return std::nullopt;
@@ -161,7 +159,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const proto::Payload answer = handle(context, request);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
 #ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
-  carry_out(effects, now);
+  runner_.carry_out(effects, now);
 #endif
   SendControlCommand command;
   command.session = event.session;
@@ -175,7 +173,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   command.answers = 1;
   wiring_.shards.send(shard, std::move(command));
 #ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
-  carry_out(effects, now);
+  runner_.carry_out(effects, now);
 #endif
 }
 
@@ -197,7 +195,7 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   Effects effects;
   watches_.connection_ended(session->index);
   membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
-  carry_out(effects, now);
+  runner_.carry_out(effects, now);
 }
 
 void Conductor::close(const Session& session, GoodbyeCode code, std::string sentence) {
@@ -207,8 +205,8 @@ void Conductor::close(const Session& session, GoodbyeCode code, std::string sent
 void Conductor::tick(milliseconds now) {
   Effects effects;
   membership_.tick(now, effects);
-  if (keep_again_at_ && *keep_again_at_ <= now) effects.emplace_back(StateDue{});
-  carry_out(effects, now);
+  if (keeper_.again_at() && *keeper_.again_at() <= now) effects.emplace_back(StateDue{});
+  runner_.carry_out(effects, now);
   if (returns_until_ && *returns_until_ <= now) {
     wiring_.tables.nodes.expect_returns_below(0);
     returns_until_.reset();
@@ -218,7 +216,7 @@ void Conductor::tick(milliseconds now) {
 
 std::optional<milliseconds> Conductor::next_deadline() const {
   std::optional<milliseconds> deadline = membership_.next_deadline();
-  for (const std::optional<milliseconds>& other : {keep_again_at_, returns_until_}) {
+  for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until_}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;
@@ -264,136 +262,14 @@ Session* Conductor::find(const SessionRef& ref, NodeId node) {
 
 NodeId Conductor::node_id(const Session& session) const { return membership_.sessions().node_id(session); }
 
-void Conductor::carry_out(const Effects& effects, milliseconds now) {
-  // First what has to outlive a crash, and once for all of them: what follows is seen by others.
-  for (const Effect& effect : effects) {
-    if (!std::holds_alternative<StateDue>(effect)) continue;
-    keep_state(now);
-    break;
-  }
-  for (const Effect& effect : effects) {
-    std::visit(
-        [&](const auto& one) {
-          using One = std::remove_cvref_t<decltype(one)>;
-          if constexpr (std::is_same_v<One, NodeNoted> || std::is_same_v<One, ServiceNoted>) {
-            watches_.note(one, membership_, now);
-          } else {
-            carry_out_one(one);
-          }
-        },
-        effect);
-  }
-}
-
-void Conductor::carry_out_one(const StateDue&) {}  // carry_out() has seen to it
-
-void Conductor::keep_state(milliseconds now) {
-  if (!wiring_.keep_state || (keep_again_at_ && *keep_again_at_ > now)) return;
-  const Durable durable = membership_.durable();
-  HubState state = state_;
-  state.node_mark = durable.node_mark;
-  state.group_mark = durable.group_mark;
-  state.kicked = durable.kicked;
-  if (const std::string error = wiring_.keep_state(state); !error.empty()) {
-    log_error(error + "; the hub goes on, but soon gives no ids to newcomers, and forgets at a restart whom it kicked");
-    keep_again_at_ = now + kKeepAgainAfter;
-    return;
-  }
-  keep_again_at_.reset();
-  state_ = std::move(state);
-  membership_.state_kept(durable);
-}
-
-void Conductor::carry_out_one(const CloseDue& effect) {
-  wiring_.shards.send(effect.place.shard, CloseCommand{ref_of(effect.place), effect.code, effect.sentence});
-}
-
-void Conductor::carry_out_one(const NodeChanged& effect) { publisher_.publish_node(effect.index, membership_); }
-
-void Conductor::carry_out_one(const GroupChanged& effect) { publisher_.publish_group(effect.index, membership_); }
-
-void Conductor::carry_out_one(const SessionEnded& effect) {
-  wiring_.shards.send(effect.place.shard, ReleaseCommand{ref_of(effect.place)});
-}
-
-void Conductor::carry_out_one(const RenumberDue& effect) {
-  watches_.connection_ended(effect.former);
-  wiring_.shards.send(effect.place.shard,
-                      RenumberCommand{ref_of(effect.place), make_id<NodeId>(facts_.id, effect.index), effect.sentence});
-}
-
-void Conductor::carry_out_one(const ServiceMovedDue& effect) {
-  const Session* session = membership_.sessions().find(effect.subscriber);
-  if (session == nullptr) return;
-  ns::ServiceMoved event;
-  event.name = effect.full_name;
-  event.old_group = effect.old_group == 0 ? GroupId{} : make_id<GroupId>(facts_.id, effect.old_group);
-  event.new_group = effect.new_group == 0 ? GroupId{} : make_id<GroupId>(facts_.id, effect.new_group);
-  event.message_type = effect.message_type;
-  event.instance = effect.instance;
-  event.delivery = static_cast<ns::Delivery>(effect.delivery);
-  event.window = effect.window;
-  event.retain = effect.retain;
-  send_event(*session, proto::encode(event));
-}
-
-void Conductor::carry_out_one(const PaceDue& effect) {
-  const Session* session = membership_.sessions().find(effect.subscriber);
-  if (session == nullptr) return;
-  const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
-  wiring_.shards.send(
-      session->place.shard,
-      PaceCommand{ref_of(session->place), make_id<GroupId>(facts_.id, effect.group), terms, effect.retained});
-}
-
-void Conductor::carry_out_one(const PaceEnded& effect) {
-  const Session* session = membership_.sessions().find(effect.subscriber);
-  if (session == nullptr) return;  // its subscriptions end with it
-  wiring_.shards.send(
-      session->place.shard,
-      EndPaceCommand{ref_of(session->place), make_id<GroupId>(facts_.id, effect.group), effect.group_gone});
-}
-
-void Conductor::carry_out_one(const RetainedDropped& effect) {
-  const Session* session = membership_.sessions().find(effect.provider);
-  if (session == nullptr) return;  // what its shard keeps of it ends with it
-  wiring_.shards.send(session->place.shard, ForgetRetainedCommand{make_id<GroupId>(facts_.id, effect.group)});
-}
-
-void Conductor::carry_out_one(const SubscriberDue& effect) {
-  const Session* session = membership_.sessions().find(effect.provider);
-  if (session == nullptr) return;
-  const auto fill = [&](auto event) {
-    event.group = make_id<GroupId>(facts_.id, effect.group);
-    event.node = make_id<NodeId>(facts_.id, effect.subscriber);
-    event.subscribers = effect.subscribers_now;
-    return proto::encode(event);
-  };
-  send_event(*session, effect.joined ? fill(ns::SubscriberJoined{}) : fill(ns::SubscriberLeft{}));
-}
-
-void Conductor::carry_out_one(const NameDecided& effect) {
-  const Session* session = membership_.sessions().find(effect.node);
-  if (session == nullptr) return;
-  send_event(*session, effect.confirmed ? proto::encode(ns::NameConfirmed{effect.name})
-                                        : proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
-}
-
 bool Conductor::serve_watches(milliseconds now) {
   const std::uint64_t resyncs = watches_.resyncs();
   const bool more = watches_.serve(membership_, now, [this](std::uint32_t node, const proto::Payload& events) {
     const Session* session = membership_.sessions().find(node);
-    if (session != nullptr) send_event(*session, events);
+    if (session != nullptr) runner_.send_event(*session, events);
   });
   name_counters_.resyncs.add(watches_.resyncs() - resyncs);
   return more;
-}
-
-void Conductor::send_event(const Session& session, const proto::Payload& payload) {
-  if (!session.connected) return;  // it declares again when it is back, and learns what is true then
-  auto frame = control_frame(proto::Kind::ns, node_id(session), facts_.id, payload);
-  wiring_.shards.send(session.place.shard,
-                      SendControlCommand{.session = ref_of(session.place), .frame = std::move(frame)});
 }
 
 }  // namespace gimnet::hub

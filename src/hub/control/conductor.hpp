@@ -8,12 +8,14 @@
 #include <span>
 
 #include "hub/control/acceptor.hpp"
+#include "hub/control/effect_runner.hpp"
 #include "hub/control/handle/request.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/hub_state.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/watches.hpp"
+#include "hub/control/state_keeper.hpp"
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
@@ -29,14 +31,12 @@ namespace gimnet::hub {
 /// Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters outlive it.
 class Conductor final : private Administration {
  public:
-  /// Keeps the state where it outlives the hub. "" when it is safe there, or why it is not.
-  using KeepState = std::function<std::string(const HubState&)>;
   struct Wiring {
     ShardProxy& shards;
     TablePublisher::Tables tables;
     std::span<const ShardCounters* const> counters;  ///< one per shard
     HubStart start{};                                ///< its state was kept already
-    KeepState keep_state{};                          ///< or none: in memory only
+    StateKeeper::Keep keep_state{};                  ///< or none: in memory only
     std::span<const QueueGauges* const> queues{};    ///< one per shard, or none
     const RefusalCounters* refusals = nullptr;       ///< or none
     ReadAgain read_again{};                          ///< or none: the configuration stays as it is
@@ -92,22 +92,6 @@ class Conductor final : private Administration {
   void want_drain() override { drain_wanted_ = true; }
   void log_level_set(LogLevel level) override;
 
-  void carry_out(const Effects& effects, std::chrono::milliseconds now);
-  void carry_out_one(const NodeChanged& effect);
-  void carry_out_one(const GroupChanged& effect);
-  void carry_out_one(const SessionEnded& effect);
-  void carry_out_one(const RenumberDue& effect);
-  void carry_out_one(const ServiceMovedDue& effect);
-  void carry_out_one(const PaceDue& effect);
-  void carry_out_one(const PaceEnded& effect);
-  void carry_out_one(const RetainedDropped& effect);
-  void carry_out_one(const SubscriberDue& effect);
-  void carry_out_one(const CloseDue& effect);
-  void carry_out_one(const StateDue& effect);
-  void carry_out_one(const NameDecided& effect);
-  void keep_state(std::chrono::milliseconds now);
-  void send_event(const Session& session, const proto::Payload& payload);
-
   // Immutable after construction
   const HubFacts facts_;
   Limits& limits_;
@@ -117,8 +101,8 @@ class Conductor final : private Administration {
   Watches watches_;
   TablePublisher publisher_;
   NameCounters name_counters_;
-  HubState state_;                                          ///< as it was kept last
-  std::optional<std::chrono::milliseconds> keep_again_at_;  ///< it could not be kept
+  StateKeeper keeper_;
+  EffectRunner runner_;  ///< on all of these
   /// After a restart: until then nodes that are not back yet count as away.
   std::optional<std::chrono::milliseconds> returns_until_;
   bool drain_wanted_ = false;

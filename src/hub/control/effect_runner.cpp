@@ -1,0 +1,124 @@
+#include "hub/control/effect_runner.hpp"
+
+#include "hub/shard/control_frame.hpp"
+#include "proto/control/ns_register.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using std::chrono::milliseconds;
+namespace ns = proto::ns;
+
+SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
+
+}  // namespace
+
+GroupId EffectRunner::group_id(std::uint32_t group) const {
+  return group == 0 ? GroupId{} : make_id<GroupId>(parts_.facts.id, group);
+}
+
+void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
+  // First what has to outlive a crash, and once for all of them: what follows is seen by others.
+  for (const Effect& effect : effects) {
+    if (!std::holds_alternative<StateDue>(effect)) continue;
+    parts_.keeper.keep(parts_.membership, now);
+    break;
+  }
+  for (const Effect& effect : effects) {
+    std::visit(
+        [&](const auto& one) {
+          using One = std::remove_cvref_t<decltype(one)>;
+          if constexpr (std::is_same_v<One, NodeNoted> || std::is_same_v<One, ServiceNoted>) {
+            parts_.watches.note(one, parts_.membership, now);
+          } else {
+            run(one);
+          }
+        },
+        effect);
+  }
+}
+
+void EffectRunner::run(const StateDue&) {}  // carry_out() has seen to it
+
+void EffectRunner::run(const CloseDue& effect) {
+  parts_.shards.send(effect.place.shard, CloseCommand{ref_of(effect.place), effect.code, effect.sentence});
+}
+
+void EffectRunner::run(const NodeChanged& effect) { parts_.publisher.publish_node(effect.index, parts_.membership); }
+
+void EffectRunner::run(const GroupChanged& effect) { parts_.publisher.publish_group(effect.index, parts_.membership); }
+
+void EffectRunner::run(const SessionEnded& effect) {
+  parts_.shards.send(effect.place.shard, ReleaseCommand{ref_of(effect.place)});
+}
+
+void EffectRunner::run(const RenumberDue& effect) {
+  parts_.watches.connection_ended(effect.former);
+  parts_.shards.send(
+      effect.place.shard,
+      RenumberCommand{ref_of(effect.place), make_id<NodeId>(parts_.facts.id, effect.index), effect.sentence});
+}
+
+void EffectRunner::run(const ServiceMovedDue& effect) {
+  const Session* session = find(effect.subscriber);
+  if (session == nullptr) return;
+  ns::ServiceMoved event;
+  event.name = effect.full_name;
+  event.old_group = group_id(effect.old_group);
+  event.new_group = group_id(effect.new_group);
+  event.message_type = effect.message_type;
+  event.instance = effect.instance;
+  event.delivery = static_cast<ns::Delivery>(effect.delivery);
+  event.window = effect.window;
+  event.retain = effect.retain;
+  send_event(*session, proto::encode(event));
+}
+
+void EffectRunner::run(const PaceDue& effect) {
+  const Session* session = find(effect.subscriber);
+  if (session == nullptr) return;
+  const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
+  parts_.shards.send(session->place.shard,
+                     PaceCommand{ref_of(session->place), group_id(effect.group), terms, effect.retained});
+}
+
+void EffectRunner::run(const PaceEnded& effect) {
+  const Session* session = find(effect.subscriber);
+  if (session == nullptr) return;  // its subscriptions end with it
+  parts_.shards.send(session->place.shard,
+                     EndPaceCommand{ref_of(session->place), group_id(effect.group), effect.group_gone});
+}
+
+void EffectRunner::run(const RetainedDropped& effect) {
+  const Session* session = find(effect.provider);
+  if (session == nullptr) return;  // what its shard keeps of it ends with it
+  parts_.shards.send(session->place.shard, ForgetRetainedCommand{group_id(effect.group)});
+}
+
+void EffectRunner::run(const SubscriberDue& effect) {
+  const Session* session = find(effect.provider);
+  if (session == nullptr) return;
+  const auto fill = [&](auto event) {
+    event.group = group_id(effect.group);
+    event.node = make_id<NodeId>(parts_.facts.id, effect.subscriber);
+    event.subscribers = effect.subscribers_now;
+    return proto::encode(event);
+  };
+  send_event(*session, effect.joined ? fill(ns::SubscriberJoined{}) : fill(ns::SubscriberLeft{}));
+}
+
+void EffectRunner::run(const NameDecided& effect) {
+  const Session* session = find(effect.node);
+  if (session == nullptr) return;
+  send_event(*session, effect.confirmed ? proto::encode(ns::NameConfirmed{effect.name})
+                                        : proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
+}
+
+void EffectRunner::send_event(const Session& session, const proto::Payload& payload) {
+  if (!session.connected) return;  // it declares again when it is back, and learns what is true then
+  auto frame = control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session), parts_.facts.id, payload);
+  parts_.shards.send(session.place.shard,
+                     SendControlCommand{.session = ref_of(session.place), .frame = std::move(frame)});
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <chrono>
+
+#include "hub/control/hub_facts.hpp"
+#include "hub/control/shard_proxy.hpp"
+#include "hub/control/state/effects.hpp"
+#include "hub/control/state/membership.hpp"
+#include "hub/control/state/watches.hpp"
+#include "hub/control/state_keeper.hpp"
+#include "hub/control/table_publisher.hpp"
+#include "proto/control/control_message.hpp"
+
+namespace gimnet::hub {
+
+/// Carries out what the state machines want done: publishes tables, commands shards, tells nodes, and keeps what has to
+/// outlive the hub. In the order in which they wanted it, which is part of its meaning (state/effects.hpp).
+/// Thread safety: the conductor's thread only. Lifetime: all its parts outlive it.
+class EffectRunner {
+ public:
+  struct Parts {
+    const HubFacts& facts;
+    ShardProxy& shards;
+    Membership& membership;
+    Watches& watches;
+    TablePublisher& publisher;
+    StateKeeper& keeper;
+  };
+  explicit EffectRunner(const Parts& parts) : parts_(parts) {}
+
+  void carry_out(const Effects& effects, std::chrono::milliseconds now);
+  /// Sends an event of kind NS; nothing to a node that is away.
+  void send_event(const Session& session, const proto::Payload& payload);
+
+ private:
+  void run(const NodeChanged& effect);
+  void run(const GroupChanged& effect);
+  void run(const SessionEnded& effect);
+  void run(const RenumberDue& effect);
+  void run(const ServiceMovedDue& effect);
+  void run(const PaceDue& effect);
+  void run(const PaceEnded& effect);
+  void run(const RetainedDropped& effect);
+  void run(const SubscriberDue& effect);
+  void run(const CloseDue& effect);
+  void run(const StateDue& effect);
+  void run(const NameDecided& effect);
+  [[nodiscard]] const Session* find(std::uint32_t node) const { return parts_.membership.sessions().find(node); }
+  [[nodiscard]] GroupId group_id(std::uint32_t group) const;
+
+  const Parts parts_;
+};
+
+}  // namespace gimnet::hub
