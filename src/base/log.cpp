@@ -10,20 +10,21 @@
 #include <mutex>
 
 #include "base/clock.hpp"
+#include "base/log_throttle.hpp"
 
 namespace gimnet {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kLinesPerSecond = 100;
-constexpr std::int64_t kBurst = 200;
 constexpr std::array<std::string_view, 5> kNames{"error", "warning", "info", "debug", "off"};
 
 constinit std::atomic<LogLevel> level_now{LogLevel::info};
 
 struct Writer {
   std::mutex mutex;
+  LogRates rates;
   LogBudget budget;
+  LogThrottle throttle;
 };
 
 Writer& writer() {
@@ -41,6 +42,22 @@ std::string time_stamp() {
   std::array<char, 8> fraction{};
   std::snprintf(fraction.data(), fraction.size(), ".%03dZ", static_cast<int>(now % kSecond / 1'000'000));
   return std::string{text.data(), size} + fraction.data();
+}
+
+std::chrono::milliseconds now_ms() { return std::chrono::milliseconds{steady_now_ns() / 1'000'000}; }
+
+/// `alike`: lines of the same kind about the same peer that were left out before this one.
+void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_t alike,
+                std::chrono::milliseconds now) {
+  out.budget.add_left_out(out.throttle.take_forgotten());
+  if (!out.budget.take(out.rates.all_per_s, now)) return out.budget.add_left_out(alike);
+  std::string line = time_stamp() + " " + std::string{kNames[static_cast<std::size_t>(level)]} + " " + escaped(text);
+  if (alike > 0) line += " (" + std::to_string(alike) + " lines like this were left out)";
+  if (const std::uint64_t count = out.budget.take_left_out(); count > 0) {
+    line += " (" + std::to_string(count) + " lines before this were left out)";
+  }
+  line += '\n';
+  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));  // nobody is left to tell about a failure
 }
 
 }  // namespace
@@ -61,17 +78,26 @@ bool log_enabled(LogLevel level) {
   return most != LogLevel::off && level <= most;
 }
 
+void set_log_rates(const LogRates& rates) {
+  Writer& out = writer();
+  const std::lock_guard lock(out.mutex);
+  out.rates = rates;
+}
+
 void log_line(LogLevel level, std::string_view text) {
   if (!log_enabled(level)) return;
   Writer& out = writer();
   const std::lock_guard lock(out.mutex);
-  if (!out.budget.take(steady_now_ns())) return;
-  std::string line = time_stamp() + " " + std::string{kNames[static_cast<std::size_t>(level)]} + " " + escaped(text);
-  if (const std::uint64_t count = out.budget.left_out(); count > 0) {
-    line += " (" + std::to_string(count) + " lines before this were left out)";
-  }
-  line += '\n';
-  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));  // nobody is left to tell about a failure
+  write_line(out, level, text, 0, now_ms());
+}
+
+void log_line(LogLevel level, const LogSubject& subject, std::string_view text) {
+  if (!log_enabled(level)) return;
+  Writer& out = writer();
+  const std::lock_guard lock(out.mutex);
+  const std::chrono::milliseconds now = now_ms();
+  const LogThrottle::Verdict verdict = out.throttle.take(subject.reason, subject.peer, out.rates.peer_per_s, now);
+  if (verdict.write) write_line(out, level, text, verdict.left_out, now);
 }
 
 std::string escaped(std::string_view text, std::size_t most) {
@@ -89,29 +115,6 @@ std::string escaped(std::string_view text, std::size_t most) {
     }
   }
   return result;
-}
-
-bool LogBudget::take(std::int64_t now_ns) {
-  constexpr std::int64_t kFull = kBurst * kSecond;
-  if (nanotokens_ < 0) {
-    nanotokens_ = kFull;
-  } else {
-    const std::int64_t passed = std::min(std::max<std::int64_t>(now_ns - last_ns_, 0), kFull);
-    nanotokens_ = std::min(kFull, nanotokens_ + passed * kLinesPerSecond);
-  }
-  last_ns_ = now_ns;
-  if (nanotokens_ < kSecond) {
-    ++left_out_;
-    return false;
-  }
-  nanotokens_ -= kSecond;
-  return true;
-}
-
-std::uint64_t LogBudget::left_out() {
-  const std::uint64_t count = left_out_;
-  left_out_ = 0;
-  return count;
 }
 
 }  // namespace gimnet

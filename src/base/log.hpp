@@ -16,11 +16,27 @@ void set_log_level(LogLevel level);
 [[nodiscard]] LogLevel log_level();
 [[nodiscard]] bool log_enabled(LogLevel level);
 
+/// Lines a second of all kinds, twice as many in a burst; and of one kind about one peer. Each 1 to 10^8.
+struct LogRates {
+  std::uint64_t all_per_s = 100;
+  std::uint64_t peer_per_s = 10;
+};
+/// Thread safety: any thread.
+void set_log_rates(const LogRates& rates);
+
 /// Writes one line with time and level to standard error: one event, for people. Control characters and broken text
-/// in `text`, which may come from strangers, are escaped. At most 100 lines a second (200 in a burst); what is left out
-/// is counted in the next line.
+/// in `text`, which may come from strangers, are escaped. What the rates leave out is counted in the next line.
 /// Thread safety: any thread. Never on the data path.
 void log_line(LogLevel level, std::string_view text);
+
+/// What somebody else may make the hub say as often as he likes: the kind of line, and who he is (without what changes
+/// from one connection to the next).
+struct LogSubject {
+  std::string_view reason;
+  std::string_view peer;
+};
+/// The same for such a line, of which there are at most LogRates::peer_per_s.
+void log_line(LogLevel level, const LogSubject& subject, std::string_view text);
 
 inline void log_error(std::string_view text) { log_line(LogLevel::error, text); }
 inline void log_warning(std::string_view text) { log_line(LogLevel::warning, text); }
@@ -29,19 +45,5 @@ inline void log_debug(std::string_view text) { log_line(LogLevel::debug, text); 
 
 /// `text` with control characters and bytes above 0x7e as \xNN, quotes and backslashes kept, cut to `most` characters.
 [[nodiscard]] std::string escaped(std::string_view text, std::size_t most = 1'000);
-
-/// How many lines may be written now: a bucket that fills with time. Thread safety: none.
-class LogBudget {
- public:
-  /// May a line be written at `now_ns`? If not it is counted as left out.
-  [[nodiscard]] bool take(std::int64_t now_ns);
-  /// Lines left out since this was last asked.
-  [[nodiscard]] std::uint64_t left_out();
-
- private:
-  std::int64_t last_ns_ = 0;
-  std::int64_t nanotokens_ = -1;  ///< below zero: not used yet, so full
-  std::uint64_t left_out_ = 0;
-};
 
 }  // namespace gimnet

@@ -72,6 +72,15 @@ constexpr std::array kTable{
     LimitInfo{"mailbox_bytes", "bytes", &Limits::mailbox_bytes, 256 * kKiB, 16 * kGiB,
               "waiting from one shard to another"},
     LimitInfo{"requests", "requests", &Limits::requests, 1, 65'536, "unanswered control requests of one node", true},
+    LimitInfo{"declarations_per_s", "declarations/s", &Limits::declarations_per_s, 1, 1'000'000,
+              "names, services and subscriptions that one node may begin or change; repeating them is free", true},
+    LimitInfo{"declarations_burst", "declarations", &Limits::declarations_burst, 1, 10'000'000,
+              "the same at once; at least services_per_node and subscriptions_per_node together", true},
+    LimitInfo{"oddities_per_s", "oddities/s", &Limits::oddities_per_s, 1, 1'000'000,
+              "requests and credits of one node that are of no use (bad_request, not_supported, denied, bad_credits)",
+              true},
+    LimitInfo{"oddities_burst", "oddities", &Limits::oddities_burst, 1, 1'000'000,
+              "the same at once; one more closes the connection", true},
     LimitInfo{"services_per_node", "services", &Limits::services_per_node, 0, 1'000'000, "advertised by one node",
               true},
     LimitInfo{"subscriptions_per_node", "subscriptions", &Limits::subscriptions_per_node, 0, 1'000'000,
@@ -94,6 +103,10 @@ constexpr std::array kTable{
               "kept for watches that are behind; one that is further behind gets a new snapshot", true},
     LimitInfo{"watch_bytes", "bytes", &Limits::watch_bytes, 64 * kKiB, 16 * kGiB, "memory of watch_changes", true},
     LimitInfo{"drain_ms", "ms", &Limits::drain_ms, 0, kHour, "time for what waits to be written at the end", true},
+    LimitInfo{"log_lines_per_s", "lines/s", &Limits::log_lines_per_s, 1, 1'000'000,
+              "written to the log, twice as many at once; those that are left out are counted", true},
+    LimitInfo{"peer_log_lines_per_s", "lines/s", &Limits::peer_log_lines_per_s, 1, 1'000'000,
+              "of one kind about one peer, as many at once; those that are left out are counted", true},
 };
 
 std::string range_of(const LimitInfo& limit) {

@@ -50,6 +50,10 @@ struct Limits {
   std::uint64_t mailbox_bytes = 16ull << 20;
   // Control
   std::uint64_t requests = 64;
+  std::uint64_t declarations_per_s = 500;
+  std::uint64_t declarations_burst = 2'048;
+  std::uint64_t oddities_per_s = 100;
+  std::uint64_t oddities_burst = 1'000;
   std::uint64_t services_per_node = 1'024;
   std::uint64_t subscriptions_per_node = 1'024;
   std::uint64_t sync_window = 1'024;
@@ -63,6 +67,9 @@ struct Limits {
   std::uint64_t watch_changes = 65'536;
   std::uint64_t watch_bytes = 16ull << 20;
   std::uint64_t drain_ms = 10'000;
+  // The log
+  std::uint64_t log_lines_per_s = 100;
+  std::uint64_t peer_log_lines_per_s = 10;
 };
 
 /// One row of the table of limits.

@@ -25,6 +25,7 @@ void raise_descriptor_limit() {
 int run(const hub::CommandLine& line) {
   const hub::HubOptions& options = line.configuration.options;
   set_log_level(options.log_level);
+  set_log_rates({options.limits.log_lines_per_s, options.limits.peer_log_lines_per_s});
   for (const std::string& warning : line.warnings) log_warning(warning);
   raise_descriptor_limit();
   std::signal(SIGPIPE, SIG_IGN);

@@ -3,13 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "base/clock.hpp"
+
 namespace gimnet {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 class CapturedLog {
  public:
@@ -79,22 +81,32 @@ TEST(Log, KnowsItsLevelsByName) {
   EXPECT_EQ(level, LogLevel::off);
 }
 
-TEST(LogBudget, TakesABurstAndThenARate) {
-  LogBudget budget;
-  int taken = 0;
-  for (int i = 0; i < 300; ++i) taken += budget.take(5 * kSecond) ? 1 : 0;
-  EXPECT_EQ(taken, 200);
-  EXPECT_EQ(budget.left_out(), 100u);
-  EXPECT_EQ(budget.left_out(), 0u);
-  taken = 0;
-  for (int i = 0; i < 300; ++i) taken += budget.take(6 * kSecond) ? 1 : 0;
-  EXPECT_EQ(taken, 100);
+std::size_t lines_in(const std::string& text) { return static_cast<std::size_t>(std::ranges::count(text, '\n')); }
+
+TEST(Log, WhatOnePeerCausesIsWrittenTenTimesASecondAndEscaped) {
+  CapturedLog log(LogLevel::info);
+  set_log_rates({1'000'000, 1});
+  for (int i = 0; i < 100'000; ++i) log_line(LogLevel::info, {"refused", "a test's peer"}, "no\n2026 info \x1b[2J");
+  log_line(LogLevel::info, {"refused", "a test's other peer"}, "yes");
+  set_log_rates({});
+  const std::string text = log.text();
+  EXPECT_THAT(text, HasSubstr("no\\x0a2026 info \\x1b[2J\n"));
+  EXPECT_THAT(text, HasSubstr(" yes"));
+  // How long this loop takes is not ours to say: a line a second of it, and all the others are counted.
+  EXPECT_LT(lines_in(text), 1'000u);
 }
 
-TEST(LogBudget, StandsAClockThatGoesBack) {
-  LogBudget budget;
-  EXPECT_TRUE(budget.take(10 * kSecond));
-  EXPECT_TRUE(budget.take(1 * kSecond));
+TEST(Log, WhatIsLeftOutIsCountedInTheNextLine) {
+  CapturedLog log(LogLevel::info);
+  set_log_rates({1, 1});
+  for (int i = 0; i < 1'000; ++i) log_info("one of many");
+  set_log_rates({1'000'000, 1});
+  const std::int64_t before = steady_now_ns();
+  while (steady_now_ns() < before + 2'000'000) {  // until there is a token again
+  }
+  log_info("at last");
+  set_log_rates({});
+  EXPECT_THAT(log.text(), ::testing::MatchesRegex("(.|\n)* at last \\([0-9]+ lines before this were left out\\)\n"));
 }
 
 }  // namespace

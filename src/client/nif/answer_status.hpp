@@ -21,6 +21,7 @@ namespace gimnet::nif {
     case proto::Status::denied:
       return NIF_DENIED;
     case proto::Status::limit:
+    case proto::Status::rate:
       return NIF_LIMIT;
   }
   return NIF_REFUSED;

@@ -11,6 +11,7 @@
 
 #include "base/log.hpp"
 #include "hub/control/goodbye.hpp"
+#include "hub/control/log_peer.hpp"
 #include "hub/transport/socket_transport.hpp"
 
 namespace gimnet::hub {
@@ -95,8 +96,9 @@ Acceptor::Shortage Acceptor::turn_away() {
   if (descriptor >= 0) {
     refusals_.no_descriptor.add(1);
     Stranger unlucky = stranger(descriptor);
-    log_error("out of descriptors: turned " + unlucky.peer.transport + " " + unlucky.peer.address +
-              " away; raise the limit (ulimit -n) or lower --limit nodes");
+    log_line(LogLevel::error, {"no_descriptor", log_peer(unlucky.peer.transport, unlucky.peer.address)},
+             "out of descriptors: turned " + unlucky.peer.transport + " " + unlucky.peer.address +
+                 " away; raise the limit (ulimit -n) or lower --limit nodes");
     static_cast<void>(send_goodbye(*unlucky.transport, proto::GoodbyeCode::no_memory,
                                    "the hub is out of descriptors; try again later"));
   }

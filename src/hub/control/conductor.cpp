@@ -5,6 +5,7 @@
 #include "base/id_text.hpp"
 #include "base/log.hpp"
 #include "hub/control/dispatch.hpp"
+#include "hub/control/log_peer.hpp"
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
@@ -19,6 +20,18 @@ namespace ns = proto::ns;
 
 std::string title(NodeId node, const Session& session) {
   return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
+}
+
+/// Was the request of no use to anybody?
+bool is_odd(proto::Status status) {
+  return status == proto::Status::bad_request || status == proto::Status::not_supported ||
+         status == proto::Status::denied;
+}
+
+/// The log's subject: nobody who comes and goes again and again fills the log, nor keeps others out of it.
+LogSubject subject(std::string_view reason, const Session& session) {
+  if (!session.name.empty()) return {reason, session.name};
+  return {reason, log_peer(session.origin.transport, session.origin.address)};
 }
 
 Sessions::Options sessions_options(const HubFacts& facts, Placement placement, const HubStart& start) {
@@ -101,9 +114,10 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   wiring_.shards.send(session.place.shard, std::move(command));
   session.close_code.reset();
   session.close_sentence.clear();
-  log_info(title(node_id(session), session) + (session.came_back ? " came back over " : " joined over ") +
-           session.origin.transport + " from " + session.origin.address + ", shard " +
-           std::to_string(session.place.shard.value()));
+  log_line(LogLevel::info, subject("joined", session),
+           title(node_id(session), session) + (session.came_back ? " came back over " : " joined over ") +
+               session.origin.transport + " from " + session.origin.address + ", shard " +
+               std::to_string(session.place.shard.value()));
 }
 
 proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& hello, Moment moment) const {
@@ -157,7 +171,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
   const ShardIndex shard = session->place.shard;
   const proto::Payload answer = handle(context, request);
-  if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, proto::peek_status(answer));
+  const proto::Status status = proto::peek_status(answer);
+  if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, status);
 #ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
 #endif
@@ -175,6 +190,15 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
 #ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
 #endif
+  if (is_odd(status)) on_oddity(event, now);
+}
+
+void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
+  Session* session = find(event.session, event.node);
+  if (session == nullptr || session->oddities.take({limits_.oddities_per_s, limits_.oddities_burst}, now)) return;
+  close(*session, GoodbyeCode::oddities,
+        "more than " + std::to_string(limits_.oddities_burst) +
+            " requests were answered bad_request, not_supported or denied in a short time; look at the answers");
 }
 
 void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
@@ -191,7 +215,7 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   } else {
     line += " lost its connection";
   }
-  log_info(line);
+  log_line(LogLevel::info, subject("left", *session), line);
   Effects effects;
   watches_.connection_ended(session->index);
   membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
@@ -241,6 +265,7 @@ Reloading Conductor::reload() {
     return reloading;
   }
   limits_ = reloading.limits;
+  set_log_rates({limits_.log_lines_per_s, limits_.peer_log_lines_per_s});
   for (std::size_t i = 0; i < facts_.shards; ++i) {
     wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, LimitsCommand{reloading.limits});
   }

@@ -83,6 +83,8 @@ class Conductor final : private Administration {
   void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment);
   [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello, Moment moment) const;
   void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
+  /// Closes a connection that asks too often for what it cannot have.
+  void on_oddity(const ControlFrameEvent& event, std::chrono::milliseconds now);
   void on_detached(const DetachedEvent& event, std::chrono::milliseconds now);
   void close(const Session& session, proto::GoodbyeCode code, std::string sentence);
   /// The session that the event is about, if it is still the same one.

@@ -48,6 +48,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(pinned_bytes_max),
     GIMNET_COUNTER(allocated_bytes),
     GIMNET_COUNTER(too_many_requests),
+    GIMNET_COUNTER(oddities),
     GIMNET_COUNTER(no_memory),
 };
 #undef GIMNET_COUNTER

@@ -11,6 +11,7 @@
 #include "base/check.hpp"
 #include "base/log.hpp"
 #include "hub/control/goodbye.hpp"
+#include "hub/control/log_peer.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -107,7 +108,8 @@ void WaitingRoom::read(Peer& peer, milliseconds now) {
     }
     case Handshake::Verdict::garbage:
       refusals_.garbage.add(1);
-      log_debug("closed " + peer.stranger.peer.address + ": what it sent is not this protocol");
+      log_line(LogLevel::debug, {"garbage", log_peer(peer.stranger.peer.transport, peer.stranger.peer.address)},
+               "closed " + peer.stranger.peer.address + ": what it sent is not this protocol");
       return remove(peer);
   }
 }
@@ -136,8 +138,10 @@ void WaitingRoom::discard(Peer& peer) {
 }
 
 void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
-  log_info("refused " + peer.stranger.peer.transport + " " + peer.stranger.peer.address + ": " + goodbye.sentence +
-           " (" + proto::goodbye_name(goodbye.code) + ")");
+  const PeerInfo& who = peer.stranger.peer;
+  log_line(LogLevel::info, {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
+           "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
+               proto::goodbye_name(goodbye.code) + ")");
   refusals_.count(goodbye.code);
   if (!send_goodbye(*peer.stranger.transport, goodbye.code, goodbye.sentence)) return remove(peer);
   peer.handshake.reset();

@@ -64,6 +64,7 @@ struct alignas(64) ShardCounters {
   Counter slow_consumers;
   Counter stalled_frames;
   Counter too_many_requests;
+  Counter oddities;
   Counter no_memory;
   Counter pauses;
   Counter resumes;

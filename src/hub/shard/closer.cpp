@@ -9,6 +9,7 @@ namespace gimnet::hub {
 void Closer::close(Connection& connection, proto::GoodbyeCode code, std::string sentence) {
   if (!connection.connected) return;
   if (code == proto::GoodbyeCode::too_many_requests) state_.counters.too_many_requests.add(1);
+  if (code == proto::GoodbyeCode::oddities) state_.counters.oddities.add(1);
   if (code == proto::GoodbyeCode::no_memory) state_.counters.no_memory.add(1);
   detach(connection, say_goodbye(connection, code, sentence));
   tell(connection, false, code, std::move(sentence));

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/token_bucket.hpp"
 #include "hub/data/egress/gather_writer.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
 #include "hub/data/fanout/recipient.hpp"
@@ -59,6 +60,7 @@ struct Connection : Recipient {
   std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
   std::uint32_t holds = 0;                          ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;                       ///< that are unanswered
+  TokenBucket oddities;                             ///< CREDITs of no use
   GatherWriter writer;
   FrameTail tail;
   IngressState ingress;

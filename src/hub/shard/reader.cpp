@@ -151,9 +151,20 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
   if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) on_skip(connection, *skip);
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
-    if (!state_.pacer.on_credit(connection, credit->group, credit->taken)) state_.counters.bad_credits.add(1);
+    if (!state_.pacer.on_credit(connection, credit->group, credit->taken)) return take_bad_credit(connection);
   }
   return true;
+}
+
+bool Reader::take_bad_credit(Connection& connection) {
+  state_.counters.bad_credits.add(1);
+  const Limits& limits = state_.limits;
+  const std::chrono::milliseconds now{state_.now_ms};
+  if (connection.oddities.take({limits.oddities_per_s, limits.oddities_burst}, now)) return true;
+  closer_.close(connection, proto::GoodbyeCode::oddities,
+                "more than " + std::to_string(limits.oddities_burst) +
+                    " CREDITs in a short time were for no subscription of this node, or out of order");
+  return false;
 }
 
 void Reader::on_ping(Connection& connection, const proto::flow::Ping& ping) {

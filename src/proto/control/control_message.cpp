@@ -6,7 +6,7 @@ namespace gimnet::proto {
 
 const char* status_name(Status status) {
   constexpr const char* kNames[kStatusCount] = {"done",  "not_supported", "bad_request", "not_found",
-                                                "taken", "denied",        "limit"};
+                                                "taken", "denied",        "limit",       "rate"};
   const auto index = static_cast<std::size_t>(status);
   return index < kStatusCount ? kNames[index] : "unknown";
 }

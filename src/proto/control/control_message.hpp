@@ -42,8 +42,9 @@ enum class Status : std::uint16_t {
   taken = 4,
   denied = 5,
   limit = 6,
+  rate = 7,
 };
-inline constexpr std::size_t kStatusCount = 7;
+inline constexpr std::size_t kStatusCount = 8;
 /// The status as documents and tools print it, for example "not_found".
 [[nodiscard]] const char* status_name(Status status);
 

@@ -149,9 +149,9 @@ Welcome Welcome::read(Fields& fields) {
 
 const char* goodbye_name(GoodbyeCode code) {
   constexpr const char* kNames[kGoodbyeCount] = {
-      "done",        "bad_version",       "malformed",     "hello_timeout", "name_taken",    "bad_name",
-      "hub_full",    "draining",          "replaced",      "silent",        "slow_consumer", "wrong_source",
-      "not_allowed", "too_many_requests", "stalled_frame", "kicked",        "no_memory",     "renumbered"};
+      "done",          "bad_version", "malformed", "hello_timeout", "name_taken",   "bad_name",    "hub_full",
+      "draining",      "replaced",    "silent",    "slow_consumer", "wrong_source", "not_allowed", "too_many_requests",
+      "stalled_frame", "kicked",      "no_memory", "renumbered",    "oddities"};
   const auto index = static_cast<std::size_t>(code);
   return index < kGoodbyeCount ? kNames[index] : "unknown";
 }

@@ -119,9 +119,10 @@ enum class GoodbyeCode : std::uint16_t {
   kicked = 15,
   no_memory = 16,
   renumbered = 17,
+  oddities = 18,
 };
 /// How many codes there are; they are counted from 0 without a gap.
-inline constexpr std::size_t kGoodbyeCount = 18;
+inline constexpr std::size_t kGoodbyeCount = 19;
 /// The code as documents and tools print it, for example "name_taken".
 [[nodiscard]] const char* goodbye_name(GoodbyeCode code);
 

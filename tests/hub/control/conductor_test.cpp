@@ -356,5 +356,42 @@ TEST_F(ConductorTest, AServiceGetsItsFormerGroupWhereItsProviderCameBack) {
   EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, foreign)->group), 3u) << "another hub's";
 }
 
+TEST_F(ConductorTest, ClosesWhoAsksTooOftenForWhatIsOfNoUse) {
+  limits.oddities_burst = 3;
+  limits.oddities_per_s = 10;
+  const Node robot = join("robot");
+  const auto ask_odd = [&] {
+    EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "**/"}).error().status, proto::Status::bad_request);
+  };
+  const auto nobody = [&] {
+    EXPECT_EQ(ask<ns::ResolveAnswer>(robot, ns::Resolve{"nobody"}).error().status, proto::Status::not_found);
+  };
+  for (int i = 0; i < 3; ++i) ask_odd();
+  for (int i = 0; i < 100; ++i) nobody();
+  now += 100ms;
+  ask_odd();
+  EXPECT_TRUE(shards.all<CloseCommand>().empty()) << "the limit, and one for the time that passed";
+  send_frame(robot, proto::Kind::ns, proto::encode_refusal({999, 7}, {}));
+  ASSERT_EQ(shards.all<CloseCommand>().size(), 1u);
+  EXPECT_EQ(shards.all<CloseCommand>()[0]->code, GoodbyeCode::oddities);
+  EXPECT_THAT(shards.all<CloseCommand>()[0]->sentence, HasSubstr("more than 3 requests"));
+  // A new connection is no way to get more.
+  detach(robot, false, GoodbyeCode::oddities, "too odd");
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  const Node back = join(hello);
+  EXPECT_EQ(back.welcome.last_goodbye_code, static_cast<std::uint16_t>(GoodbyeCode::oddities));
+  send_frame(back, proto::Kind::ns, proto::encode_refusal({999, 7}, {}));
+  EXPECT_EQ(shards.all<CloseCommand>().size(), 2u);
+}
+
+TEST_F(ConductorTest, TheDefaultsLetAThousandOdditiesPassAndNotOneMore) {
+  const Node robot = join("robot");
+  for (int i = 0; i < 1'000; ++i) send_frame(robot, proto::Kind::ctrl, proto::encode_refusal({999, 7}, {}));
+  EXPECT_TRUE(shards.all<CloseCommand>().empty());
+  send_frame(robot, proto::Kind::ctrl, proto::encode_refusal({999, 7}, {}));
+  EXPECT_EQ(shards.all<CloseCommand>().size(), 1u);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

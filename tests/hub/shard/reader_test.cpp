@@ -361,5 +361,23 @@ TEST(Reader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
   EXPECT_THAT(lanes, ::testing::ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 0));
 }
 
+TEST(Reader, ClosesForCreditsOfNoUseBeyondTheLimit) {
+  Limits limits;
+  limits.oddities_burst = 3;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  const auto credit = [&] {
+    rig.send_flow(a, proto::flow::Credit{make_id<GroupId>(HubId{7}, 5), 1});
+    rig.settle();
+  };
+  for (int i = 0; i < 3; ++i) credit();
+  EXPECT_FALSE(a.goodbye);
+  EXPECT_EQ(rig.sum(&ShardCounters::bad_credits), 3u);
+  credit();
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::oddities);
+  EXPECT_EQ(rig.sum(&ShardCounters::oddities), 1u);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -81,7 +81,8 @@ TEST(ControlMessage, SkipsUnknownKeys) {
 TEST(StatusNames, AreThoseOfTheDocument) {
   EXPECT_STREQ(status_name(Status::done), "done");
   EXPECT_STREQ(status_name(Status::limit), "limit");
-  EXPECT_STREQ(status_name(static_cast<Status>(7)), "unknown");
+  EXPECT_STREQ(status_name(Status::rate), "rate");
+  EXPECT_STREQ(status_name(static_cast<Status>(kStatusCount)), "unknown");
 }
 
 }  // namespace

@@ -136,6 +136,7 @@ TEST(GoodbyeMessage, NamesItsCodes) {
   EXPECT_STREQ(goodbye_name(GoodbyeCode::slow_consumer), "slow_consumer");
   EXPECT_STREQ(goodbye_name(GoodbyeCode::no_memory), "no_memory");
   EXPECT_STREQ(goodbye_name(GoodbyeCode::renumbered), "renumbered");
+  EXPECT_STREQ(goodbye_name(GoodbyeCode::oddities), "oddities");
   EXPECT_STREQ(goodbye_name(static_cast<GoodbyeCode>(kGoodbyeCount)), "unknown");
 }
 

@@ -52,6 +52,19 @@ class Names(Case):
             self.assertEqual(denied.exception.args[0], status, denied.exception)
             self.assertTrue(denied.exception.args[1])
 
+    def test_rates(self):
+        hub = self.hub("--limit", "declarations_burst=2", "--limit", "declarations_per_s=1", "--limit", "oddities_burst=2",
+                       "--limit", "oddities_per_s=1", "--limit", "services_per_node=0", "--limit", "subscriptions_per_node=0")
+        hasty = self.stranger(hub)
+        with self.assertRaises(Denied) as denied:
+            for number in range(10_000):
+                hasty.ask(NS, 1, put(3, TEXT, f"name-{number}"))
+        self.assertEqual(denied.exception.args[0], 7)
+        with self.assertRaises(Refused) as refused:
+            for _ in range(10_000):
+                with self.assertRaises(Denied):
+                    hasty.ask(NS, 999)
+        self.assertEqual(refused.exception.args[0], 18)
 
     def test_a_name_is_taken_changed_and_given_back(self):
         hub = self.hub()

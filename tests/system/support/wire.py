@@ -17,7 +17,8 @@ PING, PONG, CREDIT, PAUSE, RESUME, CONFIRM, SKIP = range(1, 8)
 BLOCK, DROP, LATEST = 1, 2, 3
 FLAG_REPORT, FLAG_FRAGMENT, FLAG_EXT, FLAG_KEYED = 0x04, 0x08, 0x10, 0x20
 GOODBYES = ("done bad_version malformed hello_timeout name_taken bad_name hub_full draining replaced silent "
-            "slow_consumer wrong_source not_allowed too_many_requests stalled_frame kicked no_memory").split()
+            "slow_consumer wrong_source not_allowed too_many_requests stalled_frame kicked no_memory "
+            "renumbered oddities").split()
 _SIZES = {1: "?", 2: "B", 3: "<H", 4: "<I", 5: "<Q", 13: "<q"}
 
 
@@ -109,15 +110,17 @@ class Closed(Exception):
 class Client:
     """A connection to a hub. Reads only when asked to. The test's `clients` lists them all."""
 
-    def __init__(self, test, hub, receive_bytes=None):
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    def __init__(self, test, hub, receive_bytes=None, local=False):
+        """`local`: over the hub's Unix socket."""
+        self.socket = socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_STREAM)
         test.addCleanup(self.socket.close)
         test.__dict__.setdefault("clients", []).append(self)
         if receive_bytes:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if not local:
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.socket.settimeout(PATIENCE_S)
-        self.socket.connect(("127.0.0.1", hub.port))
+        self.socket.connect(hub.socket_path if local else ("127.0.0.1", hub.port))
         self.id, self.welcome, self.pinged = 0, {}, 0
         self._bytes = bytearray()
 

@@ -47,6 +47,9 @@ proto::Payload handle_register(HandlerContext& context, const Request& request) 
       request, [&](const ns::RegisterName& wanted) -> Result<ns::RegisterNameAnswer, proto::Refusal> {
         if (wanted.name.empty()) return proto::Refusal{Status::bad_request, "REGISTER needs a name"};
         Session& session = *context.membership.sessions().find(request.session.index);
+        if (wanted.name != session.name) {
+          if (auto refusal = count_declaration(context, session)) return *refusal;
+        }
         const auto failed = context.membership.rename(session, wanted.name, context.now, context.effects);
         if (failed) return *failed;
         return ns::RegisterNameAnswer{session.name, context.membership.directory().is_provisional(session.name),
@@ -59,6 +62,7 @@ proto::Payload handle_unregister(HandlerContext& context, const Request& request
       request, [&](const ns::UnregisterName&) -> Result<ns::UnregisterNameAnswer, proto::Refusal> {
         if (request.session.name.empty()) return proto::Refusal{Status::not_found, "this node has no name"};
         Session& session = *context.membership.sessions().find(request.session.index);
+        if (auto refusal = count_declaration(context, session)) return *refusal;
         const auto failed = context.membership.rename(session, "", context.now, context.effects);
         if (failed) return *failed;
         return ns::UnregisterNameAnswer{context.membership.sessions().token_of(session)};

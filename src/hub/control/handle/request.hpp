@@ -66,6 +66,10 @@ template <class Message, class Grant>
   return proto::encode_answer(*answer, request.header.request);
 }
 
+/// Counts one name, service or subscription that the node begins or changes. nullopt: it may; else the answer is that
+/// it asked too often, and nothing is to change.
+[[nodiscard]] std::optional<proto::Refusal> count_declaration(HandlerContext& context, const Session& session);
+
 /// How much fits in one page of records.
 class PageBudget {
  public:

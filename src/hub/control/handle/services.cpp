@@ -84,6 +84,9 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   terms.window = offer.delivery == ns::Delivery::sync ? std::max(1u, offer.window) : 0;
   terms.retain = offer.retain;
   const std::string full_name = proto::join_service_name(session.name, offer.service);
+  if (!context.membership.services().provides(session.index, full_name, terms)) {
+    if (auto refusal = count_declaration(context, session)) return *refusal;
+  }
   // Only a session that came back had a group before; to anybody else it would be a way to pick one.
   const std::uint32_t former = session.came_back ? own_index(context.facts, offer.former_group).value_or(0) : 0;
   const auto done =
@@ -146,6 +149,9 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
       request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
         const auto terms = terms_of(context.limits, wanted);
         if (!terms) return terms.error();
+        if (!context.membership.services().subscribes(request.session.index, wanted.name, *terms)) {
+          if (auto refusal = count_declaration(context, request.session)) return *refusal;
+        }
         const auto topic =
             context.membership.services().subscribe(request.session.index, wanted.name, *terms, context.effects);
         if (!topic) return topic.error();

@@ -15,7 +15,8 @@ using std::chrono::milliseconds;
 bool is_misconduct(const Membership::Ending& ending) {
   if (ending.said_by_peer) return false;
   return ending.code == GoodbyeCode::malformed || ending.code == GoodbyeCode::wrong_source ||
-         ending.code == GoodbyeCode::not_allowed || ending.code == GoodbyeCode::too_many_requests;
+         ending.code == GoodbyeCode::not_allowed || ending.code == GoodbyeCode::too_many_requests ||
+         ending.code == GoodbyeCode::oddities;
 }
 
 }  // namespace

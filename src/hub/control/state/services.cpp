@@ -263,6 +263,20 @@ const Topic* Services::find_group(std::uint32_t group) const {
   return found == groups_.end() ? nullptr : found->second;
 }
 
+bool Services::provides(std::uint32_t node, std::string_view full_name, const ServiceTerms& terms) const {
+  const auto known = topics_.find(full_name);
+  if (known == topics_.end() || !known->second.service) return false;
+  const Service& service = *known->second.service;
+  return service.provider == node && service.terms == terms;
+}
+
+bool Services::subscribes(std::uint32_t node, std::string_view full_name, const SubscriberTerms& terms) const {
+  const auto known = topics_.find(full_name);
+  if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node)) return false;
+  const auto asked = known->second.terms.find(node);
+  return terms == (asked != known->second.terms.end() ? asked->second : SubscriberTerms{});
+}
+
 std::size_t Services::services_of(std::uint32_t node) const {
   const auto found = nodes_.find(node);
   return found == nodes_.end() ? 0 : found->second.provides.size();

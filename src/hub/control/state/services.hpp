@@ -30,6 +30,7 @@ struct ServiceTerms {
   std::string metadata;
   std::uint32_t window = 0;  ///< of sync(n)
   bool retain = false;
+  friend bool operator==(const ServiceTerms&, const ServiceTerms&) = default;
 };
 
 struct Service {
@@ -100,6 +101,9 @@ class Services {
   /// Topics with a service, by ascending group index.
   [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
   [[nodiscard]] const Topics& by_name() const { return topics_; }
+  /// Has the node declared exactly that already?
+  [[nodiscard]] bool provides(std::uint32_t node, std::string_view full_name, const ServiceTerms& terms) const;
+  [[nodiscard]] bool subscribes(std::uint32_t node, std::string_view full_name, const SubscriberTerms& terms) const;
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
   [[nodiscard]] IndexPool& group_indices() { return group_indices_; }

@@ -13,6 +13,7 @@
 
 #include "base/ids.hpp"
 #include "base/result.hpp"
+#include "base/token_bucket.hpp"
 #include "hub/control/state/durable.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/number_floor.hpp"
@@ -50,6 +51,9 @@ struct Session {
   /// How the hub closed its last connection; told at its next WELCOME.
   std::optional<proto::GoodbyeCode> close_code;
   std::string close_sentence;
+  // Over all its connections, so that a new one is no way to get more.
+  TokenBucket declarations;  ///< that it begins or changes
+  TokenBucket oddities;      ///< requests of no use
 };
 
 /// Why somebody was not let in: what GOODBYE says.

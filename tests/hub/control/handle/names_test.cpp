@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "base/log.hpp"
 #include "proto/control/ns_register.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
@@ -224,6 +226,7 @@ TEST_F(NamesTest, OneOfTwoClaimantsHasTheName) {
 /// Taking and giving back a name for ever leaves nothing behind.
 TEST_F(NamesTest, ChangingTheNameForEverKeepsNothing) {
   limits.watch_changes = 1'000;
+  limits.declarations_burst = 100'000;
   const Node robot = join("robot");
   for (int i = 0; i < 20'000; ++i) {
     ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{i % 2 == 0 ? "a" : "b"}));
@@ -258,6 +261,42 @@ TEST_F(NamesTest, APatternThatFitsNobodyIsAnsweredInPieces) {
     after = answer->next;
   }
   EXPECT_EQ(pages, 5);
+}
+
+TEST_F(NamesTest, AStormOfNamesIsRefusedByRateAndLeavesNothing) {
+  const Node robot = join("first");
+  const Node viewer = join("");
+  std::map<Status, int> said;
+  const auto change = [&](int i) {
+    const auto taken = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot-" + std::to_string(i)});
+    const auto freed = ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{});
+    ++said[taken ? Status::done : taken.error().status];
+    ++said[freed ? Status::done : freed.error().status];
+    shards.sent.clear();
+  };
+  for (int i = 0; i < 100'000; ++i) change(i);
+  EXPECT_EQ(said[Status::done], 2'048);
+  EXPECT_EQ(said[Status::rate], 100'000 - 1'024);
+  EXPECT_EQ(said[Status::not_found], 100'000 - 1'024) << "there was nothing to give back";
+  EXPECT_LE(conductor.membership().directory().size(), 1u) << "memory stays as it was";
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(viewer, ns::RegisterName{"viewer"})) << "others have rates of their own";
+  // As much as time gives, however long the storm lasts.
+  said.clear();
+  for (int second = 0; second < 10; ++second) {
+    now += 1s;
+    for (int i = 0; i < 1'000; ++i) change(i);
+  }
+  EXPECT_EQ(said[Status::done], 5'000);
+}
+
+TEST_F(NamesTest, WhatItHasAlreadyIsNoNewName) {
+  limits.declarations_burst = 1;
+  limits.services_per_node = limits.subscriptions_per_node = 0;
+  const Node robot = join("robot");
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot"}));
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"crane"}));
+  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status, Status::rate);
+  EXPECT_EQ(conductor.membership().directory().find("crane"), index_of(robot.id));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "base/log.hpp"
 #include "proto/control/ns.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
@@ -9,6 +11,7 @@
 namespace gimnet::hub {
 namespace {
 
+using namespace std::chrono_literals;
 using proto::Status;
 namespace ns = proto::ns;
 
@@ -187,6 +190,73 @@ TEST_F(ServiceRequestsTest, SubscriptionsAreRefusedBeyondTheLimit) {
   EXPECT_EQ(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}).error().status, Status::limit);
   ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"nobody/s0"}));
   EXPECT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}));
+}
+
+TEST_F(ServiceRequestsTest, AllThatANodeMayHaveItMayDeclareAtOnceAndOneThingMoreIsTooMuch) {
+  const Node robot = join("robot");
+  const auto declare = [&](const Node& node) {
+    for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
+      ASSERT_TRUE(ask<ns::AdvertiseAnswer>(node, ns::Advertise{.service = "s" + std::to_string(i)})) << i;
+    }
+    for (std::uint64_t i = 0; i < limits.subscriptions_per_node; ++i) {
+      ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"nobody/s" + std::to_string(i)})) << i;
+    }
+  };
+  declare(robot);
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(robot, ns::Unsubscribe{"nobody/s0"})) << "ending something is free";
+  const auto more = ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"});
+  ASSERT_FALSE(more);
+  EXPECT_EQ(more.error().status, Status::rate);
+  EXPECT_NE(more.error().sentence.find("2048 at once and 500 a second"), std::string::npos) << more.error().sentence;
+  now += 2ms;
+  EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"}));
+  // Whose connection flaps declares all of it each time, and that is free.
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  for (int flap = 0; flap < 3; ++flap) declare(join(hello));
+}
+
+TEST_F(ServiceRequestsTest, LargerQuotasMakeTheBurstLarger) {
+  limits.declarations_burst = 1;
+  limits.services_per_node = 5;
+  limits.subscriptions_per_node = 5;
+  const Node robot = join("robot");
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(i)}));
+    EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s" + std::to_string(i)}));
+  }
+  // Other terms are another declaration, the same ones are none.
+  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s0"}));
+  EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"}));
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s0", .metadata = "new"}).error().status,
+            Status::rate);
+  EXPECT_EQ(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{.name = "nobody/s0", .depth = 2}).error().status,
+            Status::rate);
+}
+
+TEST_F(ServiceRequestsTest, AStormOfSubscriptionsEndsAtTheQuotaAndThenAtTheRate) {
+  const Node robot = join("robot");
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s"}));
+  const Node viewer = join("viewer");
+  std::map<Status, int> said;
+  for (int i = 0; i < 100'000; ++i) {
+    const auto answer = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)});
+    ++said[answer ? Status::done : answer.error().status];
+    shards.sent.clear();
+  }
+  EXPECT_EQ(said[Status::done], 1'024);
+  EXPECT_EQ(said[Status::limit], 1'024);
+  EXPECT_EQ(said[Status::rate], 100'000 - 2'048);
+  EXPECT_EQ(conductor.membership().services().topics(), 1'024u + 1);
+  // A provider is told of no more comings and goings than the rate allows.
+  const Node other = join("other");
+  for (int i = 0; i < 100'000; ++i) {
+    static_cast<void>(ask<ns::SubscribeAnswer>(other, ns::Subscribe{"robot/s"}));
+    static_cast<void>(ask<ns::UnsubscribeAnswer>(other, ns::Unsubscribe{"robot/s"}));
+    said[Status::taken] += static_cast<int>(events<ns::SubscriberJoined>().size());
+    shards.sent.clear();
+  }
+  EXPECT_EQ(said[Status::taken], 2'048);
 }
 
 }  // namespace

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string_view>
+
+namespace gimnet::hub {
+
+/// Who a peer is for the log's rates: the address without its port, or the user behind a Unix socket without its
+/// process, so that a new connection is no new peer. `address` is as PeerInfo has it. Valid until: `address` changes.
+[[nodiscard]] constexpr std::string_view log_peer(std::string_view transport, std::string_view address) {
+  if (transport == "tcp") return address.substr(0, address.rfind(':'));
+  const std::size_t user = address.find("uid ");
+  return user == std::string_view::npos ? address : address.substr(user);
+}
+
+}  // namespace gimnet::hub
