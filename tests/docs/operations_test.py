@@ -30,6 +30,22 @@ def limits_in_force(tcphub):
     return rows
 
 
+def limits_of_the_example(text):
+    """As limits_in_force() has them: default, unit, range and reason."""
+    rows = {}
+    pattern = r"^# (.*) \((\d+ to \d+) (\S+)\)\n#(\w+) = (\d+)$"
+    for reason, limits, unit, name, default in re.findall(pattern, text[text.index("\n[limits]"):], re.MULTILINE):
+        rows[name] = [default, unit, limits, reason]
+    return rows
+
+
+def fields_in_the_source():
+    """What the hub bounds, by the struct that its threads look at."""
+    text = (ROOT / "src" / "hub" / "limits.hpp").read_text(encoding="utf-8")
+    struct = text[text.index("struct Limits {"):text.index("};")]
+    return re.findall(r"^  std::uint64_t (\w+) =", struct, re.MULTILINE)
+
+
 def printed(tcphub, *arguments):
     return subprocess.run([tcphub, "--print-config", *arguments], check=True, capture_output=True, text=True,
                           timeout=20).stdout
@@ -47,6 +63,13 @@ class Operations(unittest.TestCase):
         in_force = limits_in_force(self.tcphub)
         self.assertGreater(len(in_force), 20)
         self.assertEqual(documented_limits(), in_force)
+
+    def test_every_limit_is_a_key_everywhere(self):
+        fields = fields_in_the_source()
+        self.assertGreater(len(fields), 20)
+        self.assertEqual(list(limits_in_force(self.tcphub)), fields, "the help has them in their order")
+        self.assertEqual(list(documented_limits()), fields)
+        self.assertEqual(list(keys_in(printed(self.tcphub).split("[limits]")[1])), fields)
 
     def test_documents_what_a_reload_changes(self):
         told = subprocess.run([self.tcphub, "--help-limits"], check=True, capture_output=True, text=True,
@@ -69,6 +92,7 @@ class Operations(unittest.TestCase):
         text = example.read_text(encoding="utf-8")
         self.assertLessEqual(set(keys_in(text)), set(keys_in(printed(self.tcphub))))
         self.assertLessEqual(set(keys_in(printed(self.tcphub).split("[limits]")[0])), set(keys_in(text)))
+        self.assertEqual(limits_of_the_example(text), limits_in_force(self.tcphub))
         # Whoever takes the comments away gets what there is without the file.
         uncommented = re.sub(r"^#(?=[a-z_]+ = )", "", text, flags=re.MULTILINE)
         with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:

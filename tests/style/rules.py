@@ -67,7 +67,7 @@ _SLEEP = re.compile(r"\b(sleep_for|sleep_until|usleep|nanosleep)\b|\b(time|async
 _UNFINISHED = re.compile(r"\b(TODO|FIXME|HACK|XXX)\b|\bfor now\b", re.IGNORECASE)
 _MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home)/|/tmp/wt\b|\bshared/design\b")
 _PLANTED = re.compile(r"\bGIMNET_BUG_([A-Z0-9_]+)\b")
-_REQUIREMENT = re.compile(r"^\| ([A-Z]-\d+[a-z]?) \|.*\|([^|]*)\|$")
+_REQUIREMENT = re.compile(r"^\| ([A-Z]-?\d+[a-z]?) \|.*\|([^|]*)\|$")
 _TEST_PATH = re.compile(r"\b(?:tests|perf|fuzz|bench)/[\w./-]+")
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 # A public C header may guard itself in the way that every C compiler knows.

@@ -8,9 +8,9 @@ import unittest
 
 from support.processes import Hub, run_gimnet
 from support.waiting import wait_until
-from support.wire import (BLOCK, BROADCAST, CTRL, FLAG_EXT, FLAG_FRAGMENT, FLAG_KEYED, FLOW, GROUP, HELLO, LATEST, LINK,
-                          LIST, NS, OPENING, REPORT, ROUTE, SERVICE, UNICAST, Client, Closed, control, frame, hello,
-                          text, value)
+from support.wire import (BLOCK, BROADCAST, CTRL, FLAG_EXT, FLAG_FRAGMENT, FLAG_KEYED, FLAG_REPORT, FLOW, GROUP, HELLO,
+                          LATEST, LINK, LIST, NS, OPENING, REPORT, ROUTE, SERVICE, UNICAST, Client, Closed, control,
+                          frame, hello, text, value)
 
 
 class HostileInput(unittest.TestCase):
@@ -55,8 +55,11 @@ class Handshakes(HostileInput):
                     client.next()
 
     def test_another_major_version(self):
-        client = Client(self, self.hub).send(b"GIMnet\x02\x00" + hello())
-        self.assertEqual(client.first_answer().goodbye, "bad_version")
+        for major in (0, 2, 255):
+            client = Client(self, self.hub).send(b"GIMnet" + bytes([major, 0]) + hello())
+            answer = client.first_answer()
+            self.assertEqual(answer.goodbye, "bad_version")
+            self.assertIn("1", answer.fields[2], "it names the version that is spoken here")
 
     def test_another_minor_version_is_welcome(self):
         client = Client(self, self.hub).send(b"GIMnet\x01\x63" + hello())
@@ -154,6 +157,49 @@ class Frames(HostileInput):
             sender.send(sender.frame(receiver.id, b"later", kind=kind))
         got = [receiver.next_where(lambda frame: 8 <= frame.kind < 16).kind for _ in range(8)]
         self.assertEqual(got, list(range(8, 16)))
+
+    def test_every_kind_without_a_payload(self):
+        receiver = Client(self, self.hub).join()
+        for kind in range(20):
+            with self.subTest(kind=kind):
+                client = Client(self, self.hub).join()
+                client.send(client.frame(receiver.id if kind in (0, 7) or 8 <= kind < 16 else 0, b"", kind=kind))
+                if kind in (LIST, REPORT, FLOW, LINK, NS, CTRL, ROUTE):
+                    self.assertIn(client.goodbye(), ("malformed", "not_allowed"))
+                else:
+                    client.ping()
+                    self.assertEqual(client.next().kind, FLOW)
+
+    def test_the_other_byte_order(self):
+        client = Client(self, self.hub).join()
+        for field in range(3):
+            client = Client(self, self.hub).join()
+            numbers = [5, client.id, client.id]
+            words = [struct.pack(">I" if i == field else "<I", number) for i, number in enumerate(numbers)]
+            client.send(b"".join(words) + bytes([UNICAST, FLAG_REPORT, 0, 1]) + b"hello")
+            if field == 1:  # an id like any other, of a hub that is not there
+                self.assertEqual(client.next_where(lambda got: got.kind == REPORT).payload[0], 2)
+            else:
+                self.assertEqual(client.goodbye(), "malformed" if field == 0 else "wrong_source")
+
+    def test_destinations_that_are_not_there(self):
+        client = Client(self, self.hub).join()
+        no_such_node, no_route, no_such_group, no_subscriber = 1, 2, 13, 18
+        cases = ((UNICAST, client.id + 1000, no_such_node), (UNICAST, 7 << 20, no_such_node), (UNICAST, 0, no_route),
+                 (UNICAST, 8 << 20 | 1, no_route), (UNICAST, 0xFFFFFFFF, no_route), (GROUP, 7 << 20 | 5, no_such_group),
+                 (GROUP, 8 << 20 | 5, no_route), (SERVICE, 7 << 20 | 5, no_such_group))
+        for kind, dst, reason in cases:
+            with self.subTest(kind=kind, dst=dst):
+                client.send(client.frame(dst, b"x", kind=kind, flags=FLAG_REPORT))
+                report = client.next_where(lambda got: got.kind == REPORT)
+                self.assertEqual(report.payload[0], reason)
+                self.assertEqual(report.payload[8:16], struct.pack("<II", 1, dst))
+
+    def test_a_second_hello(self):
+        self.closed_as("malformed", hello(), "malformed")
+        client = Client(self, self.hub).join()
+        client.send(OPENING + bytes(8))  # read as a header: an impossible length
+        self.assertEqual(client.goodbye(), "malformed")
 
     def test_policies_that_do_not_fit(self):
         for kind in (GROUP, BROADCAST):

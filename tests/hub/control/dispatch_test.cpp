@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "base/log.hpp"
 #include "hub/control/handle/admin.hpp"
+#include "hub/control/handle/administer.hpp"
 #include "hub/control/handle/names.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
@@ -39,6 +42,26 @@ TEST(Dispatch, EveryUnknownOperationIsAnsweredNotSupported) {
     }
   }
   set_log_level(LogLevel::info);
+}
+
+/// Each role against each operation: who reads may be anybody, who changes the hub an administrator alone.
+TEST(Dispatch, GrantsEachRoleExactlyWhatItMay) {
+  namespace ctrl = proto::ctrl;
+  const std::set<std::uint16_t> known{ctrl::HubInfo::kOperation, ctrl::Statistics::kOperation,
+                                      ctrl::Connections::kOperation, ctrl::Routes::kOperation};
+  const std::set<std::uint16_t> changing{ctrl::Kick::kOperation, ctrl::Reassign::kOperation, ctrl::Drain::kOperation,
+                                         ctrl::Reload::kOperation, ctrl::SetLogLevel::kOperation};
+  const Handler unknown = handler_for(Role::admin, Kind::ctrl, 0xffff);
+  for (std::uint32_t operation = 0; operation <= 0xffff; ++operation) {
+    const auto number = static_cast<std::uint16_t>(operation);
+    const Handler node = handler_for(Role::node, Kind::ctrl, number);
+    const Handler admin = handler_for(Role::admin, Kind::ctrl, number);
+    EXPECT_EQ(node == &handle_denied, changing.contains(number)) << number;
+    EXPECT_NE(admin, &handle_denied) << number;
+    EXPECT_EQ(admin == unknown, !known.contains(number) && !changing.contains(number)) << number;
+    EXPECT_EQ(node == admin, !changing.contains(number)) << number;
+    EXPECT_EQ(handler_for(Role::node, Kind::ns, number), handler_for(Role::admin, Kind::ns, number)) << number;
+  }
 }
 
 }  // namespace

@@ -138,5 +138,33 @@ TEST(Handshake, ReservedLaneBitsAreRefused) {
   EXPECT_EQ(feed(handshake, bytes), Verdict::refused);
 }
 
+/// Every sequence of up to five of the things that a peer may say first: one of them alone is a HELLO.
+TEST(Handshake, OnlyTheOpeningAndThenHelloComeToAnEnd) {
+  using Bytes = std::vector<std::byte>;
+  const Bytes hello = link_frame(proto::encode(robot()));
+  const Bytes opening(proto::kOpening.begin(), proto::kOpening.end());
+  Bytes request = link_frame(proto::encode(proto::Goodbye{}));
+  request[12] = static_cast<std::byte>(proto::Kind::ns);
+  const std::vector<Bytes> words{opening, hello, link_frame(proto::encode(proto::Goodbye{})), request,
+                                 link_frame(proto::encode(proto::Welcome{}))};
+  constexpr std::size_t kLength = 5;
+  std::size_t sequences = 0;
+  for (std::size_t number = 0; number < 5 * 5 * 5 * 5 * 5; ++number) {
+    const Limits limits;
+    Handshake handshake(limits);
+    Verdict verdict = Verdict::more;
+    std::vector<std::size_t> said;
+    for (std::size_t i = 0, rest = number; i < kLength && verdict == Verdict::more; ++i, rest /= words.size()) {
+      said.push_back(rest % words.size());
+      verdict = feed(handshake, words[said.back()]);
+      ++sequences;
+    }
+    const bool legal = said == std::vector<std::size_t>{0, 1};
+    EXPECT_EQ(verdict == Verdict::hello, legal) << number;
+    EXPECT_NE(verdict, Verdict::more) << number;
+  }
+  EXPECT_GT(sequences, 5u * 5 * 5 * 5 * 5);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

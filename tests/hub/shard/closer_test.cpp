@@ -153,5 +153,49 @@ TEST(Closer, ASlotIsReusedWithoutItsPast) {
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
 }
 
+TEST(Closer, DeliversNothingOfAFrameThatIsCutAnywhere) {
+  for (const bool broken : {false, true}) {
+    for (std::size_t cut = 0; cut < proto::kHeaderSize + 8; ++cut) {
+      SCOPED_TRACE(cut);
+      HubRig rig;
+      FakeNode& a = rig.join(0);
+      FakeNode& b = rig.join(0);
+      std::vector<std::byte> bytes = HubRig::frame(a, b.id.value(), "whole");
+      const std::vector<std::byte> half = HubRig::frame(a, b.id.value(), "8 bytes.");
+      bytes.insert(bytes.end(), half.begin(), half.begin() + static_cast<std::ptrdiff_t>(cut));
+      rig.write(a, bytes);
+      rig.settle();
+      if (broken) {
+        a.pipe.reset();
+      } else {
+        a.pipe.close();
+      }
+      rig.settle();
+      EXPECT_THAT(b.texts(), ElementsAre("whole"));
+      EXPECT_EQ(rig.ledger().accepted, 1u) << "what never was a frame is not counted as one";
+      EXPECT_TRUE(rig.ledger().exact());
+      EXPECT_TRUE(a.pipe.transport_gone());
+    }
+  }
+}
+
+TEST(Closer, LooksAtNothingBehindAGoodbye) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  std::vector<std::byte> bytes = HubRig::frame(a, b.id.value(), "before");
+  const auto add = [&bytes](const std::vector<std::byte>& frame) {
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  };
+  const auto payload = proto::encode(proto::Goodbye{GoodbyeCode::done, ""});
+  add(HubRig::frame(a, 0, std::string(reinterpret_cast<const char*>(payload.data()), payload.size()),
+                    {.kind = proto::Kind::link}));
+  for (int i = 0; i < 1'000; ++i) add(HubRig::frame(a, b.id.value(), "behind"));
+  rig.write(a, bytes);
+  rig.settle();
+  EXPECT_THAT(b.texts(), ElementsAre("before"));
+  EXPECT_EQ(rig.ledger().accepted, 1u);
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -1,0 +1,206 @@
+// What strangers can make the hub look at, in any amount: instructions for each piece of it, counted as those of
+// scripts.cpp, must not grow with the amount. tests/perf/growth_test.py compares amounts.
+//
+//     growth_scripts SCRIPT:COUNT   runs it: once to warm up, then once counted; prints COUNT
+//     growth_scripts                prints what compiled it, and the scripts' names
+
+#include <charconv>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hub/control/state/directory.hpp"
+#include "hub/control/state/services.hpp"
+#include "proto/control/fields.hpp"
+#include "proto/control/pattern.hpp"
+
+extern "C" {
+/// Where callgrind switches its counting on and off: never inlined, known by this name.
+[[gnu::noinline]] void counted(const std::function<void()>& work) {
+  work();
+  asm volatile("");  // keeps the call from becoming a jump, which callgrind would not see the end of
+}
+}
+
+namespace gimnet::hub {
+namespace {
+
+using std::chrono::milliseconds;
+
+using Work = std::function<void()>;
+
+[[noreturn]] void wrong(const char* what) {
+  std::fprintf(stderr, "growth_scripts: %s\n", what);
+  std::exit(1);
+}
+
+/// A message of so many values under one key.
+Work duplicate_keys(std::size_t count) {
+  auto body = std::make_shared<proto::bitestream::Writer>();
+  for (std::size_t i = 0; i < count; ++i) body->put_u8(3, 0);
+  return [body] {
+    const proto::Fields fields(body->bytes(), "message");
+    if (fields.failed()) wrong("values under one key are legal");
+  };
+}
+
+/// The same under keys of 255 bytes, all different at their ends only.
+Work long_keys(std::size_t count) {
+  auto body = std::make_shared<proto::bitestream::Writer>();
+  std::string key(255, 'k');
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string number = std::to_string(i);
+    key.replace(key.size() - number.size(), number.size(), number);
+    body->put_u8(std::string_view{key}, 0);
+  }
+  return [body] {
+    const proto::Fields fields(body->bytes(), "message");
+    if (fields.failed()) wrong("long keys are legal");
+  };
+}
+
+/// Heads of nested values, each of which claims all that is behind it.
+Work nested_bomb(std::size_t count) {
+  constexpr std::size_t kHeadBytes = 8;
+  auto bytes = std::make_shared<std::vector<std::byte>>(count * kHeadBytes);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::byte* head = bytes->data() + i * kHeadBytes;
+    head[0] = std::byte{14 << 3 | 2};  // nested, with a length of 4 bytes
+    head[1] = std::byte{3};
+    store_le(head + 4, static_cast<std::uint32_t>((count - i - 1) * kHeadBytes));
+  }
+  return [bytes] {
+    const proto::Fields fields(*bytes, "message");
+    if (!fields.failed()) wrong("nesting without end is refused");
+  };
+}
+
+/// Names that hash alike wherever a hash multiplies by 31 or by 33 and adds, one beginning for all.
+std::vector<std::string> colliding_names(std::size_t count) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string name = "hall/";
+    for (int bit = 0; bit < 20; ++bit) name += (i >> bit & 1) != 0 ? "Aa" : "BB";
+    name += '-';
+    for (int bit = 0; bit < 20; ++bit) name += (i >> bit & 1) != 0 ? "Ab" : "BA";
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+Work names(std::size_t count) {
+  auto directory = std::make_shared<Directory>();
+  auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
+  return [directory, all] {
+    for (const std::string& name : *all) directory->put(name, 1);
+    for (const std::string& name : *all) {
+      if (!directory->find(name)) wrong("a name was lost");
+    }
+    for (const std::string& name : *all) directory->remove(name);
+  };
+}
+
+/// Subscribed to by a thousand nodes, so that none of them is at its limit.
+Work topics(std::size_t count) {
+  struct World {
+    Limits limits;
+    Services services{HubId{7}, limits};
+    Effects effects;
+  };
+  constexpr std::size_t kPerNode = 100;
+  auto world = std::make_shared<World>();
+  auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
+  return [world, all] {
+    for (std::size_t i = 0; i < all->size(); ++i) {
+      const auto node = static_cast<std::uint32_t>(i / kPerNode + 1);
+      if (!world->services.subscribe(node, (*all)[i], world->effects)) wrong("a subscription was refused");
+    }
+    for (std::size_t node = 1; node <= all->size() / kPerNode; ++node) {
+      world->services.node_left(static_cast<std::uint32_t>(node), milliseconds{0}, world->effects);
+    }
+    world->effects.clear();
+  };
+}
+
+/// The pattern with the most ways to fit, and names that fit none of them but at their last part.
+Work patterns(std::size_t count) {
+  std::string text = "**/a";
+  for (int i = 0; i < 7; ++i) text += "/**/a";
+  std::string name = "a";
+  for (int i = 0; i < 14; ++i) name += "/a";
+  const auto pattern = proto::Pattern::parse(text);
+  return [pattern, name = name + "/b", count] {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (pattern->matches(name)) wrong("that name does not fit");
+    }
+  };
+}
+
+/// One comparison with a pattern of so many parts, and a name of as many.
+Work pattern_parts(std::size_t count) {
+  std::string text = "**";
+  std::string name = "a";
+  for (std::size_t i = 1; i < count; ++i) {
+    text += i % 2 == 0 ? "/**" : "/a";
+    name += "/a";
+  }
+  const auto pattern = proto::Pattern::parse(text);
+  if (!pattern) wrong("at most 16 parts");
+  name.back() = 'b';
+  return [pattern, name] {
+    if (pattern->matches(name) != (name.size() == 1)) wrong("that name does not fit");
+  };
+}
+
+struct Script {
+  std::string_view name;
+  Work (*make)(std::size_t count);
+};
+
+constexpr Script kScripts[] = {
+    {"duplicate_keys", duplicate_keys},
+    {"long_keys", long_keys},
+    {"nested_bomb", nested_bomb},
+    {"names", names},
+    {"topics", topics},
+    {"patterns", patterns},
+    {"pattern_parts", pattern_parts},
+};
+
+int run(std::string_view argument) {
+  const std::size_t colon = argument.find(':');
+  std::size_t count = 0;
+  if (colon != std::string_view::npos) {
+    std::from_chars(argument.data() + colon + 1, argument.data() + argument.size(), count);
+  }
+  for (const Script& script : kScripts) {
+    if (count == 0 || argument.substr(0, colon) != script.name) continue;
+    const Work work = script.make(count);
+    work();
+    counted(work);
+    std::printf("%zu\n", count);
+    return 0;
+  }
+  wrong("say SCRIPT:COUNT");
+}
+
+}  // namespace
+}  // namespace gimnet::hub
+
+int main(int argc, char** argv) {
+  if (argc > 1) return gimnet::hub::run(argv[1]);
+#if defined(__OPTIMIZE__) && defined(NDEBUG)
+  const char* const build = "release";
+#else
+  const char* const build = "other";
+#endif
+  std::printf("%s %s %s\n", __VERSION__, GIMNET_PROCESSOR, build);
+  for (const auto& script : gimnet::hub::kScripts)
+    std::printf("%.*s\n", static_cast<int>(script.name.size()), script.name.data());
+  return 0;
+}
