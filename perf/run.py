@@ -23,7 +23,7 @@ from driver.summary import absence_lines, make_absences, make_rows, text_table  
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
-WHOLE_SECONDS = 1.0
+WHOLE_SECONDS = 0.5
 SMOKE_SECONDS = 0.1
 SMOKE_CLIENTS = 200
 SMOKE_PATIENCE_SECONDS = 30
@@ -73,7 +73,9 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
         return ["valgrind"]
     if arguments.against is not None:
         return []
-    packages = [package for name in chosen_subjects(arguments) for package in catalogue.PACKAGES.get(name, ())]
+    packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
+    if any(case.spec.roles is not None for case in choose_plan(arguments)):
+        packages += [package for name, package in catalogue.LIBRARY_PACKAGES.items() if catalogue.PACKAGES[name] in packages]
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
 

@@ -12,8 +12,8 @@ from driver.suite import Case
 HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": ["--spin"]}
 RIVAL_CLASSES = {rival.name: rival for rival in RIVALS}
 SUBJECTS = ("null", *HUBS, *RIVAL_CLASSES)
-PACKAGES = {"nats": ("nats-server", "libnats-dev"), "mosquitto": ("mosquitto", "libmosquitto-dev"),
-            "redis": ("redis-server",), "zeromq": ("libzmq3-dev",)}
+PACKAGES = {"nats": "nats-server", "mosquitto": "mosquitto", "redis": "redis-server", "zeromq": "libzmq3-dev"}
+LIBRARY_PACKAGES = {"nats": "libnats-dev", "mosquitto": "libmosquitto-dev"}
 NOT_OF_TOPICS = {"list_100": "it has no lists of recipients",
                  "broadcast_100": "it has no broadcast; a topic to which all subscribe is fan_out_100"}
 
@@ -27,7 +27,7 @@ def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
     if case.transport not in RIVAL_CLASSES[name].transports:
         return "it has no Unix socket"
     if case.spec.roles is not None and not (build / "bin" / CLIENTS[name]).exists():
-        return f"{CLIENTS[name]} was not built: no library (package {PACKAGES[name][1]})"
+        return f"{CLIENTS[name]} was not built: no library (package {LIBRARY_PACKAGES[name]})"
     return NOT_OF_TOPICS.get(case.scenario) or RIVAL_CLASSES[name].why_absent(build)
 
 
@@ -54,12 +54,20 @@ def _version_of(command: list[str]) -> str | None:
     return found.group(0) if found else None
 
 
+def _package_version(package: str) -> str | None:
+    return _version_of(["dpkg-query", "-W", "-f=${Version}", package])
+
+
 def rival_versions(names: list[str]) -> dict[str, str]:
     """What of the other hubs is installed, and its version."""
     versions = {}
     for name in names:
+        if name in LIBRARY_PACKAGES:
+            library = LIBRARY_PACKAGES[name].removesuffix("-dev")
+            if (version := _package_version(LIBRARY_PACKAGES[name])) is not None:
+                versions[library] = version
         if name == "zeromq":
-            version = _version_of(["dpkg-query", "-W", "-f=${Version}", "libzmq5"])
+            version = _package_version("libzmq5")
         else:
             rival = RIVAL_CLASSES.get(name)
             program = find_program(rival.program) if rival is not None and issubclass(rival, Rival) else None

@@ -136,9 +136,10 @@ def other_figures(rows: list[dict]) -> str:
     """Memory, rates and times that have no column of their own."""
     names = {"rate_kept": "rate kept", "rss_growth_bytes": "bytes grown by meanwhile",
              "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
-             "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s"}
+             "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s",
+             "cpu_share": "of a processor used"}
     lines = [[row["subject"], row["transport"], row["scenario"], title, shown(row[name])] for row in rows
-             for name, title in names.items() if name in row]
+             for name, title in names.items() if name in row and (name != "cpu_share" or row["scenario"] == "idle_10000")]
     return table(["subject", "transport", "scenario", "figure", "median"], lines)
 
 
@@ -171,7 +172,8 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         "## All figures", "",
         "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
-        "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000.", "",
+        "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000 and join_under_load. Peak bytes are the",
+        "hub's. The CPU of library scenarios is that of hub and programs together, in round trips for each way.", "",
         table([title for _, title in COLUMNS], [cells(row) for row in rows]), "",
         other_figures(rows), "",
         "## Libraries", "",

@@ -47,7 +47,7 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
             return run_pair(subject, case, settings)
     cpus = allowed_cpus()
     command = [str(settings.build / "bin" / "load_generator"), "--wire", subject.wire, "--scenario", case.scenario,
-               "--size", str(case.size), "--seconds", str(settings.seconds),
+               "--size", str(case.size), "--seconds", str(settings.seconds * case.spec.seconds_factor),
                "--patience", str(settings.patience_seconds)]
     if settings.clients is not None:
         command += ["--clients", str(settings.clients)]
@@ -55,7 +55,7 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
         if case.transport in subject.publish_urls:
             command += ["--publish-to", subject.publish_urls[case.transport]]
-        limit = 3 * settings.seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
+        limit = 3 * settings.seconds * case.spec.seconds_factor + 5 * settings.patience_seconds + EXTRA_SECONDS
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
                                   preexec_fn=child_setup([cpus[0] if case.spec.one_cpu else cpus[-1]]))

@@ -74,7 +74,8 @@ def draw_all(rows: list[dict], folder: pathlib.Path) -> list[tuple[str, str]]:
                series_by_subscribers(rows, 16), 10)]
     wanted += [(f"latency_{name}", f"{name}: round trips over TCP", ("round trip, us", "share that takes longer"),
                 series_of_latency(rows, name), 10) for name in ("ping_one_cpu", "ping_two_cpus", "ping_paced",
-                                                                "ping_under_bulk")]
+                                                                "ping_under_bulk", "ping_under_300MBps",
+                                                                "library_round_trip", "library_round_trip_one_cpu")]
     folder.mkdir(parents=True, exist_ok=True)
     drawn = []
     for name, title, axes_titles, series, base in wanted:

@@ -12,6 +12,8 @@ import time
 
 READY_SECONDS = 15
 PR_SET_PDEATHSIG = 1
+# Where the system lets it, a subject may hold so many connections: some refuse what 10,000 and their own files need.
+DESCRIPTORS_MIN = 65_536
 # The hub sets this on every connection; the null relay gets the same.
 SEND_BUFFER_BYTES = 256 * 1024
 
@@ -27,11 +29,16 @@ def allowed_cpus() -> list[int]:
 def child_setup(cpus: list[int]):
     """For subprocess: pins the child, lets it hold many connections, and ends it when this program dies."""
     libc = ctypes.CDLL(None, use_errno=True)
-    _, descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
 
     def set_up():
         os.sched_setaffinity(0, cpus)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
+        for descriptors in (max(hard, DESCRIPTORS_MIN), hard):
+            try:
+                resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
+                break
+            except (OSError, ValueError):
+                pass  # more than the hard limit is root's to give
         libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
     return set_up

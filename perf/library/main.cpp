@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <string>
 
+#include "generator/pattern.hpp"
+#include "generator/process.hpp"
 #include "library/library_client.hpp"
 #include "library/pair.hpp"
 #include "net/socket.hpp"
@@ -44,7 +46,8 @@ int main(int argc, char** argv) {
   const auto client = make_library_client();
   if (role == "receiver") receive_bursts(*client, setup, options);
   if (role == "echo") echo(*client, setup, options);
-  const Findings findings =
+  Findings findings =
       role == "sender" ? send_bursts(*client, setup, options) : make_round_trips(*client, setup, options);
+  findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.hub)));
   std::puts(findings.json().c_str());
 }

@@ -28,7 +28,7 @@ class Suite(unittest.TestCase):
             self.assertEqual(len(cases), len(set(cases)))
             for case in cases:
                 self.assertIn(case.scenario, suite.SCENARIOS)
-                self.assertIn(case.transport, case.spec.transports)
+                self.assertTrue(case.spec.sizes_over(case.transport), f"{case} has no such transport")
 
     def test_smoke_leaves_no_scenario_out(self):
         self.assertEqual({case.scenario for case in suite.smoke_cases()}, set(suite.SCENARIOS))
@@ -41,6 +41,19 @@ class Suite(unittest.TestCase):
         for goal in GOALS:
             case = suite.Case(goal.scenario, goal.size, goal.transport)
             self.assertIn(case, whole if case.spec.roles is not None else quick)
+
+    def test_the_whole_suite_has_every_size_and_the_hub_s_variants_where_they_are_for(self):
+        plan = suite.whole_plan(catalogue.SUBJECTS)
+        self.assertEqual({case.size for case in plan if case.scenario == "one_to_one"}, set(suite.SIZES))
+        self.assertEqual(plan[suite.Case("one_to_one", 16, "tcp")], catalogue.SUBJECTS)
+        self.assertNotIn("tcphub_2_shards", plan[suite.Case("one_to_one", 16, "unix")])
+        self.assertNotIn("tcphub_spinning", plan[suite.Case("fan_out_10", 16, "tcp")])
+        self.assertIn("tcphub_spinning", plan[suite.Case("ping_paced", 16, "tcp")])
+
+    def test_what_is_asked_for_is_measured_on_every_subject(self):
+        plan = suite.chosen_plan(["fan_out_10", "idle_10000"], [256], [], catalogue.SUBJECTS)
+        self.assertEqual(plan, {suite.Case(name, 256, transport): catalogue.SUBJECTS for name, transport in
+                                (("fan_out_10", "tcp"), ("fan_out_10", "unix"), ("idle_10000", "tcp"))})
 
     def test_libraries_are_measured_where_a_hub_has_one(self):
         plan = suite.whole_plan(catalogue.SUBJECTS)
@@ -112,7 +125,8 @@ class Subjects(unittest.TestCase):
     def test_packages_are_those_of_the_subjects(self):
         arguments = run.parse_arguments(["--only", "nats", "--quick"])
         self.assertEqual(run.chosen_subjects(arguments), ("null", "nats"))
-        self.assertEqual(run.needed_packages(arguments), ["nats-server", "libnats-dev"])
+        self.assertEqual(run.needed_packages(arguments), ["nats-server"])
+        self.assertEqual(run.needed_packages(run.parse_arguments(["--only", "nats"])), ["nats-server", "libnats-dev"])
         self.assertEqual(run.needed_packages(run.parse_arguments(["--subjects", "tcphub"])), [])
 
 
