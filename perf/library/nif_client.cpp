@@ -11,7 +11,7 @@
 namespace gimnet::perf {
 namespace {
 
-constexpr std::int32_t kPatienceMs = 10'000;
+constexpr std::int32_t kPatienceMs = 30'000;
 
 void check(nif_status status, const char* what) {
   if (status != NIF_OK) fail(std::string(what) + ": " + nif_error_text());
@@ -27,6 +27,7 @@ class NifClient final : public LibraryClient {
     options.struct_size = sizeof options;
     options.url = setup.url.c_str();
     options.name = setup.own.c_str();
+    options.connect_timeout_ms = kPatienceMs;
     options.no_token_file = 1;
     options.resume = NIF_RESUME_OFF;  // as the others: what breaks with a connection is lost
     options.callback = [](void* self, const nif_incoming* in) {
