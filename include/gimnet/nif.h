@@ -165,6 +165,7 @@ typedef struct nif_info {
   char name[NIF_NAME_BYTES_MAX + 1]; /**< As registered. */
   char hub_name[NIF_NAME_BYTES_MAX + 1];
   uint8_t token_kept; /**< 1: the session token is in a file, see nif_options.no_token_file. */
+  uint8_t ended;      /**< 1: no connection will come any more; nif_last_error() says why. Close the handle. */
 } nif_info;
 
 /** Fills *info. */
@@ -273,7 +274,8 @@ typedef enum nif_incoming_type {
   /** Connected again after a break [from: own node id; flags: NIF_CONNECTED_*]. The library declares services and
    * subscriptions again by itself. Not delivered for the first connection, which nif_connect() made. */
   NIF_CONNECTED = 3,
-  /** The connection broke; unless no_reconnect was set the library dials again [reason: GOODBYE code or 0, text]. */
+  /** The connection broke [reason: GOODBYE code or 0, text; flags: NIF_DISCONNECTED_*]. Unless a flag says otherwise
+   * the library dials again. */
   NIF_DISCONNECTED = 4,
   /** Another connection took the session over; nothing follows [text]. */
   NIF_SESSION_REPLACED = 5,
@@ -301,6 +303,11 @@ typedef enum nif_incoming_type {
 enum {
   NIF_CONNECTED_RESUMED = 0x01, /**< The counts went on: nothing was lost except what NIF_GAPs say. */
   NIF_CONNECTED_SAME_ID = 0x02  /**< The node has its former id. */
+};
+/** Bits of nif_incoming.flags of a NIF_DISCONNECTED. */
+enum {
+  /** The node was kicked, or no_reconnect is set: no connection will come any more, and nothing follows. */
+  NIF_DISCONNECTED_FOR_GOOD = 0x01
 };
 /** Bits of nif_incoming.flags of a NIF_MESSAGE: NIF_FLAG_REPORT, NIF_FLAG_KEYED. */
 

@@ -100,7 +100,8 @@ bool Node::take_over(Admitted admitted, bool first) {
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
   last_heard_ns_ = last_tick_ns_ = steady_now_ns();
-  tokens_.keep(admitted.address, session_.token);
+  address_ = std::move(admitted.address);
+  keep_token();
   {
     const MutexLock lock(mutex_);
     info_.id = session_.id;
@@ -111,8 +112,6 @@ bool Node::take_over(Admitted admitted, bool first) {
     info_.frame_bytes_max = session_.frame_bytes_max;
     copy_text(info_.name, sizeof info_.name, session_.name);
     copy_text(info_.hub_name, sizeof info_.hub_name, session_.hub_name);
-    info_.token_kept = tokens_.kept() ? 1 : 0;
-    if (!tokens_.fault().empty()) last_error_ = tokens_.fault();
     if (!session_.earlier_goodbye.empty()) last_error_ = session_.earlier_goodbye;
   }
   if (!first) {
@@ -141,6 +140,13 @@ bool Node::take_over(Admitted admitted, bool first) {
   }
   const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), wall_now_ns());
   return verdict == Inbound::Verdict::going;
+}
+
+void Node::keep_token() {
+  tokens_.keep(address_, session_.token);
+  const MutexLock lock(mutex_);
+  info_.token_kept = tokens_.kept() ? 1 : 0;
+  if (!tokens_.fault().empty()) last_error_ = tokens_.fault();
 }
 
 void Node::push_event(Record* record) {
@@ -211,7 +217,9 @@ void Node::take_new_name() {
     session_.token = std::move(new_name_->token);
     new_name_.reset();
   }
-  tokens_.forget();  // a program that is started again asks for its first name, which that token is not for
+  // The token is for the new name: a program that is started again under the former one could not use it.
+  tokens_.rename(name_);
+  keep_token();
   declarations_.declare_again();
 }
 
@@ -300,7 +308,7 @@ void Node::deliver_again() {
 
 void Node::begin_close() {
   closing_.store(true);
-  outbound_.end(NIF_CLOSED);
+  outbound_.end({NIF_CLOSED, "the handle was closed"});
   received_.close();
   requests_.close();
   clock_.clear();

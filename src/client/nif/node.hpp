@@ -92,11 +92,14 @@ class Node final : private InboundHost {
   void redial();
   void disconnect(std::string why, proto::GoodbyeCode code);
   void on_goodbye(const proto::Goodbye& goodbye);
-  void end(nif_status status);
+  [[nodiscard]] std::optional<Failure> ending_of(const std::string& why, proto::GoodbyeCode code) const;
+  void set_disconnected(const std::string& why, bool for_good) GIMNET_EXCLUDES(mutex_);
+  void end(const Failure& failure, std::string why, proto::GoodbyeCode code) GIMNET_EXCLUDES(mutex_);
   void leave();
 
   [[nodiscard]] proto::Hello hello() const;
   void take_new_name() GIMNET_EXCLUDES(mutex_);
+  void keep_token() GIMNET_EXCLUDES(mutex_);
   /// False: the hub's counts are impossible.
   [[nodiscard]] bool take_over(Admitted admitted, bool first);
   void set_last_error(std::string sentence) GIMNET_EXCLUDES(mutex_);
@@ -136,7 +139,8 @@ class Node final : private InboundHost {
   TokenStore tokens_;
   Socket socket_;
   Session session_;
-  std::string name_;  ///< to ask for
+  std::string address_;  ///< of the hub that admitted it last, as a URL
+  std::string name_;     ///< to ask for
   Backoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;

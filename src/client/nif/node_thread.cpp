@@ -186,7 +186,9 @@ void Node::redial() {
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);
-    if (admitted.error().status == NIF_REPLACED) end(NIF_REPLACED);
+    // Who dials only because it was given another id (`renumbered`) has one try.
+    const bool again = options_.reconnect && admitted.error().status != NIF_REPLACED;
+    if (!again) end(admitted.error(), admitted.error().sentence, proto::GoodbyeCode::done);
     return;
   }
   if (!take_over(std::move(*admitted), false)) {
@@ -202,46 +204,65 @@ void Node::on_goodbye(const proto::Goodbye& goodbye) {
   std::string why = std::string("the hub said goodbye: ") + proto::goodbye_name(goodbye.code);
   if (!goodbye.sentence.empty()) why += ": " + goodbye.sentence;
   disconnect(std::move(why), goodbye.code);
-  if (goodbye.code == proto::GoodbyeCode::replaced) end(NIF_REPLACED);
+}
+
+/// What calls answer where no connection follows one that ended so; nothing: the library dials again.
+std::optional<Failure> Node::ending_of(const std::string& why, proto::GoodbyeCode code) const {
+  switch (code) {
+    case proto::GoodbyeCode::replaced:
+      return Failure{NIF_REPLACED, why + "; end the other program, or connect under another name"};
+    case proto::GoodbyeCode::kicked:
+      return Failure{NIF_REFUSED, why};
+    case proto::GoodbyeCode::renumbered:
+      return std::nullopt;  // not told to go: it comes back whatever else it does at a break
+    default:
+      if (options_.reconnect) return std::nullopt;
+      return Failure{NIF_NOT_CONNECTED, why};
+  }
 }
 
 void Node::disconnect(std::string why, proto::GoodbyeCode code) {
-  const bool replaced = code == proto::GoodbyeCode::replaced;
-  const bool kicked = code == proto::GoodbyeCode::kicked;
-  // Who was given another id is not told to go: it comes back whatever else it does at a break.
-  const bool renumbered = code == proto::GoodbyeCode::renumbered;
-  const bool again = (options_.reconnect || renumbered) && !replaced && !kicked;
-  outbound_.detach(again);
+  const std::optional<Failure> ending = ending_of(why, code);
+  outbound_.detach(!ending);
   socket_.close();
   requests_.fail_all();
   names_.clear();
   clock_.clear();
-  {
-    const MutexLock lock(mutex_);
-    info_.connected = 0;
-    last_error_ = why;
-  }
-  Record* event = make_event(replaced ? NIF_SESSION_REPLACED : NIF_DISCONNECTED, std::move(why));
-  event->incoming.reason = static_cast<std::uint32_t>(code);
-  push_event(event);
-  if (kicked) {
-    end(NIF_REFUSED);
-  } else if (!again && !replaced) {
-    end(NIF_NOT_CONNECTED);
+  set_disconnected(ending ? ending->sentence : why, ending.has_value());
+  if (ending) {
+    end(*ending, std::move(why), code);
+  } else {
+    Record* event = make_event(NIF_DISCONNECTED, std::move(why));
+    event->incoming.reason = static_cast<std::uint32_t>(code);
+    push_event(event);
   }
   call_back();
 }
 
-void Node::end(nif_status status) {
+void Node::set_disconnected(const std::string& why, bool for_good) {
+  const MutexLock lock(mutex_);
+  info_.connected = 0;
+  info_.ended = for_good ? 1 : 0;
+  last_error_ = why;
+}
+
+/// The last event, and what calls answer from now on.
+void Node::end(const Failure& failure, std::string why, proto::GoodbyeCode code) {
   ended_ = true;
   tokens_.release();
+  const bool replaced = failure.status == NIF_REPLACED;
   {
     const MutexLock lock(mutex_);
     info_.token_kept = 0;
-    info_.replaced = status == NIF_REPLACED ? 1 : 0;
+    info_.replaced = replaced ? 1 : 0;
+    info_.ended = 1;
   }
-  outbound_.end(status);
-  received_.end(status);
+  Record* event = make_event(replaced ? NIF_SESSION_REPLACED : NIF_DISCONNECTED, std::move(why));
+  event->incoming.reason = static_cast<std::uint32_t>(code);
+  event->incoming.flags = replaced ? 0 : NIF_DISCONNECTED_FOR_GOOD;
+  push_event(event);
+  outbound_.end(failure);
+  received_.end(failure);
 }
 
 /// The last words: what waits, then GOODBYE, and then nothing is sent, but what the hub still says is read, so that

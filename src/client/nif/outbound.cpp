@@ -151,11 +151,11 @@ void Outbound::detach(bool again) {
   changed_.notify_all();
 }
 
-void Outbound::end(nif_status status) {
+void Outbound::end(const Failure& failure) {
   const MutexLock lock(mutex_);
-  if (state_ == State::ended && status != NIF_CLOSED) return;
+  if (state_ == State::ended && failure.status != NIF_CLOSED) return;
   state_ = State::ended;
-  end_status_ = status;
+  end_ = failure;
   changed_.notify_all();
 }
 

@@ -54,8 +54,8 @@ class Outbound {
   [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session) GIMNET_EXCLUDES(mutex_);
   /// The connection broke; `again`: another one will come. When this returns nobody uses the socket any more.
   void detach(bool again) GIMNET_EXCLUDES(mutex_);
-  /// No connection will come any more: what waits answers `status`.
-  void end(nif_status status) GIMNET_EXCLUDES(mutex_);
+  /// No connection will come any more: what waits answers with this.
+  void end(const Failure& failure) GIMNET_EXCLUDES(mutex_);
   /// Writes what waits, as far as the kernel takes it. `writable`: it has room again after it was full.
   void write_pending(bool writable) GIMNET_EXCLUDES(mutex_);
   /// The handle closes: what waits, a CONFIRM of the frames `taken` so far (0: none), and then this frame, are the last
@@ -132,7 +132,7 @@ class Outbound {
   Mutex mutex_;
   Condition changed_;
   State state_ GIMNET_GUARDED_BY(mutex_) = State::away;
-  nif_status end_status_ GIMNET_GUARDED_BY(mutex_) = NIF_NOT_CONNECTED;
+  Failure end_ GIMNET_GUARDED_BY(mutex_);  ///< of State::ended
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew

@@ -82,18 +82,7 @@ bool Outbound::write_here() {
 }
 
 nif_status Outbound::not_connected() const {
-  if (state_ == State::ended) {
-    switch (end_status_) {
-      case NIF_CLOSED:
-        return fail(NIF_CLOSED, "the handle was closed");
-      case NIF_REPLACED:
-        return fail(NIF_REPLACED, "another connection took this session over");
-      case NIF_REFUSED:
-        return fail(NIF_REFUSED, "an administrator of the hub ended this session; nif_last_error() has their words");
-      default:
-        return fail(end_status_, "the connection broke, and nif_options.no_reconnect is set");
-    }
-  }
+  if (state_ == State::ended) return fail(end_);
   return fail(NIF_NOT_CONNECTED, "the connection is broken; the library is dialing again");
 }
 

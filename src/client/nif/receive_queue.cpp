@@ -11,19 +11,6 @@ constexpr std::size_t kItemsAtOnce = 64;
 
 std::size_t cost(const Item& item) { return item.bytes + sizeof(Item); }
 
-nif_status end_answer(nif_status status) {
-  switch (status) {
-    case NIF_REPLACED:
-      return fail(NIF_REPLACED, "another connection took this session over");
-    case NIF_REFUSED:
-      return fail(NIF_REFUSED, "an administrator of the hub ended this session; nif_last_error() has their words");
-    case NIF_CLOSED:
-      return fail(NIF_CLOSED, "the handle was closed");
-    default:
-      return fail(status, "the connection broke, and nif_options.no_reconnect is set");
-  }
-}
-
 }  // namespace
 
 ReceiveQueue::~ReceiveQueue() {
@@ -60,7 +47,7 @@ Item ReceiveQueue::take_first() {
 }
 
 void ReceiveQueue::after_removal() {
-  if (items_.empty() && event_ && end_status_ == NIF_OK) event_->clear();
+  if (items_.empty() && event_ && end_.status == NIF_OK) event_->clear();
   if (stopped_ && (items_.empty() || bytes_ < bytes_max_ / 2)) {
     stopped_ = false;
     room_.raise();
@@ -74,8 +61,8 @@ nif_status ReceiveQueue::pop(std::span<nif_incoming> in, std::size_t& count, Dea
   {
     const MutexLock lock(mutex_);
     while (items_.empty() || closed_) {
-      if (closed_) return end_answer(NIF_CLOSED);
-      if (end_status_ != NIF_OK) return end_answer(end_status_);
+      if (closed_) return fail(NIF_CLOSED, "the handle was closed");
+      if (end_.status != NIF_OK) return fail(end_);
       if (deadline != kNever && steady_now_ns() >= deadline) return NIF_TIMEOUT;
       static_cast<void>(filled_.wait_until(mutex_, deadline));
     }
@@ -100,9 +87,9 @@ void ReceiveQueue::give_back(std::span<const Item> items) {
   after_removal();
 }
 
-void ReceiveQueue::end(nif_status status) {
+void ReceiveQueue::end(const Failure& failure) {
   const MutexLock lock(mutex_);
-  end_status_ = status;
+  end_ = failure;
   if (event_) event_->raise();
   filled_.notify_all();
 }
@@ -117,7 +104,7 @@ Descriptor ReceiveQueue::event_descriptor() {
   const MutexLock lock(mutex_);
   if (!event_) {
     event_ = std::make_unique<WakeSignal>();
-    if (!items_.empty() || end_status_ != NIF_OK) event_->raise();
+    if (!items_.empty() || end_.status != NIF_OK) event_->raise();
   }
   return event_->descriptor();
 }

@@ -28,7 +28,7 @@ class ReceiveQueue {
   /// message.
   [[nodiscard]] bool has_room() GIMNET_EXCLUDES(mutex_);
 
-  /// Waits for the first; NIF_OK and at least one, or NIF_TIMEOUT, or what end() was given.
+  /// Waits for the first; NIF_OK and at least one, or NIF_TIMEOUT, NIF_CLOSED, or what end() was given.
   [[nodiscard]] nif_status pop(std::span<nif_incoming> in, std::size_t& count, Deadline deadline)
       GIMNET_EXCLUDES(mutex_);
 
@@ -38,8 +38,8 @@ class ReceiveQueue {
   [[nodiscard]] std::size_t take(std::span<Item> items) GIMNET_EXCLUDES(mutex_);
   void give_back(std::span<const Item> items) GIMNET_EXCLUDES(mutex_);
 
-  /// Nothing more will come: when it is empty, pop() answers `status`.
-  void end(nif_status status) GIMNET_EXCLUDES(mutex_);
+  /// Nothing more will come: when it is empty, pop() answers with this.
+  void end(const Failure& failure) GIMNET_EXCLUDES(mutex_);
   /// Everybody who waits, and all that come later, answer NIF_CLOSED at once.
   void close() GIMNET_EXCLUDES(mutex_);
 
@@ -61,7 +61,7 @@ class ReceiveQueue {
   std::size_t bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool stopped_ GIMNET_GUARDED_BY(mutex_) = false;
   bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
-  nif_status end_status_ GIMNET_GUARDED_BY(mutex_) = NIF_OK;
+  Failure end_ GIMNET_GUARDED_BY(mutex_);  ///< NIF_OK: more may come
   std::unique_ptr<WakeSignal> event_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t stops_ GIMNET_GUARDED_BY(mutex_) = 0;
 };

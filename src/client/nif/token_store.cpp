@@ -7,7 +7,7 @@
 
 namespace gimnet::nif {
 
-TokenStore::TokenStore(std::string name, bool enabled) : name_(std::move(name)), enabled_(enabled && !name_.empty()) {}
+TokenStore::TokenStore(std::string name, bool enabled) : name_(std::move(name)), wanted_(enabled) {}
 
 TokenStore::~TokenStore() = default;
 
@@ -21,7 +21,7 @@ std::vector<std::byte> TokenStore::find(const std::string& address) {
 }
 
 void TokenStore::keep(const std::string& address, const std::vector<std::byte>& token) {
-  if (!enabled_) return;
+  if (!enabled()) return;
   kept_ = false;
   if (file_.is_open() && address_ != address) forget();
   if (!open(address, true)) return;
@@ -40,13 +40,19 @@ void TokenStore::forget() {
   kept_ = false;
 }
 
+void TokenStore::rename(std::string name) {
+  forget();
+  fault_.clear();
+  name_ = std::move(name);
+}
+
 void TokenStore::release() {
   file_.close();
   kept_ = false;
 }
 
 bool TokenStore::open(const std::string& address, bool made) {
-  if (!enabled_) return false;
+  if (!enabled()) return false;
   if (file_.is_open() && address_ == address) return true;
   file_.close();
   if (folder_ == nullptr || !folder_->fault().empty()) folder_ = std::make_unique<PrivateFolder>();

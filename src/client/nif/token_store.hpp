@@ -27,6 +27,9 @@ class TokenStore {
   void keep(const std::string& address, const std::vector<std::byte>& token);
   /// The session is over: nobody is to find the token.
   void forget();
+  /// The node has another name now, "" for none: the file of the former one goes, and what keep() is given next stands
+  /// in that of the new one.
+  void rename(std::string name);
   /// Others may have the token from now on.
   void release();
 
@@ -38,9 +41,10 @@ class TokenStore {
  private:
   /// Opens the file for that address, unless it is open. `made`: makes it if there is none.
   [[nodiscard]] bool open(const std::string& address, bool made);
+  [[nodiscard]] bool enabled() const { return wanted_ && !name_.empty(); }
 
-  const std::string name_;
-  const bool enabled_;
+  std::string name_;
+  const bool wanted_;
   std::unique_ptr<PrivateFolder> folder_;  ///< opened when it is first needed
   LockedFile file_;
   std::string address_;  ///< for which it is open

@@ -252,6 +252,47 @@ TEST(Node, DoesNotComeBackWhenItWasReplaced) {
   EXPECT_GT(nif_last_error(node, sentence, sizeof sentence), 0u);
 }
 
+TEST(Node, DoesNotComeBackWhenItWasKicked) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome());
+  nif_node* const node = connected.node.get();
+  connected.hub.send_unicast(kPeerId, kOwnId, "before");
+  connected.hub.goodbye(proto::GoodbyeCode::kicked, "it stands in the way");
+  static_cast<void>(expect(node, NIF_MESSAGE));
+  const nif_incoming last = expect(node, NIF_DISCONNECTED);
+  EXPECT_EQ(last.flags, NIF_DISCONNECTED_FOR_GOOD);
+  EXPECT_EQ(last.reason, static_cast<std::uint32_t>(proto::GoodbyeCode::kicked));
+  nif_incoming in;
+  EXPECT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_REFUSED);
+  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos) << nif_error_text();
+  EXPECT_EQ(nif_send_to(node, kPeerId, "", 0), NIF_REFUSED);
+  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos) << nif_error_text();
+  std::uint32_t id = 0;
+  EXPECT_EQ(nif_resolve(node, "other", &id, NIF_FOREVER), NIF_REFUSED);
+  EXPECT_EQ(info_of(node).ended, 1);
+  EXPECT_EQ(info_of(node).connected, 0);
+  // The next connection of the hub is another node's: this one has not dialed again.
+  EXPECT_EQ(connect_to(hub, default_options("other"), make_welcome()).hello.name, "other");
+}
+
+TEST(Node, ARenumberedOneThatMayNotReconnectHasOneTry) {
+  FakeHub hub;
+  nif_options options = default_options("robot");
+  options.no_reconnect = 1;
+  Connected connected = connect_to(hub, options, make_welcome());
+  connected.hub.goodbye(proto::GoodbyeCode::renumbered, "another id");
+  FakeConnection again = hub.accept();
+  ASSERT_TRUE(again.read_hello());
+  EXPECT_EQ(expect(connected.node.get(), NIF_DISCONNECTED).flags, 0);
+  EXPECT_EQ(info_of(connected.node.get()).ended, 0);
+  again.send(proto::kOpening);
+  again.goodbye(proto::GoodbyeCode::hub_full, "no room");
+  EXPECT_EQ(expect(connected.node.get(), NIF_DISCONNECTED).flags, NIF_DISCONNECTED_FOR_GOOD);
+  nif_incoming in;
+  EXPECT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_HUB_FULL);
+  EXPECT_EQ(info_of(connected.node.get()).ended, 1);
+}
+
 TEST(Node, WithoutReconnectCallsSayThatItIsOver) {
   FakeHub hub;
   nif_options options = default_options();

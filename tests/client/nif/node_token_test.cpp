@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include "proto/control/ns_register.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/runtime_folder.hpp"
 
@@ -114,6 +115,51 @@ TEST(NodeToken, AReplacedNodeLetsItGoAndStaysAway) {
   EXPECT_EQ(info_of(first.node.get()).token_kept, 0);
   // The next connection of the hub is this one: the replaced node has not dialed again.
   EXPECT_EQ(connect_to(hub, keeping("robot"), make_welcome()).hello.token, make_welcome().token);
+}
+
+/// Has the node ask for a name, and gives it.
+void rename(Connected& connected, const char* name, const std::vector<std::byte>& token) {
+  std::thread asking([&] { EXPECT_EQ(nif_register(connected.node.get(), name, nullptr, NIF_FOREVER), NIF_OK); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(connected.hub.next_request<proto::ns::RegisterName>(number));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(proto::ns::RegisterNameAnswer{name, false, token}, number));
+  asking.join();
+  while (info_of(connected.node.get()).token_kept == 0) std::this_thread::yield();
+}
+
+TEST(NodeToken, FollowsTheNodeToItsNewName) {
+  const RuntimeFolder runtime;
+  FakeHub hub;
+  const std::vector<std::byte> token(20, std::byte{7});
+  {
+    Connected connected = connect_to(hub, keeping("robot"), make_welcome());
+    rename(connected, "forklift", token);
+    connected.hub.close();  // GOODBYE cannot be said: as if the program was killed
+    nif_incoming in{};
+    ASSERT_EQ(nif_receive(connected.node.get(), &in, 20'000), NIF_OK);
+    EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_DISCONNECTED));
+    nif_release(&in);
+  }
+  EXPECT_TRUE(connect_to(hub, keeping("robot"), make_welcome()).hello.token.empty());
+  EXPECT_EQ(connect_to(hub, keeping("forklift"), make_welcome()).hello.token, token);
+}
+
+TEST(NodeToken, ANodeThatTakesItsFirstNameLaterKeepsItsTokenFromThenOn) {
+  const RuntimeFolder runtime;
+  FakeHub hub;
+  Connected connected = connect_to(hub, keeping(nullptr), make_welcome());
+  EXPECT_FALSE(has_files(runtime));
+  rename(connected, "robot", std::vector<std::byte>(20, std::byte{8}));
+  EXPECT_TRUE(has_files(runtime));
+  std::thread asking([&] { EXPECT_EQ(nif_unregister(connected.node.get(), NIF_FOREVER), NIF_OK); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(connected.hub.next_request<proto::ns::UnregisterName>(number));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(proto::ns::UnregisterNameAnswer{{std::byte{9}}}, number));
+  asking.join();
+  while (has_files(runtime)) std::this_thread::yield();
+  EXPECT_EQ(info_of(connected.node.get()).token_kept, 0);
 }
 
 TEST(NodeToken, CanBeSwitchedOff) {

@@ -88,7 +88,7 @@ TEST(ReceiveQueue, WaitersGetWhatComesOrTheEnd) {
   push(queue, "late");
   waiting.join();
   push(queue, "last");
-  queue.end(NIF_REPLACED);
+  queue.end({NIF_REPLACED, "taken over"});
   EXPECT_EQ(pop(queue, kNever), "last") << "what came before the end still comes";
   nif_incoming in;
   std::size_t count = 0;

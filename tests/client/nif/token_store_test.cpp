@@ -74,6 +74,30 @@ TEST(TokenStore, AnotherHubsTokenTakesThePlaceOfTheFirst) {
   EXPECT_EQ(TokenStore("robot", true).find(kOtherHub), token(2));
 }
 
+TEST(TokenStore, ANewNameHasAFileOfItsOwnAndTheFormerGoes) {
+  const RuntimeFolder runtime;
+  TokenStore store("robot", true);
+  store.keep(kHub, token(1));
+  store.rename("forklift");
+  EXPECT_FALSE(store.kept());
+  EXPECT_EQ(files_in(runtime.tokens()), 0u);
+  store.keep(kHub, token(2));
+  EXPECT_TRUE(store.kept());
+  TokenStore rival("forklift", true);
+  EXPECT_TRUE(rival.find(kHub).empty()) << "locked";
+  TokenStore next("robot", true);
+  next.keep(kHub, token(3));
+  EXPECT_TRUE(next.kept()) << "the former name is free for another";
+  store.rename("");
+  store.keep(kHub, token(4));
+  EXPECT_FALSE(store.kept());
+  EXPECT_EQ(files_in(runtime.tokens()), 1u) << "the other one's";
+  store.rename("lifter");
+  store.keep(kHub, token(5));
+  store.release();
+  EXPECT_EQ(TokenStore("lifter", true).find(kHub), token(5));
+}
+
 TEST(TokenStore, NamelessNodesAndThoseThatDoNotWantItKeepNothing) {
   const RuntimeFolder runtime;
   for (const auto& [name, enabled] : {std::pair{"", true}, std::pair{"robot", false}}) {
