@@ -25,8 +25,11 @@
 //
 // Errors: calls answer with an Outcome; those that throw instead are marked, and `.or_throw()` turns any into throwing.
 // Thread safety: every function of every class may be called from any thread at any time, on one object from many.
-// Lifetime: Senders, Publishers, Subscriptions and Queues are handles that can be copied and may outlive their Node;
-// when it is closed they answer Status::closed.
+// Lifetime: Senders, Publishers, Subscriptions, Queues and Watches are handles that can be copied and may outlive their
+// Node; when it is closed they answer Status::closed. Where no connection will come any more (the node was kicked, or
+// replaced by another connection of its session, or does not reconnect) everything answers Status::refused or, without
+// reconnecting, Status::not_connected, and the sentence says why; what was received before still comes.
+// Times: all that wait take a Timeout in ms and wait for at most that; kForever has no limit, kNoWait does not wait.
 // Callbacks: there are none. Received messages wait in queues, which the program empties when it has time.
 
 namespace gimnet {
@@ -73,20 +76,26 @@ struct SendCounts {
   std::string loss;           ///< why the last one was lost, in words; "" if none was
 };
 
-/// A stream of messages to one node with one key. Several Senders of one (peer, key) of a node are one stream: they
-/// share sequence, window and counts; the options of the first hold.
+/// A stream of messages with one key, to one node or to whoever accepts one service. Several Senders of one (peer,
+/// key), or of one service, of a node are one stream: they share sequence, window and counts; the options of the first
+/// hold. One to a service follows it: while nobody has the service, send() answers not_found; when it is back, under
+/// whichever node and group, messages go there. What was not acknowledged at its former place counts as lost.
 class Sender {
  public:
-  /// Sends. Ok: it is on its way; of a synchronized stream, settle() and counts() tell what became of it. Waits while
-  /// the window is full (AtFullWindow::wait) or the hub has paused the destination.
-  /// Errors: timeout (nothing was sent), window_full, not_connected, not_delivered, too_large, closed.
+  /// Sends 0 bytes to 1 GiB. Ok: it is on its way; of a synchronized stream, settle() and counts() tell what became of
+  /// it. Waits while the window is full (AtFullWindow::wait) or the hub has paused the destination.
+  /// Errors: timeout (nothing was sent), window_full, not_found (a service that nobody has), not_connected, refused,
+  /// not_delivered, too_large, closed.
   Outcome<void> send(BytesView data, Timeout timeout = kForever, More more = More::no) const;
   /// Waits until nothing is unacknowledged. Ok: all that was sent so far was acknowledged.
   /// Errors: not_delivered (the sentence says how many were lost and why), timeout, closed.
   Outcome<void> settle(Timeout timeout = kForever) const;
 
   [[nodiscard]] SendCounts counts() const;
+  /// The node; nobody (id 0) of a stream to a service.
   [[nodiscard]] Peer peer() const;
+  /// The service by its full name; "" of a stream to a node. Valid until: the last Sender of the stream goes.
+  [[nodiscard]] const std::string& service() const;
 
  private:
   friend class Node;
@@ -102,7 +111,7 @@ class Publisher {
   [[nodiscard]] std::size_t subscribers() const;
   /// Waits until there are that many. Errors: timeout, closed.
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
-  [[nodiscard]] const std::string& name() const;  ///< in full
+  [[nodiscard]] std::string name() const;         ///< in full, as it is now: another one after Node::take_name()
   [[nodiscard]] std::uint64_t published() const;  ///< messages given to publish() that answered ok
 
  private:
@@ -155,6 +164,7 @@ struct NodeState {
   std::string hub_name;
   std::uint32_t hub_id = 0;
   bool connected = false;
+  bool ended = false;  ///< it will not connect again; `trouble` says why
   std::uint32_t reconnects = 0;
   std::int64_t hub_round_trip_ns = 0;    ///< 0: not measured yet
   std::int64_t hub_clock_offset_ns = 0;  ///< hub's clock minus this one
@@ -187,8 +197,12 @@ class Node {
   Outcome<Sender> sender(Peer to, const SendOptions& options = {}) const;
   /// To a name or an id as text (`7.17`). Errors: as find().
   Outcome<Sender> sender(std::string_view to, const SendOptions& options = {}, Timeout timeout = Timeout{5000}) const;
-  /// To who accepts the service of that full name, with its key. Errors: not_found, timeout, not_connected.
-  Outcome<Sender> sender_to_service(std::string_view full_name, SendOptions options = {},
+  /// To who accepts the service of that full name, with its key (SendOptions::key counts for nothing). Every node of
+  /// the network may send there; the hub of the service routes it (kind SERVICE, docs/protocol.md, section 2). The node
+  /// follows the service until it is closed, as one of its subscribers.
+  /// Errors: not_found (no such service at the moment, or one that gives data), bad_name, bad_argument, limit, timeout,
+  /// not_connected.
+  Outcome<Sender> sender_to_service(std::string_view full_name, const SendOptions& options = {},
                                     Timeout timeout = Timeout{5000}) const;
   /// Sends one message; sender() and Sender::send() in one.
   Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {}, Timeout timeout = kForever) const;

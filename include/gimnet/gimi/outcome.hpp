@@ -25,7 +25,7 @@ enum class Status : std::uint8_t {
   bad_version,    ///< The hub speaks another major version of the protocol.
   name_taken,     ///< Another live node holds the name.
   bad_name,       ///< The name breaks the rules (docs/protocol.md, section 8).
-  refused,        ///< The hub is full, draining, or closed the session.
+  refused,        ///< The hub is full, draining, or ended the session: kicked, or replaced by another connection.
   not_found,      ///< No node or service of that name.
   taken,          ///< This node has such a service already.
   denied,         ///< This node may not do that.

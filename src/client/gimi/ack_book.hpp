@@ -9,17 +9,20 @@
 
 namespace gimnet::gimi {
 
-/// One stream as a table names it: the other node, and the key.
+/// One stream as a table names it: the other node, the key, and of one to a service its group. A sender that does not
+/// know who has the service names nobody.
 struct StreamName {
   Peer peer;
   MessageKey key;
+  std::uint32_t group = 0;
   friend bool operator==(const StreamName&, const StreamName&) = default;
 };
 struct StreamNameHash {
   std::size_t operator()(const StreamName& name) const noexcept {
     const std::uint64_t key = name.key.type | (static_cast<std::uint64_t>(name.key.instance) << 32);
     // Fibonacci hashing: ids and keys are small numbers that differ in their low bits.
-    return static_cast<std::size_t>((key ^ (static_cast<std::uint64_t>(name.peer.id) << 17)) * 0x9E3779B97F4A7C15u);
+    const std::uint64_t ids = (static_cast<std::uint64_t>(name.peer.id) << 17) ^ (std::uint64_t{name.group} << 31);
+    return static_cast<std::size_t>((key ^ ids) * 0x9E3779B97F4A7C15u);
   }
 };
 

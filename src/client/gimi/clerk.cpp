@@ -49,8 +49,9 @@ nif_status Clerk::acknowledge(const StreamName& sender, Lane lane, std::uint32_t
     const MutexLock lock(mutex_);
     entry = book_.acknowledge(sender);
   }
-  std::array<std::byte, proto::gimi::kAckSize> data;
-  proto::gimi::encode_ack({entry.bitmap, pong}, data);
+  std::array<std::byte, proto::gimi::kAckSizeMax> memory;
+  const std::size_t size = proto::gimi::encode_ack({entry.bitmap, pong, sender.group}, memory);
+  const std::span<const std::byte> data = std::span(memory).first(size);
   const Envelope envelope{sender.peer.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, sender.key, 0, 0};
   return uplink_.transmit(envelope, {entry.sequence, proto::gimi::Operation::ack, 0, 0}, false, data, 0);
 }

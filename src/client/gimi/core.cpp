@@ -19,10 +19,18 @@ namespace {
 /// What the GIMI header and its extension may add to the application's bytes.
 constexpr std::size_t kHeaderRoom = 1024;
 
-StreamName stream_of(const nif_incoming& in, std::uint32_t peer) {
+StreamName stream_of(const nif_incoming& in, std::uint32_t peer, std::uint32_t group) {
   const auto key = proto::gimi::StreamKey::of(in.key);
-  return {Peer{peer}, {key.type, key.instance}};
+  return {Peer{peer}, {key.type, key.instance}, group};
 }
+
+/// As its receiver names it.
+StreamName received_stream_of(const nif_incoming& in) {
+  return stream_of(in, in.from, in.kind == NIF_SERVICE ? in.to : 0);
+}
+
+/// Somebody sent it to this node, or to a service of it.
+bool is_for_one(const nif_incoming& in) { return in.kind == NIF_UNICAST || in.kind == NIF_SERVICE; }
 
 std::span<const std::byte> payload_of(const nif_incoming& in) {
   return {static_cast<const std::byte*>(in.payload), in.size};
@@ -68,10 +76,10 @@ Core::Core(const NodeOptions& options)
             static_cast<void>(nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
           }),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
-      services_(uplink_, inbox_),
+      services_(uplink_, inbox_,
+                [this](const std::string& name, const ServicePlace& place) { streams_.on_service_moved(name, place); }),
       watches_(uplink_),
-      clerk_(uplink_, streams_),
-      reconnects_(options.reconnect) {}
+      clerk_(uplink_, streams_) {}
 
 Core::~Core() { close(); }
 
@@ -117,12 +125,17 @@ nif_status Core::connect(const NodeOptions& options) {
 void Core::close() {
   if (closed_.exchange(true)) return;
   clerk_.stop();
-  inbox_.close();
-  streams_.close();
-  services_.close();
-  watches_.close();
-  pings_.close();
+  end(Ending::closed());
   static_cast<void>(nif_close(node()));
+}
+
+/// Everybody who waits leaves, and who comes later does not wait.
+void Core::end(const Ending& ending) {
+  inbox_.end(ending);
+  streams_.end(ending);
+  services_.end(ending);
+  watches_.end(ending);
+  pings_.end(ending);
 }
 
 NodeState Core::state() const {
@@ -135,6 +148,7 @@ NodeState Core::state() const {
   state.hub_name = info.hub_name;
   state.hub_id = info.hub_id;
   state.connected = info.connected != 0;
+  state.ended = info.ended != 0;
   state.reconnects = info.reconnects;
   if (info.keep_alive_seen != 0) {
     state.hub_round_trip_ns = info.round_trip_ns;
@@ -185,9 +199,12 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SUBSCRIBER_LEFT:
       return verdict_of(services_.on_subscribers(in.group, in.count));
     case NIF_SERVICE_MOVED:
-      return verdict_of(services_.on_service_moved(in.text, in.group));
+      return verdict_of(services_.on_service_moved(in.text, {in.group, {in.message_type, in.instance}}));
     case NIF_OWN_SERVICE_MOVED:
       services_.on_own_service_moved(in.text, in.group);
+      return NIF_DONE;
+    case NIF_NAME_LOST:
+      on_renamed();
       return NIF_DONE;
     case NIF_WATCHED:
       return watches_.on_watched(in) ? NIF_DONE : NIF_NOT_NOW;
@@ -223,10 +240,10 @@ nif_verdict Core::on_message(const nif_incoming& in) {
 
 nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
   if (in.kind == NIF_GROUP) return on_group_data(in, view);
-  const StreamName name = stream_of(in, in.from);
+  const StreamName name = received_stream_of(in);
   Message message = MessageAccess::make(in, view, nullptr);
   AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header.sequence);
-  const bool wanted = in.kind == NIF_UNICAST && view.header.has(proto::gimi::kFlagAckWanted);
+  const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
   if (inbox_.put(name.key, message, wanted ? &receipt : nullptr)) return NIF_KEEP;
   MessageAccess::disown(message);
   return NIF_NOT_NOW;
@@ -248,12 +265,12 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
 
 void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto ack = proto::gimi::decode_ack(view.data);
-  if (ack) streams_.on_ack(stream_of(in, in.from), view.header.sequence, *ack);
+  if (ack) streams_.on_ack(stream_of(in, in.from, ack->group), view.header.sequence, *ack);
 }
 
 void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view) {
-  if (in.kind != NIF_UNICAST || in.from == 0) return;
-  const StreamName name = stream_of(in, in.from);
+  if (!is_for_one(in) || in.from == 0) return;
+  const StreamName name = received_stream_of(in);
   const auto lane = static_cast<Lane>(in.lane);
   // Both fit or neither arrives: whoever misses them asks again.
   if (view.header.has(proto::gimi::kFlagAckWanted) && clerk_.acknowledge(name, lane, view.header.sequence) != NIF_OK) {
@@ -265,9 +282,11 @@ void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view)
 }
 
 void Core::on_report(const nif_incoming& in) {
-  if (in.kind != NIF_UNICAST) return;
+  if (!is_for_one(in)) return;
   const auto header = reported_header(in);
-  StreamTable::Report report{stream_of(in, in.to), in.reason, in.count, 0, in.text};
+  const bool to_service = in.kind == NIF_SERVICE;
+  const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
+  StreamTable::Report report{name, in.reason, in.count, 0, in.text};
   if (header && header->operation == proto::gimi::Operation::data) report.sequence = header->sequence;
   if (header && header->operation == proto::gimi::Operation::ping) {
     pings_.on_lost(header->sequence, report_words(report.text));
@@ -283,10 +302,17 @@ void Core::on_connected(const nif_incoming& in) {
 }
 
 void Core::on_disconnected(const nif_incoming& in) {
+  if (in.type == NIF_SESSION_REPLACED || (in.flags & NIF_DISCONNECTED_FOR_GOOD) != 0) {
+    // NIF answers every call with the reason from now on; this one does nothing else.
+    const nif_status status = nif_flush(node());
+    const Ending ending(status_of(status), nif_error_text());
+    streams_.on_broken(ending.why());
+    end(ending);
+    return;
+  }
   nif_info info{};
   info.struct_size = sizeof info;
-  const bool kept =
-      in.type == NIF_DISCONNECTED && reconnects_ && nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
+  const bool kept = nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
   if (kept) {
     streams_.on_interrupted(steady_now_ns());
   } else {

@@ -26,6 +26,8 @@ class Core {
   Core& operator=(const Core&) = delete;
 
   void close();
+  /// The node was given this name by the hub, "" for none.
+  void on_renamed() { services_.on_renamed(state().name); }
 
   [[nodiscard]] nif_node* node() const { return uplink_.node(); }
   [[nodiscard]] NodeState state() const;
@@ -49,6 +51,7 @@ class Core {
   void on_report(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
+  void end(const Ending& ending);
 
   Uplink uplink_;
   Inbox inbox_;
@@ -57,7 +60,6 @@ class Core {
   WatchTable watches_;
   PingTable pings_;
   Clerk clerk_;
-  const bool reconnects_;
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};
 };

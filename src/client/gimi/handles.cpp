@@ -22,13 +22,14 @@ Outcome<void> Sender::send(BytesView data, Timeout timeout, More more) const {
 Outcome<void> Sender::settle(Timeout timeout) const { return stream_->settle(timeout); }
 SendCounts Sender::counts() const { return stream_->counts(); }
 Peer Sender::peer() const { return stream_->to(); }
+const std::string& Sender::service() const { return stream_->service(); }
 
 Outcome<void> Publisher::publish(BytesView data, More more) const { return service_->publish(data, more); }
 std::size_t Publisher::subscribers() const { return service_->subscribers(); }
 Outcome<void> Publisher::wait_for_subscribers(std::size_t count, Timeout timeout) const {
   return service_->wait_for_subscribers(count, timeout);
 }
-const std::string& Publisher::name() const { return service_->full_name(); }
+std::string Publisher::name() const { return service_->full_name(); }
 std::uint64_t Publisher::published() const { return service_->published(); }
 
 Outcome<Message> Subscription::receive(Timeout timeout) const {

@@ -7,7 +7,6 @@
 namespace gimnet::gimi {
 namespace {
 
-Failure ended() { return {Status::closed, "cannot receive: the node was closed"}; }
 Failure none(Timeout timeout) {
   return {Status::timeout, "nothing was received within " + std::to_string(timeout.count()) + " ms"};
 }
@@ -108,7 +107,7 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
   {
     const MutexLock lock(mutex_);
     while (queue.empty()) {
-      if (closed_) return ended();
+      if (end_) return end_.failure("receive");
       if (is_over(deadline)) return none(timeout);
       static_cast<void>(queue.filled().wait_until(mutex_, deadline));
     }
@@ -135,7 +134,7 @@ Outcome<Message> Inbox::receive_any(Timeout timeout) {
     const MutexLock lock(mutex_);
     MessageQueue* queue = nullptr;
     while ((queue = first_waiting()) == nullptr) {
-      if (closed_) return ended();
+      if (end_) return end_.failure("receive");
       if (is_over(deadline)) return none(timeout);
       ++any_waiters_;
       static_cast<void>(any_.wait_until(mutex_, deadline));
@@ -197,9 +196,9 @@ Inbox::Counts Inbox::counts(MessageQueue& queue) {
   return {queue.size(), queue.received(), queue.overwritten()};
 }
 
-void Inbox::close() {
+void Inbox::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  end_ = ending;
   any_.notify_all();
   for (MessageQueue& queue : queues_) queue.filled().notify_all();
 }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/mutex.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -64,8 +65,8 @@ class Inbox {
   };
   [[nodiscard]] Counts counts(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
 
-  /// Nothing more comes: when they are empty, queues answer closed.
-  void close() GIMNET_EXCLUDES(mutex_);
+  /// Nothing more comes: when they are empty, queues answer so.
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_REQUIRES(mutex_);
@@ -94,7 +95,7 @@ class Inbox {
   MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) = nullptr;  ///< at most one: nothing comes while one refuses
   std::uint64_t arrivals_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t dropped_ GIMNET_GUARDED_BY(mutex_) = 0;
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "client/gimi/core.hpp"
@@ -55,15 +56,24 @@ Outcome<Sender> Node::sender(std::string_view to, const SendOptions& options, Ti
   return sender(*peer, options);
 }
 
-Outcome<Sender> Node::sender_to_service(std::string_view full_name, SendOptions options, Timeout timeout) const {
+Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOptions& options, Timeout timeout) const {
   const auto found = services(full_name, timeout);
   if (!found) return found.failure();
-  for (const ServiceRecord& service : *found) {
-    if (service.direction != Direction::accepts) continue;
-    options.key = service.key;
-    return sender(service.node, options);
+  const std::string name(full_name);
+  // The listing takes patterns, too: only the service of that very name counts.
+  const auto service = std::ranges::find(*found, name, &ServiceRecord::name);
+  if (service == found->end()) {
+    return Failure{Status::not_found, "cannot send to '" + name +
+                                          "': there is no such service at the moment; watch() tells when there is"};
   }
-  return Failure{Status::not_found, "nobody accepts '" + std::string(full_name) + "'"};
+  if (service->direction != Direction::accepts) {
+    return Failure{Status::not_found, "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
+  }
+  auto stream = core_->services().follow(name, timeout, [&](const gimi::ServicePlace& place) {
+    return core_->streams().service_stream(name, place, options);
+  });
+  if (!stream) return stream.failure();
+  return Sender({core_, *stream});
 }
 
 Outcome<void> Node::send(Peer to, BytesView data, const SendOptions& options, Timeout timeout) const {
@@ -122,12 +132,14 @@ Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {
   const std::string text(name);
   const nif_status status = nif_register(core_->node(), text.c_str(), nullptr, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "take the name '" + text + "'");
+  core_->on_renamed();
   return {};
 }
 
 Outcome<void> Node::give_name_back(Timeout timeout) const {
   const nif_status status = nif_unregister(core_->node(), nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "give the name back");
+  core_->on_renamed();
   return {};
 }
 

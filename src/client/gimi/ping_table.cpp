@@ -19,8 +19,8 @@ Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadlin
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return Failure{Status::bad_argument, "no such ping"};
   while (!place->second.answer) {
-    if (closed_) {
-      place->second.answer = Failure{Status::closed, "cannot ping: the node was closed"};
+    if (end_) {
+      place->second.answer = end_.failure("ping " + place->second.peer.text());
     } else if (is_over(deadline)) {
       place->second.answer = Failure{Status::timeout, place->second.peer.text() + " did not answer within " +
                                                           std::to_string(timeout.count()) + " ms"};
@@ -50,9 +50,9 @@ void PingTable::on_lost(std::uint32_t number, const std::string& why) {
   answered_.notify_all();
 }
 
-void PingTable::close() {
+void PingTable::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  end_ = ending;
   answered_.notify_all();
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/mutex.hpp"
+#include "client/gimi/ending.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -24,7 +25,8 @@ class PingTable {
   void on_pong(std::uint32_t number, Peer from) GIMNET_EXCLUDES(mutex_);
   /// The hub could not deliver it.
   void on_lost(std::uint32_t number, const std::string& why) GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  /// No answer comes any more.
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
   struct Waiting {
@@ -35,7 +37,7 @@ class PingTable {
   Mutex mutex_;
   Condition answered_;
   std::map<std::uint32_t, Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

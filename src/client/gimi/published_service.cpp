@@ -11,10 +11,11 @@ Outcome<void> PublishedService::publish(BytesView data, More more) {
   std::uint32_t sequence = 0;
   {
     const MutexLock lock(mutex_);
-    while (sending_ && !closed_) changed_.wait(mutex_);
-    if (closed_) return Failure{Status::closed, "cannot publish " + full_name_ + ": the node was closed"};
+    while (sending_ && !end_) changed_.wait(mutex_);
+    if (end_) return end_.failure("publish " + full_name_);
     if (group_ == 0) {
-      return Failure{Status::refused, "cannot publish " + full_name_ + ": the hub refused the service after a break"};
+      return Failure{Status::refused, "cannot publish " + full_name_ +
+                                          ": the hub did not take the service again, after a break or another name"};
     }
     sequence = ++sequence_;
     if (subscribers_ == 0 && subscribers_known_ && !options_.retain) {
@@ -26,13 +27,18 @@ Outcome<void> PublishedService::publish(BytesView data, More more) {
   }
   const nif_status status =
       uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0}, options_.timestamp, data, NIF_FOREVER);
-  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name_);
+  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name());
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();
   if (status != NIF_OK) return failure;
   ++published_;
   return {};
+}
+
+std::string PublishedService::full_name() {
+  const MutexLock lock(mutex_);
+  return full_name_;
 }
 
 std::size_t PublishedService::subscribers() {
@@ -44,7 +50,7 @@ Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout 
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
   while (subscribers_ < count) {
-    if (closed_) return Failure{Status::closed, "cannot wait for subscribers: the node was closed"};
+    if (end_) return end_.failure("wait for subscribers of " + full_name_);
     if (is_over(deadline)) {
       return Failure{Status::timeout, full_name_ + " has " + std::to_string(subscribers_) + " subscribers, not " +
                                           std::to_string(count)};
@@ -71,14 +77,19 @@ void PublishedService::on_subscribers(std::size_t count) {
   changed_.notify_all();
 }
 
+void PublishedService::on_renamed(const std::string& own_name) {
+  const MutexLock lock(mutex_);
+  full_name_ = own_name.empty() ? name_ : own_name + "/" + name_;
+}
+
 void PublishedService::on_reconnected() {
   const MutexLock lock(mutex_);
   subscribers_known_ = false;
 }
 
-void PublishedService::close() {
+void PublishedService::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  end_ = ending;
   changed_.notify_all();
 }
 

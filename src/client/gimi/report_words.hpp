@@ -10,8 +10,9 @@ namespace gimnet::gimi {
 /// What a hub's report says to people: the reason's name, and what it means where the name does not tell.
 [[nodiscard]] inline std::string report_words(std::string_view reason) {
   using Meaning = std::pair<std::string_view, std::string_view>;
-  constexpr std::array<Meaning, 6> kMeanings{
+  constexpr std::array<Meaning, 7> kMeanings{
       Meaning{"no_such_node", "no node has that id"},
+      Meaning{"no_such_group", "that service was withdrawn"},
       Meaning{"no_route", "no hub of that id can be reached"},
       Meaning{"away", "its connection broke, and it has not come back yet"},
       Meaning{"queue_full", "it does not read as fast as is sent"},

@@ -10,29 +10,36 @@ namespace {
 
 using proto::gimi::Operation;
 
-Failure closed_failure() { return {Status::closed, "cannot send: the node was closed"}; }
+proto::gimi::MessageHeader header_of(Operation operation, std::uint32_t number) { return {number, operation, 0, 0}; }
 
 }  // namespace
 
 Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
   const std::int64_t deadline = deadline_after(timeout);
   std::uint32_t sequence = 0;
+  Destination to;
   {
     const MutexLock lock(mutex_);
     auto turn = take_turn(data, deadline);
     if (!turn) return turn.failure();
     if (*turn == Turn::held) return {};
     sequence = window_.open(steady_now_ns());
+    to = destination_;
   }
-  const nif_status status = transmit(Operation::data, sequence, data, more, nif_timeout_until(deadline));
-  auto failure = status == NIF_OK ? Failure{} : failure_of(status, target());
+  const nif_status status = transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
+  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   if (finish(sequence, status, more)) watch_if_needed();
   if (status == NIF_OK) return {};
   return failure;
 }
 
 Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t deadline) {
-  while (!closed_) {
+  while (!end_) {
+    if (destination_.id == 0) {
+      return Failure{
+          Status::not_found,
+          "not sent to " + service_ + ": nobody accepts it at the moment; it can be sent to again when it is back"};
+    }
     if (!sending_ && window_.has_room()) {
       if (std::exchange(held_, std::nullopt)) ++counts_.skipped;
       sending_ = true;
@@ -40,7 +47,7 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
     }
     if (!window_.has_room() && options_.at_full == AtFullWindow::skip) {
       ++counts_.skipped;
-      return Failure{Status::window_full, "not sent to " + to_.text() + ": " + std::to_string(window_.size()) +
+      return Failure{Status::window_full, "not sent to " + target() + ": " + std::to_string(window_.size()) +
                                               " messages wait for their acknowledgement"};
     }
     if (!window_.has_room() && options_.at_full == AtFullWindow::hold_latest) {
@@ -51,11 +58,11 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
     if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
     if (is_over(deadline)) {
       return Failure{Status::timeout,
-                     "not sent to " + to_.text() + ": earlier messages were not acknowledged within the time given"};
+                     "not sent to " + target() + ": earlier messages were not acknowledged within the time given"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
-  return closed_failure();
+  return end_.failure("send to " + target());
 }
 
 void SendStream::hold(BytesView data) {
@@ -63,21 +70,34 @@ void SendStream::hold(BytesView data) {
   held_.emplace(data.span().begin(), data.span().end());
 }
 
-nif_status SendStream::transmit(Operation operation, std::uint32_t number, BytesView data, More more,
-                                std::int32_t timeout_ms) const {
-  const bool synchronized = options_.window != 0;
-  Envelope envelope{to_.id, NIF_UNICAST, NIF_POLICY_DEFAULT, options_.lane, options_.key, options_.age_max_ms, 0};
-  if (synchronized) envelope.flags |= NIF_FLAG_REPORT;
-  if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
-  proto::gimi::MessageHeader header{number, operation, 0, 0};
-  if (synchronized) header.flags |= proto::gimi::kFlagAckWanted;
-  return uplink_.transmit(envelope, header, options_.timestamp && operation == Operation::data, data, timeout_ms);
+/// What a program was told to be held could not be sent yet.
+void SendStream::hold_again(std::vector<std::byte> data) {
+  const MutexLock lock(mutex_);
+  if (held_) {
+    ++counts_.skipped;  // a newer one came meanwhile
+  } else if (end_ || destination_.id == 0) {
+    settle_freed({.acknowledged = 0, .lost = 1}, end_ ? end_.why() : "the service was withdrawn");
+  } else {
+    held_ = std::move(data);
+  }
 }
 
-nif_status SendStream::transmit_ping(std::uint32_t number) const {
+nif_status SendStream::transmit(const Destination& to, const proto::gimi::MessageHeader& header, BytesView data,
+                                More more, std::int32_t timeout_ms) const {
+  const bool synchronized = options_.window != 0;
+  Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_max_ms, 0};
+  if (synchronized) envelope.flags |= NIF_FLAG_REPORT;
+  if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
+  proto::gimi::MessageHeader asking = header;
+  if (synchronized) asking.flags |= proto::gimi::kFlagAckWanted;
+  const bool stamped = options_.timestamp && header.operation == Operation::data;
+  return uplink_.transmit(envelope, asking, stamped, data, timeout_ms);
+}
+
+nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number) const {
   std::array<std::byte, proto::gimi::kPingTimeSize> sent;
   store_le(sent.data(), wall_now_ns());
-  return transmit(Operation::ping, number, sent, More::no, 0);
+  return transmit(to, header_of(Operation::ping, number), sent, More::no, 0);
 }
 
 /// True: somebody should watch over the stream.
@@ -98,7 +118,7 @@ bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
 void SendStream::watch_if_needed() {
   {
     const MutexLock lock(mutex_);
-    if (watched_ || closed_) return;
+    if (watched_ || end_) return;
     watched_ = true;
   }
   keeper_.watch(*this);
@@ -109,16 +129,16 @@ Outcome<void> SendStream::settle(Timeout timeout) {
   const MutexLock lock(mutex_);
   if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
   while (!window_.empty() || held_) {
-    if (closed_) return closed_failure();
+    if (end_) return end_.failure("settle what was sent to " + target());
     if (is_over(deadline)) {
       return Failure{Status::timeout,
-                     std::to_string(window_.size()) + " messages to " + to_.text() + " are not acknowledged yet"};
+                     std::to_string(window_.size()) + " messages to " + target() + " are not acknowledged yet"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
   if (counts_.lost == 0) return {};
   return Failure{Status::not_delivered, std::to_string(counts_.lost) + " of " + std::to_string(counts_.sent) +
-                                            " messages to " + to_.text() + " were not acknowledged: " + counts_.loss};
+                                            " messages to " + target() + " were not acknowledged: " + counts_.loss};
 }
 
 SendCounts SendStream::counts() {
@@ -153,16 +173,30 @@ void SendStream::on_doubt() {
   window_.hurry();
 }
 
-void SendStream::on_broken(const std::string& why) {
-  const MutexLock lock(mutex_);
+void SendStream::lose_all(const std::string& why) {
   SendWindow::Freed freed = window_.lose_all();
   if (std::exchange(held_, std::nullopt)) ++freed.lost;
   settle_freed(freed, why);
 }
 
-void SendStream::close() {
+void SendStream::on_broken(const std::string& why) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  lose_all(why);
+}
+
+void SendStream::on_moved(const ServicePlace& place) {
+  const MutexLock lock(mutex_);
+  if (place.group == destination_.id) return;
+  lose_all(place.group == 0 ? "the service was withdrawn"
+                            : "the service is somewhere else now, and cannot tell any more");
+  destination_.id = place.group;
+  if (place.group != 0) destination_.key = place.key;
+  changed_.notify_all();
+}
+
+void SendStream::end(const Ending& ending) {
+  const MutexLock lock(mutex_);
+  end_ = ending;
   changed_.notify_all();
 }
 
@@ -170,9 +204,11 @@ bool SendStream::tick(std::int64_t now_ns) {
   std::uint32_t ping = 0;
   std::uint32_t sequence = 0;
   std::optional<std::vector<std::byte>> data;
+  Destination to;
   {
     const MutexLock lock(mutex_);
-    if (closed_ || (window_.empty() && !held_)) return watched_ = false;
+    to = destination_;
+    if (end_ || (window_.empty() && !held_)) return watched_ = false;
     if (sending_) return true;  // what that thread sends stands before a PING that could be put behind it now
     if (held_ && window_.has_room()) {
       data = std::exchange(held_, std::nullopt);
@@ -184,13 +220,13 @@ bool SendStream::tick(std::int64_t now_ns) {
     }
     sending_ = true;
   }
-  const nif_status status = data ? transmit(Operation::data, sequence, *data, More::no, 0) : transmit_ping(ping);
   if (data) {
+    const nif_status status = transmit(to, header_of(Operation::data, sequence), *data, More::no, 0);
     static_cast<void>(finish(sequence, status, More::no));
-    const MutexLock lock(mutex_);
-    if (status != NIF_OK && !held_) held_ = std::move(data);
+    if (status != NIF_OK) hold_again(std::move(*data));
     return true;
   }
+  const nif_status status = transmit_ping(to, ping);
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();

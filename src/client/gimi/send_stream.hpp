@@ -7,6 +7,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ack_book.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/send_window.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi.hpp"
@@ -25,17 +26,40 @@ class StreamKeeper {
   ~StreamKeeper() = default;
 };
 
-/// A stream of DATA to one node with one key. Thread safety: any thread; nothing that is called from the library's
-/// thread waits for a thread that sends.
+/// Where a service is that a stream leads to.
+struct ServicePlace {
+  std::uint32_t group = 0;  ///< 0: nobody has it at the moment
+  MessageKey key;
+};
+
+/// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any thread; nothing
+/// that is called from the library's thread waits for a thread that sends.
 class SendStream {
  public:
   SendStream(Uplink& uplink, StreamKeeper& keeper, Peer to, const SendOptions& options)
-      : uplink_(uplink), keeper_(keeper), to_(to), options_(options), window_(options.window) {}
+      : uplink_(uplink),
+        keeper_(keeper),
+        to_(to),
+        options_(options),
+        destination_{NIF_UNICAST, to.id, options.key},
+        window_(options.window) {}
+  /// `service`: its full name.
+  SendStream(Uplink& uplink, StreamKeeper& keeper, std::string service, const ServicePlace& place,
+             const SendOptions& options)
+      : uplink_(uplink),
+        keeper_(keeper),
+        service_(std::move(service)),
+        options_(options),
+        destination_{NIF_SERVICE, place.group, place.key},
+        window_(options.window) {}
 
   [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> settle(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] SendCounts counts() GIMNET_EXCLUDES(mutex_);
+  /// Nobody, of a stream to a service.
   [[nodiscard]] Peer to() const { return to_; }
+  /// "" of a stream to a node.
+  [[nodiscard]] const std::string& service() const { return service_; }
 
   /// True: a message that is held can go; tick() sends it.
   [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
@@ -45,38 +69,49 @@ class SendStream {
   void on_doubt() GIMNET_EXCLUDES(mutex_);
   /// What waits is lost, or nobody will ever tell.
   void on_broken(const std::string& why) GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  /// The service is somewhere else now: what waits for an ACK from its former place gets none any more.
+  void on_moved(const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
   /// Puts a PING behind what waits for too long, sends what is held. False: nothing waits. Does not block.
   [[nodiscard]] bool tick(std::int64_t now_ns) GIMNET_EXCLUDES(mutex_);
 
  private:
   enum class Turn : std::uint8_t { send, held };
+  struct Destination {
+    nif_kind kind = NIF_UNICAST;
+    std::uint32_t id = 0;  ///< 0: a service that nobody has
+    MessageKey key;
+  };
   /// Waits for this thread's turn, and for room in the window. After Turn::send `sending_` is this thread's.
   [[nodiscard]] Outcome<Turn> take_turn(BytesView data, std::int64_t deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status transmit(proto::gimi::Operation operation, std::uint32_t number, BytesView data, More more,
-                                    std::int32_t timeout_ms) const;
-  [[nodiscard]] nif_status transmit_ping(std::uint32_t number) const;
+  [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header, BytesView data,
+                                    More more, std::int32_t timeout_ms) const;
+  [[nodiscard]] nif_status transmit_ping(const Destination& to, std::uint32_t number) const;
   [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more) GIMNET_EXCLUDES(mutex_);
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
+  void hold_again(std::vector<std::byte> data) GIMNET_EXCLUDES(mutex_);
+  void lose_all(const std::string& why) GIMNET_REQUIRES(mutex_);
   void settle_freed(const SendWindow::Freed& freed, const std::string& why) GIMNET_REQUIRES(mutex_);
   void watch_if_needed() GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] std::string target() const { return "send to " + to_.text(); }
+  [[nodiscard]] std::string target() const { return service_.empty() ? to_.text() : service_; }
 
   Uplink& uplink_;
   StreamKeeper& keeper_;
   const Peer to_;
+  const std::string service_;
   const SendOptions options_;
 
   Mutex mutex_;
   Condition changed_;
+  Destination destination_ GIMNET_GUARDED_BY(mutex_);
   SendWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::vector<std::byte>> held_ GIMNET_GUARDED_BY(mutex_);
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;    ///< one thread is between a sequence and NIF
   bool unflushed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< NIF holds messages back because of More::yes
   bool watched_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

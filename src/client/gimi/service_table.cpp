@@ -71,7 +71,7 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
   published->on_subscribers(subscribers);
   own_names_.insert(name);
   const MutexLock lock(mutex_);
-  if (closed_) published->close();
+  if (end_) published->end(end_);
   published_by_group_[group] = published.get();
   return published_.emplace_back(std::move(published)).get();
 }
@@ -93,7 +93,7 @@ void ServiceTable::withdraw(PublishedService& service) {
   const MutexLock turn(asking_);
   std::uint32_t group = 0;
   own_names_.erase(service.name());
-  service.close();
+  service.end({Status::closed, "the service was withdrawn"});
   {
     const MutexLock lock(mutex_);
     for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
@@ -110,18 +110,19 @@ SubscribedService& ServiceTable::entry(const std::string& full_name, const Queue
   const auto place = subscribed_.find(full_name);
   if (place != subscribed_.end()) return *place->second;
   auto service = std::make_unique<SubscribedService>(full_name, inbox_.add_queue(options));
-  if (closed_) service->close();
+  if (end_) service->end(end_);
   return *subscribed_.emplace(full_name, std::move(service)).first->second;
 }
 
 /// A former group leads to the service until as many younger ones came: the event that a provider left may overtake
 /// what it published.
-void ServiceTable::set_group(SubscribedService& service, std::uint32_t group) {
+void ServiceTable::set_place(SubscribedService& service, const ServicePlace& place) {
   constexpr std::size_t kFormerGroups = 4;
-  service.on_group(group);
-  if (group == 0 || std::ranges::find(service.groups, group) != service.groups.end()) return;
-  subscribed_by_group_[group] = &service;
-  service.groups.push_back(group);
+  service.place = place;
+  service.on_group(place.group);
+  if (place.group == 0 || std::ranges::find(service.groups, place.group) != service.groups.end()) return;
+  subscribed_by_group_[place.group] = &service;
+  service.groups.push_back(place.group);
   if (service.groups.size() <= kFormerGroups) return;
   forget_group(service, service.groups.front());
   service.groups.erase(service.groups.begin());
@@ -132,6 +133,16 @@ void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group)
   if (place != subscribed_by_group_.end() && place->second == &service) subscribed_by_group_.erase(place);
 }
 
+nif_status ServiceTable::ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms) {
+  nif_subscription found{};
+  const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
+  const nif_status status = nif_subscribe_paced(uplink_.node(), service.name().c_str(), &wanted, &found, timeout_ms);
+  if (status != NIF_OK) return status;
+  const MutexLock lock(mutex_);
+  set_place(service, {found.group, {found.message_type, found.instance}});
+  return NIF_OK;
+}
+
 Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
                                                     const PaceOptions& pace, Timeout timeout) {
   const MutexLock turn(asking_);
@@ -140,16 +151,17 @@ Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name
   {
     const MutexLock lock(mutex_);
     service = &entry(full_name, options);
+    service->read = true;
   }
   inbox_.set(service->queue(), options);
   if (service->handles == 0) {
-    nif_subscription found{};
-    const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
-    const nif_status status =
-        nif_subscribe_paced(uplink_.node(), full_name.c_str(), &wanted, &found, nif_timeout(timeout));
-    if (status != NIF_OK) return failure_of(status, "subscribe " + full_name);
-    const MutexLock lock(mutex_);
-    set_group(*service, found.group);
+    const nif_status status = ask(*service, pace, nif_timeout(timeout));
+    if (status != NIF_OK) {
+      auto failure = failure_of(status, "subscribe " + full_name);
+      const MutexLock lock(mutex_);
+      service->read = false;
+      return failure;
+    }
   }
   ++service->handles;
   return service;
@@ -158,17 +170,49 @@ Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name
 void ServiceTable::unsubscribe(SubscribedService& service) {
   const MutexLock turn(asking_);
   if (--service.handles != 0) return;
+  {
+    const MutexLock lock(mutex_);
+    service.read = false;
+  }
+  if (service.followed) {
+    static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
+    return;
+  }
   static_cast<void>(nif_unsubscribe(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
   const MutexLock lock(mutex_);
   service.on_group(0);
+  service.place = {};
   for (const std::uint32_t group : service.groups) forget_group(service, group);
   service.groups.clear();
+}
+
+Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout, const MakeStream& make) {
+  const MutexLock turn(asking_);
+  const Asking asking(*this);
+  SubscribedService* service = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    service = &entry(full_name, {1, AtFullQueue::overwrite_oldest});
+  }
+  if (service->handles == 0 && !service->followed) {
+    const nif_status status = ask(*service, {}, nif_timeout(timeout));
+    if (status != NIF_OK) return failure_of(status, "send to " + full_name);
+  }
+  service->followed = true;
+  ServicePlace place;
+  {
+    const MutexLock lock(mutex_);
+    place = service->place;
+  }
+  return make(place);
 }
 
 ServiceTable::Found ServiceTable::subscribed(std::uint32_t group) {
   const MutexLock lock(mutex_);
   const auto place = subscribed_by_group_.find(group);
   if (place == subscribed_by_group_.end()) return {unknown(), nullptr};
+  // Of a service that is only sent to nobody takes messages.
+  if (!place->second->read) return {Place::unknown, nullptr};
   return {Place::found, place->second};
 }
 
@@ -180,13 +224,21 @@ ServiceTable::Place ServiceTable::on_subscribers(std::uint32_t group, std::size_
   return Place::found;
 }
 
-ServiceTable::Place ServiceTable::on_service_moved(const std::string& full_name, std::uint32_t group) {
-  const MutexLock lock(mutex_);
-  if (open_ != 0) return Place::not_yet;
-  const auto place = subscribed_.find(full_name);
-  if (place == subscribed_.end()) return Place::unknown;
-  set_group(*place->second, group);
+ServiceTable::Place ServiceTable::on_service_moved(const std::string& full_name, const ServicePlace& place) {
+  {
+    const MutexLock lock(mutex_);
+    if (open_ != 0) return Place::not_yet;
+    const auto known = subscribed_.find(full_name);
+    if (known == subscribed_.end()) return Place::unknown;
+    set_place(*known->second, place);
+  }
+  on_moved_(full_name, place);
   return Place::found;
+}
+
+void ServiceTable::on_renamed(const std::string& own_name) {
+  const MutexLock lock(mutex_);
+  for (auto& service : published_) service->on_renamed(own_name);
 }
 
 void ServiceTable::on_own_service_moved(const std::string& name, std::uint32_t group) {
@@ -206,11 +258,11 @@ void ServiceTable::on_reconnected() {
   for (auto& [group, service] : published_by_group_) service->on_reconnected();
 }
 
-void ServiceTable::close() {
+void ServiceTable::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
-  for (auto& service : published_) service->close();
-  for (auto& [name, service] : subscribed_) service->close();
+  end_ = ending;
+  for (auto& service : published_) service->end(ending);
+  for (auto& [name, service] : subscribed_) service->end(ending);
 }
 
 }  // namespace gimnet::gimi

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/published_service.hpp"
+#include "client/gimi/send_stream.hpp"
 #include "client/gimi/subscribed_service.hpp"
 #include "client/gimi/uplink.hpp"
 
@@ -20,7 +22,10 @@ namespace gimnet::gimi {
 /// or advertised once stays in the table until the node is closed, so that messages on their way find it.
 class ServiceTable {
  public:
-  ServiceTable(Uplink& uplink, Inbox& inbox) : uplink_(uplink), inbox_(inbox) {}
+  /// `on_moved` is called without a lock, from the library's thread, for each service that is somewhere else now.
+  using OnMoved = std::function<void(const std::string& full_name, const ServicePlace& place)>;
+  ServiceTable(Uplink& uplink, Inbox& inbox, OnMoved on_moved)
+      : uplink_(uplink), inbox_(inbox), on_moved_(std::move(on_moved)) {}
 
   /// The calls of a program; they ask the hub, one after another.
   [[nodiscard]] Outcome<PublishedService*> advertise(const std::string& own_name, const std::string& name,
@@ -36,6 +41,14 @@ class ServiceTable {
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
   void unsubscribe(SubscribedService& service) GIMNET_EXCLUDES(asking_, mutex_);
 
+  /// Begins a stream to a service: `make` is called once with where it is; what changes then comes to on_moved(), for
+  /// as long as the node lives.
+  using MakeStream = std::function<Outcome<SendStream*>(const ServicePlace& place)>;
+  [[nodiscard]] Outcome<SendStream*> follow(const std::string& full_name, Timeout timeout, const MakeStream& make)
+      GIMNET_EXCLUDES(asking_, mutex_);
+  /// The node has another name now: so have its services, in full.
+  void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);
+
   /// From the library's thread. `not_yet`: the program is just asking the hub about a service, and this may belong
   /// behind the answer: nif_deliver() comes with it.
   enum class Place : std::uint8_t { found, unknown, not_yet };
@@ -45,10 +58,10 @@ class ServiceTable {
   };
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Place on_service_moved(const std::string& full_name, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_service_moved(const std::string& full_name, const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
   void on_own_service_moved(const std::string& name, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   void on_reconnected() GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
   /// While one of these lives, groups that nobody knows are `not_yet`.
@@ -59,11 +72,14 @@ class ServiceTable {
   [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) { return open_ != 0 ? Place::not_yet : Place::unknown; }
   [[nodiscard]] SubscribedService& entry(const std::string& full_name, const QueueOptions& options)
       GIMNET_REQUIRES(mutex_);
-  void set_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms)
+      GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void set_place(SubscribedService& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
   void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
 
   Uplink& uplink_;
   Inbox& inbox_;
+  const OnMoved on_moved_;
 
   Mutex asking_;  ///< held while the hub is asked: its answers must be applied in the order of the questions
   std::set<std::string, std::less<>> own_names_ GIMNET_GUARDED_BY(asking_);  ///< of services that are declared now
@@ -74,7 +90,7 @@ class ServiceTable {
   std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::string, std::unique_ptr<SubscribedService>, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, SubscribedService*> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

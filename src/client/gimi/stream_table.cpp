@@ -15,6 +15,7 @@ constexpr std::int64_t kGraceNs = 30'000'000'000;
 bool is_route_gone(std::uint32_t reason) {
   switch (static_cast<proto::DropReason>(reason)) {
     case proto::DropReason::no_such_node:
+    case proto::DropReason::no_such_group:
     case proto::DropReason::no_route:
     case proto::DropReason::away:
     case proto::DropReason::link_lost:
@@ -27,25 +28,57 @@ bool is_route_gone(std::uint32_t reason) {
 
 }  // namespace
 
-Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
-  if (!to) return Failure{Status::bad_argument, "cannot send to nobody: the peer's id is 0"};
+std::optional<Failure> StreamTable::obstacle(const SendOptions& options) const {
   if (options.window > kWindowMax) {
     return Failure{Status::bad_argument, "a window of " + std::to_string(options.window) +
                                              " messages is more than one ACK can speak of: at most " +
                                              std::to_string(kWindowMax)};
   }
+  if (streams_.size() + services_.size() < kStreamsMax) return std::nullopt;
+  return Failure{Status::limit,
+                 "this node sends to " + std::to_string(kStreamsMax) + " (peer, key) and services already"};
+}
+
+Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
+  if (!to) return Failure{Status::bad_argument, "cannot send to nobody: the peer's id is 0"};
   const MutexLock lock(mutex_);
-  const StreamName name{to, options.key};
+  const StreamName name{to, options.key, 0};
   const auto place = streams_.find(name);
   if (place != streams_.end()) return place->second.get();
-  if (streams_.size() >= kStreamsMax) {
-    return Failure{Status::limit, "this node sends to " + std::to_string(kStreamsMax) + " (peer, key) already"};
-  }
+  if (auto failure = obstacle(options)) return *failure;
   return streams_.emplace(name, std::make_unique<SendStream>(uplink_, *this, to, options)).first->second.get();
+}
+
+Outcome<SendStream*> StreamTable::service_stream(const std::string& full_name, const ServicePlace& place,
+                                                 const SendOptions& options) {
+  const MutexLock lock(mutex_);
+  const auto known = services_.find(full_name);
+  if (known != services_.end()) return known->second.get();
+  if (auto failure = obstacle(options)) return *failure;
+  auto made = std::make_unique<SendStream>(uplink_, *this, full_name, place, options);
+  if (place.group != 0) by_group_[place.group] = made.get();
+  return services_.emplace(full_name, std::move(made)).first->second.get();
+}
+
+void StreamTable::on_service_moved(const std::string& full_name, const ServicePlace& place) {
+  SendStream* stream = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    const auto known = services_.find(full_name);
+    if (known == services_.end()) return;
+    stream = known->second.get();
+    std::erase_if(by_group_, [stream](const auto& entry) { return entry.second == stream; });
+    if (place.group != 0) by_group_[place.group] = stream;
+  }
+  stream->on_moved(place);
 }
 
 SendStream* StreamTable::find(const StreamName& name) {
   const MutexLock lock(mutex_);
+  if (name.group != 0) {
+    const auto service = by_group_.find(name.group);
+    return service == by_group_.end() ? nullptr : service->second;
+  }
   const auto place = streams_.find(name);
   return place == streams_.end() ? nullptr : place->second.get();
 }
@@ -53,8 +86,9 @@ SendStream* StreamTable::find(const StreamName& name) {
 std::vector<SendStream*> StreamTable::all() {
   const MutexLock lock(mutex_);
   std::vector<SendStream*> streams;
-  streams.reserve(streams_.size());
+  streams.reserve(streams_.size() + services_.size());
   for (const auto& [name, stream] : streams_) streams.push_back(stream.get());
+  for (const auto& [name, stream] : services_) streams.push_back(stream.get());
   return streams;
 }
 
@@ -65,6 +99,10 @@ void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence, const p
 
 void StreamTable::on_report(const Report& report) {
   const std::string why = report_words(report.text);
+  if (is_route_gone(report.reason) && report.name.group != 0) {
+    if (SendStream* stream = find(report.name); stream != nullptr) stream->on_broken(why);
+    return;
+  }
   if (is_route_gone(report.reason)) {
     for (SendStream* stream : all()) {
       if (stream->to() == report.name.peer) stream->on_broken(why);
@@ -83,8 +121,8 @@ void StreamTable::on_broken(const std::string& why) {
   for (SendStream* stream : all()) stream->on_broken(why);
 }
 
-void StreamTable::close() {
-  for (SendStream* stream : all()) stream->close();
+void StreamTable::end(const Ending& ending) {
+  for (SendStream* stream : all()) stream->end(ending);
 }
 
 void StreamTable::watch(SendStream& stream) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -17,13 +18,18 @@ namespace gimnet::gimi {
 /// All streams that a node sends. Thread safety: any thread. Streams live as long as the table.
 class StreamTable final : public StreamKeeper {
  public:
-  /// Most (peer, key) that a node can send to in its life.
+  /// Most (peer, key) and services that a node can send to in its life.
   static constexpr std::size_t kStreamsMax = 65536;
 
   /// `attend` is called without a lock when tick() has something to do soon (false) or at once (true).
   StreamTable(Uplink& uplink, std::function<void(bool at_once)> attend) : uplink_(uplink), attend_(std::move(attend)) {}
 
   [[nodiscard]] Outcome<SendStream*> stream(Peer to, const SendOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// To whoever accepts the service of that full name, which is at `place` now.
+  [[nodiscard]] Outcome<SendStream*> service_stream(const std::string& full_name, const ServicePlace& place,
+                                                    const SendOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// From the library's thread: a service that this node follows is there now.
+  void on_service_moved(const std::string& full_name, const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
 
   void on_ack(const StreamName& name, std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
 
@@ -41,7 +47,7 @@ class StreamTable final : public StreamKeeper {
   /// The connection broke at that time, and what waits may still be saved by a resume; 0: it is there again. When that
   /// takes longer than a hub keeps a session, tick() gives up what waits.
   void on_interrupted(std::int64_t since_ns) { interrupted_ns_.store(since_ns); }
-  void close() GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
   /// False: no stream waits for anything. One thread at a time.
   [[nodiscard]] bool tick(std::int64_t now_ns) GIMNET_EXCLUDES(mutex_);
@@ -49,6 +55,8 @@ class StreamTable final : public StreamKeeper {
 
  private:
   [[nodiscard]] SendStream* find(const StreamName& name) GIMNET_EXCLUDES(mutex_);
+  /// Why there cannot be another stream; nothing if there can.
+  [[nodiscard]] std::optional<Failure> obstacle(const SendOptions& options) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::vector<SendStream*> all() GIMNET_EXCLUDES(mutex_);
 
   Uplink& uplink_;
@@ -57,6 +65,9 @@ class StreamTable final : public StreamKeeper {
 
   Mutex mutex_;
   std::unordered_map<StreamName, std::unique_ptr<SendStream>, StreamNameHash> streams_ GIMNET_GUARDED_BY(mutex_);
+  /// By full name, and of those which are there by group id.
+  std::unordered_map<std::string, std::unique_ptr<SendStream>> services_ GIMNET_GUARDED_BY(mutex_);
+  std::unordered_map<std::uint32_t, SendStream*> by_group_ GIMNET_GUARDED_BY(mutex_);
   std::vector<SendStream*> watched_ GIMNET_GUARDED_BY(mutex_);
 };
 

@@ -13,7 +13,7 @@ Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
   while (group_ == 0) {
-    if (closed_) return Failure{Status::closed, "cannot wait for " + *name_ + ": the node was closed"};
+    if (end_) return end_.failure("wait for " + *name_);
     if (is_over(deadline)) return Failure{Status::timeout, "nobody provides " + *name_ + " yet"};
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
@@ -45,9 +45,9 @@ void SubscribedService::on_group(std::uint32_t group) {
   changed_.notify_all();
 }
 
-void SubscribedService::close() {
+void SubscribedService::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  end_ = ending;
   changed_.notify_all();
 }
 

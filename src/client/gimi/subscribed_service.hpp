@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/message_queue.hpp"
+#include "client/gimi/send_stream.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
 namespace gimnet::gimi {
 
-/// A service of another node that this one subscribed, and the queue of its messages. Thread safety: any thread.
+/// A service of another node that this one subscribed, to read it or to know where it is, and the queue of its
+/// messages. Thread safety: any thread.
 class SubscribedService {
  public:
   SubscribedService(std::string full_name, MessageQueue& queue)
@@ -32,10 +35,16 @@ class SubscribedService {
   void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   /// 0: there is no provider.
   void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
-  /// Handles of the program; guarded by the table's asking mutex.
+  /// Handles of the program that read it; guarded by the table's asking mutex.
   std::size_t handles = 0;
+  /// A stream of this node leads there; guarded by the table's asking mutex.
+  bool followed = false;
+  /// What comes is for a queue of the program; guarded by the table's mutex.
+  bool read = false;
+  /// Where it is; guarded by the table's mutex.
+  ServicePlace place;
   /// Group ids that lead to it, the youngest last; guarded by the table's mutex.
   std::vector<std::uint32_t> groups;
 
@@ -49,7 +58,7 @@ class SubscribedService {
   std::uint32_t provider_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

@@ -32,7 +32,7 @@ Outcome<WatchEvent> WatchQueue::receive(Timeout timeout) {
   {
     const MutexLock lock(mutex_);
     while (entries_.empty()) {
-      if (closed_) return Failure{Status::closed, "the node was closed"};
+      if (end_) return end_.failure("watch");
       if (is_over(deadline)) return Failure{Status::timeout, "nothing changed within the time given"};
       static_cast<void>(changed_.wait_until(mutex_, deadline));
     }
@@ -64,9 +64,9 @@ void WatchQueue::put(WatchEvent event, std::uint32_t watch, bool last) {
   changed_.notify_all();
 }
 
-void WatchQueue::close() {
+void WatchQueue::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
+  end_ = ending;
   changed_.notify_all();
 }
 
@@ -88,7 +88,7 @@ Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern, const W
     if (status == NIF_OK) {
       begun.queue = std::make_shared<WatchQueue>(uplink_);
       queues_.emplace(begun.number, begun.queue);
-      if (closed_) begun.queue->close();
+      if (end_) begun.queue->end(end_);
     }
   }
   // What came meanwhile was held back.
@@ -118,10 +118,10 @@ bool WatchTable::on_watched(const nif_incoming& in) {
   return true;
 }
 
-void WatchTable::close() {
+void WatchTable::end(const Ending& ending) {
   const MutexLock lock(mutex_);
-  closed_ = true;
-  for (const auto& [number, queue] : queues_) queue->close();
+  end_ = ending;
+  for (const auto& [number, queue] : queues_) queue->end(ending);
 }
 
 }  // namespace gimnet::gimi

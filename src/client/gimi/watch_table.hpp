@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/mutex.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi.hpp"
 
@@ -23,7 +24,7 @@ class WatchQueue {
   [[nodiscard]] std::optional<WatchEvent> try_receive() GIMNET_EXCLUDES(mutex_);
 
   void put(WatchEvent event, std::uint32_t watch, bool last) GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
   struct Entry {
@@ -38,7 +39,7 @@ class WatchQueue {
   Mutex mutex_;
   Condition changed_;
   std::deque<Entry> entries_ GIMNET_GUARDED_BY(mutex_);
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 /// The watches of a node, by NIF's numbers. Thread safety: any thread; on_watched() from the library's only.
@@ -56,14 +57,14 @@ class WatchTable {
 
   /// False: not yet, a watch() has not returned.
   [[nodiscard]] bool on_watched(const nif_incoming& in) GIMNET_EXCLUDES(mutex_);
-  void close() GIMNET_EXCLUDES(mutex_);
+  void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
   Uplink& uplink_;
   Mutex mutex_;
   std::map<std::uint32_t, std::shared_ptr<WatchQueue>> queues_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t asking_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< calls of watch() that wait for the hub
-  bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
+  Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

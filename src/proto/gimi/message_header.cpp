@@ -46,12 +46,17 @@ std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_
 
 std::optional<Ack> decode_ack(std::span<const std::byte> data) {
   if (data.size() < kAckSize) return std::nullopt;
-  return Ack{load_le<std::uint64_t>(data.data()), load_le<std::uint32_t>(data.data() + 8)};
+  Ack ack{load_le<std::uint64_t>(data.data()), load_le<std::uint32_t>(data.data() + 8), 0};
+  if (data.size() >= kAckSizeMax) ack.group = load_le<std::uint32_t>(data.data() + kAckSize);
+  return ack;
 }
 
-void encode_ack(const Ack& ack, std::span<std::byte, kAckSize> data) {
+std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data) {
   store_le(data.data(), ack.bitmap);
   store_le(data.data() + 8, ack.pong_sequence);
+  if (ack.group == 0) return kAckSize;
+  store_le(data.data() + kAckSize, ack.group);
+  return kAckSizeMax;
 }
 
 std::optional<Ping> decode_ping(std::span<const std::byte> data) {

@@ -14,6 +14,7 @@ namespace gimnet::proto::gimi {
 inline constexpr std::size_t kMessageHeaderSize = 8;
 inline constexpr std::size_t kTimestampSize = 8;
 inline constexpr std::size_t kAckSize = 12;
+inline constexpr std::size_t kAckSizeMax = 16;
 inline constexpr std::size_t kPingTimeSize = 8;
 inline constexpr std::size_t kErrorStatusSize = 2;
 
@@ -69,11 +70,13 @@ std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_
 struct Ack {
   std::uint64_t bitmap = 0;         ///< bit i: sequence - 1 - i was taken too
   std::uint32_t pong_sequence = 0;  ///< of the PONG that this repeats an ACK for, or 0
+  std::uint32_t group = 0;          ///< of the service that the stream leads to; 0 and not written: to a node
   friend constexpr bool operator==(const Ack&, const Ack&) = default;
 };
 /// Nothing: too short. Bytes after the layout are skipped.
 [[nodiscard]] std::optional<Ack> decode_ack(std::span<const std::byte> data);
-void encode_ack(const Ack& ack, std::span<std::byte, kAckSize> data);
+/// Returns the size, kAckSize or kAckSizeMax.
+std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data);
 
 /// Data of PING and, unchanged, of PONG. Valid until: its bytes change.
 struct Ping {

@@ -3,13 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/client/gimi/support/made_message.hpp"
 
 namespace gimnet::gimi {
 namespace {
 
+using test::make_counted;
 using test::make_message;
 
 struct CountingReceipt final : Receipt {
@@ -66,14 +69,14 @@ TEST_F(InboxTest, ClosingEndsAllWaits) {
   MessageQueue& queue = inbox_.queue({1, 0}, nullptr);
   std::thread one([&] { EXPECT_TRUE(inbox_.receive(queue, kForever).is(Status::closed)); });
   std::thread any([&] { EXPECT_TRUE(inbox_.receive_any(kForever).is(Status::closed)); });
-  inbox_.close();
+  inbox_.end(Ending::closed());
   one.join();
   any.join();
 }
 
 TEST_F(InboxTest, WhatCameBeforeClosingIsStillThere) {
   EXPECT_TRUE(put({1, 0}, 5));
-  inbox_.close();
+  inbox_.end(Ending::closed());
   EXPECT_EQ(inbox_.receive(inbox_.queue({1, 0}, nullptr), kForever)->sequence(), 5u);
 }
 
@@ -101,6 +104,36 @@ TEST_F(InboxTest, AMessageThatIsRefusedIsUnchanged) {
   EXPECT_EQ(receipt.kept, 0);
   EXPECT_TRUE(inbox_.put(MessageKey{2, 0}, message, &receipt));
   EXPECT_EQ(receipt.kept, 1);
+}
+
+TEST(Inbox, TellsWhatWasTakenOfAWindowWhicheverWayItWent) {
+  std::vector<std::string> told;
+  Inbox inbox(
+      2, 1000, [] {},
+      [&](const TakenMessages& taken, bool more) {
+        told.push_back(std::to_string(taken.group) + "x" + std::to_string(taken.count) + (more ? "+" : ""));
+      });
+  MessageQueue& queue = inbox.add_queue({2, AtFullQueue::overwrite_oldest});
+  const auto put = [&](std::uint32_t group) {
+    Message message = make_counted(group, 1);
+    EXPECT_TRUE(inbox.put(queue, message, nullptr));
+  };
+  put(5);
+  put(5);
+  EXPECT_TRUE(told.empty());
+  put(5);  // overwrites
+  EXPECT_TRUE(inbox.receive(queue, kNoWait));
+  EXPECT_TRUE(inbox.try_receive(queue));
+  EXPECT_EQ(told, (std::vector<std::string>{"5x1", "5x1+", "5x1"})) << "+: others wait";
+  told.clear();
+  put(6);
+  put(6);
+  EXPECT_TRUE(inbox.take_newest(queue));
+  put(7);
+  put(7);
+  inbox.resize(queue, 1);
+  EXPECT_TRUE(inbox.receive_any(kNoWait));
+  EXPECT_EQ(told, (std::vector<std::string>{"6x2", "7x1+", "7x1"}));
 }
 
 TEST_F(InboxTest, DropsMessagesOfTooManyKeys) {

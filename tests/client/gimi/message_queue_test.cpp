@@ -8,6 +8,7 @@
 namespace gimnet::gimi {
 namespace {
 
+using test::make_counted;
 using test::make_message;
 
 constexpr std::size_t kBytesMax = 100;
@@ -73,6 +74,41 @@ TEST_F(MessageQueueTest, GivesTheNewestAndForgetsTheOthers) {
   for (std::uint32_t number = 1; number <= 3; ++number) queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.pop_newest()->sequence(), 3u);
   EXPECT_TRUE(queue_.empty());
+}
+
+std::string taken_of(MessageQueue& queue) {
+  std::string text;
+  for (const TakenMessages& taken : queue.take_taken()) {
+    text += std::to_string(taken.group) + "/" + std::to_string(taken.epoch) + "x" + std::to_string(taken.count) + " ";
+  }
+  return text;
+}
+
+TEST_F(MessageQueueTest, CountsWhatWentOutOfAWindow) {
+  EXPECT_EQ(taken_of(queue_), "");
+  for (std::uint64_t arrival = 1; arrival <= 3; ++arrival) queue_.push(make_counted(5, 1), arrival);
+  EXPECT_EQ(taken_of(queue_), "") << "it is here, not taken";
+  static_cast<void>(queue_.pop());
+  EXPECT_EQ(taken_of(queue_), "5/1x1 ");
+  EXPECT_EQ(taken_of(queue_), "") << "told once";
+  queue_.push(make_counted(5, 1), 4);
+  queue_.push(make_counted(5, 1), 5);
+  EXPECT_EQ(taken_of(queue_), "5/1x1 ") << "what is overwritten was taken, too";
+  static_cast<void>(queue_.pop_newest());
+  EXPECT_EQ(taken_of(queue_), "5/1x3 ") << "and what a newer one makes idle";
+}
+
+TEST_F(MessageQueueTest, CountsEachGroupAndEpochByItself) {
+  queue_.push(make_counted(5, 1), 1);
+  queue_.push(make_counted(6, 1), 2);
+  queue_.push(make_counted(6, 2), 3);
+  while (queue_.pop()) continue;
+  EXPECT_EQ(taken_of(queue_), "5/1x1 6/1x1 6/2x1 ");
+  queue_.push(make_message("x"), 4);
+  queue_.push(make_counted(6, 0), 5);
+  queue_.resize(1);
+  static_cast<void>(queue_.pop());
+  EXPECT_EQ(taken_of(queue_), "") << "without an epoch nothing counts";
 }
 
 }  // namespace

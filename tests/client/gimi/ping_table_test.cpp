@@ -41,7 +41,7 @@ TEST(PingTable, ClosingEndsAllWaits) {
   PingTable pings;
   pings.expect(1, kPeer);
   std::thread waiter([&] { EXPECT_TRUE(pings.wait(1, INT64_MAX, kForever).is(Status::closed)); });
-  pings.close();
+  pings.end(Ending::closed());
   waiter.join();
 }
 

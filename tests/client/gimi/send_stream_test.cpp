@@ -8,112 +8,21 @@
 #include <vector>
 
 #include "gimnet/gimi.hpp"
-#include "tests/client/nif/support/fake_hub.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
 
 // Streams as they are seen on the wire, by a hub that answers what the test wants.
 
 namespace gimnet::gimi {
 namespace {
 
-using nif::test::FakeConnection;
-using nif::test::FakeHub;
-using nif::test::Frame;
-using nif::test::kHubNode;
-using nif::test::kOwnId;
-using nif::test::kPeerId;
-using proto::gimi::Operation;
+using test::Conversation;
+using test::kAll;
+using test::kKey;
+using test::kPeerId;
+using test::Operation;
+using test::Taken;
 
-constexpr MessageKey kKey{3, 4};
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
-/// A GIMI message in a frame.
-struct Taken {
-  proto::gimi::MessageHeader header;
-  std::string data;
-  proto::FrameHeader frame;
-};
-
-class SendStreamTest : public testing::Test {
- protected:
-  SendStreamTest() {
-    NodeOptions options;
-    options.hub = fake_.url();
-    options.reconnect = false;
-    std::thread joiner([&] { node_.emplace(Node::join(options).or_throw()); });
-    hub_ = fake_.admit(nif::test::make_welcome());
-    joiner.join();
-  }
-  ~SendStreamTest() override { hub_.close(); }
-
-  [[nodiscard]] Sender sender(std::size_t window, AtFullWindow at_full = AtFullWindow::wait) {
-    SendOptions options;
-    options.key = kKey;
-    options.window = window;
-    options.at_full = at_full;
-    return node_->sender(Peer{kPeerId}, options).or_throw();
-  }
-
-  /// The next message of any kind.
-  Taken next() {
-    const auto frame = hub_.next_message();
-    EXPECT_TRUE(frame.has_value());
-    return frame ? taken_of(*frame) : Taken{};
-  }
-  /// The next DATA. A stream that waits long enough for an ACK asks for it, at any place in between.
-  Taken next_data() {
-    const auto frame = next_data_frame();
-    return frame ? taken_of(*frame) : Taken{};
-  }
-  std::optional<Frame> next_data_frame() {
-    for (;;) {
-      auto frame = hub_.next_message();
-      EXPECT_TRUE(frame.has_value());
-      if (!frame || taken_of(*frame).header.operation != Operation::ping) return frame;
-    }
-  }
-
-  static Taken taken_of(const Frame& frame) {
-    const auto view = frame.view();
-    EXPECT_TRUE(view.key.has_value());
-    const auto message = proto::gimi::parse_message(view.payload);
-    EXPECT_TRUE(message.has_value());
-    if (!message) return {};
-    return {message->header, {reinterpret_cast<const char*>(message->data.data()), message->data.size()}, frame.header};
-  }
-
-  void answer(const proto::gimi::MessageHeader& header, std::span<const std::byte> data) {
-    std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
-    const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
-    std::string payload(reinterpret_cast<const char*>(prefix.data()), size);
-    payload.append(reinterpret_cast<const char*>(data.data()), data.size());
-    proto::FrameParts parts;
-    parts.header.kind = proto::Kind::unicast;
-    parts.header.dst = kOwnId;
-    parts.header.src = kPeerId;
-    parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
-    hub_.send(parts, payload);
-  }
-  void acknowledge(std::uint32_t sequence, std::uint64_t bitmap = kAll, std::uint32_t pong = 0) {
-    std::array<std::byte, proto::gimi::kAckSize> data;
-    proto::gimi::encode_ack({bitmap, pong}, data);
-    answer({sequence, Operation::ack, 0, 0}, data);
-  }
-  void report(proto::DropReason reason, std::uint32_t count, const Frame& frame) {
-    std::string payload{static_cast<char>(reason), 0, 0, 0};
-    payload.append(reinterpret_cast<const char*>(&count), sizeof count);
-    const std::size_t size = std::min<std::size_t>(frame.bytes.size(), 32);
-    payload.append(reinterpret_cast<const char*>(frame.bytes.data()), size);
-    proto::FrameParts parts;
-    parts.header.kind = proto::Kind::report;
-    parts.header.dst = kOwnId;
-    parts.header.src = kHubNode;
-    hub_.send(parts, payload);
-  }
-
-  FakeHub fake_;
-  FakeConnection hub_{-1};
-  std::optional<Node> node_;
-};
+using SendStreamTest = Conversation;
 
 TEST_F(SendStreamTest, AsksForAnAckOnlyWhenSynchronized) {
   sender(0).send("free").or_throw();

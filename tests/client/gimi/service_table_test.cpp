@@ -87,7 +87,7 @@ TEST_F(Services, EndWithTheirLastHandle) {
   const Node robot = join("robot");
   const Node viewer = join();
   std::optional<Publisher> publisher = robot.advertise("odom").or_throw();
-  std::optional<Publisher> copy = publisher;
+  std::optional<Publisher> copy(*publisher);
   std::optional<Subscription> subscription = viewer.subscribe("robot/odom").or_throw();
   const std::optional<Subscription> same = viewer.subscribe("robot/odom").or_throw();
   publisher->wait_for_subscribers(1, kWait).or_throw();
@@ -114,6 +114,117 @@ TEST_F(Services, UnsubscribingEndsTheMessages) {
   publisher.publish("to somebody").or_throw();
   EXPECT_EQ(again.receive(kWait)->text(), "to somebody");
   EXPECT_EQ(publisher.published(), 2u);
+}
+
+SendOptions synchronized(std::size_t window) {
+  SendOptions options;
+  options.window = window;
+  return options;
+}
+
+AcceptOptions accepting(MessageKey key) {
+  AcceptOptions options;
+  options.key = key;
+  options.queue = {1000, AtFullQueue::stop_reading};
+  return options;
+}
+
+TEST_F(Services, EveryNodeSendsToWhoAcceptsAndIsAnswered) {
+  const Node robot = join("robot");
+  const Queue commands = robot.accept("drive", accepting({5, 2})).or_throw();
+  const Node named = join("operator");
+  const Node nameless = join();
+  for (const Node* node : {&named, &nameless}) {
+    const Sender drive = node->sender_to_service("robot/drive", synchronized(3)).or_throw();
+    EXPECT_EQ(drive.service(), "robot/drive");
+    for (int i = 0; i < 100; ++i) drive.send(std::to_string(i)).or_throw();
+    drive.settle(kWait).or_throw();
+    EXPECT_EQ(drive.counts().acknowledged, 100u);
+    for (int i = 0; i < 100; ++i) {
+      const auto command = commands.receive(kWait);
+      ASSERT_TRUE(command);
+      EXPECT_EQ(command->text(), std::to_string(i));
+      EXPECT_EQ(command->from(), node->peer());
+      EXPECT_EQ(command->key(), (MessageKey{5, 2}));
+    }
+  }
+}
+
+TEST_F(Services, WhatIsSentToOneAndToItsNodeAreTwoStreams) {
+  const Node robot = join("robot");
+  const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
+  const Node viewer = join();
+  SendOptions options = synchronized(1);
+  options.key = {5, 0};
+  const Sender drive = viewer.sender_to_service("robot/drive", options).or_throw();
+  const Sender direct = viewer.sender("robot", options).or_throw();
+  for (int i = 0; i < 50; ++i) {
+    drive.send("service").or_throw();
+    direct.send("node").or_throw();
+  }
+  drive.settle(kWait).or_throw();
+  direct.settle(kWait).or_throw();
+  EXPECT_EQ(commands.received(), 100u);
+}
+
+TEST_F(Services, OnlyWhatAcceptsCanBeSentTo) {
+  const Node robot = join("robot");
+  const Publisher odometry = robot.advertise("odom").or_throw();
+  const Node viewer = join();
+  EXPECT_TRUE(viewer.sender_to_service("robot/odom").is(Status::not_found));
+  EXPECT_TRUE(viewer.sender_to_service("robot/drive").is(Status::not_found)) << "not there yet";
+  EXPECT_TRUE(viewer.sender_to_service("robot/*").is(Status::not_found)) << "one service, not a pattern";
+  EXPECT_TRUE(viewer.sender_to_service("a//b").is(Status::bad_name));
+  EXPECT_TRUE(viewer.sender_to_service("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
+}
+
+TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
+  const Node viewer = join();
+  std::optional<Sender> drive;
+  for (const std::uint32_t life : {1u, 2u, 3u}) {
+    const Node robot = join("robot");
+    // Each life has other types of messages, so each has another group.
+    const Queue commands = robot.accept("drive", accepting({life, 0})).or_throw();
+    if (!drive) drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+    EXPECT_TRUE(eventually([&] { return drive->send(std::to_string(life), kWait).ok(); }));
+    drive->settle(kWait).or_throw();
+    EXPECT_EQ(commands.receive(kWait)->text(), std::to_string(life));
+    EXPECT_EQ(drive->counts().acknowledged, life);
+    // What waits for its answer when the service goes is lost, not waited for.
+  }
+  EXPECT_TRUE(eventually([&] { return drive->send("?", kWait).is(Status::not_found); }));
+  EXPECT_NE(drive->send("?").failure().sentence.find("robot/drive"), std::string::npos);
+}
+
+TEST_F(Services, ASenderFollowsAServiceToItsNodesNewName) {
+  const Node viewer = join();
+  const Node robot = join("robot");
+  const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
+  const Sender drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+  drive.send("1").or_throw();
+  drive.settle(kWait).or_throw();
+  robot.take_name("forklift", kWait).or_throw();
+  EXPECT_TRUE(eventually([&] { return drive.send("?", kWait).is(Status::not_found); })) << "another service now";
+  EXPECT_TRUE(eventually([&] { return viewer.sender_to_service("forklift/drive").ok(); }));
+  viewer.sender_to_service("forklift/drive").or_throw().send("2").or_throw();
+  robot.take_name("robot", kWait).or_throw();
+  EXPECT_TRUE(eventually([&] { return drive.send("3", kWait).ok(); }));
+  std::string last;
+  while (last != "3") last = commands.receive(kWait).or_throw().text();
+}
+
+TEST_F(Services, ReadingAndSendingToOneServiceDoNotDisturbEachOther) {
+  const Node viewer = join();
+  const Node robot = join("robot");
+  const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
+  std::optional<Subscription> subscription = viewer.subscribe("robot/drive").or_throw();
+  const Sender drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
+  subscription.reset();
+  drive.send("1").or_throw();
+  drive.settle(kWait).or_throw();
+  EXPECT_EQ(viewer.services("robot/drive").or_throw().at(0).subscribers, 1u) << "it is followed";
+  const Subscription again = viewer.subscribe("robot/drive").or_throw();
+  EXPECT_TRUE(again.exists());
 }
 
 TEST_F(Services, AreRefusedWithWords) {

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <set>
+#include <thread>
 
+#include "proto/control/ns_watch.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
 namespace gimnet {
@@ -61,6 +65,7 @@ TEST_F(WatchTableTest, AServiceFollowsTheNewNameOfItsNode) {
   }
   robot.take_name("forklift", kWait).or_throw();
   EXPECT_EQ(robot.state().name, "forklift");
+  EXPECT_EQ(odometry.name(), "forklift/odom");
   std::multiset<std::string> told;
   for (int i = 0; i < 3; ++i) told.insert(next(watch));
   EXPECT_EQ(told, (std::multiset<std::string>{"withdrawn robot/odom", "renamed forklift from robot",
@@ -74,6 +79,7 @@ TEST_F(WatchTableTest, AServiceFollowsTheNewNameOfItsNode) {
   EXPECT_FALSE(old_name.exists());
   robot.give_name_back(kWait).or_throw();
   EXPECT_EQ(robot.state().name, "");
+  EXPECT_EQ(odometry.name(), "odom") << "until the node has a name again";
   EXPECT_TRUE(viewer.find("forklift").is(Status::not_found));
 }
 
@@ -117,3 +123,76 @@ TEST_F(WatchTableTest, OneThatIsNotReadHoldsUpNothingElse) {
 
 }  // namespace
 }  // namespace gimnet
+
+namespace gimnet::gimi {
+namespace {
+
+namespace ns = proto::ns;
+
+/// What a watch acknowledges, as it is seen on the wire.
+class WatchTaken : public test::Conversation {
+ protected:
+  void SetUp() override {
+    std::thread asking([&] { watch_.emplace(node_->watch("**").or_throw()); });
+    std::uint16_t number = 0;
+    const auto request = hub_.next_request<ns::Watch>(number);
+    ASSERT_TRUE(request);
+    number_ = request->watch;
+    tell(2);  // before the answer: it is held back until the program has its handle
+    hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::WatchAnswer{true}, number));
+    asking.join();
+  }
+
+  /// One frame with so many changes.
+  void tell(std::size_t changes) {
+    ns::WatchEvents events;
+    events.watch = number_;
+    events.epoch = 5;
+    events.changes.resize(changes);
+    events.changes.back().kind = ns::ChangeKind::end;
+    hub_.send_control(proto::Kind::ns, proto::encode(events));
+  }
+
+  /// The next frame is a message that the node sends now: it acknowledged nothing before.
+  void expect_nothing_acknowledged() {
+    node_->send(Peer{test::kPeerId}, "next").or_throw();
+    EXPECT_EQ(next().data, "next");
+  }
+  void expect_acknowledged() {
+    std::uint16_t number = 1;
+    const auto taken = hub_.next_request<ns::WatchTaken>(number);
+    ASSERT_TRUE(taken);
+    EXPECT_EQ(taken->watch, number_);
+    EXPECT_EQ(taken->frames, 1u);
+    EXPECT_EQ(number, 0u) << "nobody waits for an answer";
+  }
+
+  std::optional<Watch> watch_;
+  std::uint32_t number_ = 0;
+};
+
+TEST_F(WatchTaken, AFrameIsAcknowledgedWhenItsLastEventWasTaken) {
+  expect_nothing_acknowledged();
+  EXPECT_EQ(watch_->receive(kForever)->change, Change::snapshot_begins);
+  expect_nothing_acknowledged();
+  EXPECT_EQ(watch_->receive(kForever)->change, Change::snapshot_ends);
+  expect_acknowledged();
+  EXPECT_FALSE(watch_->try_receive());
+  expect_nothing_acknowledged();
+}
+
+TEST_F(WatchTaken, EachFrameByItself) {
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(watch_->receive(kForever));
+  expect_acknowledged();
+  tell(1);
+  tell(3);
+  EXPECT_TRUE(watch_->receive(kForever));
+  expect_acknowledged();
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(watch_->receive(kForever));
+  expect_nothing_acknowledged();
+  EXPECT_TRUE(watch_->receive(kForever));
+  expect_acknowledged();
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

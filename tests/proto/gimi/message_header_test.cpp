@@ -73,11 +73,22 @@ TEST(GimiAck, IsDecodedAndWrittenAsTheVectorSays) {
   const auto payload = payload_of("gimi/ack");
   const auto message = parse_message(payload);
   EXPECT_EQ(message->header.sequence, 40u);
-  EXPECT_EQ(decode_ack(message->data), (Ack{0b101, 0}));
-  std::array<std::byte, kAckSize> memory{};
-  encode_ack({0b101, 0}, memory);
-  EXPECT_EQ(Bytes(memory.begin(), memory.end()), to_bytes(message->data));
+  EXPECT_EQ(decode_ack(message->data), (Ack{0b101, 0, 0}));
+  std::array<std::byte, kAckSizeMax> memory{};
+  ASSERT_EQ(encode_ack({0b101, 0, 0}, memory), kAckSize);
+  EXPECT_EQ(Bytes(memory.begin(), memory.begin() + kAckSize), to_bytes(message->data));
   EXPECT_FALSE(decode_ack(message->data.first(kAckSize - 1)));
+}
+
+TEST(GimiAck, NamesTheGroupOfAService) {
+  const auto payload = payload_of("gimi/ack_service");
+  const auto message = parse_message(payload);
+  const Ack ack{0, 0, (7u << 20) | 5};
+  EXPECT_EQ(decode_ack(message->data), ack);
+  std::array<std::byte, kAckSizeMax> memory{};
+  ASSERT_EQ(encode_ack(ack, memory), kAckSizeMax);
+  EXPECT_EQ(Bytes(memory.begin(), memory.end()), to_bytes(message->data));
+  EXPECT_EQ(decode_ack(message->data.first(kAckSizeMax - 1))->group, 0u);
 }
 
 TEST(GimiPing, CarriesWhatIsToComeBack) {

@@ -8,6 +8,15 @@
 
 namespace gimnet::test {
 
+/// A message of a group that counts in a window of that epoch; with an epoch of 0 in none.
+inline Message make_counted(std::uint32_t group, std::uint32_t epoch) {
+  nif_incoming in{};
+  in.kind = NIF_GROUP;
+  in.to = group;
+  in.epoch = epoch;
+  return MessageAccess::make(in, {}, nullptr);
+}
+
 /// A message that NIF knows nothing of. `text` must outlive it.
 inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {}) {
   nif_incoming in{};

@@ -1,0 +1,104 @@
+#include "client/gimi/core.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tests/client/gimi/support/conversation.hpp"
+
+// What becomes of those who wait when no connection will come any more.
+
+namespace gimnet::gimi {
+namespace {
+
+using proto::GoodbyeCode;
+using test::Conversation;
+using test::kKey;
+using test::kPeerId;
+using test::Operation;
+
+/// Dials again after breaks, as programs do.
+class Dismissed : public Conversation, public testing::WithParamInterface<GoodbyeCode> {
+ protected:
+  Dismissed() : Conversation(true) {}
+};
+
+class WithoutReconnecting : public Conversation {};
+
+TEST_P(Dismissed, EverybodyWhoWaitsLeavesWithTheReason) {
+  const Sender stream = sender(1);
+  stream.send("never acknowledged").or_throw();
+  static_cast<void>(next_data());
+  const auto told = [](const Failure& failure) {
+    EXPECT_EQ(failure.status, Status::refused) << failure.sentence;
+    EXPECT_NE(failure.sentence.find("in the way"), std::string::npos) << failure.sentence;
+    EXPECT_EQ(failure.sentence.find("nif_"), std::string::npos) << failure.sentence;
+  };
+  const std::vector<std::function<void()>> calls{
+      [&] { told(node_->receive().failure()); },
+      [&] { told(node_->receive(MessageKey{1, 1}).failure()); },
+      [&] { told(stream.send("no room").failure()); },
+      [&] { EXPECT_FALSE(stream.settle()); },
+      [&] { EXPECT_FALSE(node_->ping(Peer{kPeerId}, kForever)); },
+      [&] { told(node_->find("anybody", kForever).failure()); },
+      [&] { told(node_->watch("**", {}, kForever).failure()); },
+      [&] { told(node_->subscribe("a/b", {}, kForever).failure()); },
+  };
+  std::vector<std::thread> waiting;
+  for (const auto& call : calls) waiting.emplace_back(call);
+  hub_.goodbye(GetParam(), "in the way");
+  for (std::thread& thread : waiting) thread.join();
+  for (const auto& call : calls) call();  // and nobody waits who comes later
+  EXPECT_TRUE(node_->state().ended);
+  EXPECT_FALSE(node_->state().connected);
+  EXPECT_EQ(stream.counts().lost, 1u);
+}
+
+TEST_P(Dismissed, WhatCameBeforeStillComes) {
+  constexpr int kMessages = 100;
+  const Queue queue = node_->queue(kKey, {2, AtFullQueue::stop_reading});
+  const std::string text = "x";
+  for (int i = 1; i <= kMessages; ++i) {
+    answer({static_cast<std::uint32_t>(i), Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  }
+  hub_.goodbye(GetParam(), "in the way");
+  for (std::uint32_t i = 1; i <= kMessages; ++i) ASSERT_EQ(queue.receive(kForever)->sequence(), i);
+  EXPECT_TRUE(queue.receive(kForever).is(Status::refused));
+}
+
+INSTANTIATE_TEST_SUITE_P(Core, Dismissed, testing::Values(GoodbyeCode::kicked, GoodbyeCode::replaced),
+                         [](const auto& code) { return std::string(proto::goodbye_name(code.param)); });
+
+TEST_F(WithoutReconnecting, ABreakIsTheEnd) {
+  std::thread waiting([&] { EXPECT_TRUE(node_->receive().is(Status::not_connected)); });
+  hub_.close();
+  waiting.join();
+  EXPECT_TRUE(node_->state().ended);
+  EXPECT_TRUE(node_->ping(Peer{kPeerId}, kForever).is(Status::not_connected));
+}
+
+TEST_F(WithoutReconnecting, ANodeThatIsRenumberedComesBackOrSaysThatItCannot) {
+  std::thread waiting([&] { EXPECT_FALSE(node_->receive()); });
+  hub_.goodbye(GoodbyeCode::renumbered, "you are another");
+  auto again = fake_.accept();
+  ASSERT_TRUE(again.read_hello());
+  EXPECT_FALSE(node_->state().ended);
+  again.send(proto::kOpening);
+  again.goodbye(GoodbyeCode::hub_full, "no room");
+  waiting.join();
+  EXPECT_TRUE(node_->state().ended);
+}
+
+TEST_F(WithoutReconnecting, ClosingAfterwardsAnswersClosed) {
+  hub_.close();
+  EXPECT_TRUE(node_->receive().is(Status::not_connected));
+  node_->close();
+  EXPECT_TRUE(node_->receive().is(Status::closed));
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

@@ -1,0 +1,247 @@
+#include "client/gimi/stream_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "proto/control/ns.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
+
+// Streams to services as they are seen on the wire, by a hub that answers what the test wants.
+
+namespace gimnet::gimi {
+namespace {
+
+using test::Conversation;
+using test::kAll;
+using test::kKey;
+using test::kOwnId;
+using test::kPeerId;
+using test::Operation;
+using test::Taken;
+
+namespace ns = proto::ns;
+
+constexpr std::uint32_t kGroup = (7u << 20) | 300;
+constexpr std::uint32_t kNewGroup = (7u << 20) | 301;
+constexpr const char* kService = "robot/drive";
+
+class StreamTableTest : public Conversation {
+ protected:
+  /// Answers the one question with one service, and the other with where it is.
+  void serve(ns::Direction direction = ns::Direction::accepts) {
+    std::uint16_t number = 0;
+    ASSERT_TRUE(hub_.next_request<ns::Services>(number));
+    ns::ServicesAnswer listed;
+    listed.services.resize(1);
+    listed.services[0].group = GroupId{kGroup};
+    listed.services[0].name = kService;
+    listed.services[0].node = NodeId{kPeerId};
+    listed.services[0].direction = direction;
+    hub_.send_control(proto::Kind::ns, proto::encode_answer(listed, number));
+    if (direction != ns::Direction::accepts) return;
+    const auto subscribe = hub_.next_request<ns::Subscribe>(number);
+    ASSERT_TRUE(subscribe);
+    EXPECT_EQ(subscribe->name, kService);
+    ns::SubscribeAnswer subscribed;
+    subscribed.group = GroupId{kGroup};
+    subscribed.message_type = kKey.type;
+    subscribed.instance = kKey.instance;
+    hub_.send_control(proto::Kind::ns, proto::encode_answer(subscribed, number));
+  }
+
+  [[nodiscard]] Sender to_service(std::size_t window, AtFullWindow at_full = AtFullWindow::wait) {
+    SendOptions options;
+    options.window = window;
+    options.at_full = at_full;
+    options.key = {9, 9};  // the service's own counts
+    std::optional<Sender> made;
+    std::thread asking([&] { made.emplace(node_->sender_to_service(kService, options).or_throw()); });
+    serve();
+    asking.join();
+    return *made;
+  }
+
+  void move_to(std::uint32_t group, MessageKey key = kKey) {
+    ns::ServiceMoved moved;
+    moved.name = kService;
+    moved.old_group = GroupId{std::exchange(group_, group)};
+    moved.new_group = GroupId{group};
+    moved.message_type = key.type;
+    moved.instance = key.instance;
+    hub_.send_control(proto::Kind::ns, proto::encode(moved));
+  }
+
+  /// What the hub said before was seen to by the node: so was what it says behind it.
+  void settle_down() {
+    answer({++sequence_, Operation::data, 0, 0}, {});
+    EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
+  }
+
+  std::uint32_t sequence_ = 0;
+  std::uint32_t group_ = kGroup;
+};
+
+TEST_F(StreamTableTest, AServiceIsAddressedByItsGroupAndItsKey) {
+  const Sender drive = to_service(1);
+  EXPECT_EQ(drive.service(), kService);
+  EXPECT_FALSE(drive.peer());
+  drive.send("go").or_throw();
+  const Taken taken = next_data();
+  EXPECT_EQ(taken.data, "go");
+  EXPECT_EQ(taken.frame.kind, proto::Kind::service);
+  EXPECT_EQ(taken.frame.dst, kGroup);
+  EXPECT_TRUE(taken.frame.has(proto::kFlagReport));
+  EXPECT_TRUE(taken.header.has(proto::gimi::kFlagAckWanted));
+}
+
+TEST_F(StreamTableTest, AnAckThatNamesTheGroupFreesAndOneToTheNodeDoesNot) {
+  const Sender drive = to_service(1);
+  const Sender direct = sender(1);
+  drive.send("to the service").or_throw();
+  direct.send("to the node").or_throw();
+  acknowledge(1, kAll, 0, kGroup);
+  drive.settle().or_throw();
+  EXPECT_EQ(direct.counts().acknowledged, 0u) << "another stream, though key and receiver are the same";
+  acknowledge(1, kAll);
+  direct.settle().or_throw();
+  EXPECT_EQ(drive.counts().acknowledged, 1u);
+}
+
+TEST_F(StreamTableTest, AsksTheServiceForMissingAcks) {
+  const Sender drive = to_service(1);
+  drive.send("go").or_throw();
+  static_cast<void>(next_data());
+  const Taken ping = next();
+  EXPECT_EQ(ping.header.operation, Operation::ping);
+  EXPECT_EQ(ping.frame.kind, proto::Kind::service);
+  EXPECT_EQ(ping.frame.dst, kGroup);
+  acknowledge(1, kAll, ping.header.sequence, kGroup);
+  drive.settle().or_throw();
+}
+
+TEST_F(StreamTableTest, APauseHoldsItsKindDestinationAndLaneOnly) {
+  const Sender drive = to_service(0);
+  const Sender direct = sender(0);
+  const proto::flow::Target target{proto::Kind::service, proto::Lane::normal, kGroup};
+  hub_.send(proto::flow::Pause{target});
+  settle_down();
+  EXPECT_TRUE(drive.send("too early", kNoWait).is(Status::timeout)) << "it waits";
+  direct.send("past it").or_throw();
+  node_->send(Peer{kPeerId}, "and past it").or_throw();
+  EXPECT_EQ(next_data().data, "past it");
+  EXPECT_EQ(next_data().data, "and past it");
+  std::thread waiting([&] { drive.send("afterwards").or_throw(); });
+  hub_.send(proto::flow::Resume{target});
+  const Taken taken = next_data();
+  waiting.join();
+  EXPECT_EQ(taken.data, "afterwards");
+  EXPECT_EQ(taken.frame.dst, kGroup);
+}
+
+TEST_F(StreamTableTest, FollowsAServiceThatMoves) {
+  const Sender drive = to_service(2);
+  drive.send("lost").or_throw();
+  static_cast<void>(next_data());
+  constexpr MessageKey kOther{6, 0};
+  move_to(kNewGroup, kOther);
+  settle_down();
+  const auto settled = drive.settle();
+  EXPECT_TRUE(settled.is(Status::not_delivered)) << "its former place cannot tell any more";
+  EXPECT_EQ(drive.counts().lost, 1u);
+  drive.send("found").or_throw();
+  const auto frame = next_data_frame();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(taken_of(*frame).data, "found");
+  EXPECT_EQ(frame->header.dst, kNewGroup);
+  EXPECT_EQ(frame->view().key, (proto::gimi::StreamKey{kOther.type, kOther.instance}.value()));
+  acknowledge(2, 0, 0, kGroup);
+  settle_down();
+  EXPECT_EQ(drive.counts().acknowledged, 0u) << "an answer from the former place";
+  acknowledge(2, 0, 0, kNewGroup);
+  EXPECT_TRUE(drive.settle().is(Status::not_delivered)) << "the one";
+  EXPECT_EQ(drive.counts().acknowledged, 1u);
+}
+
+TEST_F(StreamTableTest, SaysThatNobodyHasTheServiceUntilItIsBack) {
+  const Sender drive = to_service(1, AtFullWindow::hold_latest);
+  drive.send("waits for its ACK").or_throw();
+  drive.send("held").or_throw();
+  move_to(0);
+  settle_down();
+  EXPECT_TRUE(drive.send("x").is(Status::not_found));
+  EXPECT_NE(drive.send("x").failure().sentence.find(kService), std::string::npos);
+  EXPECT_EQ(drive.counts().lost, 2u);
+  EXPECT_EQ(drive.counts().waiting, 0u);
+  move_to(kNewGroup);
+  settle_down();
+  drive.send("back").or_throw();
+  Taken taken = next_data();
+  while (taken.data != "back") taken = next_data();
+  EXPECT_EQ(taken.frame.dst, kNewGroup);
+}
+
+TEST_F(StreamTableTest, AReportThatTheGroupIsGoneFreesEverything) {
+  const Sender drive = to_service(3);
+  drive.send("1").or_throw();
+  drive.send("2").or_throw();
+  const auto frame = next_data_frame();
+  ASSERT_TRUE(frame);
+  report(proto::DropReason::no_such_group, 1, *frame);
+  EXPECT_TRUE(drive.settle().is(Status::not_delivered));
+  EXPECT_EQ(drive.counts().lost, 2u);
+  EXPECT_NE(drive.counts().loss.find("no_such_group"), std::string::npos) << drive.counts().loss;
+}
+
+TEST_F(StreamTableTest, OneStreamForAllWhoSendToAService) {
+  const Sender first = to_service(5);
+  std::optional<Sender> second;
+  std::thread asking([&] { second.emplace(node_->sender_to_service(kService).or_throw()); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub_.next_request<ns::Services>(number));
+  ns::ServicesAnswer listed;
+  listed.services.resize(1);
+  listed.services[0].group = GroupId{kGroup};
+  listed.services[0].name = kService;
+  listed.services[0].direction = ns::Direction::accepts;
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(listed, number));
+  asking.join();
+  second->send("x").or_throw();
+  EXPECT_EQ(first.counts().sent, 1u);
+}
+
+TEST_F(StreamTableTest, AServiceThatGivesDataTakesNone) {
+  std::thread asking([&] {
+    const auto refused = node_->sender_to_service(kService);
+    EXPECT_TRUE(refused.is(Status::not_found));
+    EXPECT_NE(refused.failure().sentence.find("subscribe"), std::string::npos);
+  });
+  serve(ns::Direction::provides);
+  asking.join();
+}
+
+TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::service;
+  parts.header.dst = kGroup;
+  parts.header.src = kPeerId;
+  parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
+  std::string payload(8, '\0');
+  payload[0] = 1;                                               // sequence 1
+  payload[5] = static_cast<char>(proto::gimi::kFlagAckWanted);  // of DATA
+  hub_.send(parts, payload + "go");
+  const Taken ack = next();
+  EXPECT_EQ(ack.header.operation, Operation::ack);
+  EXPECT_EQ(ack.frame.kind, proto::Kind::unicast);
+  EXPECT_EQ(ack.frame.dst, kPeerId);
+  const auto read = proto::gimi::decode_ack(std::as_bytes(std::span(ack.data.data(), ack.data.size())));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->group, kGroup);
+  EXPECT_EQ(node_->receive(kKey, kForever)->text(), "go");
+}
+
+}  // namespace
+}  // namespace gimnet::gimi
