@@ -34,7 +34,8 @@ class Ctl(Case):
         receiver = start_recv(self, hub, "B")
         former = self.id_of(hub, "B")
         self.assertEqual(self.ctl("kick", "B", "--reason", "it stands in the way").code, 0)
-        wait_until(lambda: "it stands in the way" in receiver.err, "the words of the kick")
+        self.assertEqual(receiver.wait(), 3, "nobody waits for what cannot come any more")
+        self.assertIn("it stands in the way", receiver.err)
         self.assertIsNone(self.id_of(hub, "B"))
         # The name is free, and the token that the first one left counts as none.
         start_recv(self, hub, "B")

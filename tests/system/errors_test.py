@@ -2,14 +2,16 @@
 """Every path by which a person meets an error of `gimnet`: what happened, to what, what to do, and the exit code. The
 tables are the test; {port}, {folder} and {robot} stand for those of the run."""
 
+import json
 import os
+import pathlib
 import socket
 import subprocess
 import tempfile
 import threading
 import unittest
 
-from support.processes import GIMNET, Hub, Process, start_gimnet, start_recv
+from support.processes import GIMNET, HOME, Hub, Process, run_gimnet, start_gimnet, start_recv
 from support.waiting import PATIENCE_S, wait_until
 from support.wire import Client
 
@@ -194,6 +196,47 @@ class Errors(Tool):
                 self.assertEqual(self.run_tool(["--hub", hub.url, *arguments], stdout=output), (FAILED, full))
 
 
+class Administration(Tool):
+    """What `gimnet ctl` answers to those who may not, and to those who may and ask for what cannot be."""
+
+    # Over TCP, that is as nobody in particular: exit code, words, arguments of ctl.
+    DENIED_TO_OTHERS = [(DENIED, ["administrators connect over the hub's Unix socket", "--hub unix:/PATH"], words)
+                        for words in (["kick", "robot"], ["reassign", "robot", "7.99"], ["drain"], ["reload"],
+                                      ["log", "debug"])]
+    # Over the Unix socket. B is {robot}, mute is {mute}.
+    CANNOT_BE = [
+        (USAGE, ["action is missing: connections, routes, kick, reassign, drain, reload or log", "`gimnet ctl " + HOW], []),
+        (USAGE, ["there is no action 'kik' of gimnet ctl; did you mean kick?", "`gimnet ctl " + HOW], ["kik", "robot"]),
+        (USAGE, ["node is missing: name or id", "`gimnet ctl kick " + HOW], ["kick"]),
+        (USAGE, ["node needs a value: name or id"], ["kick", ""]),
+        (USAGE, ["new_id is missing: a free id of the same hub: HUB.NUMBER or NUMBER"], ["reassign", "robot"]),
+        (USAGE, ["there is no option --reson for gimnet ctl kick; did you mean --reason?"], ["kick", "robot", "--reson", "x"]),
+        (NOT_FOUND, ["there is no node 'robto'; did you mean robot?"], ["kick", "robto"]),
+        (NOT_FOUND, ["there is no node 7.999 on this hub", LIST], ["kick", "7.999"]),
+        (NOT_FOUND, ["there is no node 8.1", LIST], ["kick", "8.1"]),
+        (NOT_FOUND, ["there is no node 7.999 on this hub", LIST], ["reassign", "7.999", "7.5000"]),
+        (FAILED, ["the id {mute} is that of another node 'mute'; choose a free one"], ["reassign", "robot", "{mute}"]),
+        (USAGE, ["'x' is no id: write HUB.NUMBER, for example {robot}"], ["reassign", "robot", "x"]),
+        (USAGE, ["the id 8.5 is not one of this hub's, which begin with 7."], ["reassign", "robot", "8.5"]),
+        (USAGE, ["a node's id ends in a number from 1 to 1048574"], ["reassign", "robot", "7.1048575"]),
+        (USAGE, ["there is no log level 'debgu'", "did you mean debug?"], ["log", "debgu"]),
+        (USAGE, ["'loud'", "error, warning, info, debug or off"], ["log", "loud"]),
+        (USAGE, ["'now' is one word too many"], ["drain", "now"]),
+    ]
+
+    def test_ctl(self):
+        hub = Hub(self)
+        start_recv(self, hub, "robot")
+        self.places["robot"] = hub.wait_for_node("robot")["id"]
+        Client(self, hub).join("mute")
+        self.places["mute"] = hub.wait_for_node("mute")["id"]
+        for code, words, arguments in self.DENIED_TO_OTHERS:
+            self.expect(code, words, ["--hub", hub.url, "ctl", *arguments])
+        for code, words, arguments in self.CANNOT_BE:
+            self.expect(code, words, ["--hub", f"unix:{hub.socket_path}", "ctl", *arguments])
+        self.assertEqual(hub.wait_for_node("robot")["id"], self.places["robot"], "nothing was changed")
+
+
 class Strangers(Tool):
     """What answers at the address is no hub, another version of one, or one that does not let us in."""
 
@@ -220,6 +263,13 @@ class Strangers(Tool):
         url = self.serve(b"")
         self.expect(NO_CONNECTION, [url], ["--hub", url, "nodes"])
 
+    def test_who_never_answers(self):
+        """Accepts and is silent until the tool gives up."""
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+        url = f"tcp://127.0.0.1:{listener.getsockname()[1]}"
+        self.expect(NO_CONNECTION, [f"the peer at {url} does not answer HELLO; is it a hub?"], ["--hub", url, "nodes"])
+
     def test_another_version(self):
         body = bytes([3 << 3, 1, 0, 0, 2, 1, 0])
         goodbye = b"\x03\0\0\0" + body
@@ -230,6 +280,49 @@ class Strangers(Tool):
         hub = Hub(self, "--limit", "nodes=1")
         Client(self, hub).join("only")
         self.expect(NO_CONNECTION, [hub.url, "this hub takes 1 nodes and has them; connect to another one, or start it with a larger"], ["--hub", hub.url, "nodes"])
+
+
+class SentAway(unittest.TestCase):
+    """The hub ends the session of a tool that waits: the tool ends too, and says why."""
+
+    def setUp(self):
+        self.hub = Hub(self)
+        Client(self, self.hub).join("mute")
+
+    def kick_the_tools(self):
+        """All nodes of gimnet that are there: the one that runs, and those that ask and are gone by then."""
+        def there():
+            found = run_gimnet(self.hub, "nodes", "--all", "--json")
+            ids = [node["id"] for node in json.loads(found.out) if node["description"] == "gimnet tool"]
+            return ids if len(ids) > 1 else None
+        for node in wait_until(there, "the tool's node"):
+            run_gimnet(f"unix:{self.hub.socket_path}", "ctl", "kick", node, "--reason", "too loud")
+
+    def ends(self, tool, code, *words):
+        self.assertEqual(tool.wait(), code, tool.err)
+        for word in words:
+            self.assertIn(word, tool.err)
+        for word in ("trying to connect again", "nif_"):
+            self.assertNotIn(word, tool.err)
+
+    def test_by_an_administrator(self):
+        for words in (["recv", "--name", "B"], ["echo", "a/b"], ["echo", "**"], ["hz", "a/b"], ["bw", "**"], ["watch"],
+                      ["pub", "a/b"], ["pub", "a/b", "--wait", "1"], ["ping", "mute", "-W", "600"], ["send", "mute"]):
+            with self.subTest(words=words):
+                tool = start_gimnet(self, self.hub, *words, stdin=subprocess.PIPE)
+                self.kick_the_tools()
+                self.ends(tool, FAILED if words[0] == "send" else NO_CONNECTION, "lost the connection to the hub",
+                          "kicked", "too loud", "ask them before you come back")
+
+    def test_by_another_connection_of_its_session(self):
+        receiver = start_recv(self, self.hub, "B")
+        # Of tests that ended their hub with kill -9 others may lie there.
+        path = max(pathlib.Path(HOME.name, "gimnet", "tokens").glob("B.*"), key=lambda path: path.stat().st_mtime_ns)
+        record = path.read_bytes()
+        size = int.from_bytes(record[10:12], "little")
+        Client(self, self.hub).join("B", token=record[16:16 + size])
+        self.ends(receiver, NO_CONNECTION, "lost the connection to the hub", "replaced", "took its place",
+                  "end the other program, or connect under another name")
 
 
 class TheHubGoes(unittest.TestCase):

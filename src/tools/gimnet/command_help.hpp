@@ -21,6 +21,10 @@ Data goes to standard output, words to standard error. Ends with 0 done, 1 faile
 4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 130 and 143 by signal.
 )";
 
+/// What each command's help ends with.
+inline constexpr const char* kEverywhere =
+    "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
+
 inline constexpr const char* kSendAbout = R"(Send messages to a node, and wait until it has acknowledged them all.
 
 Examples:

@@ -1,6 +1,7 @@
 #include "tools/gimnet/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string_view>
@@ -13,29 +14,58 @@
 namespace gimnet::tool {
 namespace {
 
-/// The first word that is neither an option nor the value of one that stands before commands.
-std::string_view command_word(std::span<const char* const> arguments) {
+/// What the words call: a command and, of `ctl`, an action. "" where it is missing.
+struct Called {
+  std::string_view command;
+  std::string_view action;
+  [[nodiscard]] std::string text() const {
+    std::string text = "gimnet";
+    for (const std::string_view word : {command, action}) text += word.empty() ? "" : " " + std::string(word);
+    return text;
+  }
+};
+
+/// The first words that are neither options nor the values of those that stand anywhere.
+Called called_by(std::span<const char* const> arguments) {
+  Called called;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string_view word = arguments[i];
     if (word == "--hub" || word == "--shard" || word == "--color") {
       ++i;
-    } else if (!word.starts_with('-')) {
-      return word;
+    } else if (word.starts_with('-')) {
+      continue;
+    } else if (called.command.empty()) {
+      called.command = word;
+      if (word != "ctl") break;
+    } else {
+      called.action = word;
+      break;
     }
   }
-  return {};
+  return called;
 }
 
-/// `command`: "" or the command's word.
-CommandLineEnding wrong(const std::string& sentence, std::string_view command) {
-  const std::string called = command.empty() ? "gimnet" : "gimnet " + std::string(command);
-  return {ExitCode::usage, "gimnet: " + sentence + "\n`" + called + " --help` shows how it is called.\n"};
+CommandLineEnding wrong(const std::string& sentence, const Called& called) {
+  return {ExitCode::usage, "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
 }
 
-std::variant<Options, CommandLineEnding> unknown_command(std::string_view word) {
+CommandLineEnding unknown_command(std::string_view word) {
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
-  return wrong("there is no command '" + std::string(word) + "'" + did_you_mean(word, names), "");
+  return wrong("there is no command '" + std::string(word) + "'" + did_you_mean(word, names), {});
+}
+
+CommandLineEnding unknown_action(std::string_view word) {
+  return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" + did_you_mean(word, kCtlActions),
+               {"ctl", ""});
+}
+
+CommandLineEnding missing_action() {
+  std::string names;
+  for (const std::string_view action : kCtlActions) {
+    names += (names.empty() ? "" : action == kCtlActions.back() ? " or " : ", ") + std::string(action);
+  }
+  return wrong("action is missing: " + names, {"ctl", ""});
 }
 
 /// What CLI11 cannot know.
@@ -60,28 +90,31 @@ std::string contradiction(const Options& options) {
   return {};
 }
 
-/// The options that can be given, those of the command first.
-std::vector<const CLI::Option*> options_of(const CLI::App& app, std::string_view command) {
+/// The options that can be given, those of the command first. REQUIRES: what is called is there.
+std::vector<const CLI::Option*> options_of(const CLI::App& app, const Called& called) {
   std::vector<const CLI::Option*> all;
-  if (!command.empty()) {
-    for (const CLI::Option* option : app.get_subcommand_ptr(std::string(command))->get_options()) all.push_back(option);
+  const auto add = [&all](const CLI::App& of) {
+    for (const CLI::Option* option : of.get_options()) all.push_back(option);
+  };
+  if (!called.command.empty()) {
+    const CLI::App& command = *app.get_subcommand(std::string(called.command));
+    if (!called.action.empty()) add(*command.get_subcommand(std::string(called.action)));
+    add(command);
   }
-  for (const CLI::Option* option : app.get_options()) all.push_back(option);
+  add(app);
   return all;
 }
 
 /// A word that nothing takes.
-std::string unexpected(const std::string& word, const std::vector<const CLI::Option*>& options,
-                       std::string_view command) {
-  const std::string called = command.empty() ? "gimnet" : "gimnet " + std::string(command);
-  if (!word.starts_with('-')) return "'" + word + "' is one word too many for " + called;
+std::string unexpected(const std::string& word, const std::vector<const CLI::Option*>& options, const Called& called) {
+  if (!word.starts_with('-')) return "'" + word + "' is one word too many for " + called.text();
   const std::string given = word.substr(0, word.find('='));
   std::vector<std::string> names;
   for (const CLI::Option* option : options) {
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
   }
   const std::vector<std::string_view> views(names.begin(), names.end());
-  return "there is no option " + given + " for " + called + did_you_mean(given, views);
+  return "there is no option " + given + " for " + called.text() + did_you_mean(given, views);
 }
 
 /// What CLI11 says, in words that name the option, what was given and what it takes.
@@ -111,10 +144,12 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   CLI::App app(help::kAbout, "gimnet");
   add_commands(app, options);
   const std::span arguments(argv, static_cast<std::size_t>(argc));
-  const std::string_view word = command_word(arguments.subspan(arguments.empty() ? 0 : 1));
+  const Called called = called_by(arguments.subspan(arguments.empty() ? 0 : 1));
   const auto* known = kCommands.begin();
-  while (known != kCommands.end() && known->first != word) ++known;
-  if (!word.empty() && known == kCommands.end()) return unknown_command(word);
+  while (known != kCommands.end() && known->first != called.command) ++known;
+  if (!called.command.empty() && known == kCommands.end()) return unknown_command(called.command);
+  const bool acts = std::ranges::find(kCtlActions, called.action) != kCtlActions.end();
+  if (!called.action.empty() && !acts) return unknown_action(called.action);
   std::string sentence;
   try {
     app.parse(argc, argv);
@@ -123,15 +158,16 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   } catch (const CLI::CallForVersion& version) {
     return CommandLineEnding{ExitCode::done, std::string(version.what()) + "\n"};
   } catch (const CLI::ParseError& error) {
-    sentence = explained(error, options_of(app, word));
+    sentence = explained(error, options_of(app, called));
   }
   if (const auto extras = app.remaining(true); !extras.empty()) {
-    return wrong(unexpected(extras.front(), options_of(app, word), word), word);
+    return wrong(unexpected(extras.front(), options_of(app, called), called), called);
   }
-  if (!sentence.empty()) return wrong(sentence, word);
-  if (word.empty()) return CommandLineEnding{ExitCode::usage, app.help()};
+  if (called.command == "ctl" && !acts) return missing_action();
+  if (!sentence.empty()) return wrong(sentence, called);
+  if (called.command.empty()) return CommandLineEnding{ExitCode::usage, app.help()};
   options.command = known->second;
-  if (sentence = contradiction(options); !sentence.empty()) return wrong(sentence, word);
+  if (sentence = contradiction(options); !sentence.empty()) return wrong(sentence, called);
   return options;
 }
 

@@ -8,15 +8,10 @@
 #include <string_view>
 
 #include "tools/gimnet/command_help.hpp"
+#include "tools/gimnet/help_format.hpp"
 
 namespace gimnet::tool {
 namespace {
-
-/// An empty word is a mistake of a script, not a default.
-const CLI::Validator& not_empty() {
-  static const CLI::Validator kNotEmpty([](std::string& word) { return word.empty() ? "empty" : std::string(); }, "");
-  return kNotEmpty;
-}
 
 void add_key(CLI::App& command, Options& options) {
   command.add_option("--type", options.key.type, "message type, a whole number, default 0");
@@ -141,12 +136,18 @@ void add_lists(CLI::App& app, Options& options) {
 
 }  // namespace
 
+const CLI::Validator& not_empty() {
+  static const CLI::Validator kNotEmpty([](std::string& word) { return word.empty() ? "empty" : std::string(); }, "");
+  return kNotEmpty;
+}
+
 void add_commands(CLI::App& app, Options& options) {
   static const std::map<std::string, Colour> kColours{
       {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
+  app.formatter(help_format());  // before the commands, which take it over
   app.add_option("--hub", options.hub, "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
       ->check(not_empty());
-  app.add_flag("--json", options.json, "print JSON");
+  app.add_flag("--json", options.json, "print JSON: one document, or an object a line where there is no end");
   app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
       ->transform(CLI::CheckedTransformer(kColours).description(""));
   app.add_option("--shard", options.shard, "")->group("");
@@ -160,7 +161,10 @@ void add_commands(CLI::App& app, Options& options) {
   add_ping(app, options);
   add_lists(app, options);
   add_ctl(app, options.ctl);
-  for (CLI::App* command : app.get_subcommands({})) command->fallthrough();
+  for (CLI::App* command : app.get_subcommands({})) {
+    command->fallthrough();
+    command->footer(help::kEverywhere);
+  }
 }
 
 }  // namespace gimnet::tool

@@ -8,7 +8,8 @@
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace gimnet::tool {
 
@@ -29,5 +30,8 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{
 /// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each option's description
 /// says its unit, range and default: it is what a wrong value is answered with.
 void add_commands(CLI::App& app, Options& options);
+
+/// An empty word is a mistake of a script, not a default.
+[[nodiscard]] const CLI::Validator& not_empty();
 
 }  // namespace gimnet::tool

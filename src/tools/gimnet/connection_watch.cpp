@@ -6,7 +6,7 @@ namespace gimnet::tool {
 
 void ConnectionWatch::look() {
   const NodeState state = node_.state();
-  if (!state.peer) return;
+  if (!state.peer || state.ended) return;
   // It may have come back already.
   const bool broke = connected_ && (!state.connected || state.reconnects != reconnects_);
   if (broke) say("the connection broke (" + state.trouble + "); trying to connect again");
@@ -18,6 +18,11 @@ void ConnectionWatch::look() {
   if (broke) told_ = state.trouble;
   connected_ = state.connected;
   reconnects_ = state.reconnects;
+}
+
+bool ConnectionWatch::goes_on() {
+  look();
+  return !node_.state().ended;
 }
 
 }  // namespace gimnet::tool

@@ -7,12 +7,15 @@
 
 namespace gimnet::tool {
 
-/// Tells breaks of the connection to the user, once each. Thread safety: one thread.
+/// Tells breaks of the connection to the user, once each; not the last one, after which there is nothing to wait for.
+/// Thread safety: one thread.
 class ConnectionWatch {
  public:
   /// `node` must outlive it.
   explicit ConnectionWatch(Node& node) : node_(node) {}
   void look();
+  /// As look(). False: no connection will come any more.
+  [[nodiscard]] bool goes_on();
 
  private:
   Node& node_;

@@ -12,6 +12,7 @@ namespace gimnet::tool {
 namespace {
 
 constexpr std::size_t kReadBytes = 64 * 1024;
+constexpr int kAskMs = 500;
 
 }  // namespace
 
@@ -50,7 +51,10 @@ LineInput::State LineInput::fill() {
   if (buffer_.size() < end_ + kReadBytes) buffer_.resize(std::max(2 * buffer_.size(), end_ + kReadBytes));
   for (;;) {
     std::array<pollfd, 2> ready{pollfd{input_, POLLIN, 0}, pollfd{stop_, POLLIN, 0}};
-    if (::poll(ready.data(), ready.size(), -1) < 0 && errno != EINTR) break;
+    const int found = ::poll(ready.data(), ready.size(), go_on_ ? kAskMs : -1);
+    if (found < 0 && errno != EINTR) break;
+    if (found == 0 && !go_on_()) return State::given_up;
+    if (found <= 0) continue;
     if ((ready[1].revents & POLLIN) != 0) return State::stopped;
     if (ready[0].revents == 0) continue;
     const ssize_t count = ::read(input_, buffer_.data() + end_, buffer_.size() - end_);

@@ -5,6 +5,7 @@
 
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/line_input.hpp"
 #include "tools/gimnet/progress.hpp"
 
@@ -18,7 +19,8 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
-  LineInput input(STDIN_FILENO, session.stop().descriptor());
+  ConnectionWatch watch(session.node());
+  LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return watch.goes_on(); });
   const Progress progress([&] {
     return std::to_string(publisher.published()) + " published to " + std::to_string(publisher.subscribers());
   });
@@ -34,6 +36,8 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
         break;
       case LineInput::State::failed:
         return Failure{Status::system, std::string("cannot read standard input: ") + std::strerror(input.error())};
+      case LineInput::State::given_up:
+        return Session::gone();
       case LineInput::State::stopped:
       case LineInput::State::end:
         return {};

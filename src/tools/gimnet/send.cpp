@@ -6,6 +6,7 @@
 
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/decimal.hpp"
 #include "tools/gimnet/file_content.hpp"
 #include "tools/gimnet/json_writer.hpp"
@@ -43,7 +44,8 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
 }
 
 Outcome<void> send_lines(Session& session, const Sender& sender) {
-  LineInput input(STDIN_FILENO, session.stop().descriptor());
+  ConnectionWatch watch(session.node());
+  LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return watch.goes_on(); });
   const Progress progress([&] {
     const SendCounts counts = sender.counts();
     return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) + " acknowledged";
@@ -56,6 +58,8 @@ Outcome<void> send_lines(Session& session, const Sender& sender) {
         break;
       case LineInput::State::failed:
         return cannot_read("standard input", input.error());
+      case LineInput::State::given_up:
+        return Session::gone();
       case LineInput::State::stopped:
       case LineInput::State::end:
         return {};

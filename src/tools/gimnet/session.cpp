@@ -72,8 +72,10 @@ ExitCode Session::fail_unmatched(const std::string& kind) {
 
 ExitCode Session::fail(const Failure& failure) {
   if (stopped()) return stop_.signal() == SIGTERM ? ExitCode::terminated : ExitCode::interrupted;
-  const std::string trouble = failure.status == Status::not_connected && node_ ? node_->state().trouble : "";
-  say(trouble.empty() ? failure.sentence : "lost the connection to the hub: " + trouble);
+  const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;
+  const NodeState state = lost && node_ ? node_->state() : NodeState{};
+  const bool known = !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
+  say(known ? "lost the connection to the hub: " + state.trouble : failure.sentence);
   return exit_code_of(failure.status);
 }
 

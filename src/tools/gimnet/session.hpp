@@ -46,6 +46,8 @@ class Session {
 
   /// Prints why something did not work, and gives the code to end with: the signal's, if there was one.
   [[nodiscard]] ExitCode fail(const Failure& failure);
+  /// No connection will come any more: what to give to fail().
+  [[nodiscard]] static Failure gone() { return {Status::not_connected, "lost the connection to the hub"}; }
   /// Ends well, unless the output could not be written or a signal came.
   [[nodiscard]] ExitCode finish();
   /// finish(), and timeout if time was up before there was what was asked for.

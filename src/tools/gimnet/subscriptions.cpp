@@ -49,7 +49,9 @@ Outcome<Message> Subscriptions::receive(Timeout timeout) {
     if (is_pattern(word_)) {
       const std::int64_t next_ns = looked_ns_ + kLookAgain.count() * 1'000'000;
       if (steady_now_ns() >= next_ns) {
-        if (auto done = look_again(); !done && !done.is(Status::not_connected)) return done.failure();
+        // Without a connection what waits here still comes; if none will come any more, the end comes behind it.
+        const auto done = look_again();
+        if (!done && !done.is(Status::not_connected) && !done.is(Status::refused)) return done.failure();
       }
       wait = std::min(timeout, kLookAgain);
     }

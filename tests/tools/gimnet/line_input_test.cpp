@@ -85,6 +85,20 @@ TEST(LineInput, StopsWaiting) {
   EXPECT_EQ(input.next(line), LineInput::State::stopped);
 }
 
+TEST(LineInput, AsksWhetherToGoOnWhileNothingComes) {
+  Pipe pipe;
+  int asked = 0;
+  LineInput input(pipe.reader(), -1, [&] {
+    if (++asked == 1) pipe.write("late\n");
+    return asked < 3;
+  });
+  std::string_view line;
+  ASSERT_EQ(input.next(line), LineInput::State::line);
+  EXPECT_EQ(line, "late");
+  EXPECT_EQ(input.next(line), LineInput::State::given_up);
+  EXPECT_EQ(asked, 3);
+}
+
 TEST(LineInput, SaysThatItCannotRead) {
   LineInput input(::getpid() + 100000);
   std::string_view line;
