@@ -231,6 +231,41 @@ class Tokens(unittest.TestCase):
         self.assertNotEqual(second.id, first.id)
         self.assertEqual([node["name"] for node in hub.nodes() if node["name"]], ["B"])
 
+    def kicked(self, hub, name):
+        """Id and token of a node that an administrator kicked."""
+        node = Client(self, hub).join(name)
+        done = run_gimnet(f"unix:{hub.socket_path}", "ctl", "kick", name)
+        self.assertEqual(done.code, 0, done.err)
+        self.assertEqual(node.goodbye(), "kicked")
+        return node.id, node.welcome[2]
+
+    def test_one_of_a_kicked_node_counts_as_none(self):
+        hub = Hub(self)
+        former, token = self.kicked(hub, "B")
+        again = Client(self, hub).join("B", token=token)
+        self.assertNotEqual(again.id, former)
+        self.assertNotEqual(Client(self, hub).join(token=token).id, former)
+        # The node that has the name now is nobody that was kicked.
+        again.socket.close()
+        self.assertEqual(Client(self, hub).join("B", token=again.welcome[2]).id, again.id)
+
+    def test_nor_does_it_count_for_a_hub_that_was_killed_and_started_again(self):
+        hub = Hub(self)
+        kicked = {name: self.kicked(hub, name) for name in ("B", "C")}
+        bystander = Client(self, hub).join("D")
+        for _ in range(2):
+            hub.process.signal(signal.SIGKILL)
+            hub.process.wait()
+            hub = hub.again(self)
+            for name, (former, token) in kicked.items():
+                for wanted in (name, None):
+                    client = Client(self, hub).join(wanted, token=token)
+                    self.assertNotEqual(client.id, former)
+                    client.send(frame(0, client.id, control(GOODBYE, number(1, 3, 0)), kind=LINK)).until_closed()
+            again = Client(self, hub).join("D", token=bystander.welcome[2])
+            self.assertEqual(again.id, bystander.id, "nobody else lost anything")
+            bystander = again
+
     def test_the_name_of_a_live_node_is_not_given_to_a_token_of_another(self):
         hub = Hub(self)
         first = Client(self, hub).join("A")
