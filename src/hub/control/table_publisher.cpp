@@ -32,10 +32,14 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     for (const std::uint32_t subscriber : topic->subscribers) {
       const Session* session = membership.sessions().find(subscriber);
       GIMNET_CHECK(session != nullptr);
-      const bool paced = topic->pace_of(subscriber).has_value();
-      if (paced) members->paced_by_shard.resize(shards_);
-      auto& by_shard = paced ? members->paced_by_shard : members->by_shard;
-      by_shard[session->place.shard.value()].push_back({session->place.slot, session->place.generation});
+      const Place& place = session->place;
+      if (!topic->pace_of(subscriber)) {
+        members->by_shard[place.shard.value()].push_back({place.slot, place.generation});
+        continue;
+      }
+      members->paced_by_shard.resize(shards_);
+      const bool was_plain = topic->once_plain.contains(subscriber);
+      members->paced_by_shard[place.shard.value()].push_back({place.slot, place.generation, was_plain});
     }
   }
   static_cast<void>(tables_.groups.exchange(index, members.get()));

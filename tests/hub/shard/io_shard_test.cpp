@@ -14,6 +14,7 @@ using proto::DropReason;
 using proto::Kind;
 using ::testing::ElementsAre;
 using testing::FakeNode;
+using testing::FrameSpec;
 using testing::HubRig;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -279,6 +280,37 @@ TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
   EXPECT_EQ(a.texts(), (std::vector<std::string>{"late"}));
   EXPECT_EQ(a.frames.back().header.src, b.id.value());
   EXPECT_TRUE(rig.ledger().exact());
+}
+
+// The conductor publishes the group, then sends the pace: a shard may see the one in the middle of a turn, without the
+// other. Nothing is lost when one that gets everything wants a rate, and none comes late when it does not any more.
+TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
+  HubRig rig(2);
+  FakeNode& provider = rig.join(0);
+  FakeNode& viewer = rig.join(1);
+  const FrameSpec group{.kind = Kind::group};
+  const auto say = [&](const std::string& text) {
+    rig.send(provider, HubRig::group(5), text, group);
+    rig.settle();
+  };
+  rig.publish_group(5, provider.id, {&viewer});
+  say("plain");
+  rig.publish_paced_group(5, provider.id, {&viewer}, false, true);
+  say("published");
+  rig.pace(viewer, 5, {.depth = 3, .interval_us = 1'000'000});
+  say("paced");
+  for (const char* text : {"held 1", "held 2", "held 3"}) say(text);
+  EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced"));
+  rig.now_ms += 1'000;
+  rig.pace(viewer, 5, {});
+  say("behind them");
+  EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced", "held 1", "held 2", "held 3", "behind them"));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+  // Who has only just subscribed gets nothing before its shard knows how much.
+  FakeNode& other = rig.join(1);
+  rig.publish_paced_group(5, provider.id, {&viewer, &other});
+  say("too soon");
+  EXPECT_THAT(other.frames, IsEmpty());
 }
 
 // Whoever held it releases the id that it had, which leads to nobody.

@@ -72,7 +72,8 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
   const bool counted = static_cast<proto::ns::Delivery>(service->terms.delivery) == proto::ns::Delivery::sync;
   const std::uint32_t most = counted ? service->terms.window : 0;
   pace.window = pace.window == 0 ? most : std::min(pace.window, most);
-  if (pace.window == 0 && pace.interval_us == 0 && !service->terms.retain) return std::nullopt;
+  const bool bounded = pace.window != 0 || pace.interval_us != 0 || service->terms.retain;
+  if (!bounded && !once_paced.contains(subscriber)) return std::nullopt;
   return pace;
 }
 
@@ -303,6 +304,8 @@ void Services::forget_if_idle(std::uint32_t node) {
 
 void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects) {
   topic.service = service;
+  topic.once_plain.clear();
+  topic.once_paced.clear();
   groups_[service.group] = &topic;
   if (old_group != 0) {
     effects.emplace_back(
@@ -334,11 +337,20 @@ void Services::change_terms(Topic& topic, std::uint32_t subscriber, const Subscr
   const std::optional<SubscriberTerms> before = topic.pace_of(subscriber);
   topic.terms.erase(subscriber);
   if (terms != SubscriberTerms{}) topic.terms[subscriber] = terms;
+  if (before && !topic.pace_of(subscriber)) topic.once_paced.insert(subscriber);
   const std::optional<SubscriberTerms> after = topic.pace_of(subscriber);
   if (before == after) return;
-  if (before.has_value() != after.has_value()) effects.emplace_back(GroupChanged{topic.service->group});
-  if (after) return begin_pace(topic, subscriber, effects);
-  effects.emplace_back(PaceEnded{subscriber, topic.service->group, false});
+  if (!before) {
+    topic.once_plain.insert(subscriber);
+    effects.emplace_back(GroupChanged{topic.service->group});
+  }
+  begin_pace(topic, subscriber, effects);
+}
+
+void Services::forget_subscriber(Topic& topic, std::uint32_t subscriber) {
+  topic.terms.erase(subscriber);
+  topic.once_plain.erase(subscriber);
+  topic.once_paced.erase(subscriber);
 }
 
 void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
@@ -356,7 +368,7 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
   const auto place = std::lower_bound(list.begin(), list.end(), node);
   GIMNET_CHECK(place != list.end() && *place == node);
   const bool paced = topic.pace_of(node).has_value();
-  topic.terms.erase(node);
+  forget_subscriber(topic, node);
 #ifdef GIMNET_BUG_LEFT_COUNTS_ITSELF
   const auto number = static_cast<std::uint32_t>(list.size());
   list.erase(place);

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "base/result.hpp"
@@ -45,6 +46,10 @@ struct Topic {
   std::optional<Service> service;
   std::vector<std::uint32_t> subscribers;                    ///< node indices, ascending
   std::unordered_map<std::uint32_t, SubscriberTerms> terms;  ///< of those that asked for something
+  /// Subscribers that changed their terms in this group: that got everything and are paced now; and that asked for a
+  /// pace and do not any more. Those stay paced, without bounds: what is held for them goes before what comes.
+  std::unordered_set<std::uint32_t> once_plain;
+  std::unordered_set<std::uint32_t> once_paced;
 
   /// What the shards hold that subscriber to; nothing if it simply gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(std::uint32_t subscriber) const;
@@ -129,6 +134,7 @@ class Services {
   void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
   static void end_group(const Topic& topic, Effects& effects);
   static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
+  static void forget_subscriber(Topic& topic, std::uint32_t subscriber);
   void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects);
   void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
   void remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects);

@@ -33,8 +33,9 @@ PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const P
   if (known == nullptr) return recipient.paced->add(group, terms);
   known->active = true;
   if (!(known->terms() == terms)) known->set_terms(terms);
-  while (known->held() > known->terms().depth) drop_oldest(*known, DropReason::replaced);
+  // What may go now is not too much, however little may be held from now on.
   release(*known);
+  while (known->held() > known->terms().depth) drop_oldest(*known, DropReason::replaced);
   return *known;
 }
 

@@ -14,14 +14,23 @@ struct GroupMember {
   std::uint32_t generation = 0;
 };
 
+/// A recipient of a group whose shard paces what it gets (Pacer).
+struct PacedMember {
+  ConnectionSlot slot;
+  std::uint32_t generation = 0;
+  /// It got everything before it was paced, and does until its shard has heard of the pace. One that has only just
+  /// subscribed gets nothing until then.
+  bool was_plain = false;
+};
+
 /// The recipients of one group at one moment. Thread safety: immutable once published. Ownership: the table
 /// publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<std::vector<GroupMember>> by_shard;
-  /// Those of which the shard paces what they get (Pacer); empty if there are none.
-  std::vector<std::vector<GroupMember>> paced_by_shard;
+  /// Those of which the shard paces what they get; empty if there are none.
+  std::vector<std::vector<PacedMember>> paced_by_shard;
   bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
 };
 

@@ -117,14 +117,20 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
   settle(run, outcomes);
 }
 
-/// A member whose subscription has not reached this shard yet, or has not begun, is none yet.
-std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const std::vector<GroupMember>& here) {
+/// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one without the other.
+std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const std::vector<PacedMember>& here) {
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
-  for (const GroupMember& member : here) {
-    const Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
-    PacedSubscription* subscription = recipient != nullptr ? Pacer::find(*recipient, GroupId{header.dst}) : nullptr;
-    if (subscription != nullptr && pacer_.offer(*subscription, run, header, handover)) ++outcomes;
+  for (const PacedMember& member : here) {
+    Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
+    if (recipient == nullptr) continue;
+    PacedSubscription* subscription = Pacer::find(*recipient, GroupId{header.dst});
+    if (subscription != nullptr) {
+      if (pacer_.offer(*subscription, run, header, handover)) ++outcomes;
+    } else if (member.was_plain) {
+      fanout_.deliver(*recipient, run, header, handover);
+      ++outcomes;
+    }
   }
   return outcomes;
 }

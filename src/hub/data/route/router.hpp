@@ -46,7 +46,7 @@ class Router {
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
   void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
-                                       const std::vector<GroupMember>& here);
+                                       const std::vector<PacedMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);

@@ -298,8 +298,17 @@ TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
   EXPECT_THAT(take_words(), ElementsAre("group 1", "group 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 2 of 1: 0/1"));
+  EXPECT_THAT(services_.find_group(1)->once_plain, ElementsAre(kViewer)) << "until then it gets everything";
+  // It stays paced: what is held for it goes before what comes.
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1"));
+  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1"));
+  EXPECT_TRUE(services_.find_group(1)->pace_of(kViewer));
+  EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1", "left 2 of 1: 0"));
+  // Who begins again begins as anybody else.
+  EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "joined 2 of 1: 1"));
+  EXPECT_FALSE(services_.find_group(1)->pace_of(kViewer));
 }
 
 }  // namespace

@@ -172,15 +172,16 @@ void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vect
   publish(index, std::move(group));
 }
 
-void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
-                                 bool retain) {
+void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced, bool retain,
+                                 bool was_plain) {
   auto group = std::make_unique<GroupMembers>();
   group->provider = provider;
   group->retain = retain;
   group->by_shard.resize(shards_.size());
   group->paced_by_shard.resize(shards_.size());
   for (const FakeNode* member : paced) {
-    group->paced_by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});
+    group->paced_by_shard[member->shard.value()].push_back(
+        {member->session.slot, member->session.generation, was_plain});
   }
   publish(index, std::move(group));
 }

@@ -104,7 +104,7 @@ class HubRig {
   void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members);
   /// The same with members that are paced: each needs pace() too.
   void publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
-                           bool retain = false);
+                           bool retain = false, bool was_plain = false);
   void withdraw_group(std::uint32_t index);
   void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false);
 
