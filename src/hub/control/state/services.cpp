@@ -244,6 +244,13 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
     auto& list = entry.subscribers;
     list.erase(std::lower_bound(list.begin(), list.end(), node_index));
     list.insert(std::lower_bound(list.begin(), list.end(), new_index), new_index);
+    if (auto asked = entry.terms.extract(node_index)) {
+      asked.key() = new_index;
+      entry.terms.insert(std::move(asked));
+    }
+    for (auto* changed : {&entry.once_plain, &entry.once_paced}) {
+      if (changed->erase(node_index) != 0) changed->insert(new_index);
+    }
     if (!entry.service) continue;
     // First the one that comes: a provider that hears of no subscribers stops.
     const auto count = static_cast<std::uint32_t>(list.size());

@@ -292,6 +292,21 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
   EXPECT_THAT(take_words(), ElementsAre("group 3", "no pace 2 of 3, gone", "forget 3", "moved 2: 3->0"));
 }
 
+TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
+  EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
+  services_.node_renumbered(kViewer, 40, effects_);
+  const Topic& topic = *services_.find_group(1);
+  ASSERT_TRUE(topic.pace_of(40));
+  EXPECT_EQ(topic.pace_of(40)->interval_us, 1000u);
+  EXPECT_THAT(topic.once_plain, ElementsAre(40u));
+  EXPECT_FALSE(topic.pace_of(kViewer)) << "the next one of that id asked for nothing";
+  take_words();
+  EXPECT_TRUE(services_.subscribe(40, "robot/odom", {.interval_us = 1000}, effects_));
+  EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
+}
+
 TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
