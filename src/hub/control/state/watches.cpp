@@ -25,6 +25,8 @@ Watches::Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits)
     : hub_(std::move(hub)), limits_(limits), journal_(epoch, limits) {}
 
 void Watches::note(const NodeNoted& noted, const Membership& membership, milliseconds now) {
+  // Also of one that was ended while it was connected, whose connection ends for nobody.
+  if (noted.kind == ns::ChangeKind::left) connection_ended(noted.index);
   ns::Change change;
   change.kind = noted.kind;
   change.former_name = noted.former_name;

@@ -6,6 +6,7 @@
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
+#include "proto/control/ns_watch.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
 namespace gimnet::hub {
@@ -138,6 +139,38 @@ TEST_F(AdministerTest, ANodeGoesOnUnderAnotherId) {
   EXPECT_EQ(again.session.generation, robot_.session.generation);
   const auto resolved = ask<ns::ResolveAnswer>(admin_, ns::Resolve{"robot"});
   EXPECT_EQ(resolved->node, wanted);
+}
+
+TEST_F(AdministerTest, WhoWatchesIsToldOfTheFormerIdAndOfTheNewOne) {
+  const Node viewer = join("viewer");
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"}));
+  ASSERT_TRUE(ask<ns::WatchAnswer>(viewer, ns::Watch{.watch = 1, .pattern = "robot/**"}));
+  while (conductor.serve_watches(now)) {
+  }
+  const std::size_t before = events<ns::WatchEvents>().size();
+  const NodeId wanted = make_id<NodeId>(kHub, 77);
+  ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, wanted}));
+  while (conductor.serve_watches(now)) {
+  }
+  const auto told = events<ns::WatchEvents>();
+  ASSERT_EQ(told.size(), before + 1);
+  const std::vector<ns::Change>& changes = told.back().changes;
+  ASSERT_THAT(changes, SizeIs(3));
+  EXPECT_EQ(changes[0].kind, ns::ChangeKind::left);
+  EXPECT_EQ(changes[0].node->node, robot_.id);
+  EXPECT_EQ(changes[0].node->name, "robot");
+  EXPECT_EQ(changes[1].kind, ns::ChangeKind::joined);
+  EXPECT_EQ(changes[1].node->node, wanted);
+  EXPECT_EQ(changes[1].node->name, "robot");
+  EXPECT_EQ(changes[2].kind, ns::ChangeKind::changed);
+  EXPECT_EQ(changes[2].service->node, wanted);
+}
+
+TEST_F(AdministerTest, WhoIsKickedWatchesNothingAnyMore) {
+  ASSERT_TRUE(ask<ns::WatchAnswer>(robot_, ns::Watch{.watch = 1}));
+  EXPECT_EQ(conductor.watches().size(), 1u);
+  ASSERT_TRUE(request(admin_, ctrl::Kick{robot_.id, ""}));
+  EXPECT_EQ(conductor.watches().size(), 0u);
 }
 
 TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
