@@ -29,7 +29,7 @@ class Checks {
  private:
   void events();
   /// The numbers in what providers were told.
-  void counts(const std::vector<DueEvent>& told) const;
+  void counts(const std::vector<DueEvent>& told, const Model::Renumbered& renumbered) const;
   void sessions() const;
   void names() const;
   void node_table() const;

@@ -37,6 +37,10 @@ struct TraceCommand {
     trace.note("conductor: shard {a}, release slot {b} of generation {c}", shard, command.session.slot.value(),
                command.session.generation);
   }
+  void operator()(const hub::RenumberCommand& command) const {
+    trace.note("conductor: shard {a}, slot {b} is node {c} now", shard, command.session.slot.value(),
+               index_of(command.node));
+  }
   void operator()(const hub::DrainCommand&) const { trace.note("conductor: shard {a}, drain", shard); }
   template <class Other>
   void operator()(const Other&) const {
@@ -59,12 +63,38 @@ HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& st
               {kHub, setting.plan.shards, nodes_, groups_, quiescence_, around.network, around.conductor_wanted,
                [this](ShardIndex shard, const hub::ShardCommand& command) { checks_.before_it_leaves(shard, command); },
                around.is_slow}),
-      checks_({nodes_, groups_, shards_, kHub, setting.plan.limits}, model_),
+      checks_({nodes_, groups_, shards_, kHub, model_.limits()}, model_),
       limits_(setting.plan.limits),
       conductor_(facts(setting), hub::Placement::spread, limits_,
-                 hub::Conductor::Wiring{shards_, {nodes_, groups_, quiescence_}, readable_, start, around.keep_state}) {
+                 hub::Conductor::Wiring{shards_,
+                                        {nodes_, groups_, quiescence_},
+                                        readable_,
+                                        start,
+                                        around.keep_state,
+                                        {},
+                                        nullptr,
+                                        [this] { return read_again(); },
+                                        {}}) {
   checks_.watch(conductor_);
   shards_.believe(model_);
+}
+
+hub::Reloading HubLife::read_again() {
+  Random& random = setting_.random;
+  hub::Reloading reloading;
+  reloading.log_level = LogLevel::off;
+  if (random.chance(setting_.plan.bad_configuration)) {
+    reloading.faults.emplace_back("a key that there is not");
+    model_.configuration(std::nullopt);
+    return reloading;
+  }
+  reloading.limits = limits_;
+  reloading.limits.services_per_node = random.between(2, 6);
+  reloading.limits.subscriptions_per_node = random.between(2, 8);
+  reloading.limits.page_records = random.between(4, 40);
+  reloading.limits.declarations_burst = random.between(1, 40);
+  model_.configuration(reloading.limits);
+  return reloading;
 }
 
 void HubLife::trace_sent() {
@@ -80,10 +110,11 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
   const milliseconds now = setting_.agenda.now_ms();
   shards_.forget_sent();
   stranger.identity = newcomer.identity;
+  stranger.may_administer = newcomer.identity == kAdministrator;
   const std::int64_t wall = wall_ns(setting_);
   const auto refusal = conductor_.admit(stranger, newcomer.hello, {now, wall});
-  const Model::Hello hello{
-      newcomer.hello, false, stranger.peer.address, newcomer.identity, milliseconds{wall / 1'000'000}, number};
+  const Model::Hello hello{newcomer.hello,    stranger.may_administer,        stranger.peer.address,
+                           newcomer.identity, milliseconds{wall / 1'000'000}, number};
   trace_sent();
   if (refusal) {
     setting_.trace.note("conductor: refuses wire {a} with code {b}: {t}", newcomer.wire->number,
@@ -126,13 +157,16 @@ void HubLife::take_event(std::size_t shard) {
   trace_sent();
   if (is_frame) {
     const hub::SendControlCommand* answer = nullptr;
+    bool closed = false;
     for (const SimShards::Sent& sent : shards_.sent()) {
+      const auto* closing = std::get_if<hub::CloseCommand>(sent.command);
+      closed = closed || (closing != nullptr && closing->code == proto::GoodbyeCode::oddities);
       const auto* control = std::get_if<hub::SendControlCommand>(sent.command);
       if (control == nullptr || control->answers == 0) continue;
       require(answer == nullptr, Checker::answers, "a request is answered twice");
       answer = control;
     }
-    model_.asked(asked, answer, now);
+    model_.asked(asked, answer, closed, now);
   } else if (is_end) {
     model_.detached(ended, now);
   }

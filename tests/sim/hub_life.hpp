@@ -50,6 +50,8 @@ class HubLife {
  private:
   static constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
   void trace_sent();
+  /// What the hub reads when it is asked to read its configuration again.
+  [[nodiscard]] hub::Reloading read_again();
 
   Setting& setting_;
   hub::NodeTable nodes_;

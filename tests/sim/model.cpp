@@ -15,6 +15,14 @@ std::string quoted(const std::string& name) { return "'" + name + "'"; }
 
 }  // namespace
 
+Model::Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
+    : limits_(limits), census_(census), hub_(hub), past_(std::move(past)) {
+  for (const Kicked& kicked : past_.kicked) {
+    std::uint64_t& least = least_[kicked.index];
+    least = std::max(least, kicked.number + 1);
+  }
+}
+
 std::optional<GoodbyeCode> Model::judge_name(const std::string& name, std::uint32_t claimant) const {
   if (!proto::valid_name(name)) return GoodbyeCode::bad_name;
   const auto holder = names_.find(name);
@@ -30,12 +38,15 @@ void Model::judge_token(const Hello& hello, Verdict& verdict) const {
   const auto least = least_.find(token.index);
   const bool over = least != least_.end() && token.number < least->second;
   if (over || token.expiry <= hello.wall || token.identity != hello.identity) return;
-  const auto holder = sessions_.find(token.index);
+  const auto moved = moved_.find(token.index);
+  const std::uint32_t index = present(token.index);
+  const auto holder = sessions_.find(index);
   if (holder == sessions_.end()) {
     if (token.name == hello.hello.name) verdict.former = token;
-  } else if (holder->second.number == token.number && holder->second.token_name == token.name) {
-    verdict.session = token.index;
+    return;
   }
+  const std::uint64_t number = moved == moved_.end() ? holder->second.token_number : moved->second.token_number;
+  if (number == token.number && holder->second.token_name == token.name) verdict.session = index;
 }
 
 /// Why the token was not honoured, for the census.
@@ -48,12 +59,18 @@ void Model::count_token(const Hello& hello, const Verdict& verdict) {
   }
   if (found->second.expiry <= hello.wall) return census_.add(Happening::token_expired);
   if (found->second.identity != hello.identity) return census_.add(Happening::token_of_another_identity);
+  const auto kicked = [&](const Kicked& one) {
+    return one.index == found->second.index && one.number >= found->second.number;
+  };
+  if (std::any_of(past_.kicked.begin(), past_.kicked.end(), kicked)) census_.add(Happening::kicked_token_refused);
   census_.add(Happening::token_of_the_past);
 }
 
 Past Model::past() const {
   Past past = past_;
-  past.nodes.insert(nodes_given_.begin(), nodes_given_.end());
+  for (const std::uint32_t index : nodes_given_) {
+    if (!assigned_.contains(index)) past.nodes.insert(index);
+  }
   past.groups.insert(groups_given_.begin(), groups_given_.end());
   return past;
 }
@@ -119,7 +136,8 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   session.identity = hello.identity;
   session.token_expiry = hello.wall + milliseconds{limits_.token_ms};
   session.watches.clear();
-  past_.tokens[attach.welcome.token] = {index, session.number, session.name, session.identity, session.token_expiry};
+  past_.tokens[attach.welcome.token] = {index, session.token_number, session.name, session.identity,
+                                        session.token_expiry};
   session.connected = true;
   ++session.attachment;
   require(attach.welcome.node == attach.node && attach.welcome.name == session.name, Checker::names,
@@ -134,16 +152,20 @@ void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32
   if (verdict.session == 0) {
     if (!verdict.former) take_new_index(index, now);
     nodes_given_.push_back(index);
+    assigned_.erase(index);
+    moved_.erase(index);
     Session& session = sessions_[index];
-    session.number = verdict.former ? verdict.former->number : hello.new_session;
+    session.number = hello.new_session;
+    session.token_number = verdict.former ? verdict.former->number : ++past_.token_numbers;
     session.joined = now;
     session.came_back = verdict.former.has_value();
     std::uint64_t& least = least_[index];
-    least = std::max(least, session.number);
+    least = std::max(least, session.token_number);
     return census_.add(Happening::joined);
   }
   Session& session = sessions_.at(index);
   census_.add(session.connected ? Happening::came_back_replacing : Happening::came_back);
+  if (!former(index).empty()) census_.add(Happening::renumbered_came_back);
   ++session.life;
   session.came_back = true;
   session.declares = true;
@@ -207,16 +229,18 @@ void Model::take_name(std::uint32_t index, const std::string& name, milliseconds
 void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
   const Session* found = known(event.session, event.node);
   if (found == nullptr || found->attachment != event.attachment || !found->connected) return;
-  const std::uint32_t index = index_of(event.node);
+  const std::uint32_t index = present(index_of(event.node));
   Session& session = sessions_.at(index);
   const bool left = event.said_by_peer && event.code == GoodbyeCode::done;
   const bool misconduct =
       !event.said_by_peer && (event.code == GoodbyeCode::malformed || event.code == GoodbyeCode::wrong_source ||
-                              event.code == GoodbyeCode::not_allowed || event.code == GoodbyeCode::too_many_requests);
+                              event.code == GoodbyeCode::not_allowed || event.code == GoodbyeCode::too_many_requests ||
+                              event.code == GoodbyeCode::oddities);
   if (left) census_.add(Happening::goodbye);
   if (misconduct) census_.add(session.name.empty() ? Happening::misconduct_nameless : Happening::misconduct_named);
   if (left || (misconduct && session.name.empty())) {
-    least_[index] = session.number + 1;
+    least_[index] = session.token_number + 1;
+    for (const std::uint32_t each : former(index)) least_[each] = moved_.at(each).token_number + 1;
     return end(index, now);
   }
   if (!event.said_by_peer && event.code != GoodbyeCode::done) {
@@ -255,6 +279,7 @@ void Model::end(std::uint32_t index, milliseconds now) {
   names_.erase(session.name);
   generations_.erase(index);
   sessions_.erase(index);
+  for (const std::uint32_t each : former(index)) moved_.erase(each);
   ended_.push_back(index);
   rest(resting_ids_, index, now);
 }
@@ -264,7 +289,7 @@ void Model::rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t i
 }
 
 const Model::Session* Model::known(const hub::SessionRef& ref, NodeId node) const {
-  const auto found = sessions_.find(index_of(node));
+  const auto found = sessions_.find(present(index_of(node)));
   if (found == sessions_.end() || generations_.at(found->first) != ref.generation) return nullptr;
   return &found->second;
 }

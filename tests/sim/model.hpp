@@ -38,10 +38,17 @@ struct DueEvent {
 /// A token as the hub gave it out.
 struct GivenToken {
   std::uint32_t index = 0;
-  std::uint64_t number = 0;  ///< of the session
+  std::uint64_t number = 0;  ///< Model::Session::token_number
   std::string name;
   std::string identity;
   milliseconds expiry{};  ///< since 1970
+};
+
+/// Whose tokens count as none, also after a restart.
+struct Kicked {
+  std::uint32_t index = 0;
+  std::uint64_t number = 0;
+  milliseconds expiry{};
 };
 
 /// What outlives the hub: tokens that nodes hold, and the indices that it must not give to newcomers any more.
@@ -49,6 +56,17 @@ struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
   std::set<std::uint32_t> nodes;
   std::set<std::uint32_t> groups;
+  std::vector<Kicked> kicked;
+  std::uint64_t token_numbers = 0;  ///< given so far
+};
+
+/// So much at once, and so much a second.
+struct Allowance {
+  bool used = false;
+  std::uint64_t left = 0;  ///< thousandths
+  milliseconds last{};
+  /// False: nothing is left.
+  bool spend(std::uint64_t per_s, std::uint64_t burst, milliseconds now);
 };
 
 /// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was told and what it
@@ -57,11 +75,13 @@ struct Past {
 /// Thread safety: none. Errors: Broken, thrown at the first difference.
 class Model final : public Witness {
  public:
-  Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
-      : limits_(limits), census_(census), hub_(hub), past_(std::move(past)) {}
+  Model(const hub::Limits& limits, Census& census, HubId hub, Past past);
 
   struct Session {
-    std::uint64_t number = 0;  ///< of all sessions, never given twice
+    std::uint64_t number = 0;        ///< of all sessions, never given twice
+    std::uint64_t token_number = 0;  ///< which tokens are its own; another one with each id
+    Allowance declarations;
+    Allowance oddities;
     proto::Role role{};
     bool connected = false;
     std::uint32_t attachment = 0;
@@ -109,8 +129,14 @@ class Model final : public Witness {
   void refused(const Hello& hello, const proto::Goodbye& goodbye, milliseconds now);
   void detached(const hub::DetachedEvent& event, milliseconds now);
   void ticked(milliseconds now);
-  /// The answer to a request, nothing if there was none.
-  void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, milliseconds now);
+  /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.
+  void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
+  /// What a RELOAD would read now; nothing: something is wrong with it.
+  void configuration(const std::optional<hub::Limits>& limits) { configuration_ = limits; }
+  [[nodiscard]] const hub::Limits& limits() const { return limits_; }
+  /// Former and present index of those that were given another one since this was last asked.
+  using Renumbered = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+  [[nodiscard]] Renumbered take_renumbered() { return std::exchange(renumbered_, {}); }
 
   /// Does the hub know the connection by which this came?
   [[nodiscard]] const Session* known(const hub::SessionRef& session, NodeId node) const;
@@ -180,6 +206,19 @@ class Model final : public Witness {
   void judge_names(const Asked& asked, std::uint16_t operation);
   void judge_services(const Asked& asked, std::uint16_t operation);
   void judge_control(const Asked& asked, std::uint16_t operation);
+  void judge_admin(const Asked& asked, std::uint16_t operation);
+  void judge_kick(const Asked& asked);
+  void judge_reassign(const Asked& asked);
+  void judge_reload(const Asked& asked);
+  /// The index of a node that is there, also by one that it had before; 0: none.
+  [[nodiscard]] std::uint32_t find_node(NodeId node);
+  void kick(std::uint32_t index, milliseconds now);
+  void renumber(std::uint32_t index, std::uint32_t to, milliseconds now);
+  /// The index under which a node goes on that had this one.
+  [[nodiscard]] std::uint32_t present(std::uint32_t index) const;
+  [[nodiscard]] std::vector<std::uint32_t> former(std::uint32_t index) const;
+  /// One more declaration. False: the answer must be `rate`.
+  [[nodiscard]] bool may_declare(const Asked& asked);
   void judge_register(const Asked& asked);
   void judge_unregister(const Asked& asked);
   void judge_watch(const Asked& asked);
@@ -198,7 +237,13 @@ class Model final : public Witness {
   [[nodiscard]] NodeId id(std::uint32_t index) const { return make_id<NodeId>(hub_, index); }
   [[nodiscard]] GroupId group_id(std::uint32_t index) const { return make_id<GroupId>(hub_, index); }
 
-  const hub::Limits& limits_;
+  /// Where a node went, and the number of the tokens that it had there.
+  struct Moved {
+    std::uint32_t index = 0;
+    std::uint64_t token_number = 0;
+  };
+
+  hub::Limits limits_;
   Census& census_;
   const HubId hub_;
   std::map<std::uint32_t, Session> sessions_;
@@ -213,6 +258,10 @@ class Model final : public Witness {
   std::map<std::uint32_t, std::uint64_t> least_;       ///< index: sessions below that number are over for good
   std::map<std::uint32_t, milliseconds> resting_ids_;  ///< index: until when
   std::map<std::uint32_t, milliseconds> resting_groups_;
+  std::map<std::uint32_t, Moved> moved_;  ///< by former index
+  std::set<std::uint32_t> assigned_;      ///< indices that an administrator gave: newcomers may get them, too
+  Renumbered renumbered_;
+  std::optional<hub::Limits> configuration_;
   std::vector<DueEvent> due_;
   std::uint64_t orders_ = 0;
 };

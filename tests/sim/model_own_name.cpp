@@ -16,6 +16,7 @@ void Model::judge_register(const Asked& asked) {
   if (!wanted || wanted->name.empty()) return require_status(asked, Status::bad_request, Checker::answers);
   const std::string& name = wanted->name;
   if (name != asked.session.name) {
+    if (!may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
     const std::optional<GoodbyeCode> refusal = judge_name(name, asked.index);
     if (refusal == GoodbyeCode::bad_name) return require_status(asked, Status::bad_request, Checker::names);
     if (refusal) return require_status(asked, Status::taken, Checker::names);
@@ -33,6 +34,7 @@ void Model::judge_unregister(const Asked& asked) {
     return require_status(asked, Status::bad_request, Checker::answers);
   }
   if (asked.session.name.empty()) return require_status(asked, Status::not_found, Checker::names);
+  if (!may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
   require_status(asked, Status::done, Checker::names);
   const auto answer = proto::decode_answer<ns::UnregisterNameAnswer>(asked.answer);
   require(answer.has_value(), Checker::answers, "the answer to UNREGISTER cannot be read");
@@ -50,7 +52,7 @@ void Model::renamed(const Asked& asked, const std::string& name, const std::vect
     take_name(asked.index, name, asked.now);
     asked.session.token_name = name;
   }
-  past_.tokens[token] = {asked.index, asked.session.number, asked.session.token_name, asked.session.identity,
+  past_.tokens[token] = {asked.index, asked.session.token_number, asked.session.token_name, asked.session.identity,
                          asked.session.token_expiry};
 }
 

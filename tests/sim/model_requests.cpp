@@ -25,11 +25,12 @@ void Model::require_status(const Asked& asked, Status status, Checker checker) {
                       proto::status_name(status));
 }
 
-void Model::asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, milliseconds now) {
+void Model::asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed,
+                  milliseconds now) {
   if (known(event.session, event.node) == nullptr) {
     return require(answer == nullptr, Checker::answers, "a request of a session that is over is answered");
   }
-  const std::uint32_t index = index_of(event.node);
+  const std::uint32_t index = present(index_of(event.node));
   if (sessions_.at(index).attachment != event.attachment) {
     census_.add(Happening::request_of_replaced_connection);
     return require(answer == nullptr, Checker::answers, "a request of a connection that was replaced is answered");
@@ -51,6 +52,12 @@ void Model::asked(const hub::ControlFrameEvent& event, const hub::SendControlCom
               answer->attachment == event.attachment,
           Checker::answers, "an answer is not for the connection that asked");
   const Asked asked{index, sessions_.at(index), payload, said, now};
+  const Status status = proto::read_status(said_view->body).status;
+  if (status == Status::bad_request || status == Status::not_supported || status == Status::denied) {
+    const bool one_too_many = !asked.session.oddities.spend(limits_.oddities_per_s, limits_.oddities_burst, now);
+    if (one_too_many) census_.add(Happening::asked_too_often_in_vain);
+    require(closed == one_too_many, Checker::limits, "the limit on requests of no use does not hold");
+  }
   if (kind == Kind::ctrl) return judge_control(asked, view->header.operation);
   judge_names(asked, view->header.operation);
 }
@@ -122,6 +129,10 @@ void Model::judge_control(const Asked& asked, std::uint16_t operation) {
       return require_status(asked, Status::done, Checker::answers);
     case ctrl::Connections::kOperation:
       return judge_connections(asked);
+    case ctrl::Kick::kOperation:
+    case ctrl::Reassign::kOperation:
+    case ctrl::Reload::kOperation:
+      return judge_admin(asked, operation);
     default:
       census_.add(Happening::unknown_operation);
       require_status(asked, Status::not_supported, Checker::answers);

@@ -15,6 +15,10 @@ bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
          a.delivery == b.delivery;
 }
 
+bool same_terms(const ns::Advertise& a, const ns::Advertise& b) {
+  return same_stream(a, b) && a.metadata == b.metadata;
+}
+
 }  // namespace
 
 const Model::Topic* Model::topic(const std::string& full_name) const {
@@ -104,6 +108,8 @@ void Model::judge_advertise(const Asked& asked) {
     return require_status(asked, Status::bad_request, Checker::answers);
   }
   const Service* known = service(full_name);
+  const bool said_before = known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
+  if (!said_before && !may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
   if (known != nullptr && known->provider != asked.index) return require_status(asked, Status::taken, Checker::names);
   if (known == nullptr && session.provides.size() >= limits_.services_per_node) {
     census_.add(Happening::services_limit);
@@ -172,6 +178,7 @@ void Model::judge_subscribe(const Asked& asked) {
   if (!wanted || !proto::valid_name(wanted->name)) return require_status(asked, Status::bad_request, Checker::answers);
   Session& session = asked.session;
   const bool fresh = !session.subscribes.contains(wanted->name);
+  if (fresh && !may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
   if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
     census_.add(Happening::subscriptions_limit);
     return require_status(asked, Status::limit, Checker::limits);

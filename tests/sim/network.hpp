@@ -12,6 +12,9 @@
 
 namespace gimnet::sim {
 
+/// Who may administer the hub, as the system tells it.
+inline constexpr const char* kAdministrator = "uid 0";
+
 using Bytes = std::vector<std::byte>;
 
 /// A connection, with both its ends. Frames arrive in the order in which they were sent, after some time.

@@ -15,6 +15,9 @@ constexpr Time kQuietEnd = 2s;
 constexpr Time kLastDial = 1s;
 /// After the faults nodes act so many times as slowly.
 constexpr std::uint64_t kCalm = 4;
+/// One node in so many administers the hub; of the others' acts so many thousandths are tries to.
+constexpr std::uint32_t kAdministrators = 20;
+constexpr std::uint64_t kTries = 5;
 }  // namespace
 
 SimNode::SimNode(const Around& around, std::uint32_t number) : around_(around), number_(number) {
@@ -25,7 +28,9 @@ SimNode::SimNode(const Around& around, std::uint32_t number) : around_(around), 
   wish_ = nameless ? std::string{} : name;
   slow_ = random.chance(plan.slow_reader);
   resumes_ = random.chance(plan.waits_away);
-  identity_ = random.chance(500) ? "open" : "uid " + std::to_string(number);
+  identity_ = random.chance(500) ? "open" : "uid " + std::to_string(number + 1);
+  administers_ = number % kAdministrators == 1;
+  if (administers_) identity_ = kAdministrator;
 }
 
 std::string SimNode::some_name() {
@@ -60,6 +65,8 @@ void SimNode::act() {
   if (faulty() && break_something()) return;
   if (!link().welcomed || now > around_.setting.plan.end - kQuietEnd) return;
   say_taken();
+  const std::uint64_t administering = administers_ ? around_.setting.plan.administers : kTries;
+  if (faulty() && around_.setting.random.chance(administering)) administer();
   for (std::uint64_t count = around_.setting.random.between(1, 3); count > 0; --count) ask_something();
 }
 
@@ -84,6 +91,8 @@ bool SimNode::break_something() {
     dial();
   } else if (setting.random.chance(plan.misconduct)) {
     misbehave();
+  } else if (setting.random.chance(plan.flood)) {
+    flood();
   } else {
     return false;
   }
@@ -177,6 +186,7 @@ void SimNode::forget_life() {
   known_.clear();
   view_ = {};
   wants_watch_ = false;
+  former_ids_.clear();
 }
 
 void SimNode::dial() {
@@ -200,6 +210,7 @@ proto::Hello SimNode::hello(std::string& identity) {
   hello.resume = resumes_;
   hello.epoch = random.next();
   hello.description = "node " + std::to_string(number_);
+  if (administers_) hello.role = proto::Role::admin;
   if (!faulty()) return hello;
   if (!token_.empty() && random.chance(around_.setting.plan.bad_token)) spoil_token(hello, identity);
   if (random.chance(around_.setting.plan.rename)) hello.name = some_name();
@@ -252,6 +263,8 @@ void SimNode::sees_the_end(const WirePointer& wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
     lose_connection();
+    // Half of those who were kicked show their token all the same.
+    if (std::exchange(was_kicked_, false) && around_.setting.random.chance(500)) forget_life();
     if (refused) give_up_others();
     const std::uint64_t soon_us = around_.setting.random.between(20'000, 600'000);
     not_before_ = around_.setting.agenda.now() + Time{refused ? 3 * soon_us : soon_us};
@@ -271,7 +284,9 @@ void SimNode::on_link(const WirePointer& wire, std::span<const std::byte> payloa
   require(goodbye.has_value(), Checker::answers, "GOODBYE cannot be read");
   around_.setting.trace.note("node {a} is told GOODBYE {b} on wire {c}", number_,
                              static_cast<std::uint64_t>(goodbye->code), wire->number);
-  if (wire == wire_) refusal_ = goodbye->code;
+  if (wire != wire_) return;
+  refusal_ = goodbye->code;
+  was_kicked_ = goodbye->code == GoodbyeCode::kicked;
 }
 
 void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome) {
@@ -283,6 +298,7 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
   if (wire != wire_) return;
   // Those of another session are not replaced by this one.
   if (welcome.node != id_) {
+    if (id_ != NodeId{}) former_ids_.insert(id_);
     Link kept = std::move(to);
     links_.erase(wire->number);
     give_up_others();

@@ -84,6 +84,7 @@ class SimNode {
   void hang();
   void say_goodbye();
   void misbehave();
+  void flood();
   void lose_connection();
   void give_up_others();
   void forget_life();
@@ -96,6 +97,7 @@ class SimNode {
   void declare_again();
   void watch_or_rename(std::uint64_t choice);
   void watch();
+  void administer();
   void say_taken();
   void on_own_name(const Open& asked, std::span<const std::byte> payload);
   void on_watch_events(std::span<const std::byte> payload);
@@ -123,11 +125,14 @@ class SimNode {
   std::string wish_;  ///< the name; "" for a node without one
   bool slow_ = false;
   bool resumes_ = false;
+  bool administers_ = false;
   std::string identity_;  ///< as the system tells the hub
   // Of its session
   std::vector<std::byte> token_;
   std::vector<std::byte> old_token_;  ///< of a session before
   NodeId id_;
+  std::set<NodeId> former_ids_;  ///< under which frames may still come
+  bool was_kicked_ = false;
   std::string registered_;  ///< the name that it has
   std::map<std::string, Provided> provides_;
   std::map<std::string, GroupId> subscribes_;  ///< by full name; the group is 0 while nobody provides it

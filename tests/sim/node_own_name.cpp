@@ -26,6 +26,15 @@ void SimNode::watch_or_rename(std::uint64_t choice) {
   if (!wants_watch_ && number_ % kWatchers == 0) watch();
 }
 
+/// One name after the other, as many at once as it may ask for.
+void SimNode::flood() {
+  around_.setting.trace.note("node {a} floods the hub with names", number_);
+  while (link().open.size() < around_.setting.plan.limits.requests) {
+    const std::string name = some_name();
+    ask(ns::RegisterName{name}, about(name));
+  }
+}
+
 void SimNode::watch() {
   wants_watch_ = true;
   ask(view_.request(kWatch), {});

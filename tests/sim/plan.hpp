@@ -29,13 +29,15 @@ struct Plan {
   std::uint64_t goodbye = 0;
   std::uint64_t twin = 0;
   std::uint64_t misconduct = 0;
+  std::uint64_t administers = 0;  ///< of an administrator's acts
   std::uint64_t flood = 0;
   // Thousandths of other occasions
-  std::uint64_t bad_token = 0;    ///< of HELLOs
-  std::uint64_t lost_token = 0;   ///< of crashes
-  std::uint64_t rename = 0;       ///< of HELLOs
-  std::uint64_t slow_reader = 0;  ///< of nodes
-  std::uint64_t shard_pause = 0;  ///< of turns
+  std::uint64_t bad_token = 0;          ///< of HELLOs
+  std::uint64_t lost_token = 0;         ///< of crashes
+  std::uint64_t rename = 0;             ///< of HELLOs
+  std::uint64_t slow_reader = 0;        ///< of nodes
+  std::uint64_t bad_configuration = 0;  ///< of reloads
+  std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
   std::uint64_t disk_full = 0;  ///< of times that the hub keeps its state
   std::uint32_t hub_kills = 0;  ///< in all

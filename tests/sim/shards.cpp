@@ -108,6 +108,11 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
   } else if (const auto* closing = std::get_if<hub::CloseCommand>(&command)) {
     Seat* seat = find(index, closing->session.slot, closing->session.generation);
     if (seat != nullptr && seat->wire) close(index, *seat, closing->code, closing->sentence.c_str());
+  } else if (const auto* renumbered = std::get_if<hub::RenumberCommand>(&command)) {
+    Seat* seat = find(index, renumbered->session.slot, renumbered->session.generation);
+    require(seat != nullptr, Checker::seam, "a session gets another id that the shard does not know");
+    seat->node = renumbered->node;
+    if (seat->wire) close(index, *seat, GoodbyeCode::renumbered, renumbered->sentence.c_str());
   } else if (const auto* released = std::get_if<hub::ReleaseCommand>(&command)) {
     release(index, released->session);
   } else if (std::holds_alternative<hub::DrainCommand>(command)) {

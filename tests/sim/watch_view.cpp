@@ -66,6 +66,7 @@ void WatchView::require_agreed(const Model& model) const {
   for (const auto& [group, topic] : model.groups()) {
     const auto found = services_.find(group);
     if (found == services_.end() || found->second.name != topic->first ||
+        index_of(found->second.node) != topic->second.service->provider ||
         found->second.metadata != topic->second.service->terms.metadata) {
       broken(Checker::convergence, "a watch is wrong about the service '" + topic->first + "'");
     }

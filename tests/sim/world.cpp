@@ -1,5 +1,6 @@
 #include "tests/sim/world.hpp"
 
+#include <algorithm>
 #include <set>
 
 namespace gimnet::sim {
@@ -82,7 +83,14 @@ void World::kill_hub() {
   watches_due_ = false;
   // What is still on its way to the old life finds its wires closed; the old shards stay until then.
   dead_.push_back(std::move(life_));
-  begin_life(dead_.back()->model().past());
+  Past past = dead_.back()->model().past();
+  // Who was kicked while the disk was full is forgotten.
+  std::erase_if(past.kicked, [this](const Kicked& one) {
+    return std::none_of(disk_.kicked.begin(), disk_.kicked.end(), [&one](const hub::SessionToken& kept) {
+      return kept.index == one.index && kept.expiry == one.expiry;
+    });
+  });
+  begin_life(std::move(past));
 }
 
 void World::say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {

@@ -260,6 +260,9 @@ Reloading Conductor::reload() {
   if (wiring_.read_again) reloading = wiring_.read_again();
   if (!wiring_.read_again) reloading.faults.emplace_back("this hub has no configuration that could be read again");
   for (const std::string& fault : reloading.faults) log_error(fault);
+#ifdef GIMNET_BUG_BAD_CONFIGURATION_TAKEN
+  if (!reloading.faults.empty()) limits_ = reloading.limits;
+#endif
   if (!reloading.faults.empty()) {
     log_error("the configuration was not read again: the former one stays in force, whole");
     return reloading;

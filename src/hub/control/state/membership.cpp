@@ -110,7 +110,9 @@ void Membership::name_decided(Session& session, const NameDecision& decision, mi
 }
 
 void Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects) {
+#ifndef GIMNET_BUG_KICKED_TOKEN_HONOURED
   sessions_.remember_kicked(session);
+#endif
   effects.emplace_back(StateDue{});
   effects.emplace_back(CloseDue{session.place, GoodbyeCode::kicked, sentence});
   end(session, now, effects);
@@ -156,7 +158,9 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
   }
   // The new id leads to the node before the old one says that it moved.
   effects.emplace_back(NodeChanged{index});
+#ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});
+#endif
   effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name, {}});
   effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
   services_.node_renumbered(former, index, effects);

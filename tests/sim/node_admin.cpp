@@ -1,0 +1,25 @@
+#include "proto/control/ctrl.hpp"
+#include "tests/sim/node.hpp"
+
+// How a simulated node administers the hub, or tries to.
+
+namespace gimnet::sim {
+
+namespace ctrl = proto::ctrl;
+
+void SimNode::administer() {
+  Random& random = around_.setting.random;
+  if (known_.empty() || link().open.size() >= around_.setting.plan.limits.requests) return;
+  const NodeId whom = random.pick(known_);
+  const std::uint64_t choice = random.below(10);
+  if (choice < 3) return ask(ctrl::Kick{whom, "it is in the way"}, {}, proto::Kind::ctrl);
+  if (choice == 3) return ask(ctrl::Reload{}, {}, proto::Kind::ctrl);
+  ctrl::Reassign order;
+  order.node = whom;
+  order.new_node = random.pick(known_);  // held, unless it has left
+  const auto nearby = static_cast<std::uint32_t>((index_of(whom) + random.below(1'000)) % kEveryIndex);
+  if (choice < 9) order.new_node = make_id<NodeId>(hub_of(whom), nearby);
+  ask(order, {}, proto::Kind::ctrl);
+}
+
+}  // namespace gimnet::sim
