@@ -34,7 +34,8 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", seconds, "how long is measured")->check(CLI::Range(0.01, 3600.0));
   app.add_option("--patience", patience, "seconds after which a message that has not come is lost")
       ->check(CLI::Range(0.1, 600.0));
-  app.add_option("--clients", options.client_count, "connections of idle_10000, connect_10000 and join_under_load")
+  app.add_option("--clients", options.client_count,
+                 "connections of idle_10000, connect_10000, join_under_load and ping_beside_joins")
       ->check(CLI::Range(2, 1'000'000));
   CLI11_PARSE(app, argc, argv);
 

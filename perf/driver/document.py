@@ -45,6 +45,7 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 | idle_10000 | 10,000 nodes that say nothing but keep-alives |
 | connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
 | join_under_load | the time until 1,000 nodes have joined while one_to_one goes on, and what is left of its rate |
+| ping_beside_joins | round trips of two nodes while 1,000 others join, and without that (`_alone`) |
 | library_burst | one program sends to another as fast as its library takes it, at most 16,384 messages or 2 MiB under way |
 | library_round_trip | a program answers each message of another; processes run where the system puts them |
 | library_round_trip_one_cpu | the same on one processor: the software's path without idle wake-ups |

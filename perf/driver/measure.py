@@ -20,7 +20,7 @@ class Settings:
     build: pathlib.Path
     seconds: float = 1.0
     runs: int = 3
-    clients: int | None = None  # of idle_10000, connect_10000 and join_under_load
+    clients: int | None = None  # of idle_10000, connect_10000, join_under_load and ping_beside_joins
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
     patience_seconds: float = 2.0  # a message that takes longer is lost

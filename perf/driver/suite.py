@@ -46,6 +46,7 @@ SCENARIOS = {
     "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", unix_sizes=()),
     "connect_10000": Scenario(metric="seconds", unix_sizes=()),
     "join_under_load": Scenario(metric="seconds", unix_sizes=()),
+    "ping_beside_joins": Scenario(metric="p99_us", unix_sizes=()),
     "library_burst": Scenario(relay_mode=None, roles=("receiver", "sender"), sizes=(16, 1024),
                               unix_sizes=(16, 1024)),
     "library_round_trip": Scenario(relay_mode=None, metric="p50_us", roles=("echo", "pinger")),

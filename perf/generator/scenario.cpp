@@ -43,6 +43,7 @@ constexpr Named kScenarios[] = {
     {"idle_10000", idle},
     {"connect_10000", connect_many},
     {"join_under_load", join_under_load},
+    {"ping_beside_joins", ping_beside_joins},
 };
 
 double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
@@ -53,16 +54,12 @@ double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
 
 }  // namespace
 
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns) {
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns, const std::string& suffix) {
+  constexpr std::pair<const char*, double> kShares[] = {{"p10_us", 0.1},    {"p25_us", 0.25}, {"p50_us", 0.5},
+                                                        {"p75_us", 0.75},   {"p90_us", 0.9},  {"p99_us", 0.99},
+                                                        {"p999_us", 0.999}, {"max_us", 1}};
   std::sort(round_trips_ns.begin(), round_trips_ns.end());
-  findings.add("p10_us", percentile_us(round_trips_ns, 0.1));
-  findings.add("p25_us", percentile_us(round_trips_ns, 0.25));
-  findings.add("p50_us", percentile_us(round_trips_ns, 0.5));
-  findings.add("p75_us", percentile_us(round_trips_ns, 0.75));
-  findings.add("p90_us", percentile_us(round_trips_ns, 0.9));
-  findings.add("p99_us", percentile_us(round_trips_ns, 0.99));
-  findings.add("p999_us", percentile_us(round_trips_ns, 0.999));
-  findings.add("max_us", percentile_us(round_trips_ns, 1));
+  for (const auto& [name, share] : kShares) findings.add(name + suffix, percentile_us(round_trips_ns, share));
 }
 
 std::string Findings::json() const {

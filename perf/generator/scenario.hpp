@@ -18,7 +18,7 @@ struct RunOptions {
   std::size_t payload_bytes = 16;
   std::chrono::nanoseconds duration{1'000'000'000};
   pid_t process = 0;               ///< the measured hub or relay
-  std::size_t client_count = 0;    ///< of idle, connect and join_under_load; 0: the scenario's own
+  std::size_t client_count = 0;    ///< of idle, connect, join_under_load and ping_beside_joins; 0: the scenario's own
   double bulk_bytes_a_second = 0;  ///< of ping_under_bulk; 0: as fast as it goes
 };
 
@@ -32,8 +32,8 @@ class Findings {
   std::vector<std::pair<std::string, double>> values_;
 };
 
-/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`. Sorts them.
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns);
+/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`, each with `suffix` behind. Sorts them.
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns, const std::string& suffix = {});
 
 /// Adds what the subject itself says that it dropped and kept, and `ledger_gap`: what its account does not explain.
 void add_ledger(Engine& engine, Findings& findings);
@@ -59,6 +59,7 @@ Findings fan_out(Engine& engine, const RunOptions& options, std::size_t subscrib
 Findings ping(Engine& engine, const RunOptions& options);
 Findings ping_paced(Engine& engine, const RunOptions& options);
 Findings ping_under_bulk(Engine& engine, const RunOptions& options);
+Findings ping_beside_joins(Engine& engine, const RunOptions& options);
 
 // stalled_scenario.cpp: one subscriber that does not read beside one that does.
 Findings stalled_subscriber(Engine& engine, const RunOptions& options);
