@@ -1,0 +1,145 @@
+"""Recorded conversations (tests/vectors/conversation): files of lines `WHO > HEX` for a frame, or the opening, that a node
+sent, and `WHO < HEX` for one from the hub, in an order in which they can be played again. `#` begins a comment."""
+
+import dataclasses
+import struct
+
+from support.wire import (BROADCAST, CTRL, FLOW, GOODBYE, GROUP, HEADER, HELLO, LINK, LIST, NS, OPENING, PING, PONG, REPORT,
+                          SERVICE, UNICAST, WELCOME)
+
+NESTED = 14
+KINDS = {UNICAST: "UNICAST", GROUP: "GROUP", LIST: "LIST", BROADCAST: "BROADCAST", SERVICE: "SERVICE", REPORT: "REPORT",
+         FLOW: "FLOW", LINK: "LINK", NS: "NS", CTRL: "CTRL"}
+
+OPERATIONS = {
+    LINK: {1: "HELLO", 2: "WELCOME", 3: "GOODBYE"},
+    NS: {1: "REGISTER", 2: "UNREGISTER", 3: "RESOLVE", 4: "REVERSE", 5: "LIST", 6: "WATCH", 7: "ADVERTISE", 8: "WITHDRAW",
+         9: "SERVICES", 10: "SUBSCRIBE", 11: "UNSUBSCRIBE", 12: "UNWATCH", 13: "WATCH_TAKEN", 32: "SERVICE_MOVED",
+         33: "SUBSCRIBER_JOINED", 34: "SUBSCRIBER_LEFT", 37: "WATCH_EVENTS"},
+    CTRL: {1: "HUB_INFO", 2: "STATISTICS", 3: "CONNECTIONS", 4: "KICK", 5: "REASSIGN", 7: "RELOAD", 8: "LOG_LEVEL",
+           9: "ROUTES"},
+}
+
+# What is another one each time: (kind, operation): paths of keys. Sentences are for people, and may be put in other words.
+VOLATILE = {
+    (LINK, HELLO): {(3,), (4,)},
+    (LINK, WELCOME): {(2,), (5,), (10,), (17,)},
+    (LINK, GOODBYE): {(2,)},
+    (NS, 0x8001): {(5,)},
+    (NS, 0x8002): {(5,)},
+    (NS, 0x8005): {(3, 7), (3, 8)},
+    (NS, 37): {(6,), (3, 4, 7), (3, 4, 8)},
+    (CTRL, 0x8001): {(5,), (7,)},
+    (CTRL, 0x8002): {(3,)},
+    (CTRL, 0x8003): {(3, 5), (3, 7)},
+}
+
+
+@dataclasses.dataclass
+class Step:
+    """One frame, or an opening, that somebody sent."""
+
+    who: str
+    from_hub: bool
+    data: bytes
+
+    @property
+    def is_opening(self):
+        return self.data == OPENING
+
+    @property
+    def kind(self):
+        return self.data[12]
+
+    @property
+    def operation(self):
+        return struct.unpack_from("<H", self.data, HEADER)[0]
+
+    def words(self):
+        if self.is_opening:
+            return "the opening"
+        name = KINDS.get(self.kind, str(self.kind))
+        if self.kind in (LINK, NS, CTRL):
+            operation, request = struct.unpack_from("<HH", self.data, HEADER)
+            what = OPERATIONS[self.kind].get(operation & 0x7FFF, f"operation {operation & 0x7FFF}")
+            numbered = f", request {request}" if request else ""
+            return f"{name}, {'answer to ' if operation & 0x8000 else ''}{what}{numbered}"
+        return f"{name}, {len(self.data) - HEADER} bytes"
+
+
+def is_keep_alive(data):
+    """Times and counts of their own: no part of what was said."""
+    return data != OPENING and data[12] == FLOW and data[HEADER] in (PING, PONG)
+
+
+def load(path):
+    steps = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        words = line.split("#")[0].split()
+        if words:
+            steps.append(Step(words[0], words[1] == "<", bytes.fromhex("".join(words[2:]))))
+    return steps
+
+
+def save(path, title, steps):
+    lines = [f"# {line}" for line in title.splitlines()]
+    for step in steps:
+        header, body = step.data[:HEADER].hex(" ", 4), step.data[HEADER:].hex()
+        sign = "<" if step.from_hub else ">"
+        lines += [f"# {step.who} {'is told' if step.from_hub else 'says'}: {step.words()}",
+                  f"{step.who} {sign} {step.data.hex()}" if step.is_opening else f"{step.who} {sign} {header} {body}".rstrip()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def values(stream):
+    """[(key, type, content)]; the content of a nested value is such a list."""
+    found, at = [], 0
+    while at < len(stream):
+        head, key = stream[at], int.from_bytes(stream[at + 1:at + 4], "little")
+        size_bytes = 1 << (head & 3)
+        size = int.from_bytes(stream[at + 4:at + 4 + size_bytes], "little")
+        at += 4 + size_bytes
+        content = stream[at:at + size]
+        at += size
+        found.append((key, head >> 3, values(content) if head >> 3 == NESTED else content))
+    return found
+
+
+def without(content, volatile, path=()):
+    """The same without the values at the volatile paths, and without the sentence of an answer that says no."""
+    kept = []
+    for key, kind, value in content:
+        here = (*path, key)
+        if here in volatile:
+            continue
+        kept.append((key, kind, without(value, volatile, here) if kind == NESTED else value))
+    return kept
+
+
+def stable(step):
+    """What has to be the same each time: header without the length, and the values that are not volatile."""
+    if step.is_opening:
+        return "opening", [], step.data[:6]
+    header = step.data[4:HEADER]
+    if step.kind not in (LINK, NS, CTRL):
+        return header, [], step.data[HEADER:]
+    operation = step.operation
+    volatile = set(VOLATILE.get((step.kind, operation), ()))
+    content = values(step.data[HEADER + 4:])
+    refused = operation & 0x8000 and content and content[0][0] == 1 and int.from_bytes(content[0][2], "little") != 0
+    if refused:
+        volatile.add((2,))
+    return header, without(content, volatile), step.data[HEADER:HEADER + 4]
+
+
+def covers(now, recorded):
+    """Is all of the recorded in what comes now? Keys that came later may stand beside it."""
+    remaining = list(now)
+    for key, kind, value in recorded:
+        for index, (other_key, other_kind, other) in enumerate(remaining):
+            if other_key == key and other_kind == kind and (covers(other, value) if kind == NESTED else other == value):
+                del remaining[:index + 1]
+                break
+        else:
+            return False
+    return True
