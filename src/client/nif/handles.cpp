@@ -4,7 +4,6 @@
 #include <atomic>
 #include <utility>
 
-#include "base/mutex.hpp"
 #include "client/nif/platform.hpp"
 
 namespace gimnet::nif {
@@ -16,8 +15,8 @@ constexpr std::uint64_t kUsersMask = 0x7FFF'FFFFu;
 
 struct Slot {
   std::atomic<std::uint64_t> state{0};
-  Node* node = nullptr;               ///< written while nobody is inside, before `open` is set
-  std::uint32_t fork_generation = 0;  ///< the same
+  std::atomic<Node*> node{nullptr};   ///< set by who claims the slot, before `open` is set; null: free
+  std::uint32_t fork_generation = 0;  ///< written by the same, between the two
 };
 
 constinit std::array<Slot, kHandlesMax> g_slots{};
@@ -34,7 +33,7 @@ std::uintptr_t generation_of(std::uint64_t state) { return static_cast<std::uint
 
 nif_node* handle_of(std::uint32_t slot, std::uint64_t state) {
   const std::uintptr_t value = (generation_of(state) << kGenerationShift) | (std::uintptr_t{slot} << kSlotShift) | kTag;
-  return reinterpret_cast<nif_node*>(value);
+  return reinterpret_cast<nif_node*>(value);  // NOLINT(performance-no-int-to-ptr): a number in a pointer's clothes
 }
 
 /// The slot that the handle names and, in the handle's own words, its generation. False: not a handle.
@@ -88,17 +87,17 @@ NodeRef find_node(const nif_node* handle) {
   return ref;
 }
 
+// Claims by compare-and-swap: a lock would stay locked in the child of a fork() for ever.
 nif_node* add_node(std::unique_ptr<Node>& node) {
-  static constinit Mutex adding;
-  const MutexLock lock(adding);
   for (std::uint32_t i = 0; i < kHandlesMax; ++i) {
     // Slots rest as long as there are others, so that generations last.
     const std::uint32_t index = g_search_from.fetch_add(1) % kHandlesMax;
     Slot& slot = g_slots[index];
-    const std::uint64_t state = slot.state.load();
-    if (slot.node != nullptr || (state & (kOpen | kUsersMask)) != 0) continue;
-    slot.node = node.release();
+    Node* claimed = nullptr;
+    if (!slot.node.compare_exchange_strong(claimed, node.get())) continue;
+    [[maybe_unused]] const Node* const owned = node.release();  // by the slot from now on
     slot.fork_generation = fork_generation();
+    const std::uint64_t state = slot.state.load();
     const std::uint64_t next = (((state >> 32) + 1) << 32) | kOpen;
     slot.state.store(next);
     return handle_of(index, next);
