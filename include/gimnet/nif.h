@@ -255,7 +255,10 @@ nif_status nif_send_to(nif_node* node, uint32_t to, const void* data, size_t siz
 /** Writes what NIF_FLAG_MORE held back. Does not wait. */
 nif_status nif_flush(nif_node* node);
 
-/** Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub. */
+/** Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub.
+ *  NIF_NOT_CONNECTED: broken without resume; or, once after each such loss, frames sent since the last nif_drain() were
+ * given up unconfirmed, because the hub that came back does not know this connection: some may not have arrived.
+ * NIF_TIMEOUT, NIF_CLOSED, NIF_REPLACED. */
 nif_status nif_drain(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- receiving */

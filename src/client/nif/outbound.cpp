@@ -117,6 +117,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
     // What was queued under an id that the node does not have any more, which the hub need not remember.
     if (session.id != id_) queue_.set_source(session.id);
   } else {
+    lost_ |= queue_.retained_bytes() > 0;
     queue_.restart(session.id);
     ++epochs_;
   }
@@ -134,7 +135,8 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
     const std::size_t size = proto::flow::encode_frame(skip, NodeId{0}, frame);
     if (!put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size))) return std::nullopt;
   }
-  state_ = State::connected;
+  // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes in.
+  if (state_ != State::ended) state_ = State::connected;
   changed_.notify_all();
   return missing;
 }
@@ -147,7 +149,10 @@ void Outbound::detach(bool again) {
   full_ = false;
   queue_.disconnect();
   pauses_.clear();
-  if (!again || !queue_.resume()) static_cast<void>(queue_.drop_all());
+  if (!again || !queue_.resume()) {
+    lost_ |= !queue_.all_written() || queue_.retained_bytes() > 0;
+    static_cast<void>(queue_.drop_all());
+  }
   changed_.notify_all();
 }
 

@@ -136,6 +136,7 @@ class Outbound {
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
+  bool lost_ GIMNET_GUARDED_BY(mutex_) = false;  ///< frames were given up unconfirmed, and drain() has not said so yet
   Socket* socket_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
   std::vector<std::byte> goodbye_ GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written

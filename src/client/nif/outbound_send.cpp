@@ -245,6 +245,11 @@ nif_status Outbound::drain(Deadline deadline) {
   for (;;) {
     if (state_ == State::ended) return not_connected();
     if (state_ == State::away && !queue_.resume()) return not_connected();
+    // An empty queue proves nothing once something was thrown out of it.
+    if (std::exchange(lost_, false)) {
+      return fail(NIF_NOT_CONNECTED,
+                  "the connection was lost before everything was confirmed; some of it may not have arrived");
+    }
     if (queue_.all_written() && !writing_ && queue_.retained_bytes() == 0) return NIF_OK;
     if (write_here()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {

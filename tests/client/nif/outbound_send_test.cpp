@@ -231,5 +231,17 @@ TEST(OutboundSend, DrainWaitsForWritingAndConfirmation) {
   EXPECT_EQ(counters_of(connected.node.get()).retained_bytes, 0u);
 }
 
+TEST(OutboundSend, DrainTellsOnceThatTheHubForgotWhatItHadNotConfirmed) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(1u << 20));
+  ASSERT_EQ(send(connected.node.get(), kPeerId, "a"), NIF_OK);
+  ASSERT_TRUE(connected.hub.next_message());
+  connected.hub.close();
+  connected.hub = hub.admit(make_welcome(1u << 20));
+  while (info_of(connected.node.get()).reconnects == 0) std::this_thread::yield();
+  EXPECT_EQ(nif_drain(connected.node.get(), NIF_FOREVER), NIF_NOT_CONNECTED);
+  EXPECT_EQ(nif_drain(connected.node.get(), NIF_FOREVER), NIF_OK);
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
