@@ -4,11 +4,15 @@
 
 namespace gimnet::nif {
 
-void CreditBook::begin(bool resumed) {
+void CreditBook::begin_anew() {
   const MutexLock lock(mutex_);
-  if (!resumed) ++epoch_;
+  ++epoch_;
+  for (auto& [group, account] : accounts_) account.taken = account.told = 0;
+}
+
+void CreditBook::tell_all() {
+  const MutexLock lock(mutex_);
   for (auto& [group, account] : accounts_) {
-    if (!resumed) account.taken = account.told = 0;
     if (account.taken != 0) tell(group, account);
   }
 }

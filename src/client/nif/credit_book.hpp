@@ -18,8 +18,11 @@ class CreditBook {
  public:
   explicit CreditBook(Outbound& outbound) : outbound_(outbound) {}
 
-  /// A connection stands.
-  void begin(bool resumed) GIMNET_EXCLUDES(mutex_);
+  /// A connection that was not resumed is about to stand: counts begin at 0. Before the first post on it, so that no
+  /// total of the earlier one is told there.
+  void begin_anew() GIMNET_EXCLUDES(mutex_);
+  /// A connection stands: what was taken is told (again).
+  void tell_all() GIMNET_EXCLUDES(mutex_);
   /// The hub counts this group, with that window; 0: it does not. Counts of an earlier subscription go on.
   void open(GroupId group, std::uint32_t window) GIMNET_EXCLUDES(mutex_);
   /// The group is gone.

@@ -55,6 +55,20 @@ nif_status list_pages(Node& node, Request request, std::vector<Record> Answer::*
   }
 }
 
+/// Asks and enters the outcome by `once`. The library declares again, at each connection anew, what had been entered by
+/// then; so what was answered before such a moment and entered behind it is asked once more.
+template <class Once>
+nif_status declare(Node& node, Once once) {
+  bool done = false;
+  for (;;) {
+    const std::uint32_t before = node.reconnects();
+    const nif_status status = once();
+    if (status == NIF_NOT_FOUND && done) return NIF_OK;  // ended twice
+    if (status != NIF_OK || before == node.reconnects()) return status;
+    done = true;
+  }
+}
+
 struct OwnedReply : nif_reply {
   proto::Payload payload;
   std::string text;
@@ -154,9 +168,13 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
       return fail(NIF_BAD_NAME, "cannot advertise '" + request.service + "': a service's name has one part");
     }
     ns::AdvertiseAnswer answer;
-    const nif_status status = ask(found, request, answer, "advertise", request.service, deadline_after(timeout_ms));
+    const Deadline deadline = deadline_after(timeout_ms);
+    const nif_status status = declare(found, [&] {
+      const nif_status asked = ask(found, request, answer, "advertise", request.service, deadline);
+      if (asked == NIF_OK) found.declarations().add_service(request, answer.group);
+      return asked;
+    });
     if (status != NIF_OK) return status;
-    found.declarations().add_service(request, answer.group);
     *group = answer.group.value();
     if (subscribers != nullptr) *subscribers = answer.subscribers;
     return NIF_OK;
@@ -166,10 +184,13 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     ns::WithdrawAnswer answer;
-    const nif_status status = ask(found, ns::Withdraw{GroupId{group}}, answer, "withdraw the service",
-                                  gimnet::to_string(GroupId{group}), deadline_after(timeout_ms));
-    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_service(GroupId{group});
-    return status;
+    const Deadline deadline = deadline_after(timeout_ms);
+    return declare(found, [&] {
+      const nif_status status = ask(found, ns::Withdraw{GroupId{group}}, answer, "withdraw the service",
+                                    gimnet::to_string(GroupId{group}), deadline);
+      if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_service(GroupId{group});
+      return status;
+    });
   });
 }
 
@@ -198,9 +219,13 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
       request.rate_hz = pace->rate_hz;
     }
     ns::SubscribeAnswer answer;
-    const nif_status status = ask(found, request, answer, "subscribe", full_name, deadline_after(timeout_ms));
+    const Deadline deadline = deadline_after(timeout_ms);
+    const nif_status status = declare(found, [&] {
+      const nif_status asked = ask(found, request, answer, "subscribe", full_name, deadline);
+      if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
+      return asked;
+    });
     if (status != NIF_OK) return status;
-    found.declarations().add_subscription(request, answer.group);
     if (subscription != nullptr) {
       *subscription = {answer.group.value(), answer.message_type,
                        answer.instance,      static_cast<std::uint32_t>(answer.delivery),
@@ -214,10 +239,12 @@ nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeou
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (const nif_status status = check_name(full_name, "unsubscribe"); status != NIF_OK) return status;
     ns::UnsubscribeAnswer answer;
-    const nif_status status =
-        ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline_after(timeout_ms));
-    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_subscription(full_name);
-    return status;
+    const Deadline deadline = deadline_after(timeout_ms);
+    return declare(found, [&] {
+      const nif_status status = ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline);
+      if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_subscription(full_name);
+      return status;
+    });
   });
 }
 

@@ -96,6 +96,8 @@ bool Node::take_over(Admitted admitted, bool first) {
   const bool same_id = admitted.session.id == session_.id;
   session_ = std::move(admitted.session);
   if (!first) outbound_.set_declaring(true);  // until declare_again() below knows better
+  // Before anything can be posted: a total of the earlier connection would count as one of this.
+  if (!session_.resumed) credits_.begin_anew();
   const auto let_go = outbound_.attach(socket_, session_);
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
@@ -128,7 +130,7 @@ bool Node::take_over(Admitted admitted, bool first) {
     gap->incoming.reason = static_cast<std::uint32_t>(proto::DropReason::link_lost);
     push_event(gap);
   }
-  credits_.begin(session_.resumed);
+  credits_.tell_all();
   inbound_.begin(session_);
   confirmed_ = inbound_.taken();
   const auto space = inbound_.space();
@@ -252,6 +254,11 @@ void Node::set_last_error(std::string sentence) {
 std::string Node::last_error() {
   const MutexLock lock(mutex_);
   return last_error_;
+}
+
+std::uint32_t Node::reconnects() {
+  const MutexLock lock(mutex_);
+  return info_.reconnects;
 }
 
 void Node::fill_info(nif_info& info) {

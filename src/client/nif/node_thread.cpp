@@ -282,8 +282,9 @@ void Node::leave() {
   std::byte memory[4096];
   for (;;) {
     const IoResult result = socket_.read(memory);
+    if (steady_now_ns() >= deadline) break;  // also of a hub that never ends
     if (result.state == IoResult::State::done) continue;
-    if (result.state != IoResult::State::would_block || steady_now_ns() >= deadline) break;
+    if (result.state != IoResult::State::would_block) break;
     static_cast<void>(wait_for(socket_, true, false, wake_, deadline));
     wake_.clear();
   }

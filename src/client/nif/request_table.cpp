@@ -128,7 +128,8 @@ bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer)
     if (found == open_.end()) return false;
     Open& open = found->second;
     const bool matches = open.kind == kind && (open.operation | proto::kAnswerBit) == answer.header.operation;
-    if (!matches || open.state == State::answered) return false;
+    // A broken one still belongs to the call that asked: it was posted anew behind the break, and asks once more.
+    if (!matches || open.state == State::answered || open.state == State::broken) return false;
     if (open.state == State::waiting && !open.handler) {
       open.state = State::answered;
       open.answer = std::move(payload);

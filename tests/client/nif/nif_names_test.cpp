@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,6 +45,42 @@ TEST(NifNames, ResolvesOnceAndRemembers) {
         EXPECT_EQ(request->name, "robot/base");
         connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
       });
+}
+
+// Whichever of the two the library knows first, the break or the answer, the next connection has the service.
+TEST(NifNames, AServiceThatIsAnsweredAtABreakIsDeclaredBehindIt) {
+  for (int round = 0; round < 50; ++round) {
+    FakeHub hub;
+    Connected connected = connect_to(hub, default_options(), make_welcome());
+    nif_node* const node = connected.node.get();
+    nif_service service{};
+    service.struct_size = sizeof service;
+    service.name = "odom";
+    std::uint32_t group = 0;
+    std::atomic<int> declared = 0;
+    std::atomic<bool> silent = false;  // nothing was declared for as long as the hub has patience
+    converse(
+        [&] {
+          EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+          while (declared == 0 && !silent) std::this_thread::yield();
+          connected.node = OpenNode();
+        },
+        [&] {
+          std::uint16_t number = 0;
+          ASSERT_TRUE(connected.hub.next_request<ns::Advertise>(number));
+          ns::AdvertiseAnswer answer;
+          answer.group = GroupId{kOwnId};
+          connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+          connected.hub.close();
+          connected.hub = hub.admit(make_welcome());
+          for (; connected.hub.next_request<ns::Advertise>(number); ++declared) {
+            connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+          }
+          silent = true;
+          connected.hub.close();
+        });
+    EXPECT_GT(declared, 0) << "round " << round;
+  }
 }
 
 TEST(NifNames, TellsWhatTheHubSays) {
@@ -169,15 +206,21 @@ TEST(NifNames, AsksAgainAfterABreak) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   nif_node* const node = connected.node.get();
-  converse([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); },
-           [&] {
-             std::uint16_t number = 0;
-             ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
-             connected.hub.close();
-             connected.hub = hub.admit(make_welcome());
-             ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
-             connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
-           });
+  converse(
+      [&] {
+        EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK);
+        connected.node = OpenNode();
+      },
+      [&] {
+        std::uint16_t number = 0;
+        ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
+        connected.hub.close();
+        connected.hub = hub.admit(make_welcome());
+        while (connected.hub.next_request<ns::Subscribe>(number)) {
+          connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
+        }
+        connected.hub.close();
+      });
 }
 
 TEST(NifNames, IgnoresAnswersToNothing) {
