@@ -104,7 +104,7 @@ void SendQueue::stage(Runs& from, std::size_t bytes_max) {
 
 std::optional<std::uint8_t> SendQueue::pick_lane() const {
   std::optional<std::uint8_t> first;
-  for (std::uint8_t lane = 0; lane < proto::kLanes; ++lane) {
+  for (std::uint8_t lane = 0; lane < proto::kLaneCount; ++lane) {
     if (lanes_[lane].empty()) continue;
     if (passed_over_[lane] >= kPassedOverMax) return lane;
     if (!first) first = lane;
