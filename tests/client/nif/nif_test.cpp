@@ -256,20 +256,23 @@ TEST(Nif, WhatACallbackRefusesStaysInOrder) {
 }
 
 TEST(Nif, TheEndOfABurstIsWrittenWithoutAFurtherCall) {
-  constexpr int kBursts = 50;
-  constexpr int kMessages = 300;
+  constexpr int kBursts = 40;
   FakeHub hub;
-  Connected connected = connect_to(hub, default_options(), make_welcome());
+  proto::Welcome welcome = make_welcome();
+  welcome.keep_alive_ms = 600'000;  // or what is forgotten would go with the next PING
+  Connected connected = connect_to(hub, default_options(), welcome);
   int next = 0;
-  for (int burst = 0; burst < kBursts; ++burst) {
-    for (int i = 0; i < kMessages; ++i) {
-      const std::string text = std::to_string(burst * kMessages + i);
+  for (int burst = 1; burst <= kBursts; ++burst) {
+    // Of all lengths, so that some end while the library's thread writes.
+    const int count = 97 * burst;
+    for (int i = 0; i < count; ++i) {
+      const std::string text = std::to_string(next + i);
       ASSERT_EQ(nif_send_to(connected.node.get(), kPeerId, text.data(), text.size()), NIF_OK);
     }
-    for (int i = 0; i < kMessages; ++i) {
+    for (const int end = next + count; next < end; ++next) {
       const auto frame = connected.hub.next_message();
       ASSERT_TRUE(frame) << next;
-      ASSERT_EQ(frame->payload(), std::to_string(next++));
+      ASSERT_EQ(frame->payload(), std::to_string(next));
     }
   }
 }
