@@ -19,7 +19,8 @@ row is the median of its runs. What is measured is `build/release/bin/tcphub` as
 machine to machine; the ratios of one run are what counts.
 
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
-fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`.
+fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`. Runs of `ping_paced` are four times, of
+libraries twice as long as the others.
 
 **Other hubs** (`perf/driver/rivals.py`): Debian's packages as their documentation would have them for messages that need not be kept, and in their favour:
 nothing on disk, no passwords, TCP_NODELAY; nats-server; mosquitto at QoS 0; redis-server with RESP 3 and without replies to PUBLISH; ZeroMQ's XPUB/XSUB

@@ -35,14 +35,15 @@ def run_pair(subject: Subject, case: Case, settings) -> dict[str, float]:
     """What the asking program found. Raises SubjectError."""
     answering, asking = case.spec.roles
     cpus = allowed_cpus()[:1] if case.spec.one_cpu else allowed_cpus()
+    seconds = settings.seconds * case.spec.seconds_factor
     command = [str(settings.build / "bin" / CLIENTS[subject.name]), "--connect", subject.urls[case.transport],
-               "--size", str(case.size), "--seconds", str(settings.seconds),
+               "--size", str(case.size), "--seconds", str(seconds),
                "--patience", str(settings.patience_seconds), "--hub", str(subject.pid)]
     partner = subprocess.Popen([*command, "--role", answering], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, preexec_fn=child_setup(cpus))
     try:
         await_ready(partner)
-        limit = 3 * settings.seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
+        limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
         try:
             done = subprocess.run([*command, "--role", asking, "--partner", str(partner.pid)], capture_output=True,
                                   text=True, timeout=limit, stdin=subprocess.DEVNULL, preexec_fn=child_setup(cpus))

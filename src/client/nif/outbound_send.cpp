@@ -14,6 +14,8 @@ namespace {
 
 /// No longer than this is a burst gathered for one write.
 constexpr std::int64_t kGatherNsMax = 100'000;
+/// From one look at whether it goes on to the next.
+constexpr std::int64_t kLookNs = 1'000;
 /// With NIF_FLAG_MORE this much is written anyway.
 constexpr std::size_t kHeldBytesMax = 64 * 1024;
 /// After so many quick sends in a row gathering them pays for the wake-up of the library's thread.
@@ -55,6 +57,9 @@ bool Outbound::gather_burst() {
     if (appended >= enough) break;
     if (appended != before) last = now;
     std::this_thread::yield();
+    // A look at the senders' memory slows them down, and a yield is a system call.
+    while (steady_now_ns() - now < kLookNs) {
+    }
   }
   mutex_.lock();
   return true;
