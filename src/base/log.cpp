@@ -1,5 +1,6 @@
 #include "base/log.hpp"
 
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,11 +47,19 @@ std::string time_stamp() {
 
 std::chrono::milliseconds now_ms() { return std::chrono::milliseconds{steady_now_ns() / 1'000'000}; }
 
+/// A pipe that nobody reads, or a terminal that was stopped, takes nothing: who logs must not stand still with it. A
+/// line is shorter than the page that a pipe has free when it can be written.
+bool stderr_takes_a_line() {
+  pollfd out{STDERR_FILENO, POLLOUT, 0};
+  return ::poll(&out, 1, 0) != 0;
+}
+
 /// `alike`: lines of the same kind about the same peer that were left out before this one.
 void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_t alike,
                 std::chrono::milliseconds now) {
   out.budget.add_left_out(out.throttle.take_forgotten());
   if (!out.budget.take(out.rates.all_per_s, now)) return out.budget.add_left_out(alike);
+  if (!stderr_takes_a_line()) return out.budget.add_left_out(1 + alike);
   std::string line = time_stamp() + " " + std::string{kNames[static_cast<std::size_t>(level)]} + " " + escaped(text);
   if (alike > 0) line += " (" + std::to_string(alike) + " lines like this were left out)";
   if (const std::uint64_t count = out.budget.take_left_out(); count > 0) {

@@ -25,8 +25,9 @@ struct LogRates {
 void set_log_rates(const LogRates& rates);
 
 /// Writes one line with time and level to standard error: one event, for people. Control characters and broken text
-/// in `text`, which may come from strangers, are escaped. What the rates leave out is counted in the next line.
-/// Thread safety: any thread. Never on the data path.
+/// in `text`, which may come from strangers, are escaped. What the rates leave out, and what standard error does not
+/// take at once, is counted in the next line: a log that nobody reads holds nobody up. Thread safety: any thread. Never
+/// on the data path.
 void log_line(LogLevel level, std::string_view text);
 
 /// What somebody else may make the hub say as often as he likes: the kind of line, and who he is (without what changes

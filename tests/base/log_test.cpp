@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 
 #include "base/clock.hpp"
 
@@ -94,6 +96,29 @@ TEST(Log, WhatOnePeerCausesIsWrittenTenTimesASecondAndEscaped) {
   EXPECT_THAT(text, HasSubstr(" yes"));
   // How long this loop takes is not ours to say: a line a second of it, and all the others are counted.
   EXPECT_LT(lines_in(text), 1'000u);
+}
+
+TEST(Log, APipeThatNobodyReadsHoldsNobodyUp) {
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  const int before = ::dup(STDERR_FILENO);
+  ASSERT_EQ(::dup2(pipe[1], STDERR_FILENO), STDERR_FILENO);
+  set_log_rates({1'000'000, 1});
+  const std::string line(900, 'x');
+  for (int i = 0; i < 1'000; ++i) log_info(line);  // a pipe has 64 KiB
+  std::array<char, 65'536> memory{};
+  ASSERT_GT(::read(pipe[0], memory.data(), memory.size()), 0);
+  log_info("read again");
+  set_log_rates({});
+  ASSERT_EQ(::dup2(before, STDERR_FILENO), STDERR_FILENO);
+  ::close(before);
+  ::close(pipe[1]);
+  std::string text;
+  for (ssize_t size = 0; (size = ::read(pipe[0], memory.data(), memory.size())) > 0;) {
+    text.append(memory.data(), static_cast<std::size_t>(size));
+  }
+  ::close(pipe[0]);
+  EXPECT_THAT(text, ::testing::ContainsRegex("read again \\([0-9]+ lines before this were left out\\)\n"));
 }
 
 TEST(Log, WhatIsLeftOutIsCountedInTheNextLine) {
