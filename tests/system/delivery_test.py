@@ -6,7 +6,7 @@ import tempfile
 import threading
 import unittest
 
-from support.logs import robot_log
+from support.logs import robot_logs
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.waiting import wait_until
 from support.wire import Client, random_bytes
@@ -54,54 +54,58 @@ class Chatter:
 class Delivery(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.log = robot_log()
+        cls.logs = robot_logs()
+        cls.lines = sum(log.count(b"\n") for log in cls.logs)
 
-    def send_log(self, hub, sender_shard, receiver_shard):
-        lines = self.log.count(b"\n")
-        receiver = start_recv(self, hub, "B", "-n", str(lines), "--shard", str(receiver_shard))
-        sent = run_gimnet(hub, "send", "B", "--json", "--shard", str(sender_shard), data=self.log)
-        self.assertEqual(sent.code, 0, sent.err)
-        self.assertIn(f'"acknowledged":{lines}'.encode(), sent.out)
-        self.assertEqual(receiver.wait(), 0, receiver.err)
-        self.assertEqual(receiver.out, self.log)
+    def send_logs(self, hub, sender_shard, receiver_shard):
+        for log in self.logs:
+            lines = log.count(b"\n")
+            receiver = start_recv(self, hub, "B", "-n", str(lines), "--shard", str(receiver_shard))
+            sent = run_gimnet(hub, "send", "B", "--json", "--shard", str(sender_shard), data=log)
+            self.assertEqual(sent.code, 0, sent.err)
+            self.assertIn(f'"acknowledged":{lines}'.encode(), sent.out)
+            self.assertEqual(receiver.wait(), 0, receiver.err)
+            self.assertEqual(receiver.out, log)
 
     def test_through_one_shard(self):
         hub = Hub(self, shards=1)
-        self.send_log(hub, 0, 0)
+        self.send_logs(hub, 0, 0)
         status = hub.quiet_status(self)
         self.assertEqual(status["counters"]["mailbox_entries"], 0)
         self.assertEqual(status["ledger"]["dropped"], 0, status["counters"])
-        self.assertGreaterEqual(status["ledger"]["delivered"], self.log.count(b"\n"))
+        self.assertGreaterEqual(status["ledger"]["delivered"], self.lines)
 
     def test_through_two_shards_from_one_to_the_other(self):
         hub = Hub(self, shards=2)
         before = hub.counter("mailbox_frames")
-        self.send_log(hub, 0, 1)
+        self.send_logs(hub, 0, 1)
         status = hub.quiet_status(self)
-        self.assertGreaterEqual(status["counters"]["mailbox_frames"] - before, self.log.count(b"\n"))
+        self.assertGreaterEqual(status["counters"]["mailbox_frames"] - before, self.lines)
         self.assertGreater(status["counters"]["mailbox_entries"], 0)
         self.assertEqual(status["ledger"]["dropped"], 0, status["counters"])
 
     def test_on_the_same_of_two_shards(self):
         hub = Hub(self, shards=2)
-        self.send_log(hub, 1, 1)
+        self.send_logs(hub, 1, 1)
         status = hub.quiet_status(self)
         self.assertEqual(status["counters"]["mailbox_entries"], 0)
         self.assertEqual(status["shards"][0]["ledger"]["accepted"], 0)
 
     def test_with_a_hundred_others_chattering(self):
-        hub = Hub(self, shards=2)
-        chatter = Chatter(self, hub, shards=2)
-        self.send_log(hub, 0, 1)
-        chatter.stop()
-        self.assertGreater(chatter.sent, 0)
-        hub.quiet_status(self)
+        for shards, receiver_shard in ((1, 0), (2, 0), (2, 1)):
+            with self.subTest(shards=shards, receiver_shard=receiver_shard):
+                hub = Hub(self, shards=shards)
+                chatter = Chatter(self, hub, shards=shards)
+                self.send_logs(hub, 0, receiver_shard)
+                chatter.stop()
+                self.assertGreater(chatter.sent, 0)
+                hub.quiet_status(self)
 
     def test_through_a_unix_socket(self):
         hub = Hub(self)
         hub.url = hub.addresses[1]
         self.assertTrue(hub.url.startswith("unix:"))
-        self.send_log(hub, 0, 0)
+        self.send_logs(hub, 0, 0)
 
 
 class Sizes(unittest.TestCase):

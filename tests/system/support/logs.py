@@ -27,12 +27,15 @@ def _made_up(lines):
             yield f"FLASER 180 {ranges} {math.cos(angle):.6f} {math.sin(angle):.6f} {angle:.6f} 0 0 0 {stamp}"
 
 
-def robot_log():
-    """The bytes of a log, whole lines, newline at the end."""
+def _with_newline(data):
+    return data if data.endswith(b"\n") else data + b"\n"
+
+
+def robot_logs():
+    """The bytes of each log that there is: whole lines, newline at the end."""
     folder = _folder()
     logs = sorted(folder.glob("*.log.gz")) if folder else []
     if not logs:
         print("no robot log found (GIMNET_ROBOT_LOGS names a folder): a made-up one is used", file=sys.stderr)
-        return "".join(line + "\n" for line in _made_up(3000)).encode()
-    data = gzip.decompress(logs[0].read_bytes()).replace(b"\r", b"")
-    return data if data.endswith(b"\n") else data + b"\n"
+        return ["".join(line + "\n" for line in _made_up(3000)).encode()]
+    return [_with_newline(gzip.decompress(log.read_bytes()).replace(b"\r", b"")) for log in logs]
