@@ -19,7 +19,7 @@ void check(nif_status status, const char* what) {
 
 class NifClient final : public LibraryClient {
  public:
-  ~NifClient() override { static_cast<void>(nif_close(node_)); }
+  ~NifClient() override { static_cast<void>(nif_close(node_.load())); }
 
   void open(const Setup& setup, OnMessage on_message) override {
     on_message_ = std::move(on_message);
@@ -35,15 +35,17 @@ class NifClient final : public LibraryClient {
       return NIF_DONE;
     };
     options.user = this;
-    check(nif_connect(&options, &node_), "connect");
+    nif_node* node = nullptr;
+    check(nif_connect(&options, &node), "connect");
+    node_.store(node);
     if (setup.is_first) return;
     std::uint32_t id = 0;
-    check(nif_resolve(node_, setup.partner.c_str(), &id, kPatienceMs), "find the partner");
+    check(nif_resolve(node, setup.partner.c_str(), &id, kPatienceMs), "find the partner");
     partner_.store(id);
   }
 
   void send(std::span<const std::byte> payload) override {
-    check(nif_send_to(node_, partner_.load(std::memory_order_relaxed), payload.data(), payload.size()), "send");
+    check(nif_send_to(node_.load(), partner_.load(std::memory_order_relaxed), payload.data(), payload.size()), "send");
   }
 
  private:
@@ -53,7 +55,7 @@ class NifClient final : public LibraryClient {
     on_message_({static_cast<const std::byte*>(in.payload), in.size});
   }
 
-  nif_node* node_ = nullptr;
+  std::atomic<nif_node*> node_{nullptr};  ///< read by the library's thread, too
   OnMessage on_message_;
   std::atomic<std::uint32_t> partner_{0};  ///< no partner: a number by itself
 };

@@ -1,5 +1,6 @@
 #include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <vector>
 
 #include "generator/inbox.hpp"
@@ -27,12 +28,16 @@ class Pinger {
     client.open(setup, [this](std::span<const std::byte> message) { on_message(message); });
   }
 
-  /// Until the time is up or one is lost. What wait() returns makes what happened on the library's thread visible here.
+  /// Until the time is up or one is lost.
   void run(std::chrono::nanoseconds duration) {
-    done_.store(false);
-    end_ = Clock::now() + duration;
-    send_next();
-    const auto deadline = end_ + options_.patience;
+    const auto end = Clock::now() + duration;
+    {
+      const std::lock_guard lock(mutex_);
+      done_.store(false);
+      end_ = end;
+      send_next();
+    }
+    const auto deadline = end + options_.patience;
     while (!done_.load() && Clock::now() < deadline) static_cast<void>(client_.wait(deadline));
   }
 
@@ -50,6 +55,7 @@ class Pinger {
 
   void on_message(std::span<const std::byte> message) {
     const auto now = Clock::now();
+    const std::lock_guard lock(mutex_);
     inbox_.on_message(message);
     round_trips_ns_.push_back((now - begin_).count());
     if (now < end_) {
@@ -62,13 +68,16 @@ class Pinger {
 
   LibraryClient& client_;
   const PairOptions options_;
+  std::atomic<bool> done_{false};
+
+  // The main thread's to begin with, then the library's, which says by done_ that it is through.
+  std::mutex mutex_;
   std::vector<std::byte> payload_;
   Inbox inbox_;
   std::uint64_t sequence_ = 0;
   Clock::time_point begin_;
   Clock::time_point end_;
   std::vector<std::int64_t> round_trips_ns_;
-  std::atomic<bool> done_{false};
 };
 
 }  // namespace
