@@ -50,12 +50,14 @@ class Queue {
   Outcome<Message> receive(Timeout timeout = kForever) const;
   /// Takes the oldest; nothing if there is none.
   [[nodiscard]] std::optional<Message> try_receive() const;
-  /// Takes the newest and throws the others away, uncounted.
+  /// Takes the newest and throws the others away, which counts as taking them and not as overwriting. Nothing if there
+  /// is none.
   [[nodiscard]] std::optional<Message> take_newest() const;
 
-  /// Changes the size while it runs; the oldest that no longer fit go and are counted. 1..kQueueMessagesMax.
+  /// Changes the size while it runs; the oldest that no longer fit go and are counted. 1..kQueueMessagesMax; other
+  /// numbers count as the nearest of these.
   void resize(std::size_t messages) const;
-  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] std::size_t size() const;           ///< messages that wait now
   [[nodiscard]] std::uint64_t received() const;     ///< all that ever came
   [[nodiscard]] std::uint64_t overwritten() const;  ///< went because it was full
 
@@ -106,8 +108,11 @@ class Sender {
 /// An own service that provides data. Copies are the same service; with the last one it ends.
 class Publisher {
  public:
-  /// Sends to all subscribers; not waited for by slow ones. Without subscribers nothing leaves the process.
+  /// Sends 0 bytes to 1 GiB to all subscribers; slow ones are not waited for. Without subscribers nothing leaves the
+  /// process, but of a retained service. Waits while the connection is broken, where that is resumed, and while the own
+  /// send queue is full. Errors: refused (the hub did not take the service again), not_connected, too_large, closed.
   Outcome<void> publish(BytesView data, More more = More::no) const;
+  /// How many there are, as the hub told last.
   [[nodiscard]] std::size_t subscribers() const;
   /// Waits until there are that many. Errors: timeout, closed.
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
@@ -124,9 +129,10 @@ class Publisher {
 /// subscription; with the last one it ends.
 class Subscription {
  public:
-  /// As Queue::receive().
+  /// As Queue::receive() and Queue::try_receive().
   Outcome<Message> receive(Timeout timeout = kForever) const;
   [[nodiscard]] std::optional<Message> try_receive() const;
+  /// Where its messages wait. The subscription lasts as long as this queue is held.
   [[nodiscard]] Queue queue() const;
   /// Is there a provider at the moment?
   [[nodiscard]] bool exists() const;
@@ -255,12 +261,17 @@ class Node {
                        Timeout timeout = Timeout{5000}) const;
 
   /// A node by its name, or by its id as text. Errors: not_found, bad_name, timeout, not_connected.
+  /// An id as text is not asked for; an answer for a name is remembered for a second.
   Outcome<Peer> find(std::string_view name, Timeout timeout = Timeout{5000}) const;
+  /// The name of a node, "" of one without a name. Errors: not_found, timeout, not_connected.
   Outcome<std::string> name_of(Peer peer, Timeout timeout = Timeout{5000}) const;
   /// Nodes whose name matches (`*` one part, `**` any number; "": all, those without a name too), ascending ids.
+  /// Errors of this and the others that list: bad_name (no pattern), timeout, not_connected, protocol.
   Outcome<std::vector<NodeRecord>> nodes(std::string_view pattern = {}, Timeout timeout = Timeout{5000}) const;
-  /// Services whose full name matches.
+  /// Services whose full name matches, ascending group ids.
   Outcome<std::vector<ServiceRecord>> services(std::string_view pattern = {}, Timeout timeout = Timeout{5000}) const;
+  /// What the hub is, what its io threads counted, who is connected where (ascending ids), and which hubs it knows
+  /// (docs/operations.md).
   Outcome<HubRecord> hub(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ShardCounts>> hub_counters(Timeout timeout = Timeout{5000}) const;
   Outcome<std::vector<ConnectionRecord>> hub_connections(Timeout timeout = Timeout{5000}) const;
@@ -268,7 +279,8 @@ class Node {
 
   // ---- changing the hub, for those who joined as administrators; everybody else is denied
 
-  /// Ends the session of a node, which is told `reason` and does not come back by itself. Errors: not_found, denied.
+  /// Ends the session of a node, which is told `reason` (at most 256 bytes) and does not come back by itself; its token
+  /// counts for nothing from then on. Errors: not_found, denied, bad_argument (this node itself).
   Outcome<void> kick(Peer node, std::string_view reason = {}, Timeout timeout = Timeout{5000}) const;
   /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument.
   Outcome<void> reassign(Peer node, Peer new_id, Timeout timeout = Timeout{5000}) const;
@@ -279,7 +291,8 @@ class Node {
   /// error, warning, info, debug or off. The level before. Errors: bad_argument, denied.
   Outcome<std::string> set_hub_log_level(std::string_view level, Timeout timeout = Timeout{5000}) const;
 
-  /// Sends a small message to the library of another node, which answers by itself. The round trip in ns.
+  /// Sends a small message to the library of another node, which answers by itself with `echo` in it. The round trip in
+  /// ns, in that lane there and back.
   /// Errors: timeout (lost, or late), not_delivered (no such node, no way to it), closed.
   Outcome<std::int64_t> ping(Peer to, Timeout timeout = Timeout{1000}, Lane lane = Lane::normal,
                              BytesView echo = {}) const;

@@ -1,7 +1,13 @@
 #ifndef GIMNET_NIF_NAMES_H
 #define GIMNET_NIF_NAMES_H
 
-/* Names, services and other questions to the hub. Included by gimnet/nif.h. */
+/* Names, services and other questions to the hub. Included by gimnet/nif.h.
+ *
+ * All of these ask the hub and wait for its answer, for at most timeout_ms, over a break too: beside what is named
+ * below they answer NIF_TIMEOUT, NIF_NOT_CONNECTED (broken, and the time is up), NIF_REFUSED or NIF_REPLACED (it will
+ * not come back), NIF_PROTOCOL (the hub's answer cannot be), NIF_BAD_ARGUMENT (NULL), NIF_IN_CALLBACK, NIF_NO_MEMORY,
+ * and what nif.h says of handles. Names are at most NIF_NAME_BYTES_MAX bytes: up to 16 parts of A-Z a-z 0-9 . _ -,
+ * separated by `/` (docs/protocol.md, section 8). */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -19,7 +25,8 @@ typedef struct nif_node nif_node;
  * no_such_node or renumbered, and at every break. NIF_NOT_FOUND, NIF_BAD_NAME, NIF_TIMEOUT, NIF_NOT_CONNECTED. */
 nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t timeout_ms);
 
-/** Finds the name of a node, "" for one without a name. `name` must have room for NIF_NAME_BYTES_MAX + 1 bytes. */
+/** Finds the name of a node, "" for one without a name; remembered as those of nif_resolve(). `name` must have room for
+ * NIF_NAME_BYTES_MAX + 1 bytes. NIF_NOT_FOUND. */
 nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms);
 
 /** One node of a list. Text: NUL-terminated, never NULL. */
@@ -41,7 +48,8 @@ typedef struct nif_node_list {
 } nif_node_list;
 
 /** Lists the nodes whose name matches the pattern (`*` one part, `**` any number; NULL: all nodes, also those without a
- *  name) into *list, which nif_free_nodes() frees. */
+ *  name) into *list, which nif_free_nodes() frees. It is asked for in pages: nodes that come or go meanwhile may be in
+ *  it or not. NIF_BAD_NAME: no pattern. */
 nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list, int32_t timeout_ms);
 void nif_free_nodes(nif_node_list* list);
 
@@ -58,7 +66,7 @@ typedef struct nif_service {
   uint32_t instance;
   uint8_t direction;    /**< nif_direction. */
   uint8_t delivery;     /**< nif_delivery. */
-  const char* metadata; /**< For people and tools; may be NULL. */
+  const char* metadata; /**< For people and tools, at most 4,096 bytes of UTF-8; may be NULL. */
   uint32_t window;      /**< n of NIF_SYNC_DELIVERY, 0: 1. At most the hub's limit, 1,024 unless it was set. */
   uint8_t retain;       /**< Not 0: the hub keeps the last message (1 MiB) and gives it to each new subscriber first. */
 } nif_service;
@@ -69,7 +77,7 @@ typedef struct nif_service {
 nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
                          int32_t timeout_ms);
 
-/** Ends an own service. NIF_NOT_FOUND. */
+/** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's. */
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
 
 /** One service of a list. Text: NUL-terminated, never NULL. */

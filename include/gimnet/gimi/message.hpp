@@ -25,7 +25,7 @@ struct Peer {
   friend constexpr auto operator<=>(const Peer&, const Peer&) = default;
 };
 
-/// What a message is: which queue of its receiver it belongs to. The numbers are the application's.
+/// What a message is: which queue of its receiver it belongs to. The numbers, any of 32 bits, are the application's.
 struct MessageKey {
   std::uint32_t type = 0;
   std::uint32_t instance = 0;
@@ -58,8 +58,8 @@ class BytesView {
   std::size_t size_ = 0;
 };
 
-/// A message that was received. Owns its bytes, which stay where the network put them; it may share a block of up to
-/// 64 KiB with its neighbours, so a program that keeps few of many for long copies those.
+/// A message that was received. Owns its bytes, which stay where the network put them; it may share a block of
+/// 256 KiB with its neighbours, so a program that keeps few of many for long copies those.
 /// Thread safety: a value that can be moved; one thread at a time. Lifetime: may outlive the node.
 class Message {
  public:
@@ -79,10 +79,12 @@ class Message {
   [[nodiscard]] std::string_view text() const { return {reinterpret_cast<const char*>(data_.data()), data_.size()}; }
   [[nodiscard]] std::size_t size() const { return data_.size(); }
 
+  /// Who sent it: the first hub vouches for it.
   [[nodiscard]] Peer from() const { return from_; }
   [[nodiscard]] MessageKey key() const { return key_; }
   [[nodiscard]] Lane lane() const { return lane_; }
-  /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its subscribers.
+  /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its subscribers; after
+  /// 2^32 - 1 comes 0.
   [[nodiscard]] std::uint32_t sequence() const { return sequence_; }
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }

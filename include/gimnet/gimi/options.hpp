@@ -20,12 +20,15 @@ inline constexpr std::size_t kQueueMessagesMax = std::size_t{1} << 24;
 
 /// How to join. Everything has a default that works on one machine.
 struct NodeOptions {
-  std::string name;  ///< "": a node without a name, found by its id only
+  /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a name, found by its
+  /// id only.
+  std::string name;
   /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this machine.
   std::string hub;
-  std::string description;  ///< for people, at most 256 bytes
-  Timeout timeout{5000};    ///< for joining
-  bool wait_for_hub = false;
+  std::string description;    ///< for people, at most 256 bytes
+  Timeout timeout{5000};      ///< for joining, in ms
+  bool wait_for_hub = false;  ///< dial again until `timeout` if there is no hub yet
+  /// Dial again after a break, after a random time below 50 ms, 100 ms ... 1 s. false: a break is the end.
   bool reconnect = true;
   /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed. Default: nodes with a
   /// name.
@@ -37,10 +40,10 @@ struct NodeOptions {
   std::optional<std::uint8_t> shard;
   /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it. Else: denied.
   bool administrator = false;
-  std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, up to 1 GiB
+  std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, in bytes, up to 1 GiB
   std::size_t receive_bytes = std::size_t{16} << 20;      ///< may wait unread when a queue holds the reading back
-  std::size_t queue_messages = kQueueMessagesDefault;     ///< size of queues that nobody asked for
-  std::uint32_t socket_receive_bytes = 0;                 ///< SO_RCVBUF; 0: the system's
+  std::size_t queue_messages = kQueueMessagesDefault;  ///< size of queues that nobody asked for, 1..kQueueMessagesMax
+  std::uint32_t socket_receive_bytes = 0;              ///< SO_RCVBUF, in bytes; 0: the system's
 };
 
 /// What a queue does when a message comes and it is full.
@@ -77,8 +80,8 @@ struct SendOptions {
   /// receiver sets its own pace. 0: unsynchronized, as fast as the network takes it; nothing is acknowledged.
   std::size_t window = 0;
   AtFullWindow at_full = AtFullWindow::wait;
-  bool timestamp = false;        ///< tell the receiver when it was sent
-  std::uint32_t age_max_ms = 0;  ///< not 0: dropped on the way when older
+  bool timestamp = false;        ///< tell the receiver when it was sent: 8 bytes more
+  std::uint32_t age_max_ms = 0;  ///< not 0: dropped on the way when older, by the clocks of this node and the hubs
 };
 
 struct PublishOptions {
@@ -86,17 +89,18 @@ struct PublishOptions {
   MessageKey key;
   Lane lane = Lane::normal;
   bool timestamp = true;
-  std::string metadata;  ///< for people and tools
-  std::uint32_t window = 1;  ///< of Delivery::sync: messages that a subscriber may not have taken
+  std::string metadata;  ///< for people and tools, at most 4,096 bytes of UTF-8
+  std::uint32_t window =
+      1;  ///< of Delivery::sync: messages that a subscriber may not have taken, 1..1,024 (a hub's limit)
   /// The hub keeps the last message, up to 1 MiB, and gives it to each new subscriber first.
   bool retain = false;
 };
 
 /// A service that takes data, such as commands.
 struct AcceptOptions {
-  MessageKey key;
-  QueueOptions queue;
-  std::string metadata;
+  MessageKey key;        ///< of the messages that it takes
+  QueueOptions queue;    ///< in which they wait
+  std::string metadata;  ///< for people and tools, at most 4,096 bytes of UTF-8
 };
 
 /// What a watch is about.
