@@ -19,9 +19,8 @@ class TokenBucket {
   /// Takes a token; false: there is none. A clock that goes back fills nothing.
   [[nodiscard]] bool take(const Rate& rate, std::chrono::milliseconds now) {
     const std::uint64_t full = rate.burst * kToken;
-    if (!used_) {
+    if (last_ == kNever) {
       left_ = full;
-      used_ = true;
     } else if (now > last_) {
       const auto passed_ms = static_cast<std::uint64_t>((now - last_).count());
       // A token a second is a thousandth of one a millisecond.
@@ -36,10 +35,10 @@ class TokenBucket {
 
  private:
   static constexpr std::uint64_t kToken = 1'000;
+  static constexpr std::chrono::milliseconds kNever = std::chrono::milliseconds::min();
 
-  std::chrono::milliseconds last_{0};
+  std::chrono::milliseconds last_ = kNever;
   std::uint64_t left_ = 0;  ///< thousandths of a token
-  bool used_ = false;
 };
 
 }  // namespace gimnet

@@ -189,7 +189,7 @@ void Checks::names() const {
     const std::string& name = (expected++)->second.name;
     if (session.name != name) {
       broken(Checker::names,
-             "node " + std::to_string(index) + " has the name '" + session.name + "', not '" + name + "'");
+             "node " + std::to_string(index) + " has the name '" + session.name.str() + "', not '" + name + "'");
     }
     if (name.empty()) continue;
     ++named;

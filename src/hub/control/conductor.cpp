@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
 std::string title(NodeId node, const Session& session) {
-  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
+  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
 }
 
 /// Was the request of no use to anybody?
@@ -112,11 +112,10 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
-  session.close_code.reset();
-  session.close_sentence.clear();
+  session.closing.reset();
   log_line(LogLevel::info, subject("joined", session),
            title(node_id(session), session) + (session.came_back ? " came back over " : " joined over ") +
-               session.origin.transport + " from " + session.origin.address + ", shard " +
+               session.origin.transport.str() + " from " + session.origin.address.str() + ", shard " +
                std::to_string(session.place.shard.value()));
 }
 
@@ -132,11 +131,11 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
   welcome.hub_time_ns = moment.wall_ns;
   welcome.resume_buffer_bytes = hello.resume ? static_cast<std::uint32_t>(limits_.resume_bytes) : 0;
   welcome.grace_ms = static_cast<std::uint32_t>(limits_.grace_ms);
-  welcome.name = session.name;
+  welcome.name = session.name.str();
   welcome.name_provisional = membership_.directory().is_provisional(session.name);
-  if (session.close_code) {
-    welcome.last_goodbye_code = static_cast<std::uint16_t>(*session.close_code);
-    welcome.last_goodbye_sentence = session.close_sentence.substr(0, proto::kSentenceBytesMax);
+  if (session.closing) {
+    welcome.last_goodbye_code = static_cast<std::uint16_t>(session.closing->code);
+    welcome.last_goodbye_sentence = session.closing->sentence.substr(0, proto::kSentenceBytesMax);
   }
   return welcome;
 }

@@ -53,10 +53,10 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context, const ctrl::C
     const Session& session = entry->second;
     ctrl::ConnectionRecord record;
     record.node = make_id<NodeId>(context.facts.id, session.index);
-    record.name = session.name;
+    record.name = session.name.str();
     record.shard = session.place.shard.value();
-    record.transport = session.origin.transport;
-    record.peer = session.origin.address;
+    record.transport = session.origin.transport.str();
+    record.peer = session.origin.address.str();
     record.connected = session.connected;
     const std::size_t shard = session.place.shard.value();
     if (shard < context.queues.size()) record.queued_bytes = context.queues[shard]->queued_bytes(session.place.slot);

@@ -26,10 +26,10 @@ Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) 
 }
 
 std::string title(NodeId node, const Session& session) {
-  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name + "'");
+  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
 }
 
-std::string by_whom(const Session& admin) { return admin.origin.transport + " " + admin.origin.address; }
+std::string by_whom(const Session& admin) { return admin.origin.transport.str() + " " + admin.origin.address.str(); }
 
 Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& request, const ctrl::Kick& wanted) {
   const auto session = find_node(context, wanted.node);

@@ -52,7 +52,7 @@ proto::Payload handle_register(HandlerContext& context, const Request& request) 
         }
         const auto failed = context.membership.rename(session, wanted.name, context.now, context.effects);
         if (failed) return *failed;
-        return ns::RegisterNameAnswer{session.name, context.membership.directory().is_provisional(session.name),
+        return ns::RegisterNameAnswer{session.name.str(), context.membership.directory().is_provisional(session.name),
                                       context.membership.sessions().token_of(session)};
       });
 }
@@ -88,7 +88,7 @@ proto::Payload handle_reverse(HandlerContext& context, const Request& request) {
         if (index == kHubIndex) return ns::ReverseAnswer{context.facts.name, make_id<NodeId>(context.facts.id, 0)};
         const Session* session = index ? context.membership.sessions().find(*index) : nullptr;
         if (session == nullptr) return proto::Refusal{Status::not_found, "no node has that id"};
-        return ns::ReverseAnswer{session->name, make_id<NodeId>(context.facts.id, session->index)};
+        return ns::ReverseAnswer{session->name.str(), make_id<NodeId>(context.facts.id, session->index)};
       });
 }
 

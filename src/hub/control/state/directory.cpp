@@ -42,8 +42,8 @@ std::optional<Refusal> Directory::refusal(std::string_view name, const Session* 
   if (!holder->connected) return std::nullopt;
   return Refusal{proto::GoodbyeCode::name_taken,
                  "the name '" + std::string{name} + "' is held by node " + to_string(sessions.node_id(*holder)) +
-                     ", connected over " + holder->origin.transport + " from " + holder->origin.address + " since " +
-                     age_text(now - holder->connected_at) + "; end that one, or choose another name"};
+                     ", connected over " + holder->origin.transport.str() + " from " + holder->origin.address.str() +
+                     " since " + age_text(now - holder->connected_at) + "; end that one, or choose another name"};
 }
 
 void Directory::put(std::string_view name, std::uint32_t index, NameStanding standing) {

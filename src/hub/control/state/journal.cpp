@@ -5,6 +5,7 @@
 namespace gimnet::hub {
 
 void Journal::add(proto::ns::Change change) {
+  GIMNET_CHECK(keeps_);
   GIMNET_CHECK(change.node.has_value() != change.service.has_value());
   change.version = ++version_;
   proto::bitestream::Writer writer;

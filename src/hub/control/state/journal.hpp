@@ -12,8 +12,8 @@
 namespace gimnet::hub {
 
 /// The latest changes of names and services, numbered without gaps: what those who watch have yet to hear. It is one
-/// for all of them, so that who is slow keeps nothing for himself. Thread safety: none. Limits: watch_changes and
-/// watch_bytes; the oldest go.
+/// for all of them, so that who is slow keeps nothing for himself. Until somebody watches it only counts: nobody could
+/// come back for what was before. Thread safety: none. Limits: watch_changes and watch_bytes; the oldest go.
 class Journal {
  public:
   /// A change as it travels, and what decides who hears of it.
@@ -28,8 +28,15 @@ class Journal {
   /// `epoch` is not 0 and differs from that of every earlier start of the hub.
   Journal(std::uint64_t epoch, const Limits& limits) : limits_(limits), epoch_(epoch) {}
 
-  /// Keeps the change under the next version. REQUIRES: it has a node or a service.
+  /// Somebody watches: changes are kept from here on.
+  void begin() { keeps_ = true; }
+  /// Are changes kept? If not, pass() is all that one of them needs.
+  [[nodiscard]] bool keeps() const { return keeps_; }
+
+  /// Keeps the change under the next version. REQUIRES: keeps(); it has a node or a service.
   void add(proto::ns::Change change);
+  /// Counts a change that is not kept. REQUIRES: !keeps().
+  void pass() { ++version_; }
 
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   /// Of the last change; 0: there was none.
@@ -46,6 +53,7 @@ class Journal {
 
   const Limits& limits_;
   const std::uint64_t epoch_;
+  bool keeps_ = false;
   std::uint64_t version_ = 0;
   std::deque<Note> notes_;
   std::size_t bytes_ = 0;

@@ -76,8 +76,7 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
     return;
   }
   if (!ending.said_by_peer && ending.code != GoodbyeCode::done) {
-    session.close_code = ending.code;
-    session.close_sentence = ending.sentence;
+    session.closing = std::make_unique<Closing>(Closing{ending.code, ending.sentence});
   }
   sessions_.begin_grace(session, now);
   effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
@@ -99,7 +98,7 @@ std::optional<Failure> Membership::rename(Session& session, const std::string& n
 }
 
 void Membership::name_decided(Session& session, const NameDecision& decision, milliseconds now, Effects& effects) {
-  const std::string name = session.name;
+  const std::string name = session.name.str();
   if (!directory_.is_provisional(name)) return;
   if (decision.confirmed) {
     directory_.confirm(name);
@@ -142,7 +141,7 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
   if (!sessions_.renumber(session, index, now)) {
     const Session* holder = sessions_.find(index);
     const std::string id = to_string(make_id<NodeId>(hub_of(sessions_.node_id(session)), index));
-    const std::string held = holder == nullptr || holder->name.empty() ? "" : " '" + holder->name + "'";
+    const std::string held = holder == nullptr || holder->name.empty() ? "" : " '" + holder->name.str() + "'";
     return Failure{proto::Status::taken,
                    holder != nullptr ? "the id " + id + " is that of another node" + held + "; choose a free one"
                                      : "the id " + id +
@@ -161,7 +160,7 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
 #ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});
 #endif
-  effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name, {}});
+  effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name.str(), {}});
   effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
   services_.node_renumbered(former, index, effects);
   effects.emplace_back(RenumberDue{session.place, former, index,
@@ -218,7 +217,7 @@ void Membership::make_room(milliseconds now, Effects& effects) {
 }
 
 void Membership::take_name(Session& session, const std::string& name, milliseconds now, Effects& effects) {
-  const std::string former = std::exchange(session.name, name);
+  const std::string former = std::exchange(session.name, CompactText(name)).str();
   if (!former.empty()) {
     services_.node_renamed(session.index, now, effects);
 #ifndef GIMNET_BUG_OLD_NAME_STAYS
@@ -240,7 +239,7 @@ void Membership::end(Session& session, milliseconds now, Effects& effects) {
 #ifndef GIMNET_BUG_SLOT_NOT_RELEASED
   effects.emplace_back(SessionEnded{session.place});
 #endif
-  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name, {}});
+  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name.str(), {}});
   for (const std::uint32_t index : former) effects.emplace_back(NodeChanged{index});
   sessions_.end(session, now);
 }

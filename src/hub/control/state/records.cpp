@@ -8,12 +8,12 @@ ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Serv
                          std::chrono::milliseconds now) {
   ns::NodeRecord record;
   record.node = make_id<NodeId>(hub.id, session.index);
-  record.name = session.name;
+  record.name = session.name.str();
   record.hub = hub.id;
   record.hub_name = hub.name;
   record.connected = session.connected;
-  record.description = session.description;
-  record.place = session.origin.address;
+  record.description = session.description.str();
+  record.place = session.origin.address.str();
   record.joined_ms = static_cast<std::uint64_t>((now - session.joined).count());
   record.services = static_cast<std::uint32_t>(services.services_of(session.index));
   return record;

@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/compact_text.hpp"
 #include "base/ids.hpp"
 #include "base/result.hpp"
 #include "base/token_bucket.hpp"
@@ -27,30 +29,35 @@ namespace gimnet::hub {
 
 /// Where a connection came from, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid 77 uid 1000".
 struct Origin {
-  std::string transport;
-  std::string address;
+  CompactText transport;
+  CompactText address;
 };
 
-/// A node's membership of this hub: outlives its connections by the grace time.
+/// How the hub closed a connection.
+struct Closing {
+  proto::GoodbyeCode code{};
+  std::string sentence;
+};
+
+/// A node's membership of this hub: outlives its connections by the grace time. There are as many as nodes, most of
+/// them idle: what few of them have takes a pointer, no more.
 struct Session {
-  std::uint32_t index = 0;  ///< of its node id
+  std::uint32_t index = 0;       ///< of its node id
+  std::uint32_t attachment = 0;  ///< of the latest connection, counted from 1
   SessionNumber number = 0;
   Place place;
   proto::Role role{};
   bool connected = false;
-  std::uint32_t attachment = 0;  ///< of the latest connection, counted from 1
-  std::string name;              ///< "" for a node without one
-  std::string description;
-  std::string identity;                      ///< who its peer is; nobody else can claim it
-  std::string token_name;                    ///< for which its latest token was written
-  bool came_back = false;                    ///< with a token, to this hub or to this hub before its restart
-  std::chrono::milliseconds token_expiry{};  ///< since 1970
+  bool came_back = false;  ///< with a token, to this hub or to this hub before its restart
+  CompactText name;        ///< "" for a node without one
+  CompactText description;
+  CompactText identity;                      ///< who its peer is; nobody else can claim it
+  CompactText token_name;                    ///< for which its latest token was written
   Origin origin;                             ///< of the latest connection
+  std::chrono::milliseconds token_expiry{};  ///< since 1970
   std::chrono::milliseconds joined{};        ///< when the session began
   std::chrono::milliseconds connected_at{};  ///< when its latest connection was admitted
-  /// How the hub closed its last connection; told at its next WELCOME.
-  std::optional<proto::GoodbyeCode> close_code;
-  std::string close_sentence;
+  std::unique_ptr<const Closing> closing;    ///< of its last connection, if it was; told at its next WELCOME
   // Over all its connections, so that a new one is no way to get more.
   TokenBucket declarations;  ///< that it begins or changes
   TokenBucket oddities;      ///< requests of no use

@@ -27,6 +27,7 @@ Watches::Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits)
 void Watches::note(const NodeNoted& noted, const Membership& membership, milliseconds now) {
   // Also of one that was ended while it was connected, whose connection ends for nobody.
   if (noted.kind == ns::ChangeKind::left) connection_ended(noted.index);
+  if (!journal_.keeps()) return journal_.pass();
   ns::Change change;
   change.kind = noted.kind;
   change.former_name = noted.former_name;
@@ -43,6 +44,7 @@ void Watches::note(const NodeNoted& noted, const Membership& membership, millise
 }
 
 void Watches::note(const ServiceNoted& noted, const Membership& membership, milliseconds /*now*/) {
+  if (!journal_.keeps()) return journal_.pass();
   ns::Change change;
   change.kind = noted.kind;
   const Topic* topic =
@@ -79,6 +81,7 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
                                        : "this hub takes " + std::to_string(limits_.watches)) +
                                       " watches; end one first, or start the hub with a larger --limit " + limit};
   }
+  journal_.begin();
   const bool goes_on = wanted.epoch == journal_.epoch() && journal_.reaches(wanted.version);
   if (goes_on) {
     watch.phase = Phase::live;

@@ -19,6 +19,7 @@ ns::Change node_change(std::uint32_t index, std::size_t name_bytes = 5) {
 TEST(Journal, NumbersChangesWithoutGaps) {
   const Limits limits;
   Journal journal(9, limits);
+  journal.begin();
   EXPECT_EQ(journal.version(), 0u);
   EXPECT_TRUE(journal.reaches(0));
   for (std::uint32_t i = 1; i <= 5; ++i) journal.add(node_change(i));
@@ -32,6 +33,7 @@ TEST(Journal, KeepsSoManyChanges) {
   Limits limits;
   limits.watch_changes = 3;
   Journal journal(9, limits);
+  journal.begin();
   for (std::uint32_t i = 1; i <= 3; ++i) journal.add(node_change(i));
   EXPECT_TRUE(journal.reaches(0));
   journal.add(node_change(4));
@@ -45,14 +47,32 @@ TEST(Journal, KeepsSoManyBytes) {
   Limits limits;
   limits.watch_bytes = 64 * 1024;
   Journal journal(9, limits);
+  journal.begin();
   for (std::uint32_t i = 1; i <= 1'000; ++i) journal.add(node_change(i, 255));
   EXPECT_TRUE(journal.reaches(1'000 - 64));
   EXPECT_FALSE(journal.reaches(1'000 - 256));
 }
 
+TEST(Journal, OnlyCountsUntilItBegins) {
+  const Limits limits;
+  Journal journal(9, limits);
+  EXPECT_FALSE(journal.keeps());
+  for (int i = 0; i < 3; ++i) journal.pass();
+  EXPECT_EQ(journal.version(), 3u);
+  EXPECT_FALSE(journal.reaches(2));
+  EXPECT_TRUE(journal.reaches(3));
+  journal.begin();
+  EXPECT_TRUE(journal.keeps());
+  journal.add(node_change(4));
+  EXPECT_FALSE(journal.reaches(2)) << "what was only counted";
+  EXPECT_TRUE(journal.reaches(3));
+  EXPECT_EQ(journal.at(4).index, 4u);
+}
+
 TEST(Journal, TellsServicesFromNodes) {
   const Limits limits;
   Journal journal(9, limits);
+  journal.begin();
   ns::Change change;
   change.kind = ns::ChangeKind::advertised;
   change.service.emplace();

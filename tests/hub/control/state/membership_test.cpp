@@ -176,15 +176,16 @@ TEST_F(MembershipTest, AGoodbyeWithAReasonKeepsTheGraceTime) {
   Session* robot = join("robot");
   membership_.connection_ended(*robot, {true, GoodbyeCode::silent, "lost you"}, 1s, effects_);
   EXPECT_FALSE(robot->connected);
-  EXPECT_FALSE(robot->close_code);
+  EXPECT_EQ(robot->closing, nullptr);
   EXPECT_EQ(membership_.sessions().all().size(), 1u);
 }
 
 TEST_F(MembershipTest, HowTheHubClosedIsRemembered) {
   Session* robot = join("robot");
   membership_.connection_ended(*robot, {false, GoodbyeCode::slow_consumer, "took too little"}, 1s, effects_);
-  EXPECT_EQ(robot->close_code, GoodbyeCode::slow_consumer);
-  EXPECT_EQ(robot->close_sentence, "took too little");
+  ASSERT_NE(robot->closing, nullptr);
+  EXPECT_EQ(robot->closing->code, GoodbyeCode::slow_consumer);
+  EXPECT_EQ(robot->closing->sentence, "took too little");
 }
 
 TEST_F(MembershipTest, AReturningNodeMayTakeAnotherName) {

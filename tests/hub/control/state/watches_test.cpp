@@ -42,7 +42,8 @@ class WatchesTest : public ::testing::Test {
     Effects effects;
     ServiceTerms terms;
     terms.metadata = metadata;
-    const auto done = membership.services().advertise(session.index, session.name + "/" + service, terms, now, effects);
+    const auto done =
+        membership.services().advertise(session.index, session.name.str() + "/" + service, terms, now, effects);
     EXPECT_TRUE(done);
     note(effects);
     return done->group;
@@ -120,6 +121,19 @@ TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
   end(join("late"), true);
   EXPECT_EQ(take(viewer), (Texts{"advertised hall/robot/pose", "changed hall/robot/pose", "away hall/robot",
                                  "withdrawn hall/robot/pose", "joined late", "left late"}));
+}
+
+TEST_F(WatchesTest, KeepNothingBeforeSomebodyWatches) {
+  Session& viewer = join("viewer");
+  join("hall/robot");
+  EXPECT_FALSE(watches.journal().keeps());
+  EXPECT_EQ(watches.journal().version(), 2u);
+  // A place in the journal that nobody was ever told cannot be gone on from.
+  ASSERT_EQ(watch(viewer, {.watch = 1, .epoch = kEpoch, .version = 1}), Status::done);
+  EXPECT_TRUE(watches.journal().keeps());
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present hall/robot", "end"}));
+  join("late");
+  EXPECT_EQ(take(viewer), Texts{"joined late"});
 }
 
 TEST_F(WatchesTest, TellOnlyWhatThePatternAndTheSubjectsSay) {
@@ -212,7 +226,7 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
     if (text.starts_with("joined") || text.starts_with("advertised")) known.insert(name);
   }
   std::set<std::string> expected;
-  for (const auto& [index, session] : membership.sessions().all()) expected.insert(session.name);
+  for (const auto& [index, session] : membership.sessions().all()) expected.insert(session.name.str());
   for (const auto& [group, topic] : membership.services().groups()) expected.insert(std::string{topic->full_name});
   EXPECT_EQ(known, expected);
 }
@@ -278,7 +292,10 @@ TEST_F(WatchesTest, WhoIsTooFarBehindBeginsAgain) {
 
 TEST_F(WatchesTest, GoOnWhereTheWatcherWasIfTheChangesAreStillThere) {
   Session& viewer = join("viewer");
+  ASSERT_EQ(watch(viewer, {.watch = 1}), Status::done);
+  take(viewer);
   const std::uint64_t before = watches.journal().version();
+  watches.connection_ended(viewer.index);
   join("robot");
   ASSERT_EQ(watch(viewer, {.watch = 1, .epoch = kEpoch, .version = before}), Status::done);
   EXPECT_EQ(take(viewer), Texts{"joined robot"});
