@@ -49,7 +49,7 @@ GOALS = (
     Goal("ping_paced", 16, "tcp", "p999_us", None, 250, subject="tcphub_spinning"),
     Goal("ping_under_bulk", 16, "tcp", "p99_over_idle", None, 1.5),
     Goal("stalled_subscriber", 1024, "tcp", "rate_kept", None, 0.95, at_least=True),
-    Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 2048, 1024),
+    Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 1024, 1024),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
     Goal("library_burst", 16, "tcp", "rate_over_best", None, 2, at_least=True),
     Goal("library_burst", 16, "unix", "rate_over_best", None, 2, at_least=True),

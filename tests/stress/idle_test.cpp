@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kNodes = 10'000;
 constexpr std::size_t kProcesses = 4;
-constexpr std::int64_t kBytesPerNode = 2 * 1'024;
+constexpr std::int64_t kBytesPerNode = 1'024;
 
 /// A process that holds idle nodes and keeps them alive until it is ended.
 class Holder {
@@ -87,7 +87,7 @@ class Holder {
   Descriptor told_;
 };
 
-TEST(IdleNodes, CostTheHubAtMostTwoKibibytesEach) {
+TEST(IdleNodes, CostTheHubAtMostOneKibibyteEach) {
   if (raise_descriptor_limit() < kNodes + 100) GTEST_SKIP() << "the hub may hold too few descriptors here";
   // Keep-alive goes on as always; only its end waits longer, for holders that a busy machine does not schedule in time.
   const HubProcess hub({"--shards", "2", "--limit", "silent_ms=60000"});

@@ -12,6 +12,8 @@ constexpr std::size_t kBufferRoom = 64;  // before its bytes
 static_assert(sizeof(Buffer) <= kBufferRoom);
 constexpr std::size_t kHeaderRoom = 16;  // a frame's header, which its length does not count
 constexpr std::size_t kFreeForeignMax = 4096;
+/// For a smaller chunk, looking through what is lent would cost more than a new one.
+constexpr std::uint32_t kTakeBackBytes = 16 * 1024;
 }  // namespace
 
 void BufferRef::recycle(Buffer& buffer) { buffer.pool->recycle(buffer); }
@@ -60,6 +62,10 @@ BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
   for (std::uint8_t size_class = 0; size_class < chunk_bytes_.size(); ++size_class) {
     if (bytes > chunk_bytes_[size_class]) continue;
     Buffer* chunk = free_chunks_[size_class].pop();
+    if (chunk == nullptr && !lent_.empty() && chunk_bytes_[size_class] >= kTakeBackBytes) {
+      take_back_lent();
+      chunk = free_chunks_[size_class].pop();
+    }
     if (chunk == nullptr) {
       chunk = allocate(chunk_bytes_[size_class], BufferKind::chunk);
       chunk->size_class = size_class;
@@ -146,6 +152,12 @@ void BufferPool::keep_or_free(Buffer& buffer) {
     if (list.count * buffer.capacity < kFreeChunkBytesMax) return list.push(buffer);
   }
   free_buffer(&buffer);
+}
+
+std::size_t BufferPool::kept_chunk_bytes() const {
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < free_chunks_.size(); ++i) bytes += free_chunks_[i].count * chunk_bytes_[i];
+  return bytes;
 }
 
 void BufferPool::take_back_lent() {

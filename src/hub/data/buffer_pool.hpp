@@ -47,6 +47,8 @@ class BufferPool {
   void take_back_lent();
   /// Free here, and still read by other shards when last looked at.
   [[nodiscard]] std::size_t lent_buffers() const { return lent_.size(); }
+  /// Bytes of free chunks that wait for their next use.
+  [[nodiscard]] std::size_t kept_chunk_bytes() const;
 
  private:
   static constexpr std::uint8_t kUnpooled = 0xFF;

@@ -56,7 +56,7 @@ class RingQueue {
   }
 
  private:
-  static constexpr std::size_t kFirstItems = 2;
+  static constexpr std::size_t kFirstItems = 1;  // a keep-alive is all that an idle connection ever has in one
   static constexpr std::size_t kKeepItems = 16;
 
   void grow() {

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "base/token_bucket.hpp"
@@ -45,22 +44,26 @@ struct Progress {
 /// begins anew: it may hold frames under an id that is forgotten, and would be refused for them at each return.
 inline constexpr std::size_t kFormerNodesMax = 8;
 
-/// A session on its shard, and its connection while it has one. Thread safety: one shard.
+/// A session on its shard, and its connection while it has one. There are as many as nodes, most of them idle: what few
+/// of them need is made when they need it, and the members stand so that little is lost between them. Thread safety:
+/// one shard.
 struct Connection : Recipient {
-  std::unique_ptr<Transport> transport;  ///< nullptr: away
-  std::uint32_t attachment = 0;
   Interest armed;
-  bool blocked = false;              ///< the transport took less than was offered: wait for it
-  bool waits_for_room = false;       ///< not read: a shard that it sends to has too much to do
-  bool must_confirm = false;         ///< nothing more can be written before its CONFIRM: read even if held
-  bool gauged = false;               ///< its queue gauge is not 0
-  std::vector<NodeId> former_nodes;  ///< under which it may still send, the latest last
-  bool missed_resume = false;        ///< RESUME had no place: it would stay paused for ever
-  bool draining = false;             ///< closes once everything is written
-  std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
-  std::uint32_t holds = 0;                          ///< by outboxes; not read while it is not 0
-  std::uint32_t requests = 0;                       ///< that are unanswered
+  bool blocked = false;         ///< the transport took less than was offered: wait for it
+  bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
+  bool must_confirm = false;    ///< nothing more can be written before its CONFIRM: read even if held
+  bool gauged = false;          ///< its queue gauge is not 0
+  bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
+  bool draining = false;        ///< closes once everything is written
+  std::uint32_t attachment = 0;
+  std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
+  std::uint32_t requests = 0;  ///< that are unanswered
+  std::uint32_t ping_sequence = 0;
+  std::uint32_t unsent_limit = 0;                   ///< of the transport; 0: not limited
+  std::unique_ptr<Transport> transport;             ///< nullptr: away
+  std::vector<NodeId> former_nodes;                 ///< under which it may still send, the latest last
   TokenBucket oddities;                             ///< CREDITs of no use
+  std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
   GatherWriter writer;
   FrameTail tail;
   IngressState ingress;
@@ -68,9 +71,7 @@ struct Connection : Recipient {
   std::uint64_t last_sent_ms = 0;
   std::uint64_t tail_since_ms = 0;
   std::uint64_t sent_bytes = 0;
-  std::uint32_t ping_sequence = 0;
-  std::uint32_t unsent_limit = 0;    ///< of the transport; 0: not limited
-  std::optional<Progress> progress;  ///< while something waits
+  std::unique_ptr<Progress> progress;  ///< while something waits
   std::unique_ptr<ResumeState> resume;
 
   /// It could not be heard, nor finish a frame, while the hub did not read it.

@@ -91,7 +91,8 @@ void Flusher::on_blocked(Connection& connection) {
 
 void Flusher::watch(Connection& connection) {
   if (connection.progress) return;
-  Progress& progress = connection.progress.emplace();
+  connection.progress = std::make_unique<Progress>();
+  Progress& progress = *connection.progress;
   progress.since_ms = progress.block_since_ms = progress.rate_since_ms = state_.now_ms;
   progress.taken_bytes = progress.block_taken_bytes = progress.rate_bytes = taken_bytes(connection);
 }

@@ -17,13 +17,14 @@ class Flusher {
 
   /// All connections that have something to write. Returns whether some of them could have written more.
   bool flush_dirty();
+  /// One connection, at once. It may be closed by it.
+  void flush(Connection& connection);
   /// The connection's transport takes more again.
   void on_writable(Connection& connection);
   /// A connection that has waiting messages: is it too slow? Called each tick. May close it.
   void look_after(Connection& connection);
 
  private:
-  void flush(Connection& connection);
   void let_wait(Connection& connection);
   void on_blocked(Connection& connection);
   /// From here on look_after() asks whether the connection gets on.

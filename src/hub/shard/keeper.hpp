@@ -27,6 +27,7 @@ class Keeper {
 
  private:
   void look_at(Connection& connection);
+  void say_ping(Connection& connection);
 
   ShardState& state_;
   Closer& closer_;

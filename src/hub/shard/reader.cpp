@@ -83,10 +83,16 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
 
 bool Reader::handle_run(Connection& connection, proto::RunView& view) {
   auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
-  switch (state_.gate.admit(connection.ingress, bytes, view, state_.now_ms)) {
-    case Admission::data:
-      route(connection, view);
-      return true;
+  const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
+  if (admission == Admission::data) {
+    route(connection, view);
+    return true;
+  }
+  return handle_other(connection, view, admission);
+}
+
+bool Reader::handle_other(Connection& connection, const proto::RunView& view, Admission admission) {
+  switch (admission) {
     case Admission::flow:
       return handle_flow(connection, view);
     case Admission::link:
@@ -97,6 +103,7 @@ bool Reader::handle_run(Connection& connection, proto::RunView& view) {
       state_.counters.wrong_source.add(1);
       return refuse(connection, view, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
                     "a frame's source is not this connection's node id; put the id from WELCOME into src");
+    case Admission::data:
     case Admission::malformed:
       break;
   }
@@ -118,6 +125,7 @@ bool Reader::refuse(Connection& connection, const proto::RunView& view, proto::D
 void Reader::route(Connection& connection, const proto::RunView& view) {
   state_.tally.accepted += view.frames;
   if (connection.resume) count_taken(connection, view);
+  if (state_.router.append(view.bytes, view.size, view.frames)) return;
   const proto::FrameHeader header = proto::load_header(view.bytes);
   if (header.has(proto::kFlagExt)) fill_trace(view);
   const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};

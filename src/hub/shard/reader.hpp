@@ -23,6 +23,7 @@ class Reader {
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);
   /// May shorten `view` to the frames that it handled.
   [[nodiscard]] bool handle_run(Connection& connection, proto::RunView& view);
+  [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view, Admission admission);
   void route(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);

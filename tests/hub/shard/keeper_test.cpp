@@ -28,6 +28,19 @@ TEST(Keeper, SaysPingAfterTheKeepAliveInterval) {
   EXPECT_THAT(a.flow_of<proto::flow::Ping>(), SizeIs(3));
 }
 
+TEST(Keeper, TakesLittleMemoryToTellManyAtOnce) {
+  HubRig rig;
+  constexpr std::size_t kNodes = 2'000;
+  std::vector<FakeNode*> nodes;
+  for (std::size_t i = 0; i < kNodes; ++i) nodes.push_back(&rig.join(0));
+  const std::size_t before = rig.shard(0).state().pool.kept_chunk_bytes();
+  rig.now_ms += 1'500;
+  rig.turn_shard(0);
+  EXPECT_LE(rig.shard(0).state().pool.kept_chunk_bytes() - before, 16u * 256);
+  rig.settle();
+  for (const FakeNode* node : nodes) EXPECT_THAT(node->flow_of<proto::flow::Ping>(), SizeIs(1));
+}
+
 TEST(Keeper, ClosesASilentNodeAtTheSilentTimeAndNotBefore) {
   HubRig rig;
   FakeNode& silent = rig.join(0);

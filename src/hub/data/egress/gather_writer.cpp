@@ -69,6 +69,7 @@ void GatherWriter::gather(Batch& batch, Job& job) {
     batch.add(Source::partial, partial_.run.bytes + partial_.offset, partial_.run.size - partial_.offset);
   }
   gather_queue(batch, Source::control, job.outbox.control(), job);
+  if (!job.outbox.has_lanes()) return;
   RingQueue<Run>& replay = job.outbox.replay();
   if (!replay.empty()) {
     gather_queue(batch, Source::replay, replay, job);
@@ -89,11 +90,16 @@ void GatherWriter::gather_queue(Batch& batch, Source source, RingQueue<Run>& que
 
 void GatherWriter::gather_lanes(Batch& batch, Job& job) {
   std::array<LaneCursor, proto::kLaneCount> cursors;
+  std::size_t filled = 0;
+  std::size_t only = 0;
   for (std::size_t lane = 0; lane < cursors.size(); ++lane) {
     if (job.outbox.lane(lane).empty()) continue;
     cursors[lane].number = job.outbox.lane(lane).entries().first_number();
     load(cursors[lane], lane, job);
+    ++filled;
+    only = lane;
   }
+  if (filled == 1) return gather_lane(batch, only, cursors[only], job);
   while (!batch.full()) {
     const std::size_t lane = choose_lane(cursors, job.outbox);
     if (lane == proto::kLaneCount) return;
@@ -103,6 +109,19 @@ void GatherWriter::gather_lanes(Batch& batch, Job& job) {
     owe(lane, size, cursors, job.outbox);
     if (size < run.size) return;
     advance(cursors[lane], lane, job);
+  }
+}
+
+/// The usual case: nobody else waits, so nobody is owed anything.
+void GatherWriter::gather_lane(Batch& batch, std::size_t lane, LaneCursor& cursor, Job& job) {
+  std::uint64_t& owed = job.outbox.owed()[lane];
+  while (cursor.run != nullptr && !batch.full()) {
+    const Run& run = *cursor.run;
+    const std::uint32_t size = allowed(run, batch.bytes, job);
+    if (size != 0) batch.add(static_cast<Source>(static_cast<std::size_t>(Source::lane0) + lane), run.bytes, size);
+    owed -= std::min<std::uint64_t>(owed, size);
+    if (size < run.size) return;
+    advance(cursor, lane, job);
   }
 }
 

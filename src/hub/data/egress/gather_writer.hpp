@@ -77,6 +77,7 @@ class GatherWriter {
   void gather(Batch& batch, Job& job);
   void gather_queue(Batch& batch, Source source, RingQueue<Run>& queue, Job& job);
   void gather_lanes(Batch& batch, Job& job);
+  static void gather_lane(Batch& batch, std::size_t lane, LaneCursor& cursor, Job& job);
   static void load(LaneCursor& cursor, std::size_t lane, Job& job);
   static void advance(LaneCursor& cursor, std::size_t lane, Job& job);
   [[nodiscard]] static std::size_t choose_lane(std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox);

@@ -89,22 +89,6 @@ void LaneQueue::push(Entry entry) {
   note_message(placed, entries_.end_number() - 1);
 }
 
-bool LaneQueue::extend_last(const Run& run, const Buffer& buffer, const std::byte* place) {
-  if (entries_.empty()) return false;
-  Entry& last = entries_.back();
-  if (last.run.buffer.get() != &buffer || last.run.bytes + last.run.size != place || last.frames == 0 || last.more ||
-      !is_plain(last) || !same_header(last.run.bytes, run.bytes)) {
-    return false;
-  }
-  last.run.size += run.size;
-  last.run.frames += run.frames;
-  last.size += run.size;
-  last.frames += run.frames;
-  bytes_ += run.size;
-  if (last.block) block_bytes_ += run.size;
-  return true;
-}
-
 Entry* LaneQueue::find_message(NodeId src, std::uint32_t message_number) {
   if (entries_.size() <= kSearchMax) return search_message(src, message_number);
   if (!messages_indexed_) index_messages();

@@ -34,9 +34,16 @@ class LaneQueue {
 
   /// Adds the entry, or joins it to the last one where both are plain runs of the same header in neighbouring memory.
   void push(Entry entry);
-  /// Counts `run` into the last entry, if that is of the same header and ends at `place` in `buffer`, where the
-  /// caller puts the bytes.
-  [[nodiscard]] bool extend_last(const Run& run, const Buffer& buffer, const std::byte* place);
+  /// Counts more frames into the last entry, behind which the caller has put them. REQUIRES: it is plain, of one piece,
+  /// and they have its header.
+  void extend(Entry& last, std::uint32_t bytes, std::uint32_t frames) {
+    last.run.size += bytes;
+    last.run.frames += frames;
+    last.size += bytes;
+    last.frames += frames;
+    bytes_ += bytes;
+    if (last.block) block_bytes_ += bytes;
+  }
   /// The entry that still waits for more fragments of that message, or nullptr.
   [[nodiscard]] Entry* find_message(NodeId src, std::uint32_t message_number);
   void append_fragment(Entry& entry, Run fragment, bool last, PiecePool& pool);

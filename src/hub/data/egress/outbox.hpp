@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/egress/lane_queue.hpp"
+#include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
 
 namespace gimnet::hub {
@@ -18,13 +20,24 @@ struct Handover {
 
 /// What waits to be written to one connection: control frames, and four lanes of messages, with the policies of
 /// docs/protocol.md, section 5. While the connection takes everything at once, push() is a few instructions: policies
-/// begin when something waits. Thread safety: one shard. Ownership: references to buffers.
+/// begin when something waits. A connection that only keeps alive has nothing but its control frames; what data needs
+/// is made for the first of it. Thread safety: one shard. Ownership: references to buffers.
 class Outbox {
  public:
   Outbox() = default;
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
 
+  /// The usual case of small messages, made short: frames like those that came last are copied right behind them.
+  /// False: nothing was done, push() them. REQUIRES: as push(), of which one was made in this turn.
+  [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count, Tally& tally) {
+    if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kCopyBytesMax) return false;
+    lanes_->open.append(frames, size, count);
+    chunk_used_ += size;
+    tally.queued += count;
+    tally.copied_bytes += size;
+    return true;
+  }
   /// Data frames for this connection. Every frame ends in a lane or in the drop book.
   /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if FRAGMENT, EXT or LATEST.
   void push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context);
@@ -42,7 +55,7 @@ class Outbox {
   void tell_lost(const Run& run) const;
 
   /// Frames of an earlier connection, to be written again before all lanes.
-  [[nodiscard]] RingQueue<Run>& replay() { return replay_; }
+  [[nodiscard]] RingQueue<Run>& replay() { return lanes().replay; }
   /// They will not be written again.
   void drop_replay(proto::DropReason reason, EgressContext& context);
 
@@ -51,7 +64,7 @@ class Outbox {
   /// Bytes of messages that are not LATEST: what makes a consumer slow.
   [[nodiscard]] std::uint64_t stale_bytes() const;
   [[nodiscard]] bool has_block() const;
-  [[nodiscard]] bool paused_anyone() const { return !pauses_.empty(); }
+  [[nodiscard]] bool paused_anyone() const { return lanes_ && !lanes_->pauses.empty(); }
 
   /// After a flush that left something: what stays is counted against the budget, small frames are copied out of
   /// their slabs, and policies apply from here on.
@@ -75,8 +88,13 @@ class Outbox {
 
   // For the gather writer, which takes entries out
   [[nodiscard]] RingQueue<Run>& control() { return control_; }
-  [[nodiscard]] LaneQueue& lane(std::size_t lane) { return lanes_[lane]; }
-  [[nodiscard]] std::array<std::uint64_t, proto::kLaneCount>& owed() { return owed_; }
+  /// Has it had anything but control frames? Not since it was idle for a while.
+  [[nodiscard]] bool has_lanes() const { return lanes_ != nullptr; }
+  [[nodiscard]] LaneQueue& lane(std::size_t lane) {
+    lanes().open.close();
+    return lanes_->queues[lane];
+  }
+  [[nodiscard]] std::array<std::uint64_t, proto::kLaneCount>& owed() { return lanes().owed; }
   void on_control_left(std::uint32_t bytes) { control_bytes_ -= bytes; }
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
@@ -84,6 +102,17 @@ class Outbox {
   struct CutMessage {
     NodeId src;
     std::uint32_t number = 0;
+  };
+  /// What data frames need.
+  struct Lanes {
+    OpenRun open;  ///< first, with all that append() looks at
+    std::array<LaneQueue, proto::kLaneCount> queues;
+    std::array<std::uint64_t, proto::kLaneCount> settled{};  ///< entries below this number are settled
+    std::array<std::uint64_t, proto::kLaneCount> owed{};     ///< bytes due to a waiting lane, see GatherWriter
+    RingQueue<Run> replay;
+    std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
+    PauseBook pauses;
+    std::vector<CutMessage> cut;
   };
   /// Messages of which the rest is still refused; beyond it the rest of the oldest is let through, and the recipient
   /// finds the gap.
@@ -96,7 +125,15 @@ class Outbox {
   /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
   static constexpr std::uint32_t kSettleBytesMax = 16 * 1024;
 
-  [[nodiscard]] bool append_copy(const Run& run, const proto::FrameHeader& header, EgressContext& context);
+  [[nodiscard]] Lanes& lanes() {
+    if (!lanes_) lanes_ = std::make_unique<Lanes>();
+    return *lanes_;
+  }
+  void close_run() {
+    if (lanes_) lanes_->open.close();
+  }
+  /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in the chunk.
+  void open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index);
   [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
                                  EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
@@ -118,19 +155,13 @@ class Outbox {
   [[nodiscard]] std::uint64_t data_bytes() const;
 
   RingQueue<Run> control_;
-  RingQueue<Run> replay_;
-  std::array<LaneQueue, proto::kLaneCount> lanes_;
-  std::array<std::uint64_t, proto::kLaneCount> settled_{};  ///< entries below this number are settled
-  std::array<std::uint64_t, proto::kLaneCount> owed_{};     ///< bytes due to a waiting lane, see GatherWriter
-  std::uint32_t control_bytes_ = 0;
-  std::uint64_t charged_bytes_ = 0;  ///< of the lanes' entries, counted against the budget
-  bool backlog_ = false;
+  std::unique_ptr<Lanes> lanes_;  ///< nullptr: no data since it was made or trimmed
+  CountedGroups* counted_ = nullptr;
   BufferRef chunk_;  ///< where copies go
   std::uint32_t chunk_used_ = 0;
   std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk
-  PauseBook pauses_;
-  CountedGroups* counted_ = nullptr;
-  std::vector<CutMessage> cut_;
+  std::uint32_t control_bytes_ = 0;
+  bool backlog_ = false;
 };
 
 }  // namespace gimnet::hub

@@ -10,7 +10,7 @@ namespace gimnet::hub {
 Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context)
     : self_(self), mailboxes_(std::move(mailboxes)), recipients_(recipients), context_(context) {
   GIMNET_CHECK(mailboxes_.size() <= kShardsMax);
-  open_.resize(mailboxes_.size());
+  stretches_.resize(mailboxes_.size());
 }
 
 void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
@@ -44,13 +44,54 @@ void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader
 }
 
 void Fanout::hand_over(ShardIndex to, const Run& run) {
-  Run& open = open_[to.value()];
-  if (open.frames != 0) {
-    if (open.extend(run)) return;
+  Stretch& stretch = stretches_[to.value()];
+  if (stretch.open.frames != 0) {
+    if (stretch.open.extend(run) || gather(stretch, run)) return;
     post(to);
   }
-  open_[to.value()] = run.share();
+  stretch.open = run.share();
   open_shards_ |= std::uint64_t{1} << to.value();
+}
+
+/// Frames that alternate between shards would each have an entry of their own. Order: what was handed over stands in
+/// `open` in the order in which it came, and is posted before anything that does not fit behind it. The other shard
+/// reads only bytes that were written before the entry was posted, and those are never written again while it may read
+/// them: later frames go behind them, or into a chunk of which no loan is open.
+bool Fanout::gather(Stretch& stretch, const Run& run) {
+  if (run.size >= kGatherBytesMax) return false;
+  const Run& open = stretch.open;
+  const bool gathered = stretch.chunk && open.buffer.get() == stretch.chunk.get() &&
+                        open.bytes + open.size == stretch.chunk->data + stretch.chunk_used;
+  if (!gathered) {
+    if (open.size >= kGatherBytesMax) return false;
+    make_room(stretch, open.size + run.size);
+    const std::byte* const begin = copy_behind(stretch, open);
+    stretch.open = Run{stretch.chunk.share(), begin, open.size, open.frames};
+  } else if (stretch.chunk->capacity - stretch.chunk_used < run.size) {
+    return false;
+  }
+  static_cast<void>(copy_behind(stretch, run));
+  stretch.open.size += run.size;
+  stretch.open.frames += run.frames;
+  return true;
+}
+
+void Fanout::make_room(Stretch& stretch, std::uint32_t bytes) {
+  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last byte.
+  if (stretch.chunk && stretch.chunk->references == 1 && stretch.chunk->lent.load(std::memory_order_acquire) == 0) {
+    stretch.chunk_used = 0;
+  }
+  if (stretch.chunk && stretch.chunk->capacity - stretch.chunk_used >= bytes) return;
+  stretch.chunk = context_.pool.take_chunk(kGatherChunkBytes);
+  stretch.chunk_used = 0;
+}
+
+std::byte* Fanout::copy_behind(Stretch& stretch, const Run& run) {
+  std::byte* const place = stretch.chunk->data + stretch.chunk_used;
+  std::memcpy(place, run.bytes, run.size);
+  stretch.chunk_used += run.size;
+  context_.tally.copied_bytes += run.size;
+  return place;
 }
 
 void Fanout::post_all() {
@@ -60,7 +101,7 @@ void Fanout::post_all() {
 }
 
 void Fanout::post(ShardIndex to) {
-  Run run = std::exchange(open_[to.value()], Run{});
+  Run run = std::exchange(stretches_[to.value()].open, Run{});
   open_shards_ &= ~(std::uint64_t{1} << to.value());
   posted_ |= std::uint64_t{1} << to.value();
   if (mailboxes_[to.value()]->full(self_, run.size)) {

@@ -10,7 +10,7 @@
 namespace gimnet::hub {
 
 /// Hands frames to their recipients: a reference or a small copy into each outbox on this shard, and for other shards
-/// one mailbox entry for a whole stretch of neighbouring frames. Thread safety: one shard.
+/// one mailbox entry for a whole stretch of frames. Thread safety: one shard.
 class Fanout {
  public:
   /// mailboxes: of all shards, by index.
@@ -18,7 +18,8 @@ class Fanout {
 
   /// To one recipient here. Frames larger than it takes are dropped.
   void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
-  /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one entry.
+  /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one entry; small ones
+  /// that lie apart, with those for others between them, are copied together for it. Their order is kept.
   void hand_over(ShardIndex to, const Run& run);
   /// No frame behind the last one will come: what was handed over is posted.
   void post_all();
@@ -44,8 +45,21 @@ class Fanout {
 
  private:
   static constexpr std::uint32_t kListChunkBytes = 16 * 1024;
+  static constexpr std::uint32_t kGatherChunkBytes = 16 * 1024;
+  /// Frames below this are cheaper to copy than to give an entry of their own.
+  static constexpr std::uint32_t kGatherBytesMax = 1024;
+
+  /// What goes to one other shard in this burst and may still grow.
+  struct Stretch {
+    Run open;         ///< one behind the other; none: nothing was handed over since the last post()
+    BufferRef chunk;  ///< where those are put together that lay apart
+    std::uint32_t chunk_used = 0;
+  };
 
   void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
+  [[nodiscard]] bool gather(Stretch& stretch, const Run& run);
+  void make_room(Stretch& stretch, std::uint32_t bytes);
+  [[nodiscard]] std::byte* copy_behind(Stretch& stretch, const Run& run);
   void post(ShardIndex to);
   void put(ShardIndex to, const Run& run);
   /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is not read until there
@@ -56,9 +70,9 @@ class Fanout {
   const std::vector<Mailbox*> mailboxes_;
   RecipientTable& recipients_;
   EgressContext& context_;
-  std::vector<Run> open_;          ///< by shard: what was handed over and may still grow
-  std::uint64_t open_shards_ = 0;  ///< bit set of those with frames
-  BufferRef lists_;                ///< where LIST frames without their ids are put
+  std::vector<Stretch> stretches_;  ///< by shard
+  std::uint64_t open_shards_ = 0;   ///< bit set of those with frames
+  BufferRef lists_;                 ///< where LIST frames without their ids are put
   std::uint32_t lists_used_ = 0;
   std::uint64_t posted_ = 0;
   std::uint64_t crowded_ = 0;

@@ -17,11 +17,11 @@ struct Recipient {
   ConnectionSlot slot;
   std::uint32_t generation = 0;
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;  ///< largest `length` that it takes
+  Outbox outbox;
+  std::unique_ptr<PacedBook> paced;  ///< if one of its subscriptions is (Pacer)
   bool connected = false;
   bool waits_when_away = false;  ///< asked for resume: frames wait during its grace time
   bool dirty = false;            ///< is in the list of those to be flushed
-  Outbox outbox;
-  std::unique_ptr<PacedBook> paced;  ///< if one of its subscriptions is (Pacer)
 };
 
 /// The sessions of a shard by slot, and those that this turn has something to write for. Thread safety: one shard.

@@ -5,8 +5,6 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::size_t kSourceOffset = 8;
-constexpr std::size_t kLaneOffset = 15;
 /// A node that used up its share of lane 0 gets it back after so long below it.
 constexpr std::uint64_t kDemotionMs = 1'000;
 constexpr std::uint64_t kLane0WindowMs = 100;
@@ -19,7 +17,7 @@ Admission refuse(IngressState& state, proto::FrameError error) {
 void write_source(std::byte* run, const proto::RunView& view, std::uint32_t source) {
   for (std::uint32_t done = 0; done < view.size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
-    store_le(run + done + kSourceOffset, source);
+    store_le(run + done + IngressGate::kSourceOffset, source);
     done += frame;
   }
 }
@@ -44,9 +42,9 @@ void keep_frames_with_key(proto::RunView& view) {
 
 }  // namespace
 
-Admission IngressGate::admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
+Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
   proto::FrameHeader header = proto::load_header(view.bytes);
-  const auto attributes = load_le<std::uint32_t>(view.bytes + 12);
+  const auto attributes = load_le<std::uint32_t>(view.bytes + kAttributesOffset);
 #if defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
   if (attributes != state.admitted_attributes) {
 #else

@@ -52,10 +52,11 @@ void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
   while (next < end) {
     const proto::NextRun found = proto::next_run(next, end, length_max);
     GIMNET_CHECK(found.found == proto::Found::run);  // the sending shard parsed them
-    const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
-    fanout_.context().tally.queued -= run.frames;
-    dispatch(run, run.header(), true);
     next += found.run.size;
+    fanout_.context().tally.queued -= found.run.frames;
+    if (append(found.run.bytes, found.run.size, found.run.frames)) continue;
+    const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
+    dispatch(run, run.header(), true);
   }
 }
 

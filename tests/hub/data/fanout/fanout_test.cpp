@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 #include "tests/hub/data/support/route_rig.hpp"
 
 namespace gimnet::hub {
@@ -30,14 +33,77 @@ TEST(Fanout, NeighbouringFramesBecomeOneEntry) {
   EXPECT_EQ(rig.fanout.take_posted(), 0u);
 }
 
-TEST(Fanout, AGapBeginsAnotherEntry) {
+/// What the other shard gets, entry by entry, as the payloads of its frames.
+std::vector<std::vector<std::string>> entries_of(RouteRig& rig) {
+  std::vector<std::vector<std::string>> entries;
+  rig.mailbox_there.drain(
+      1'000, [] {},
+      [&](const Mail& mail) {
+        std::vector<std::string>& payloads = entries.emplace_back();
+        for (std::uint32_t done = 0; done < mail.size;) {
+          const proto::FrameHeader header = proto::load_header(mail.bytes + done);
+          payloads.emplace_back(reinterpret_cast<const char*>(mail.bytes) + done + proto::kHeaderSize, header.length);
+          done += static_cast<std::uint32_t>(header.frame_size());
+        }
+        EXPECT_EQ(payloads.size(), mail.frames);
+        BufferPool::end_loan(mail.lent);
+      });
+  return entries;
+}
+
+using Entries = std::vector<std::vector<std::string>>;
+
+TEST(Fanout, SmallFramesThatLieApartBecomeOneEntryInTheirOrder) {
   RouteRig rig;
-  rig.fanout.hand_over(kThere, rig.egress.run({"one"}));
-  const hub::Run between = rig.egress.run({"for somebody else"});
-  rig.fanout.hand_over(kThere, rig.egress.run({"two"}));
+  for (const char* payload : {"one", "two", "three", "four"}) {
+    rig.fanout.hand_over(kThere, rig.egress.run({payload}));
+    static_cast<void>(rig.egress.run({"for somebody else"}));
+  }
+  rig.fanout.hand_over(kThere, rig.egress.run({"five", "six"}));
   rig.fanout.post_all();
-  EXPECT_THAT(rig.take_mail(), ElementsAre(1u, 1u));
-  static_cast<void>(between);
+  EXPECT_EQ(entries_of(rig), (Entries{{"one", "two", "three", "four", "five", "six"}}));
+}
+
+TEST(Fanout, LargeFramesThatLieApartStayWhereTheyAre) {
+  RouteRig rig;
+  const std::string large(1'024 - proto::kHeaderSize, 'l');
+  const std::string small(1'023 - proto::kHeaderSize, 's');
+  const auto apart = [&](const std::string& payload) {
+    rig.fanout.hand_over(kThere, rig.egress.run({payload}));
+    static_cast<void>(rig.egress.run({"for somebody else"}));
+  };
+  const std::uint64_t copied = rig.egress.tally.copied_bytes;
+  for (const std::string& payload : {large, large, small, large}) apart(payload);
+  EXPECT_EQ(rig.egress.tally.copied_bytes, copied);
+  apart(small);
+  rig.fanout.post_all();
+  EXPECT_EQ(rig.egress.tally.copied_bytes, copied) << "a large one before it";
+  EXPECT_EQ(entries_of(rig), (Entries{{large}, {large}, {small}, {large}, {small}}));
+  apart(small);
+  apart(small);
+  rig.fanout.post_all();
+  EXPECT_EQ(rig.egress.tally.copied_bytes, copied + 2 * 1'023u);
+  EXPECT_EQ(entries_of(rig), (Entries{{small, small}}));
+}
+
+TEST(Fanout, WhatTheOtherShardStillReadsIsNotWrittenOver) {
+  RouteRig rig;
+  Entries expected;
+  // More than one chunk, in many bursts, of which the other shard has read none.
+  for (int burst = 0; burst < 40; ++burst) {
+    std::vector<std::string>& entry = expected.emplace_back();
+    for (int i = 0; i < 3; ++i) {
+      entry.push_back(std::to_string(burst) + "." + std::to_string(i) + std::string(300, '.'));
+      rig.fanout.hand_over(kThere, rig.egress.run({entry.back()}));
+      static_cast<void>(rig.egress.run({"for somebody else"}));
+    }
+    rig.fanout.post_all();
+  }
+  std::vector<std::string> all;
+  for (const auto& entry : entries_of(rig)) all.insert(all.end(), entry.begin(), entry.end());
+  std::vector<std::string> wanted;
+  for (const auto& entry : expected) wanted.insert(wanted.end(), entry.begin(), entry.end());
+  EXPECT_EQ(all, wanted);
 }
 
 TEST(Fanout, AFullMailboxDropsWhatMayBeDropped) {

@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <utility>
+
+#include "hub/data/egress/outbox.hpp"
+
+// What becomes of a message where something waits already: the policies of docs/protocol.md, section 5.
+
+namespace gimnet::hub {
+
+bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+  if (is_cut(entry, header, context)) return true;
+  LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
+  Entry* message = lane.find_message(NodeId{header.src}, entry.message_number);
+  if (message == nullptr) return false;
+  if (backlog_ && context.budget.exhausted()) {
+    lose(entry, proto::DropReason::over_budget, context);
+    return true;
+  }
+  const bool over = !fits(header.lane & proto::kLaneMask, entry.size, context.limits);
+  if (over && entry.block) {
+    ask_to_pause(entry, header, context);
+  }
+  // The message may have been settled already, and is not looked at again.
+  if (backlog_) settle_run(entry.run, entry.shared, context);
+  lane.append_fragment(*message, std::move(entry.run), entry.complete, context.pieces);
+  return true;
+}
+
+void Outbox::forget_cut(NodeId src, std::uint32_t number) {
+  std::erase_if(lanes_->cut, [&](const CutMessage& each) { return each.src == src && each.number == number; });
+}
+
+bool Outbox::is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+  const NodeId src{header.src};
+  std::vector<CutMessage>& all = lanes_->cut;
+  const auto cut = std::ranges::find_if(
+      all, [&](const CutMessage& each) { return each.src == src && each.number == entry.message_number; });
+  if (cut == all.end()) return false;
+  if (entry.complete) all.erase(cut);
+  tell_lost(entry);
+  context.tally.queued -= entry.frames;
+  context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, proto::DropReason::cut_message);
+  return true;
+}
+
+void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
+  if (entry.latest && !entry.touched) {
+    Entry older;
+    // It takes a place that may have been settled already, and is not looked at again.
+    if (backlog_) settle_run(entry.run, entry.shared, context);
+    if (lane.replace_latest(entry, older)) {
+      lose(older, proto::DropReason::replaced, context);
+      return;
+    }
+  }
+  if (context.budget.exhausted()) {
+    lose(entry, proto::DropReason::over_budget, context);
+  } else if (entry.touched || fits(header.lane & proto::kLaneMask, entry.size, context.limits)) {
+    lane.push(std::move(entry));
+  } else if (entry.block) {
+    admit_block(std::move(entry), header, context);
+  } else {
+    admit_full(std::move(entry), header, context);
+  }
+}
+
+void Outbox::admit_block(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  ask_to_pause(entry, header, context);
+  const std::size_t lane = header.lane & proto::kLaneMask;
+  const std::uint64_t most = lane_limit(lane, context.limits) + kReservesMax * context.limits.reserve_bytes;
+  if (lanes_->queues[lane].bytes() + entry.size > most) {
+    lose(entry, proto::DropReason::queue_full, context);
+  } else {
+    lanes_->queues[lane].push(std::move(entry));
+  }
+}
+
+void Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t lane = header.lane & proto::kLaneMask;
+  const bool past_reserve =
+      lanes_->queues[lane].bytes() + entry.size > lane_limit(lane, context.limits) + context.limits.reserve_bytes;
+  lanes_->pauses.on_full(NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
+                         past_reserve, context.signals);
+}
+
+/// Policies count messages: the first ones of a run may still fit.
+void Outbox::admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  while (entry.run.frames > 1) {
+    Entry first;
+    first.run = entry.run.share();
+    first.run.size = first.size = entry.run.skip_frame();
+    first.run.frames = first.frames = 1;
+    first.shared = entry.shared;
+    entry.size -= first.size;
+    --entry.frames;
+    admit_message(std::move(first), header, context);
+  }
+  admit_message(std::move(entry), header, context);
+}
+
+void Outbox::admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t index = header.lane & proto::kLaneMask;
+  LaneQueue& lane = lanes_->queues[index];
+  if (header.policy() != proto::Policy::drop) {
+    Entry oldest;
+    while (!fits(index, entry.size, context.limits) && lane.drop_oldest(oldest)) {
+      lose(oldest, proto::DropReason::queue_full, context);
+    }
+  }
+  // A message that is larger than the limit may wait as long as it is the only one.
+  if (fits(index, entry.size, context.limits) || (lane.bytes() == 0 && header.policy() != proto::Policy::drop)) {
+    lane.push(std::move(entry));
+  } else {
+    lose(entry, proto::DropReason::queue_full, context);
+  }
+}
+
+void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
+  if (entry.frames == 0) return;
+  if (entry.fragmented && !entry.complete) {
+    std::vector<CutMessage>& cut = lanes_->cut;
+    if (cut.size() == kCutMessagesMax) cut.erase(cut.begin());
+    cut.push_back({NodeId{entry.run.header().src}, entry.message_number});
+  }
+  tell_lost(entry);
+  context.tally.queued -= entry.frames;
+  do {
+    if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason);
+  } while (entry.next_piece());
+  entry.size = entry.frames = 0;
+}
+
+}  // namespace gimnet::hub
