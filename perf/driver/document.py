@@ -1,12 +1,15 @@
 """docs/performance.md from the JSON document of a run."""
 
+import pathlib
+
 from driver.goals import FIELD_TITLES, GOALS, RIVAL_FIELDS, Goal
 from driver.summary import COLUMNS, absence_lines, cells, shown
 
+FINDINGS = pathlib.Path(__file__).resolve().parent.parent / "findings.md"
 INTRODUCTION = """# Performance
 
 What the hub costs, measured against the cheapest relay that there can be and against other hubs. This page is written by `./dev perf --report`;
-nothing here is edited by hand.
+nothing here is edited by hand, but for the findings, which are those of `perf/findings.md`.
 
 ## The yardstick
 
@@ -172,6 +175,7 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         "A bound must hold; a goal is where the hub is to get.", "",
         goal_table(rows), "",
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
+        FINDINGS.read_text(),
         "## All figures", "",
         "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
         "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000 and join_under_load. Peak bytes are the",
