@@ -22,7 +22,8 @@ constexpr std::size_t kMessages = 100;
 
 class Audience {
  public:
-  explicit Audience(const char* shards) : hub_({"--shards", shards}), observer_(hub_.unix_url()) {
+  explicit Audience(const char* shards)
+      : hub_({"--shards", shards, "--limit", "silent_ms=600000"}), observer_(hub_.unix_url()) {
     JoinOptions options;
     options.hello.name = "publisher";
     publisher_ = RawNode(hub_.tcp_url(), options);
