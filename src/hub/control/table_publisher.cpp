@@ -26,7 +26,10 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
   std::unique_ptr<GroupMembers> members;
   if (const Topic* topic = membership.services().find_group(index); topic != nullptr) {
     members = std::make_unique<GroupMembers>();
+    const Session* provider = membership.sessions().find(topic->service->provider);
+    GIMNET_CHECK(provider != nullptr);
     members->provider = make_id<NodeId>(hub_, topic->service->provider);
+    members->provider_shard = provider->place.shard;
     members->by_shard.resize(shards_);
     members->retain = topic->service->terms.retain;
     for (const std::uint32_t subscriber : topic->subscribers) {

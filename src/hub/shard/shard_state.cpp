@@ -23,7 +23,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              .hub = hub_shared.hub},
       fanout(index, hub_shared.mailboxes, recipients, egress),
       pacer(fanout),
-      retained(hub_shared.nodes, hub_shared.groups, fanout, pacer),
+      retained(hub_shared.groups, fanout, pacer),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
       receive_buffer(pool, tally, hub_shared.limits.partial_bytes),
       gate(limits, tally) {}

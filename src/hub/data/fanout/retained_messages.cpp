@@ -115,13 +115,12 @@ void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message)
 
 void RetainedMessages::ask_start(PacedSubscription& subscription) {
   const GroupMembers* members = groups_.find(index_of(subscription.group()));
-  const NodePlace provider = members != nullptr ? nodes_.find(index_of(members->provider)) : NodePlace{};
   ++subscription.awaited_starts;
-  if (!provider.exists()) return;  // the group is about to go
+  if (members == nullptr) return;  // the subscription is about to end
   const Recipient& recipient = subscription.recipient();
   const GroupStart start{subscription.group(), recipient.slot, recipient.generation, fanout_.self()};
-  if (provider.shard == fanout_.self()) return on_start_wanted(start);
-  fanout_.post_word(provider.shard, mail_about(MailKind::start_wanted, start));
+  if (members->provider_shard == fanout_.self()) return on_start_wanted(start);
+  fanout_.post_word(members->provider_shard, mail_about(MailKind::start_wanted, start));
 }
 
 PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) const {

@@ -9,7 +9,6 @@
 #include "hub/data/egress/kept_message.hpp"
 #include "hub/data/fanout/pacer.hpp"
 #include "hub/data/route/group_table.hpp"
-#include "hub/data/route/node_table.hpp"
 
 namespace gimnet::hub {
 
@@ -23,8 +22,8 @@ namespace gimnet::hub {
 /// Thread safety: one shard. Limits: retained_bytes for one message, and the budget.
 class RetainedMessages {
  public:
-  RetainedMessages(const NodeTable& nodes, const GroupTable& groups, Fanout& fanout, Pacer& pacer)
-      : nodes_(nodes), groups_(groups), fanout_(fanout), pacer_(pacer), context_(fanout.context()) {}
+  RetainedMessages(const GroupTable& groups, Fanout& fanout, Pacer& pacer)
+      : groups_(groups), fanout_(fanout), pacer_(pacer), context_(fanout.context()) {}
 
   // ---- the provider's shard
 
@@ -68,7 +67,6 @@ class RetainedMessages {
   void hand(const GroupStart& start, const KeptMessage& message);
   [[nodiscard]] PacedSubscription* subscription_of(const GroupStart& start) const;
 
-  const NodeTable& nodes_;
   const GroupTable& groups_;
   Fanout& fanout_;
   Pacer& pacer_;

@@ -27,6 +27,7 @@ struct PacedMember {
 /// publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
+  ShardIndex provider_shard;  ///< constant while the group lives, whatever id its provider has
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<std::vector<GroupMember>> by_shard;
   /// Those of which the shard paces what they get; empty if there are none.

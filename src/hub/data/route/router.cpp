@@ -91,10 +91,21 @@ const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader&
   return members;
 }
 
+/// Its session here has not heard of its new id yet, and neither has the node.
+bool Router::still_goes_by(NodeId node, const proto::FrameHeader& header) const {
+  const NodePlace place = place_of(node);
+  if (!place.exists() || place.shard != fanout_.self()) return false;
+  const Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
+  return recipient != nullptr && recipient->node == NodeId{header.src};
+}
+
 void Router::to_group(const Run& run, const proto::FrameHeader& header, bool handed_over) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
-  if (members->provider != NodeId{header.src}) return drop(run, proto::DropReason::not_allowed);
+  // What was handed over was looked at by the shard that took it in; its provider may have been renumbered since.
+  if (!handed_over && members->provider != NodeId{header.src} && !still_goes_by(members->provider, header)) {
+    return drop(run, proto::DropReason::not_allowed);
+  }
   const std::vector<GroupMember>& here = members->by_shard[fanout_.self().value()];
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;

@@ -126,6 +126,17 @@ TEST_F(RetainedMessagesTest, WhatIsTooLargeIsNotKeptNorIsAnOlderOne) {
   EXPECT_EQ(got(subscriber(1)).size(), 2u) << "at the limit";
 }
 
+// The conductor publishes a new id of the provider, then that the former one is nobody's, then the group.
+TEST_F(RetainedMessagesTest, IsGivenWhileTheProviderIsRenumbered) {
+  publish("1");
+  FakeNode& late = subscriber(1);
+  rig.nodes().publish(400, {provider.shard, provider.session.slot, provider.session.generation});
+  rig.nodes().publish(index_of(provider.id), NodePlace::renumbered());
+  EXPECT_EQ(got(late), (Texts{"1"}));
+  publish("2");
+  EXPECT_EQ(got(late), (Texts{"2"}));
+}
+
 TEST_F(RetainedMessagesTest, IsChargedAndFreedWithItsService) {
   publish(std::string(5'000, 'x'));
   rig.turn();

@@ -18,7 +18,7 @@ class RouteRig {
         mailbox_there(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context),
         pacer(fanout),
-        retained(nodes, groups, fanout, pacer),
+        retained(groups, fanout, pacer),
         router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
   ~RouteRig() {
     for (const auto& recipient : recipients_made) {
