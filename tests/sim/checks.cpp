@@ -239,7 +239,8 @@ void Checks::group_table() const {
     }
   }
   for (const std::uint32_t group : model_.groups_given()) {
-    if (subject_.groups.find(group) != nullptr && !model_.groups().contains(group)) {
+    const hub::GroupMembers* members = subject_.groups.find(group);
+    if (members != nullptr && !members->ends() && !model_.groups().contains(group)) {
       broken(Checker::group_table, "the table has group " + std::to_string(group) + ", which nobody provides");
     }
   }

@@ -84,9 +84,22 @@ void SimShards::take_mail(std::size_t index) {
   Shard& shard = shards_[index];
   take_commands(index, shard.commands.size());
   for (std::size_t count = shard.mail.size(); count > 0; --count) {
-    const Bytes frame = std::move(shard.mail.front());
+    const Mail mail = std::move(shard.mail.front());
     shard.mail.pop_front();
-    route(index, frame, true);
+    if (mail.fence) {
+      push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::FencePassedEvent{*mail.fence}});
+    } else {
+      route(index, mail.frame, true);
+    }
+  }
+}
+
+void SimShards::post_fence(std::size_t index, std::uint32_t ticket) {
+  const hub::Fence fence{ShardIndex{static_cast<std::uint8_t>(index)}, ticket};
+  for (std::size_t other = 0; other < shards_.size(); ++other) {
+    if (other == index) continue;
+    shards_[other].mail.push_back({{}, fence});
+    want_turn(other);
   }
 }
 
@@ -112,7 +125,7 @@ void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t nod
   if (place.shard.value() != index) {
     if (handed_over) return;
     setting_.census.add(Happening::unicast_across_shards);
-    shards_[place.shard.value()].mail.push_back(frame);
+    shards_[place.shard.value()].mail.push_back({frame});
     return want_turn(place.shard.value());
   }
   Seat* seat = find(index, place.slot, place.generation);
@@ -123,6 +136,7 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   const proto::FrameHeader header = proto::load_header(frame.data());
   const std::uint32_t group = index_of(GroupId{header.dst});
   const GroupMembers* members = parts_.groups.find(group);
+  if (members != nullptr && members->ends()) return;  // the model knows of it no more, nor who subscribed
   if (members == nullptr || members->provider.value() != header.src) {
     if (members != nullptr) setting_.census.add(Happening::group_of_another);
     return;
@@ -140,14 +154,14 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   if (handed_over) return;
   for (std::size_t other = 0; other < shards_.size(); ++other) {
     if (other == index || members->by_shard[other].empty()) continue;
-    shards_[other].mail.push_back(frame);
+    shards_[other].mail.push_back({frame});
     want_turn(other);
   }
 }
 
 void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
   const GroupMembers* members = parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
-  if (members != nullptr) to_node(index, frame, index_of(members->provider), handed_over);
+  if (members != nullptr && !members->ends()) to_node(index, frame, index_of(members->provider), handed_over);
 }
 
 void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {

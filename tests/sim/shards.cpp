@@ -115,6 +115,8 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
     if (seat->wire) close(index, *seat, GoodbyeCode::renumbered, renumbered->sentence.c_str());
   } else if (const auto* released = std::get_if<hub::ReleaseCommand>(&command)) {
     release(index, released->session);
+  } else if (const auto* fence = std::get_if<hub::FenceCommand>(&command)) {
+    post_fence(index, fence->ticket);
   } else if (std::holds_alternative<hub::DrainCommand>(command)) {
     drain(index);
   } else if (std::holds_alternative<hub::StopCommand>(command)) {

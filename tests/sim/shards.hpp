@@ -93,10 +93,14 @@ class SimShards final : public hub::ShardProxy {
     bool ready = false;
     bool flush_due = false;
   };
+  struct Mail {
+    Bytes frame;
+    std::optional<hub::Fence> fence = std::nullopt;  ///< instead of a frame
+  };
   struct Shard {
     std::deque<hub::ShardCommand> commands;
     std::deque<hub::ShardEvent> events;
-    std::deque<Bytes> mail;
+    std::deque<Mail> mail;
     std::vector<std::unique_ptr<Seat>> seats;  ///< by slot
     std::vector<bool> used;                    ///< by slot: somebody had it before
     std::vector<std::uint32_t> ready;          ///< slots to be read
@@ -114,6 +118,7 @@ class SimShards final : public hub::ShardProxy {
   void say(std::size_t shard, const hub::SendControlCommand& command);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
+  void post_fence(std::size_t shard, std::uint32_t ticket);
   void read(std::size_t shard, Seat& seat);
   /// False: the connection has ended.
   bool handle(std::size_t shard, Seat& seat, Bytes frame);

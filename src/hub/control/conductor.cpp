@@ -145,6 +145,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
     on_frame(*frame, now);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
     on_detached(*detached, now);
+  } else if (const auto* passed = std::get_if<FencePassedEvent>(&event.what)) {
+    runner_.fence_passed(*passed);
   } else if (std::holds_alternative<DrainedEvent>(event.what) && shards_to_drain_ > 0) {
     --shards_to_drain_;
   }

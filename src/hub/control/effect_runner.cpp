@@ -46,7 +46,24 @@ void EffectRunner::run(const CloseDue& effect) {
 
 void EffectRunner::run(const NodeChanged& effect) { parts_.publisher.publish_node(effect.index, parts_.membership); }
 
-void EffectRunner::run(const GroupChanged& effect) { parts_.publisher.publish_group(effect.index, parts_.membership); }
+void EffectRunner::run(const GroupChanged& effect) {
+  if (parts_.membership.services().find_group(effect.index) != nullptr) {
+    endings_.finish(effect.index);
+    return parts_.publisher.publish_group(effect.index, parts_.membership);
+  }
+  if (endings_.contains(effect.index)) return;
+  // Not cleared at once: its last frames may still be on their way to other shards.
+  if (const auto provider_shard = parts_.publisher.end_group(effect.index)) {
+    endings_.begin(effect.index, *provider_shard);
+  }
+}
+
+void EffectRunner::fence_passed(const FencePassedEvent& event) {
+  for (const std::uint32_t group : endings_.on_passed(event)) {
+    parts_.publisher.clear_group(group);
+    endings_.finish(group);
+  }
+}
 
 void EffectRunner::run(const SessionEnded& effect) {
   parts_.shards.send(effect.place.shard, ReleaseCommand{ref_of(effect.place)});
@@ -85,8 +102,11 @@ void EffectRunner::run(const PaceDue& effect) {
 void EffectRunner::run(const PaceEnded& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;  // its subscriptions end with it
-  parts_.shards.send(session->place.shard,
-                     EndPaceCommand{ref_of(session->place), group_id(effect.group), effect.group_gone});
+  const EndPaceCommand command{ref_of(session->place), group_id(effect.group), effect.group_gone};
+  if (effect.group_gone && endings_.contains(effect.group)) {
+    return endings_.defer(effect.group, session->place.shard, command);
+  }
+  parts_.shards.send(session->place.shard, command);
 }
 
 void EffectRunner::run(const RetainedDropped& effect) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "hub/control/group_endings.hpp"
 #include "hub/control/hub_facts.hpp"
 #include "hub/control/shard_proxy.hpp"
 #include "hub/control/state/effects.hpp"
@@ -26,9 +27,11 @@ class EffectRunner {
     TablePublisher& publisher;
     StateKeeper& keeper;
   };
-  explicit EffectRunner(const Parts& parts) : parts_(parts) {}
+  explicit EffectRunner(const Parts& parts) : parts_(parts), endings_(parts.shards) {}
 
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
+  /// A shard has taken what another one had handed over to it.
+  void fence_passed(const FencePassedEvent& event);
   /// Sends an event of kind NS; nothing to a node that is away.
   void send_event(const Session& session, const proto::Payload& payload);
 
@@ -49,6 +52,7 @@ class EffectRunner {
   [[nodiscard]] GroupId group_id(std::uint32_t group) const;
 
   const Parts parts_;
+  GroupEndings endings_;
 };
 
 }  // namespace gimnet::hub

@@ -45,6 +45,33 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
       members->paced_by_shard[place.shard.value()].push_back({place.slot, place.generation, was_plain});
     }
   }
+  replace(index, std::move(members));
+}
+
+std::optional<ShardIndex> TablePublisher::end_group(std::uint32_t index) {
+  const auto found = published_.find(index);
+  if (found == published_.end()) return std::nullopt;
+  const GroupMembers& before = *found->second;
+  const ShardIndex provider_shard = before.provider_shard;
+  const auto is_elsewhere = [provider_shard](const auto& by_shard) {
+    for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
+      if (shard != provider_shard.value() && !by_shard[shard].empty()) return true;
+    }
+    return false;
+  };
+  if (!is_elsewhere(before.by_shard) && !is_elsewhere(before.paced_by_shard)) {
+    replace(index, nullptr);
+    return std::nullopt;
+  }
+  auto ending = std::make_unique<GroupMembers>(before);
+  ending->provider = NodeId{};
+  replace(index, std::move(ending));
+  return provider_shard;
+}
+
+void TablePublisher::clear_group(std::uint32_t index) { replace(index, nullptr); }
+
+void TablePublisher::replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members) {
   static_cast<void>(tables_.groups.exchange(index, members.get()));
   std::unique_ptr<const GroupMembers>& current = published_[index];
   if (current != nullptr) garbage_.push_back({tables_.quiescence.ticket(), std::move(current)});

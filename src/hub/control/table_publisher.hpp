@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 
 #include "hub/concurrent/quiescence.hpp"
@@ -33,6 +34,12 @@ class TablePublisher {
   /// Publishes what `membership` says of the group now.
   void publish_group(std::uint32_t index, const Membership& membership);
 
+  /// The group has no provider any more. Where it has members on other shards than its provider's, the table says so
+  /// and keeps them for what is on its way there, until clear_group(): returns the provider's shard. Otherwise it is
+  /// cleared.
+  [[nodiscard]] std::optional<ShardIndex> end_group(std::uint32_t index);
+  void clear_group(std::uint32_t index);
+
   /// Frees what nobody looks at any more. True: something is left to free.
   bool collect();
   [[nodiscard]] std::size_t garbage() const { return garbage_.size(); }
@@ -42,6 +49,8 @@ class TablePublisher {
     std::uint64_t ticket;
     std::unique_ptr<const GroupMembers> members;
   };
+  void replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members);
+
   const HubId hub_;
   const std::size_t shards_;
   const Tables tables_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/ids.hpp"
+#include "hub/data/fanout/mailbox.hpp"
 #include "hub/data/fanout/paced_subscription.hpp"
 #include "hub/limits.hpp"
 #include "hub/transport/transport.hpp"
@@ -21,6 +22,9 @@
 // publishes a group before it sends the PaceCommand of a member, and that before any answer. So commands that wait are
 // carried out before mail that came after them: a frame neither finds its recipient unattached nor overtakes the event
 // about it.
+//
+// The other way round a shard's mail to other shards and its events to the conductor may overtake each other. Where the
+// conductor takes something away that such mail needs, a group, it fences first (hub/control/group_endings.hpp).
 
 namespace gimnet::hub {
 
@@ -103,6 +107,11 @@ struct RenumberCommand {
   std::string sentence;
 };
 
+/// Asks each other shard to tell the conductor, with FencePassedEvent, when it has taken all that this one handed over.
+struct FenceCommand {
+  std::uint32_t ticket = 0;  ///< numbers the fences of this shard
+};
+
 /// What the shard goes by from its next turn on.
 struct LimitsCommand {
   Limits limits;
@@ -118,7 +127,7 @@ struct StopCommand {};
 
 using ShardCommand =
     std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, RenumberCommand, LimitsCommand,
-                 PaceCommand, EndPaceCommand, ForgetRetainedCommand, DrainCommand, StopCommand>;
+                 PaceCommand, EndPaceCommand, ForgetRetainedCommand, FenceCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor --------------------------------------------------------------------------------------------
 
@@ -152,9 +161,14 @@ struct FarewellEvent {
 /// The shard has nothing left to write (answer to DrainCommand).
 struct DrainedEvent {};
 
+/// The shard that tells it has taken all that shard `fence.of` handed over to it before it carried out FenceCommand.
+struct FencePassedEvent {
+  Fence fence;
+};
+
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent> what;
+  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent, FencePassedEvent> what;
 };
 
 }  // namespace gimnet::hub

@@ -209,6 +209,7 @@ void IoShard::execute(ShardCommand& command) {
                    }
                  },
                  [&](ForgetRetainedCommand& forget) { state_.retained.forget(forget.group); },
+                 [&](const FenceCommand& fence) { state_.fanout.post_fence(fence.ticket); },
                  [&](DrainCommand& drain) { keeper_.drain(drain.deadline_ms); },
                  [&](StopCommand&) { stopped_ = true; },
              },

@@ -9,10 +9,11 @@
 namespace gimnet::hub {
 namespace {
 
-GroupStart start_of(const Mail& mail) {
-  GroupStart start;
-  std::memcpy(&start, mail.small, sizeof start);
-  return start;
+template <class Word>
+Word word_of(const Mail& mail) {
+  Word word;
+  std::memcpy(&word, mail.small, sizeof word);
+  return word;
 }
 
 }  // namespace
@@ -231,11 +232,13 @@ void Reader::take_mail(const Mail& mail) {
     case MailKind::release:
       return state_.signals.apply_hold(mail.node, false);
     case MailKind::start_wanted:
-      return state_.retained.on_start_wanted(start_of(mail));
+      return state_.retained.on_start_wanted(word_of<GroupStart>(mail));
     case MailKind::start:
-      return state_.retained.on_start(start_of(mail));
+      return state_.retained.on_start(word_of<GroupStart>(mail));
+    case MailKind::fence:
+      return state_.tell_conductor({state_.self, FencePassedEvent{word_of<Fence>(mail)}});
     case MailKind::retained:
-      return state_.retained.on_handed(start_of(mail),
+      return state_.retained.on_handed(word_of<GroupStart>(mail),
                                        {state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});
   }
 }

@@ -58,6 +58,28 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   EXPECT_TRUE(groups_.find(1)->by_shard[robot.place.shard.value()].empty());
 }
 
+TEST_F(TablePublisherTest, AGroupEndsInTwoStepsWhereItHasMembersElsewhere) {
+  const Session& robot = join("robot");
+  const Session& far = join("far");
+  const Session& near = join("near");
+  ASSERT_NE(robot.place.shard, far.place.shard);
+  ASSERT_EQ(robot.place.shard, near.place.shard);
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  subscribe(near, "robot/odom");
+  publisher_.publish_group(1, membership_);
+  EXPECT_FALSE(publisher_.end_group(1)) << "nothing can be on its way";
+  EXPECT_EQ(groups_.find(1), nullptr);
+  subscribe(far, "robot/odom");
+  publisher_.publish_group(1, membership_);
+  EXPECT_EQ(publisher_.end_group(1), robot.place.shard);
+  ASSERT_NE(groups_.find(1), nullptr);
+  EXPECT_TRUE(groups_.find(1)->ends());
+  EXPECT_EQ(groups_.find(1)->by_shard[far.place.shard.value()].size(), 1u);
+  publisher_.clear_group(1);
+  EXPECT_EQ(groups_.find(1), nullptr);
+  EXPECT_FALSE(publisher_.end_group(1));
+}
+
 TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {
   const Session& robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));

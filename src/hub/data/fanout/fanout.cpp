@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstring>
+#include <type_traits>
 
 #include "hub/data/egress/resume_buffer.hpp"
 
@@ -163,6 +164,19 @@ void Fanout::look_for_room() {
   for (std::uint64_t shards = crowded_; shards != 0; shards &= shards - 1) {
     const int shard = std::countr_zero(shards);
     if (!mailboxes_[static_cast<std::size_t>(shard)]->crowded(self_)) crowded_ &= ~(std::uint64_t{1} << shard);
+  }
+}
+
+void Fanout::post_fence(std::uint32_t ticket) {
+  post_all();
+  const Fence fence{self_, ticket};
+  static_assert(std::is_trivially_copyable_v<Fence> && sizeof fence <= sizeof Mail::small);
+  Mail mail;
+  mail.kind = MailKind::fence;
+  mail.small_size = sizeof fence;
+  std::memcpy(mail.small, &fence, sizeof fence);
+  for (std::size_t shard = 0; shard < mailboxes_.size(); ++shard) {
+    if (shard != self_.value()) post_word(ShardIndex{static_cast<std::uint8_t>(shard)}, mail);
   }
 }
 

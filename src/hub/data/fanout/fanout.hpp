@@ -40,6 +40,8 @@ class Fanout {
   [[nodiscard]] RecipientTable& recipients() { return recipients_; }
   [[nodiscard]] EgressContext& context() { return context_; }
   [[nodiscard]] std::uint64_t take_wakeups() { return std::exchange(wakeups_, 0); }
+  /// Behind all that was handed over so far, to each other shard.
+  void post_fence(std::uint32_t ticket);
   /// A word for a sender on another shard.
   void post_word(ShardIndex to, Mail mail);
 

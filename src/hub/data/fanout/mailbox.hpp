@@ -22,6 +22,7 @@ enum class MailKind : std::uint8_t {
   release,
   start_wanted,  ///< a subscriber of a retained group wants to begin: `small` is a GroupStart
   start,         ///< it begins here: what came before in this mailbox is not for it, what comes after is
+  fence,         ///< all that was handed over before was taken when this is: `small` is a Fence
   retained,      ///< frames of the last message, for that one subscriber
 };
 
@@ -31,6 +32,12 @@ struct GroupStart {
   ConnectionSlot slot;
   std::uint32_t generation = 0;
   ShardIndex shard;
+};
+
+/// Asks when a shard has taken everything that another one handed over to it up to now.
+struct Fence {
+  ShardIndex of;             ///< that posted it
+  std::uint32_t ticket = 0;  ///< numbers the fences of that shard
 };
 
 /// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a word about a sender.

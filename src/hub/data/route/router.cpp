@@ -104,7 +104,7 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
   if (members == nullptr) return;
   // What was handed over was looked at by the shard that took it in; its provider may have been renumbered since.
   if (!handed_over && members->provider != NodeId{header.src} && !still_goes_by(members->provider, header)) {
-    return drop(run, proto::DropReason::not_allowed);
+    return drop(run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
   const std::vector<GroupMember>& here = members->by_shard[fanout_.self().value()];
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
@@ -156,7 +156,9 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t
 
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over) {
   const GroupMembers* members = find_group(run, header);
-  if (members != nullptr) to_node(run, header, members->provider, handed_over);
+  if (members == nullptr) return;
+  if (members->ends()) return drop(run, proto::DropReason::no_such_group);
+  to_node(run, header, members->provider, handed_over);
 }
 
 void Router::to_list(const Run& run, const proto::FrameHeader& header, bool handed_over) {

@@ -96,6 +96,8 @@ class HubRig {
   FakeNode& join(std::size_t shard, const JoinSpec& spec = {});
   /// Another connection for its session; its counts tell what it took so far.
   void rejoin(FakeNode& node, const JoinSpec& spec = {});
+  /// A node that a test had attached by itself, with the far end of its connection. The reference stays good.
+  FakeNode& adopt(FakeNode node) { return nodes_played_.emplace_back(std::move(node)); }
   void release(FakeNode& node);
   /// Gives the node another id. Its connection is closed in the next turn.
   void renumber(FakeNode& node, std::uint32_t index);
@@ -137,6 +139,8 @@ class HubRig {
   [[nodiscard]] Connection* connection(const FakeNode& node) { return state(node.shard.value()).find(node.session); }
   [[nodiscard]] HubId hub() const { return HubId{7}; }
   [[nodiscard]] NodeTable& nodes() { return nodes_; }
+  [[nodiscard]] GroupTable& groups() { return groups_; }
+  [[nodiscard]] Quiescence& quiescence() { return quiescence_; }
   [[nodiscard]] static std::uint32_t group(std::uint32_t index) { return make_id<GroupId>(HubId{7}, index).value(); }
 
   std::uint64_t now_ms = 1'000'000;
