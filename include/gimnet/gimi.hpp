@@ -87,7 +87,7 @@ class Sender {
   /// Sends 0 bytes to 1 GiB. Ok: it is on its way; of a synchronized stream, settle() and counts() tell what became of
   /// it. Waits while the window is full (AtFullWindow::wait) or the hub has paused the destination.
   /// Errors: timeout (nothing was sent), window_full, not_found (a service that nobody has), not_connected, refused,
-  /// not_delivered, too_large, closed.
+  /// not_delivered (also of SendOptions::end_at_loss: nothing was sent), too_large, closed.
   Outcome<void> send(BytesView data, Timeout timeout = kForever, More more = More::no) const;
   /// Waits until nothing is unacknowledged. Ok: all that was sent so far was acknowledged.
   /// Errors: not_delivered (the sentence says how many were lost and why), timeout, closed.

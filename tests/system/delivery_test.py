@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A robot's log by `gimnet send` arrives in `gimnet recv` in order, byte for byte, and the ledger is exact."""
 
+import json
 import subprocess
 import tempfile
 import threading
@@ -160,6 +161,44 @@ class Losses(unittest.TestCase):
         self.assertEqual(sent.code, 1)
         self.assertIn("not acknowledged", sent.err)
         self.assertIn("the hub reports", sent.err)
+
+    def test_send_stops_at_a_loss_although_its_input_goes_on(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B", "-n", "1")
+        sender = start_gimnet(self, hub, "send", "B", "--json", stdin=subprocess.PIPE)
+        sender.popen.stdin.write(b"one\n")
+        sender.popen.stdin.flush()
+        self.assertEqual(receiver.wait(), 0)
+        wait_until(lambda: not hub.nodes(), "B to leave")
+        sender.popen.stdin.write(b"two\n")
+        sender.popen.stdin.flush()
+        self.assertEqual(sender.wait(), 1, "standard input is still open")
+        self.assertEqual(sender.err, "gimnet: 1 of 2 messages were not acknowledged by B: the hub reports no_such_node: "
+                                     "B has left; 1 was, and the rest of the input was not sent\n")
+        self.assertEqual(json.loads(sender.out), {"sent": 2, "acknowledged": 1, "lost": 1, "waiting": 0})
+
+    def test_send_stops_when_the_receiver_is_killed_in_the_middle(self):
+        hub = Hub(self, "--limit", "grace_ms=1")
+        receiver = start_recv(self, hub, "B")
+        sender = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE)
+        stopping = threading.Event()
+
+        def feed():
+            try:
+                while not stopping.is_set():
+                    sender.popen.stdin.write(b"line\n" * 1000)
+                    sender.popen.stdin.flush()
+            except BrokenPipeError:
+                pass
+        feeding = threading.Thread(target=feed)
+        feeding.start()
+        self.addCleanup(feeding.join)
+        self.addCleanup(stopping.set)
+        wait_until(lambda: receiver.out_size > 50000, "ten thousand lines")
+        receiver.signal(9)
+        self.assertEqual(sender.wait(), 1, sender.err)
+        self.assertIn("messages were not acknowledged by B: ", sender.err)
+        self.assertIn(", and the rest of the input was not sent", sender.err)
 
     def test_send_ends_when_the_hub_goes(self):
         hub = Hub(self)

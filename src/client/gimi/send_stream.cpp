@@ -35,6 +35,7 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
 
 Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t deadline) {
   while (!end_) {
+    if (options_.end_at_loss && counts_.lost != 0) return loss();
     if (destination_.id == 0) {
       return Failure{
           Status::not_found,
@@ -137,8 +138,12 @@ Outcome<void> SendStream::settle(Timeout timeout) {
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
   if (counts_.lost == 0) return {};
-  return Failure{Status::not_delivered, std::to_string(counts_.lost) + " of " + std::to_string(counts_.sent) +
-                                            " messages to " + target() + " were not acknowledged: " + counts_.loss};
+  return loss();
+}
+
+Failure SendStream::loss() const {
+  return {Status::not_delivered, std::to_string(counts_.lost) + " of " + std::to_string(counts_.sent) +
+                                     " messages to " + target() + " were not acknowledged: " + counts_.loss};
 }
 
 SendCounts SendStream::counts() {

@@ -92,6 +92,8 @@ class SendStream {
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
   void hold_again(std::vector<std::byte> data) GIMNET_EXCLUDES(mutex_);
   void lose_all(const std::string& why) GIMNET_REQUIRES(mutex_);
+  /// REQUIRES: something was lost.
+  [[nodiscard]] Failure loss() const GIMNET_REQUIRES(mutex_);
   void settle_freed(const SendWindow::Freed& freed, const std::string& why) GIMNET_REQUIRES(mutex_);
   void watch_if_needed() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::string target() const { return service_.empty() ? to_.text() : service_; }

@@ -32,7 +32,8 @@ Examples:
   gimnet send 7.17 --file map.png           one message
   echo stop | gimnet send B --lane real_time
 
-At most 64 messages wait for their acknowledgement. Ends with 0 when all are acknowledged, else with 1 and the reason.
+At most 64 messages wait for their acknowledgement. Ends with 0 when all are acknowledged; stops at the first loss and says
+why: ends with 4 if nobody is there, otherwise with 1.
 )";
 
 inline constexpr const char* kRecvAbout = R"(Print the messages that are sent to this node.

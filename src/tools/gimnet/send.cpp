@@ -11,6 +11,7 @@
 #include "tools/gimnet/file_content.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/line_input.hpp"
+#include "tools/gimnet/loss_words.hpp"
 #include "tools/gimnet/progress.hpp"
 
 namespace gimnet::tool {
@@ -43,9 +44,18 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
   return sender.settle();
 }
 
-Outcome<void> send_lines(Session& session, const Sender& sender) {
+/// Waits for the fate of what was sent before a loss, and answers with the loss.
+Outcome<void> settle_loss(const Sender& sender) {
+  auto settled = sender.settle();
+  return settled ? Failure{Status::not_delivered, "messages were lost"} : settled;
+}
+
+/// `rest`: input is left that was not sent.
+Outcome<void> send_lines(Session& session, const Sender& sender, bool& rest) {
   ConnectionWatch watch(session.node());
-  LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return watch.goes_on(); });
+  LineInput input(STDIN_FILENO, session.stop().descriptor(),
+                  [&] { return watch.goes_on() && sender.counts().lost == 0; });
+  rest = true;
   const Progress progress([&] {
     const SendCounts counts = sender.counts();
     return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) + " acknowledged";
@@ -54,14 +64,18 @@ Outcome<void> send_lines(Session& session, const Sender& sender) {
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
-        if (auto sent = sender.send(line, kForever, input.has_line() ? More::yes : More::no); !sent) return sent;
+        if (auto sent = sender.send(line, kForever, input.has_line() ? More::yes : More::no); !sent) {
+          return sender.counts().lost != 0 ? settle_loss(sender) : sent;
+        }
         break;
       case LineInput::State::failed:
         return cannot_read("standard input", input.error());
       case LineInput::State::given_up:
-        return Session::gone();
+        return sender.counts().lost != 0 ? settle_loss(sender) : Session::gone();
       case LineInput::State::stopped:
+        return {};
       case LineInput::State::end:
+        rest = false;
         return {};
     }
   }
@@ -76,11 +90,13 @@ void print(Session& session, const SendCounts& counts) {
 }
 
 /// Why not all arrived: what the stream knows says more than the call that failed after it.
-Failure reason(const Session& session, const SendCounts& counts, Failure failure) {
+Failure reason(const Session& session, const SendCounts& counts, bool rest, Failure failure) {
   if (counts.lost == 0) return failure;
-  return {Status::not_delivered, std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
-                                     " messages were not acknowledged by " + session.options().target + ": " +
-                                     counts.loss};
+  const std::string& target = session.options().target;
+  return {Status::not_delivered,
+          std::to_string(counts.lost) + " of " + std::to_string(counts.sent) + " messages were not acknowledged by " +
+              target + ": " + loss_words(counts.loss, target) + "; " + std::to_string(counts.acknowledged) +
+              (counts.acknowledged == 1 ? " was" : " were") + (rest ? ", and the rest of the input was not sent" : "")};
 }
 
 /// It was the id of nobody: as a name that nobody has.
@@ -105,15 +121,17 @@ ExitCode run_send(Session& session) {
   stream.key = options.key;
   stream.lane = options.lane;
   stream.window = kWindow;
+  stream.end_at_loss = true;
   const auto sender = session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
-  auto sent = options.file.empty() ? send_lines(session, *sender) : send_file(*sender, options.file);
+  bool rest = false;
+  auto sent = options.file.empty() ? send_lines(session, *sender, rest) : send_file(*sender, options.file);
   if (sent && !session.stopped()) sent = sender->settle();
   const SendCounts counts = sender->counts();
   print(session, counts);
   if (sent) return session.finish();
   session.output().flush();
-  const ExitCode code = session.fail(reason(session, counts, sent.failure()));
+  const ExitCode code = session.fail(reason(session, counts, rest, sent.failure()));
   if (session.stopped()) return code;
   return nobody_there(counts) ? ExitCode::not_found : ExitCode::failed;
 }

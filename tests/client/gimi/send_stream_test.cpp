@@ -131,6 +131,27 @@ TEST_F(SendStreamTest, AReportOfAGoneRouteFreesEverythingThere) {
   EXPECT_EQ(stream.counts().lost, 2u);
 }
 
+TEST_F(SendStreamTest, EndsAtALossWhereTheCallerWantsThat) {
+  SendOptions options;
+  options.key = kKey;
+  options.window = 3;
+  options.end_at_loss = true;
+  const Sender stream = node_->sender(Peer{kPeerId}, options).or_throw();
+  stream.send("1").or_throw();
+  stream.send("2").or_throw();
+  const auto first = next_data_frame();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(next_data().data, "2");
+  report(proto::DropReason::queue_full, 1, *first);
+  acknowledge(2, 0);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  const auto refused = stream.send("3");
+  EXPECT_TRUE(refused.is(Status::not_delivered));
+  EXPECT_NE(refused.failure().sentence.find("queue_full"), std::string::npos) << refused.failure().sentence;
+  EXPECT_EQ(stream.counts().sent, 2u) << "nothing more is sent";
+  EXPECT_EQ(stream.counts().acknowledged, 1u);
+}
+
 TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
