@@ -139,6 +139,22 @@ class Sizes(unittest.TestCase):
                 self.send_file(hub, size)
         hub.quiet_status(self)
 
+    def test_the_largest_message_that_is_taken_and_one_byte_more(self):
+        hub = Hub(self)
+        for number, limit in enumerate((10, 8192, 65536, 1 << 20)):
+            with self.subTest(limit=limit), tempfile.NamedTemporaryFile() as file:
+                name = f"B{number}"
+                receiver = start_recv(self, hub, name, "-n", "1", "--max-size", str(limit))
+                file.write(bytes(limit + 1))
+                file.flush()
+                sent = run_gimnet(hub, "send", name, "--file", file.name)
+                self.assertEqual(sent.code, 1)
+                self.assertIn(f"it takes messages of at most {limit} bytes, and this one has {limit + 1}", sent.err)
+                file.truncate(limit)
+                sent = run_gimnet(hub, "send", name, "--file", file.name)
+                self.assertEqual((sent.code, receiver.wait()), (0, 0), sent.err)
+                self.assertEqual(receiver.out_size, limit + 1, "the payload and a newline")
+
     def test_a_file_that_the_receiver_does_not_take(self):
         hub = Hub(self)
         receiver = start_recv(self, hub, "B", "--max-size", "100000")

@@ -40,8 +40,10 @@ struct NodeOptions {
   std::optional<std::uint8_t> shard;
   /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it. Else: denied.
   bool administrator = false;
-  std::size_t message_bytes_max = std::size_t{64} << 20;  ///< largest message taken, in bytes, up to 1 GiB
-  std::size_t receive_bytes = std::size_t{16} << 20;      ///< may wait unread when a queue holds the reading back
+  /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped; its sender is told if it
+  /// waits for an ACK.
+  std::size_t message_bytes_max = std::size_t{64} << 20;
+  std::size_t receive_bytes = std::size_t{16} << 20;   ///< may wait unread when a queue holds the reading back
   std::size_t queue_messages = kQueueMessagesDefault;  ///< size of queues that nobody asked for, 1..kQueueMessagesMax
   std::uint32_t socket_receive_bytes = 0;              ///< SO_RCVBUF, in bytes; 0: the system's
 };

@@ -11,13 +11,33 @@
 #include "client/gimi/deadline.hpp"
 #include "client/gimi/message_access.hpp"
 #include "client/gimi/report_words.hpp"
+#include "proto/control/control_message.hpp"
 #include "proto/frame/frame_header.hpp"
+#include "proto/frame/window.hpp"
 
 namespace gimnet::gimi {
 namespace {
 
 /// What the GIMI header and its extension may add to the application's bytes.
 constexpr std::size_t kHeaderRoom = 1024;
+/// Status of an ERROR about a DATA that is larger than its receiver takes.
+constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
+/// Of what another node says, so much is kept.
+constexpr std::size_t kSentenceBytesMax = 256;
+
+/// NIF refuses what its sender still waits with. Less than its window is on its way already: that comes whole, so that
+/// this library can tell the sender of which message it speaks.
+std::size_t nif_bytes_max(std::size_t message_bytes_max) {
+  const std::size_t whole = std::max<std::size_t>(message_bytes_max, proto::kWindowDefault) + kHeaderRoom;
+  return std::min<std::size_t>(whole, NIF_MESSAGE_BYTES_MAX);
+}
+
+/// What another node says, fit for a terminal.
+std::string plain_words(std::string_view sentence) {
+  std::string words(sentence.substr(0, kSentenceBytesMax));
+  std::ranges::replace_if(words, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return words;
+}
 
 StreamName stream_of(const nif_incoming& in, std::uint32_t peer, std::uint32_t group) {
   const auto key = proto::gimi::StreamKey::of(in.key);
@@ -70,7 +90,8 @@ std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in
 }  // namespace
 
 Core::Core(const NodeOptions& options)
-    : inbox_(
+    : message_bytes_max_(options.message_bytes_max),
+      inbox_(
           options.queue_messages, options.receive_bytes, [this] { static_cast<void>(nif_deliver(node())); },
           [this](const TakenMessages& taken, bool more) {
             static_cast<void>(nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
@@ -107,7 +128,7 @@ nif_status Core::connect(const NodeOptions& options) {
   if (options.shard) how.shard_plus_one = static_cast<std::uint8_t>(*options.shard + 1);
   how.administrator = options.administrator ? 1 : 0;
   how.receive_queue_bytes = options.receive_bytes;
-  how.message_bytes_max = std::min(options.message_bytes_max + kHeaderRoom, NIF_MESSAGE_BYTES_MAX);
+  how.message_bytes_max = nif_bytes_max(options.message_bytes_max);
   how.socket_receive_bytes = options.socket_receive_bytes;
   how.callback = &Core::on_incoming;
   how.user = this;
@@ -226,6 +247,9 @@ nif_verdict Core::on_message(const nif_incoming& in) {
     case Operation::ack:
       on_ack(in, *view);
       return NIF_DONE;
+    case Operation::error:
+      on_error(in, *view);
+      return NIF_DONE;
     case Operation::ping:
       on_ping(in, *view);
       return NIF_DONE;
@@ -239,6 +263,7 @@ nif_verdict Core::on_message(const nif_incoming& in) {
 }
 
 nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (view.data.size() > message_bytes_max_) return refuse(in, view);
   if (in.kind == NIF_GROUP) return on_group_data(in, view);
   const StreamName name = received_stream_of(in);
   Message message = MessageAccess::make(in, view, nullptr);
@@ -261,6 +286,27 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
   }
   service->on_message(in.from, view.header.sequence);
   return NIF_KEEP;
+}
+
+nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  inbox_.count_dropped();
+  if (in.kind != NIF_UNICAST || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
+  const std::string sentence = "it takes messages of at most " + std::to_string(message_bytes_max_) +
+                               " bytes, and this one has " + std::to_string(view.data.size());
+  const auto key = proto::gimi::StreamKey::of(in.key);
+  const Envelope envelope{
+      in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), {key.type, key.instance}, 0, 0};
+  // Where there is no room for it, the sender learns from the next PONG that the message is not here.
+  static_cast<void>(uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
+                                     proto::gimi::encode_failure({kTooLarge, sentence}), 0));
+  return NIF_DONE;
+}
+
+void Core::on_error(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto failure = proto::gimi::decode_failure(view.data);
+  if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
+  streams_.on_refused(stream_of(in, in.from, 0), view.header.sequence,
+                      "the receiver refused it: " + plain_words(failure->sentence));
 }
 
 void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {

@@ -47,12 +47,16 @@ class Core {
   [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
+  /// A message that is larger than this node takes: its sender is told.
+  [[nodiscard]] nif_verdict refuse(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_report(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
   void end(const Ending& ending);
 
+  const std::size_t message_bytes_max_;
   Uplink uplink_;
   Inbox inbox_;
   StreamTable streams_;

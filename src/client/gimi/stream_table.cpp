@@ -97,6 +97,10 @@ void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence, const p
   if (stream != nullptr && stream->on_ack(sequence, ack)) attend_(true);
 }
 
+void StreamTable::on_refused(const StreamName& name, std::uint32_t sequence, const std::string& why) {
+  if (SendStream* stream = find(name); stream != nullptr) stream->on_lost(sequence, why);
+}
+
 void StreamTable::on_report(const Report& report) {
   const std::string why = report_words(report.text);
   if (is_route_gone(report.reason) && report.name.group != 0) {

@@ -33,6 +33,9 @@ class StreamTable final : public StreamKeeper {
 
   void on_ack(const StreamName& name, std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
 
+  /// The receiver says that it did not take that DATA, and why.
+  void on_refused(const StreamName& name, std::uint32_t sequence, const std::string& why) GIMNET_EXCLUDES(mutex_);
+
   /// What the hub says of a frame of this node that it could not deliver.
   struct Report {
     StreamName name;

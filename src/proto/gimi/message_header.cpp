@@ -1,5 +1,7 @@
 #include "proto/gimi/message_header.hpp"
 
+#include <algorithm>
+
 #include "base/endian.hpp"
 
 namespace gimnet::proto::gimi {
@@ -68,6 +70,13 @@ std::optional<Failure> decode_failure(std::span<const std::byte> data) {
   if (data.size() < kErrorStatusSize) return std::nullopt;
   const auto text = data.subspan(kErrorStatusSize);
   return Failure{load_le<std::uint16_t>(data.data()), {reinterpret_cast<const char*>(text.data()), text.size()}};
+}
+
+std::vector<std::byte> encode_failure(const Failure& failure) {
+  std::vector<std::byte> data(kErrorStatusSize + failure.sentence.size());
+  store_le(data.data(), failure.status);
+  std::ranges::copy(std::as_bytes(std::span(failure.sentence)), data.begin() + kErrorStatusSize);
+  return data;
 }
 
 }  // namespace gimnet::proto::gimi

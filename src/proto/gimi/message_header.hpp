@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 // The header of GIMI messages: the first bytes of the payload of a KEYED frame (docs/protocol.md, section 7).
 // Thread safety: value types and pure functions.
@@ -93,5 +94,6 @@ struct Failure {
 };
 /// Nothing: too short.
 [[nodiscard]] std::optional<Failure> decode_failure(std::span<const std::byte> data);
+[[nodiscard]] std::vector<std::byte> encode_failure(const Failure& failure);
 
 }  // namespace gimnet::proto::gimi

@@ -152,6 +152,26 @@ TEST_F(SendStreamTest, EndsAtALossWhereTheCallerWantsThat) {
   EXPECT_EQ(stream.counts().acknowledged, 1u);
 }
 
+TEST_F(SendStreamTest, ARefusalFreesTheMessageAndSaysWhy) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  next_data();
+  answer({1, Operation::error, 0, 0}, proto::gimi::encode_failure({6, "it is \x1b too large"}));
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().loss, "the receiver refused it: it is ? too large");
+}
+
+TEST_F(SendStreamTest, AnErrorOfAnotherKindFreesNothing) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  next_data();
+  answer({1, Operation::error, 0, 0}, proto::gimi::encode_failure({3, "what of it"}));
+  answer({1, Operation::error, 0, 0}, {});
+  acknowledge(1);
+  EXPECT_TRUE(stream.settle());
+  EXPECT_EQ(stream.counts().lost, 0u);
+}
+
 TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
