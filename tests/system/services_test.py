@@ -227,6 +227,9 @@ class Pings(unittest.TestCase):
         gone = run_gimnet(hub, "ping", "7.999", "-c", "1")
         self.assertEqual(gone.code, 4)
         self.assertIn("no_such_node", gone.err)
+        lost = run_gimnet(hub, "ping", "7.999", "-c", "1", "--json")
+        self.assertEqual(json.loads(lost.out), {"target": "7.999", "id": "7.999", "sent": 1, "lost": 1, "min": None,
+                                                "mean": None, "p50": None, "p99": None, "p99.9": None, "max": None})
 
 
 class Acknowledgements(unittest.TestCase):

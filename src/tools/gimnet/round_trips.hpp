@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace gimnet::tool {
@@ -12,15 +13,16 @@ class RoundTrips {
   void add(std::int64_t ns) { ns_.push_back(ns); }
   [[nodiscard]] std::size_t count() const { return ns_.size(); }
 
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   struct Summary {
-    double min = 0.0;
-    double mean = 0.0;
-    double p50 = 0.0;
-    double p99 = 0.0;
-    double p99_9 = 0.0;
-    double max = 0.0;
+    double min = kNone;
+    double mean = kNone;
+    double p50 = kNone;
+    double p99 = kNone;
+    double p99_9 = kNone;
+    double max = kNone;
   };
-  /// Zeros if there are none. A percentile is the smallest value that at least that part of all does not exceed.
+  /// kNone, which JSON writes as null, if there are none. A percentile is the smallest value that at least that part of all does not exceed.
   [[nodiscard]] Summary summary_us() const;
 
  private:
