@@ -81,7 +81,8 @@ void add_pub(CLI::App& app, Options& options) {
   pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
       ->check(CLI::Range(0.001, 1e6));
-  pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, a whole number");
+  pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, 0 to 1000000, default 0")
+      ->check(CLI::Range(std::size_t{0}, std::size_t{1'000'000}));
   add_lane(pub, options);
   add_key(pub, options);
 }

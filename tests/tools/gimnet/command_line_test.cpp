@@ -113,6 +113,11 @@ TEST(CommandLine, RefusesValuesOutOfRange) {
   EXPECT_NE(refusal({"send", "B", "--lane", "fast"}).find("--lane"), std::string::npos);
   EXPECT_NE(refusal({"recv", "--name", "B", "--max-size", "1073741825"}).find("--max-size"), std::string::npos);
   EXPECT_NE(refusal({"send"}), "not refused");
+  EXPECT_EQ(options({"pub", "a/b", "--wait", "1000000"}).subscribers, 1'000'000u);
+  for (const char* wrong : {"1000001", "-1", "18446744073709551616"}) {
+    EXPECT_NE(refusal({"pub", "a/b", "--wait", wrong}).find("is no value for --wait: wait until so many"),
+              std::string::npos);
+  }
 }
 
 TEST(CommandLine, HelpEndsWell) {
