@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/check.hpp"
+
 #ifdef GIMNET_TSAN_QUEUE
 #include <deque>
 #include <mutex>
@@ -38,7 +40,8 @@ class MpscQueue {
     const std::lock_guard lock(mutex_);
     items_.push_back(std::move(item));
 #else
-    queue_.enqueue(tokens_[producer], std::move(item));
+    // It fails where there is no memory for another block; an item that vanishes would be a loss that nobody counts.
+    GIMNET_CHECK(queue_.enqueue(tokens_[producer], std::move(item)));
 #endif
   }
 
