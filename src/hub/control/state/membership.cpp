@@ -31,8 +31,11 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
     if (std::optional<Refusal> refusal = directory_.refusal(request.name, claim.session, sessions_, now)) {
       return std::move(*refusal);
     }
-    end_absent_holder(request.name, claim.session, now, effects);
   }
+  if (claim.session == nullptr) {
+    if (std::optional<Refusal> refusal = room_refusal(request.name)) return std::move(*refusal);
+  }
+  if (!request.name.empty()) end_absent_holder(request.name, claim.session, now, effects);
   const Result<Joined, Refusal> found = session_for(request, claim, now, effects);
   if (!found) return found.error();
   Session& session = *found->session;
@@ -209,6 +212,12 @@ void Membership::end_absent_holder(const std::string& name, const Session* claim
   const std::optional<std::uint32_t> holder = directory_.find(name);
   if (!holder || (claimant != nullptr && claimant->index == *holder)) return;
   end(*sessions_.find(*holder), now, effects);
+}
+
+std::optional<Refusal> Membership::room_refusal(const std::string& name) {
+  // The limit may have been lowered, so that more would have to go than make way.
+  const std::size_t ending = (directory_.find(name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
+  return sessions_.full_refusal(ending);
 }
 
 void Membership::make_room(milliseconds now, Effects& effects) {

@@ -81,8 +81,8 @@ Result<Session*, Refusal> Sessions::restore(const SessionToken& token, std::opti
   return &put(token.index, token.number, shard_hint, now);
 }
 
-std::optional<Refusal> Sessions::full_refusal() const {
-  if (!full()) return std::nullopt;
+std::optional<Refusal> Sessions::full_refusal(std::size_t ending) const {
+  if (sessions_.size() - ending < limits_.nodes) return std::nullopt;
   return Refusal{proto::GoodbyeCode::hub_full, "this hub takes " + std::to_string(limits_.nodes) +
                                                    " nodes and has them; connect to another one, or start it with a "
                                                    "larger --limit nodes"};
@@ -182,6 +182,11 @@ void Sessions::end(Session& session, milliseconds now) {
 Session* Sessions::next_expired(milliseconds now) {
   Session* named = take_due(away_named_, now);
   return named != nullptr ? named : take_due(away_nameless_, now);
+}
+
+bool Sessions::nameless_away() {
+  while (!away_nameless_.empty() && !still_away(away_nameless_.front())) away_nameless_.pop_front();
+  return !away_nameless_.empty();
 }
 
 Session* Sessions::longest_away_nameless() { return take_due(away_nameless_, milliseconds::max()); }

@@ -136,6 +136,10 @@ class Sessions {
   [[nodiscard]] Session* next_expired(std::chrono::milliseconds now);
   /// The session without a name that is away longest, or nullptr. The caller ends it.
   [[nodiscard]] Session* longest_away_nameless();
+  /// Is there a session for longest_away_nameless()?
+  [[nodiscard]] bool nameless_away();
+  /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
+  [[nodiscard]] std::optional<Refusal> full_refusal(std::size_t ending = 0) const;
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.
@@ -163,7 +167,6 @@ class Sessions {
   };
   /// The next of `away` that is due at `now`, taken off the list, or nullptr.
   [[nodiscard]] Session* take_due(std::deque<Away>& away, std::chrono::milliseconds now);
-  [[nodiscard]] std::optional<Refusal> full_refusal() const;
   Session& put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                std::chrono::milliseconds now);
   /// Is it still the absence that was noted?
