@@ -28,11 +28,12 @@ void RawNode::begin_join(const std::string& url, const JoinOptions& options) {
 bool RawNode::finish_join() {
   read_some();
   if (is_closed_ && !goodbye_) throw std::runtime_error("the hub closed the connection before WELCOME");
+  if (goodbye_) throw std::runtime_error("not admitted: " + goodbye_->sentence);
   if (buffer_.size() < proto::kOpeningSize) return false;
   if (taken_ == 0) taken_ = proto::kOpeningSize;
   while (!is_joined_) {
-    if (goodbye_) throw std::runtime_error("not admitted: " + goodbye_->sentence);
     const auto frame = next();
+    if (goodbye_) throw std::runtime_error("not admitted: " + goodbye_->sentence);
     if (!frame) return false;
     auto welcome = proto::decode<proto::Welcome>(frame->body());
     if (!welcome) throw std::runtime_error(welcome.error().sentence);

@@ -79,11 +79,15 @@ class RawNode {
   /// Sends a PING where nothing was sent for half a second: to be called often by who wants to stay.
   void keep_alive();
 
-  /// Asks the hub and waits for its answer; data frames that come before it are lost to the test.
+  /// Asks the hub and waits for its answer, or why it says no; data frames that come before it are lost to the test.
+  template <class Answer, class Request>
+  [[nodiscard]] Result<Answer, proto::Refusal> try_ask(proto::Kind kind, const Request& request) {
+    return proto::decode_answer<Answer>(exchange(kind, proto::encode(request, ++request_)));
+  }
+  /// The same where no is a failure.
   template <class Answer, class Request>
   [[nodiscard]] Answer ask(proto::Kind kind, const Request& request) {
-    const std::vector<std::byte> payload = exchange(kind, proto::encode(request, ++request_));
-    auto answer = proto::decode_answer<Answer>(payload);
+    auto answer = try_ask<Answer>(kind, request);
     if (!answer) throw std::runtime_error(answer.error().sentence);
     return *answer;
   }
