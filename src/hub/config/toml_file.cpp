@@ -1,15 +1,29 @@
 #include "hub/config/toml_file.hpp"
 
 #define TOML_EXCEPTIONS 0
+// The library has two errors that a file can bring about, each undefined behaviour, and an abort where assertions are
+// on: it takes for granted that the name of a table begins like one ("[?"), and that a letter like the umlauts outside
+// of a text is a blank. Here the first is not taken for granted, and goes on to the error that the library has for such
+// a name; the second is no blank.
+#include <toml++/impl/forward_declarations.h>
+#undef TOML_ASSERT_ASSUME
+#define TOML_ASSERT_ASSUME(expr) static_assert(true)
+#undef TOML_UNREACHABLE
+#define TOML_UNREACHABLE return false
+#include <toml++/impl/unicode.h>
+#undef TOML_UNREACHABLE
+#define TOML_UNREACHABLE __builtin_unreachable()
 #include <toml++/toml.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "base/log.hpp"
+#include "proto/bitestream/utf8.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -51,6 +65,18 @@ class Lines {
     const std::string_view line = lines_[number - 1];
     return line.size() - trimmed(line).size() + 1;
   }
+  /// Puts a `?` in place of each byte that is no UTF-8. Column (from 1, in characters) of the first; 0: there was none.
+  [[nodiscard]] std::size_t mend_text(std::size_t number) {
+    std::string& line = lines_[number - 1];
+    std::size_t first = 0;
+    for (std::size_t at = 0, column = 1; at < line.size(); ++column) {
+      const std::size_t size = character_size(std::string_view{line}.substr(at));
+      if (size == 0) line[at] = '?';
+      if (size == 0 && first == 0) first = column;
+      at += std::max<std::size_t>(size, 1);
+    }
+    return first;
+  }
   [[nodiscard]] std::string text() const {
     std::string all;
     for (const std::string& line : lines_) all += line + "\n";
@@ -58,6 +84,14 @@ class Lines {
   }
 
  private:
+  /// Bytes of the first character; 0: it is none.
+  static std::size_t character_size(std::string_view text) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
+    for (std::size_t size = 1; size <= std::min<std::size_t>(4, text.size()); ++size) {
+      if (proto::bitestream::valid_utf8(bytes, size)) return size;
+    }
+    return 0;
+  }
   static std::string_view trimmed(std::string_view line) {
     const std::size_t first = line.find_first_not_of(" \t");
     return first == std::string_view::npos ? std::string_view{} : line.substr(first);
@@ -98,13 +132,26 @@ Fault fault_of(const toml::parse_error& error, const Lines& lines, const std::st
           "this is not TOML: " + escaped(what, kQuotedMax) + "; write KEY = VALUE, texts in quotes"};
 }
 
+/// What is no UTF-8, by lines. The parser would say so at the character before, and get no further.
+std::set<std::size_t> mend_text(Lines& lines, const std::string& name, Faults& faults) {
+  std::set<std::size_t> mended;
+  for (std::size_t number = 1; number <= lines.size() && faults.size() < kConfigFaultsMax; ++number) {
+    const std::size_t column = lines.mend_text(number);
+    if (column == 0) continue;
+    mended.insert(number);
+    faults.push_back({place_of(name, number, column), "this is not UTF-8 text; save the file in that encoding"});
+  }
+  return mended;
+}
+
 /// Parses as much as can be made sense of. Nothing: too much is wrong.
 std::optional<toml::table> parse(std::string_view text, const std::string& name, Faults& faults) {
   Lines lines(text);
+  const std::set<std::size_t> mended = mend_text(lines, name, faults);
   std::size_t left_out_from = 0;  // the last lines that were left out; 0: none
   std::size_t left_out_to = 0;
   for (std::size_t tries = 0; tries < kTriesMax && faults.size() < kConfigFaultsMax; ++tries) {
-    toml::parse_result parsed = toml::parse(tries == 0 ? std::string{text} : lines.text());
+    toml::parse_result parsed = toml::parse(tries == 0 && mended.empty() ? std::string{text} : lines.text());
     if (parsed) return std::move(parsed).table();
     const toml::parse_error& error = parsed.error();
     const std::size_t line = std::clamp<std::size_t>(error.source().begin.line, 1, lines.size());
@@ -114,7 +161,7 @@ std::optional<toml::table> parse(std::string_view text, const std::string& name,
       if (left_out_from == 1) return std::nullopt;
       left_out_from = lines.beginning(left_out_from - 1);
     } else {
-      faults.push_back(fault_of(error, lines, name));
+      if (!mended.contains(line)) faults.push_back(fault_of(error, lines, name));
       left_out_from = left_out_to = line;
     }
     lines.leave_out(left_out_from, left_out_to);
@@ -218,7 +265,9 @@ std::string toml_quoted(std::string_view text) {
   for (const char c : text) {
     std::array<char, 8> code{};
     if (c == '"' || c == '\\') {
+#ifndef GIMNET_BUG_QUOTES_NOT_ESCAPED
       quoted += '\\';
+#endif
       quoted += c;
     } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
       std::snprintf(code.data(), code.size(), "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));

@@ -17,7 +17,7 @@ inline constexpr std::size_t kConfigFaultsMax = 100;
 /// What a configuration file says, and what is no TOML in it.
 struct TomlFile {
   std::vector<Given> keys;  ///< in the order of the file; those of [limits] as "limits.key"
-  Faults faults;            ///< in the order of the file
+  Faults faults;            ///< what is no UTF-8 before what is no TOML
 };
 
 /// Reads TOML 1.0. What is wrong is left out and the rest is read all the same, so that everything that is wrong is

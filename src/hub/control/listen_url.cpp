@@ -3,24 +3,32 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 
+#include <algorithm>
 #include <charconv>
+
+#include "base/log.hpp"
 
 namespace gimnet::hub {
 namespace {
 
+constexpr std::size_t kQuotedMax = 120;
+
 Error refuse(std::string_view text, std::string_view why) {
-  return Error{"cannot listen on " + std::string{text} + ": " + std::string{why}};
+  return Error{"cannot listen on " + escaped(text, kQuotedMax) + ": " + std::string{why}};
 }
 
 constexpr std::string_view kForms = "write tcp://127.0.0.1:7450, tcp://[::1]:7450 or unix:/path/to/socket";
 
+/// The system's functions would read only what stands before it.
+bool has_zero(const std::string& host) { return host.find('\0') != std::string::npos; }
+
 bool is_v4(const std::string& host) {
   in_addr address{};
-  return ::inet_pton(AF_INET, host.c_str(), &address) == 1;
+  return !has_zero(host) && ::inet_pton(AF_INET, host.c_str(), &address) == 1;
 }
 bool is_v6(const std::string& host) {
   in6_addr address{};
-  return ::inet_pton(AF_INET6, host.c_str(), &address) == 1;
+  return !has_zero(host) && ::inet_pton(AF_INET6, host.c_str(), &address) == 1;
 }
 
 Result<ListenUrl> parse_tcp(std::string_view text, std::string_view rest) {
@@ -38,7 +46,7 @@ Result<ListenUrl> parse_tcp(std::string_view text, std::string_view rest) {
   url.host = std::string{bracketed ? rest.substr(1, colon - 2) : rest.substr(0, colon)};
   if (url.host == "localhost") url.host = "127.0.0.1";
   if (bracketed ? !is_v6(url.host) : !is_v4(url.host)) {
-    return refuse(text, "'" + url.host + "' is not a numeric address; " + std::string{kForms});
+    return refuse(text, "'" + escaped(url.host, kQuotedMax) + "' is not a numeric address; " + std::string{kForms});
   }
   return url;
 }
@@ -51,8 +59,9 @@ Result<ListenUrl> parse_unix(std::string_view text, std::string_view rest) {
     return refuse(text, "the path has " + std::to_string(rest.size()) + " bytes, and a socket's may have " +
                             std::to_string(kSocketPathMax) + "; choose a shorter one");
   }
-  if (rest.find('\0') != std::string_view::npos || rest.find(' ') != std::string_view::npos) {
-    return refuse(text, "the path must not contain spaces");
+  // Addresses are printed side by side, and in lines of the log.
+  if (std::ranges::any_of(rest, [](unsigned char c) { return c <= ' ' || c == 0x7f; })) {
+    return refuse(text, "the path must not contain spaces or control characters");
   }
   ListenUrl url;
   url.scheme = ListenUrl::Scheme::unix_socket;

@@ -6,10 +6,14 @@
 namespace gimnet::hub {
 namespace {
 
+using ::testing::Contains;
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
+using ::testing::UnorderedElementsAre;
 
 std::vector<std::string> places(const TomlFile& file) {
   std::vector<std::string> found;
@@ -55,6 +59,32 @@ TEST(TomlFile, TellsEverySyntaxErrorAtItsPlaceAndReadsTheRest) {
   const TomlFile file = read_toml("shards = \nhub_id = 3\nbad line\n= 4\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
   EXPECT_THAT(places(file), ElementsAre("f:1:10", "f:3:5", "f:4:1", "f:6:10"));
   EXPECT_THAT(keys(file), ElementsAre("hub_id", "limits.grace_ms"));
+}
+
+TEST(TomlFile, TellsWhereTextIsNoUtf8AndReadsTheRest) {
+  const TomlFile file =
+      read_toml("\xe4 = 1\nshards = \n# Gr\xc3\xb6\xdf\x65\n[limits]\nnodes = 3\nx = '\xff\xff'\n", "f");
+  EXPECT_THAT(places(file), UnorderedElementsAre("f:1:1", "f:2:10", "f:3:6", "f:6:6"));
+  EXPECT_THAT(file.faults[0].sentence, HasSubstr("not UTF-8"));
+  EXPECT_THAT(keys(file), Contains("limits.nodes"));
+}
+
+TEST(TomlFile, ATableWithoutAName) {
+  for (const std::string header : {"[?]", "[[?]]", "[ . ]", "[", "[[", "[]", "[=", "[\x01"}) {
+    const TomlFile file = read_toml("shards = 2\n" + header + "\nhub_id = 3\n", "f");
+    EXPECT_THAT(file.faults, SizeIs(1)) << header;
+    EXPECT_THAT(places(file), Each(StartsWith("f:2:"))) << header;
+    EXPECT_THAT(keys(file), Contains("shards")) << header;
+  }
+}
+
+TEST(TomlFile, LettersThatAKeyCannotHave) {
+  const TomlFile file = read_toml(
+      "gr\xc3\xb6\xc3\x9f"
+      "e = 3\nshards = \xc3\xb6\nhub_id = 3\xc3\xa9\nhub_name = 'x'\n",
+      "f");
+  EXPECT_THAT(places(file), ElementsAre(StartsWith("f:1:"), StartsWith("f:2:"), StartsWith("f:3:")));
+  EXPECT_THAT(keys(file), ElementsAre("hub_name"));
 }
 
 TEST(TomlFile, AKeyGivenTwiceIsTold) {

@@ -43,6 +43,16 @@ TEST(ListenUrl, RefusesTheRestWithASentence) {
   }
 }
 
+TEST(ListenUrl, StrangeBytesAreRefusedAndNotRepeated) {
+  using namespace std::string_literals;
+  for (const std::string& text : {"unix:/a\nb"s, "unix:/a\x7f"s, "unix:/a\0"s, "tcp:/\n"s, "tcp://127.0.0.1\0:1"s,
+                                  "tcp://\x1b[2J:1"s, "tcp://[::1\0]:1"s}) {
+    const Result<ListenUrl> url = parse_listen_url(text);
+    ASSERT_FALSE(url) << text;
+    for (const char c : url.error().sentence) EXPECT_TRUE(c >= ' ' && c <= '~') << url.error().sentence;
+  }
+}
+
 TEST(ListenUrl, SocketPathsFitTheKernelsAndNotOneByteMore) {
   EXPECT_TRUE(parse_listen_url("unix:/" + std::string(kSocketPathMax - 1, 'a')));
   EXPECT_FALSE(parse_listen_url("unix:/" + std::string(kSocketPathMax, 'a')));
