@@ -1,228 +1,256 @@
 // A whole io shard with two admitted nodes, on the in-memory transport: whatever they send, however it is split and
-// whenever they read, the ledger is exact, and what comes out is legal frames that one of the two wrote.
-// Input: steps of {u8 choice, ...}: which node, and bytes that it writes, how its connection behaves, or time.
+// whenever they read, the ledger is exact, and what comes out is legal frames that one of the two wrote. Of a paced
+// group (sync(n), a rate, retain) the one gets from the other no more than its window, in order, and in the end no
+// window has leaked. Input: steps of {u8 choice, ...}: which node, and bytes that it writes, how its connection
+// behaves, or time; from 16 on, what becomes of the paced group.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
-#include <optional>
-#include <span>
 #include <vector>
 
-#include "fuzz/support/fuzz_input.hpp"
-#include "hub/shard/io_shard.hpp"
-#include "hub/transport/memory_transport.hpp"
-#include "proto/frame/flow.hpp"
-#include "proto/frame/frame_parser.hpp"
+#include "fuzz/support/paced_counts.hpp"
+#include "fuzz/support/shard_world.hpp"
+#include "proto/frame/frame_builder.hpp"
 
 namespace {
 
 using namespace gimnet;
 using namespace gimnet::hub;
+using fuzzing::Node;
 
-constexpr HubId kHub{7};
-constexpr std::uint32_t kGroupIndex = 1;
 constexpr std::size_t kStepsMax = 200;
+constexpr std::uint32_t kFirstPacedIndex = 2;
+constexpr std::uint32_t kPieceBytes = 300;
 
-/// Small bounds, so that a short input reaches them.
-Limits small_limits() {
-  Limits limits;
-  limits.lane0_bytes = limits.lane1_bytes = limits.lane2_bytes = limits.lane3_bytes = 2 * 1024;
-  limits.reserve_bytes = 1024;
-  limits.resume_bytes = 1024;
-  limits.control_bytes = 2 * 1024;
-  limits.requests = 3;
-  return limits;
-}
-
-/// One of the two nodes.
-struct Node {
-  NodeId id;
-  SessionRef session;
-  std::uint32_t attachment = 0;
-  MemoryPeer pipe;
-  std::vector<std::byte> stream;
-  bool opened = false;
-  std::uint64_t taken = 0;
-  std::uint64_t hub_epoch = 0;
-};
-
-class World {
+class PacedWorld final : public fuzzing::ShardWorld {
  public:
-  World()
-      : shared_{kHub,   limits_,     nodes_,    groups_,      quiescence_, budget_,
-                inbox_, {&mailbox_}, {&waker_}, {&counters_}, {&queues_}},
-        shard_(std::make_unique<IoShard>(ShardIndex{0}, shared_, IoShard::Options{})) {
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      node_[i].id = make_id<NodeId>(kHub, i + 1);
-      node_[i].session = {ConnectionSlot{i}, 100 + i};
-      attach(node_[i], true);
-    }
-    members_.provider = node_[0].id;
-    members_.by_shard.push_back({{node_[1].session.slot, node_[1].session.generation}});
-    static_cast<void>(groups_.exchange(kGroupIndex, &members_));
-  }
-  ~World() { shard_->let_go(); }
-
-  void step(fuzz::Choices& input) {
+  void pace_or_step(fuzz::Choices& input) {
     const std::uint8_t choice = input.byte();
-    Node& node = node_[choice & 1];
-    switch (choice >> 1 & 7) {
-      case 0:
-      case 1:
-        node.pipe.write(input.bytes(std::size_t{input.byte()} | std::size_t{input.byte()} << 8));
-        break;
-      case 2:
-        node.pipe.plan_receives(std::vector<std::size_t>(16, 1 + input.below(64)));
-        break;
-      case 3:
-        node.pipe.set_room(std::size_t{8} * input.byte());
-        break;
-      case 4:
-        node.pipe.set_room(MemoryPeer::kAll);
-        break;
-      case 5:
-        read(node);
-        break;
-      case 6:
-        now_ms_ += std::uint64_t{20} * input.byte();
-        break;
-      default:
-        if (node.pipe.transport_gone() || input.below(2) == 0) attach(node, false);
-    }
-    turn();
+    if (choice < 16) return step(choice, input);
+    pace_step(choice, input);
   }
-
-  void finish() {
-    for (Node& node : node_) {
-      node.pipe.set_room(MemoryPeer::kAll);
-      node.pipe.plan_receives({});
-    }
-    for (int i = 0; i < 20; ++i) turn();
-    for (Node& node : node_) {
-      read(node);
-      shard_->send(ReleaseCommand{node.session});
-    }
-    turn();
-    FUZZ_MUST(counters_.queued.value() == 0);
-    // The slab that is read into may have been kept by a frame that is gone; the next read finds out.
-    FUZZ_MUST(shard_->state().pool.pinned_bytes() <= kSlabReadBytes + 16 + limits_.frame_bytes);
+  void check_and_finish() {
+    if (paced_index_ != 0) check_pace();
+    finish();
   }
 
  private:
-  void attach(Node& node, bool new_session) {
-    if (!new_session) read(node);
-    auto [transport, peer] = make_memory_pipe();
-    node.pipe = std::move(peer);
-    node.stream.clear();
-    node.opened = false;
-    AttachCommand command;
-    command.session = node.session;
-    command.attachment = ++node.attachment;
-    command.node = node.id;
-    command.new_session = new_session;
-    command.transport = std::move(transport);
-    command.welcome.node = node.id;
-    command.welcome.token = {std::byte{1}};
-    command.resume_wanted = node.id == node_[1].id;
-    command.peer_epoch = 5;
-    command.known_hub_epoch = node.hub_epoch;
-    command.known_taken = node.taken;
-    command.peer_resume_bytes = 256;
-    command.peer_frame_bytes = 4096;
-    shard_->send(std::move(command));
-    nodes_.publish(index_of(node.id), {ShardIndex{0}, node.session.slot, node.session.generation});
+  void on_group_frame(const proto::FrameView& frame) override {
+    if (paced_index_ != 0 && frame.header.dst == paced_group().value()) counts_.take(frame);
+  }
+  void on_new_epoch(const Node& node) override {
+    if (paced_index_ == 0 || node.id != node_[1].id) return;
+    counts_.begin_epoch(terms_.window);
+    counts_.allow_repeats(sequence_);
+  }
+
+  // ---- the paced group: the conductor's part
+
+  [[nodiscard]] GroupId paced_group() const { return make_id<GroupId>(fuzzing::kHub, paced_index_); }
+
+  void pace_step(std::uint8_t choice, fuzz::Choices& input) {
+    if (paced_index_ == 0 || choice % 16 == 0) begin_group(input.byte());
+    switch (choice % 8) {
+      case 0:
+        break;
+      case 1:
+        change_terms(input.byte());
+        break;
+      case 2:
+        end_pace(false);
+        break;
+      case 3:
+        credit(input.byte());
+        break;
+      case 4:
+        read(node_[1]);
+        break;
+      default:
+        publish(choice % 32 >= 16 ? 0 : 2 * std::size_t{input.byte()});
+    }
     turn();
   }
 
-  void turn() {
-    std::vector<Ready> ready;
-    for (const Node& node : node_) {
-      const Connection* connection = shard_->state().find(node.session);
-      if (connection == nullptr || !connection->connected) continue;
-      ready.push_back({connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
+  /// Another group in place of the one that there was.
+  void begin_group(std::uint8_t how) {
+    if (paced_index_ != 0) {
+      static_cast<void>(groups_.exchange(paced_index_, nullptr));
+      end_pace(true);
+      shard_->send(ForgetRetainedCommand{paced_group()});
+      // No frame of it may be under way to a table that does not know it.
+      turn();
     }
-    shard_->turn(ready, now_ms_);
-    inbox_.drain(1'000, [](ShardEvent&&) {});
-    std::uint64_t dropped = 0;
-    for (const Counter& reason : counters_.dropped) dropped += reason.value();
-    FUZZ_MUST(counters_.accepted.value() + counters_.copies.value() ==
-              counters_.delivered.value() + dropped + counters_.queued.value());
+    paced_index_ = paced_index_ == 0 ? kFirstPacedIndex : paced_index_ + 1;
+    constexpr std::uint32_t kWindows[] = {0, 1, 2, 5};
+    terms_ = {kWindows[how & 3], 1, 0};
+    retain_ = (how & 4) != 0;
+    pieces_.clear();
+    counts_.begin(terms_.window);
+    publish_members(false);
+    if ((how & 8) == 0) begin_pace();
   }
 
-  void read(Node& node) {
-    node.pipe.read(node.stream);
-    std::size_t begin = 0;
-    if (!node.opened && node.stream.size() >= proto::kOpeningSize) {
-      FUZZ_MUST(proto::check_opening(node.stream) == proto::Opening::accepted);
-      node.opened = true;
-      begin = proto::kOpeningSize;
-    }
-    while (node.opened && node.stream.size() - begin >= proto::kHeaderSize) {
-      const std::span<const std::byte> rest = std::span(node.stream).subspan(begin);
-      const auto frame = proto::parse_frame(rest, proto::Origin::hub);
-      if (!frame) FUZZ_MUST(frame.error() == proto::FrameError::incomplete);
-      if (!frame) break;
-      check(node, *frame);
-      begin += frame->header.frame_size();
-    }
-    node.stream.erase(node.stream.begin(), node.stream.begin() + static_cast<std::ptrdiff_t>(begin));
+  void publish_members(bool subscribed) {
+    GroupMembers& made = *paced_members_.emplace_back(std::make_unique<GroupMembers>());
+    made.provider = node_[0].id;
+    made.retain = retain_;
+    made.by_shard.resize(1);
+    if (subscribed) made.paced_by_shard = {{{node_[1].session.slot, node_[1].session.generation}}};
+    static_cast<void>(groups_.exchange(paced_index_, &made));
+    subscribed_ = subscribed;
   }
 
-  void check(Node& node, const proto::FrameView& frame) {
-    const proto::FrameHeader& header = frame.header;
-    const bool from_hub = header.src == make_id<NodeId>(kHub, kHubIndex).value();
-    const auto kind = static_cast<std::uint8_t>(header.kind);
-    if (header.kind == proto::Kind::flow) {
-      const auto message = proto::flow::decode(frame.payload);
-      FUZZ_MUST(message.has_value());
-      if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) node.taken += skip->count;
-      return;
+  void begin_pace() {
+    // The last one may be the last one that it had.
+    if (!subscribed_) counts_.allow_repeats(sequence_);
+    if (!subscribed_) publish_members(true);
+    counts_.set_window(terms_.window);
+    shard_->send(PaceCommand{node_[1].session, paced_group(), terms_, retain_});
+    turn();
+  }
+
+  void change_terms(std::uint8_t how) {
+    terms_.depth = 1 + (how & 3);
+    terms_.interval_us = (how & 4) != 0 ? 50'000u * (1 + (how >> 4)) : 0;
+    begin_pace();
+  }
+
+  void end_pace(bool group_gone) {
+    if (!subscribed_) return;
+    if (!group_gone) publish_members(false);
+    subscribed_ = false;
+    shard_->send(EndPaceCommand{node_[1].session, paced_group(), group_gone});
+    turn();
+  }
+
+  // ---- its nodes
+
+  void publish(std::size_t size) {
+    if (pieces_.empty()) cut_message(size);
+    node_[0].pipe.write(pieces_.front());
+    pieces_.pop_front();
+  }
+
+  void cut_message(std::size_t size) {
+    std::vector<std::byte> content(size + sizeof(fuzz::PacedCounts::Message));
+    const fuzz::PacedCounts::Message message{.sequence = ++sequence_};
+    const auto bytes = std::as_bytes(std::span{&message, 1});
+    if (content.size() > kPieceBytes) {
+      std::copy(bytes.begin(), bytes.end(), content.end() - static_cast<std::ptrdiff_t>(bytes.size()));
     }
-    if (kind >= proto::kFirstControlKind || header.kind == proto::Kind::report) {
-      FUZZ_MUST(from_hub && header.dst == node.id.value());
-      if (const auto welcome = proto::decode<proto::Welcome>(frame.payload)) {
-        if (!welcome->resumed) node.taken = 0;
-        node.hub_epoch = welcome->epoch;
+    std::copy(bytes.begin(), bytes.end(), content.begin());
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::group;
+    parts.header.dst = paced_group().value();
+    parts.header.src = node_[0].id.value();
+    parts.header.lane = 1;
+    const auto total = static_cast<std::uint32_t>(content.size());
+    for (std::uint32_t offset = 0; offset < total; offset += kPieceBytes) {
+      const std::span<const std::byte> piece =
+          std::span{content}.subspan(offset).first(std::min<std::size_t>(kPieceBytes, total - offset));
+      if (total > kPieceBytes) {
+        parts.fragment = proto::FragmentHeader{static_cast<std::uint32_t>(sequence_), offset, total};
       }
-      return;
-    }
-    ++node.taken;
-    FUZZ_MUST(header.src == node_[0].id.value() || header.src == node_[1].id.value());
-    FUZZ_MUST(header.length <= 4096 && header.hops == 0 && !header.has(proto::kFlagReservedMask));
-    switch (header.kind) {
-      case proto::Kind::group:
-        FUZZ_MUST(node.id == node_[1].id && header.src == node_[0].id.value());
-        break;
-      case proto::Kind::list:
-        FUZZ_MUST(header.dst == 0);
-        break;
-      case proto::Kind::broadcast:
-        FUZZ_MUST(header.src != node.id.value());
-        break;
-      case proto::Kind::service:
-        FUZZ_MUST(node.id == node_[0].id);
-        break;
-      default:
-        FUZZ_MUST(header.dst == node.id.value());
+      std::vector<std::byte> frame(proto::kPrefixSizeMax + piece.size());
+      frame.resize(proto::write_frame(parts, piece, frame));
+      pieces_.push_back(std::move(frame));
     }
   }
 
-  const Limits limits_ = small_limits();
-  NodeTable nodes_;
-  GroupTable groups_;
-  Quiescence quiescence_{1};
-  Budget budget_{limits_.budget_bytes};
-  ControlInbox inbox_{1};
-  Waker waker_;
-  Mailbox mailbox_{1, {limits_.mailbox_entries, limits_.mailbox_bytes}, waker_};
-  ShardCounters counters_;
-  QueueGauges queues_{8};
-  const HubShared shared_;
-  GroupMembers members_;
-  Node node_[2];
-  std::unique_ptr<IoShard> shard_;
-  std::uint64_t now_ms_ = 1'000'000;
+  void flow(Node& node, const proto::flow::Message& message) {
+    std::byte frame[proto::flow::kFrameSizeMax];
+    const std::size_t size = proto::flow::encode_frame(message, node.id, frame);
+    node.pipe.write(std::span{frame}.first(size));
+  }
+
+  /// 255: more than there was.
+  void credit(std::uint8_t messages) {
+    // It has read WELCOME, by which it knows from where it counts.
+    read(node_[1]);
+    if (!node_[1].welcomed) return;
+    if (messages == 255) counts_.lied();
+    const std::uint64_t total = counts_.credit(messages);
+    flow(node_[1], proto::flow::Credit{paced_group(), total + (messages == 255 ? 1'000 : 0)});
+  }
+
+  // ---- in the end
+
+  /// Everything that is there is read and, if so, credited; time passes.
+  void settle(bool with_credit) {
+    for (int round = 0; round < 12; ++round) {
+      now_ms_ += 100;
+      for (Node& node : node_) {
+        read(node);
+        flow(node, proto::flow::Confirm{node.taken});
+      }
+      if (with_credit) credit(254);
+      turn();
+    }
+    for (Node& node : node_) read(node);
+  }
+
+  /// On new connections the window is whole, the rate is kept, and who comes late gets the last message.
+  void check_pace() {
+    for (Node& node : node_) attach(node, false);
+    pieces_.clear();
+    terms_.depth = 1;
+    terms_.interval_us = 0;
+    begin_pace();
+    // Long enough for what has no end to be given up, which the next message finds out.
+    settle(true);
+    settle(true);
+    publish(0);
+    settle(true);
+    FUZZ_MUST(counts_.last() == sequence_);
+    check_window();
+    check_rate();
+    check_retained();
+  }
+
+  void check_window() {
+    if (terms_.window == 0) return;
+    const std::uint64_t before = counts_.ended();
+    for (std::uint32_t i = 0; i < terms_.window + 1; ++i) publish(0);
+    settle(false);
+    FUZZ_MUST(counts_.ended() - before == terms_.window);
+    settle(true);
+    FUZZ_MUST(counts_.ended() - before == terms_.window + 1 && counts_.last() == sequence_);
+  }
+
+  void check_rate() {
+    const std::uint64_t before = counts_.ended();
+    terms_.interval_us = 10'000'000;
+    begin_pace();
+    for (int i = 0; i < 3; ++i) publish(0);
+    settle(true);
+    FUZZ_MUST(counts_.ended() - before == 1);
+    terms_.interval_us = 0;
+    begin_pace();
+  }
+
+  void check_retained() {
+    settle(true);
+    end_pace(false);
+    publish(0);
+    settle(true);
+    const std::uint64_t before = counts_.ended();
+    begin_pace();
+    settle(true);
+    FUZZ_MUST(counts_.ended() - before == (retain_ ? 1 : 0));
+    if (retain_) FUZZ_MUST(counts_.last() == sequence_);
+  }
+
+  std::vector<std::unique_ptr<GroupMembers>> paced_members_;
+  std::uint32_t paced_index_ = 0;  ///< 0: there is none yet
+  PaceTerms terms_;
+  bool retain_ = false;
+  bool subscribed_ = false;
+  fuzz::PacedCounts counts_;
+  std::deque<std::vector<std::byte>> pieces_;  ///< of the message that is being written
+  std::uint64_t sequence_ = 0;
 };
 
 }  // namespace
@@ -230,8 +258,8 @@ class World {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::Choices input(fuzz::input(data, size));
-  World world;
-  for (std::size_t steps = 0; input.left() && steps < kStepsMax; ++steps) world.step(input);
-  world.finish();
+  PacedWorld world;
+  for (std::size_t steps = 0; input.left() && steps < kStepsMax; ++steps) world.pace_or_step(input);
+  world.check_and_finish();
   return 0;
 }
