@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "fuzz/support/fuzz_input.hpp"
 #include "proto/control/names.hpp"
+#include "proto/control/pattern.hpp"
 
 namespace {
 
@@ -56,6 +58,16 @@ bool matches_naively(const Parts& pattern, const Parts& name) {
   return fits[0][0];
 }
 
+/// What the hub finds names by without comparing each.
+void check_pattern(std::string_view text, std::string_view name) {
+  const std::optional<Pattern> pattern = Pattern::parse(text);
+  FUZZ_MUST(pattern.has_value() == valid_naively(text, true));
+  if (!pattern) return;
+  FUZZ_MUST(pattern->text() == text && text.starts_with(pattern->beginning()));
+  FUZZ_MUST(pattern->is_name() == valid_naively(text, false));
+  if (valid_naively(name, false) && pattern->matches(name)) FUZZ_MUST(name.starts_with(pattern->beginning()));
+}
+
 void check_service_name(std::string_view name) {
   if (!valid_name(name)) return;
   const ServiceName split = split_service_name(name);
@@ -75,6 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_MUST(valid_pattern(pattern) == valid_naively(pattern, true));
   const bool legal = valid_naively(name, false) && valid_naively(pattern, true);
   FUZZ_MUST(matches(pattern, name) == (legal && matches_naively(split_naively(pattern), split_naively(name))));
+  check_pattern(pattern, name);
   check_service_name(name);
   return 0;
 }
