@@ -52,8 +52,10 @@ class BufferPool {
 
  private:
   static constexpr std::uint8_t kUnpooled = 0xFF;
-  static constexpr std::size_t kFreeSlabsMax = 16;
-  static constexpr std::size_t kFreeChunkBytesMax = std::size_t{4} << 20;
+  /// As many slabs as a full mailbox of another shard (16 MiB unless configured) keeps on their way; with fewer, each
+  /// round trip of a burst between shards would free slabs and allocate them again.
+  static constexpr std::size_t kFreeSlabsMax = 64;
+  static constexpr std::size_t kFreeChunkBytesMax = std::size_t{8} << 20;
 
   struct FreeList {
     Buffer* head = nullptr;
