@@ -45,7 +45,9 @@ void Pacer::unsubscribe(Recipient& recipient, GroupId group, bool group_gone) {
   drop_held(*known, DropReason::no_subscriber);
   unschedule(*known);
   known->active = false;
-  if (group_gone || recipient.paced->size() > kEndedMax) recipient.paced->erase(*known);
+  // A start that is still under way would be taken for the next subscription's, which began later.
+  const bool too_many = recipient.paced->size() > kEndedMax && known->awaited_starts == 0;
+  if (group_gone || too_many) recipient.paced->erase(*known);
 }
 
 PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
