@@ -9,7 +9,7 @@ import unittest
 
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.waiting import wait_until
-from support.wire import FLAG_KEYED, NS, Client, number, text
+from support.wire import FLAG_KEYED, GROUP, NS, Client, number, text
 
 DATA, ACK, PING = 0, 1, 5  # operations of GIMI
 KEY = 8
@@ -43,6 +43,24 @@ class Services(unittest.TestCase):
                          ('say "hi"', 5, 9, 1, "a/b/c"))
         self.assertEqual(second["text_hex"], "ff")
         self.assertGreaterEqual(first["age_us"], 0)
+
+    def test_echo_says_what_did_not_come(self):
+        hub = Hub(self)
+        provider = Client(self, hub).join("r")
+        group = provider.ask(NS, 7, text(3, "s"))[3]
+        lines = start_gimnet(self, hub, "echo", "r/s", "-n", "2")
+        objects = start_gimnet(self, hub, "echo", "r/s", "-n", "2", "--json")
+        paced = start_gimnet(self, hub, "echo", "r/s", "-n", "2", "--rate", "1000")
+        wait_until(lambda: subscribers_of(hub, "r/s") == 3, "the subscribers")
+        for sequence in (1, 943):
+            data = struct.pack("<IBBH", sequence, DATA, 0, 0) + b"x"
+            provider.send(provider.frame(group, bytes(KEY) + data, kind=GROUP, flags=FLAG_KEYED))
+            wait_until(lambda: paced.out, "a message, before the next one could take its place")
+        for tool in (lines, objects, paced):
+            self.assertEqual(tool.wait(), 0, tool.err)
+        said = "gimnet: 941 messages of r/s did not come (this reader was too slow)\n"
+        self.assertEqual((lines.err, objects.err, paced.err), (said, said, ""))
+        self.assertEqual([json.loads(line)["missed"] for line in objects.out.splitlines()], [0, 941])
 
     def test_a_subscription_survives_its_provider(self):
         hub = Hub(self)

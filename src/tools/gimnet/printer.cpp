@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "base/clock.hpp"
 #include "tools/gimnet/bounds.hpp"
 #include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/json_writer.hpp"
@@ -11,14 +12,18 @@ namespace {
 
 constexpr Timeout kLookAtConnection{500};
 
-void print(Session& session, const Message& message) {
+void print(Session& session, const Message& message, std::optional<std::uint64_t> missed) {
   Output& output = session.output();
   if (session.options().raw) {
     output.write(message.data());
     output.write("\n");
   } else {
-    output.write(session.options().json ? json_line(message) : text_line(message));
+    output.write(session.options().json ? json_line(message, missed) : text_line(message));
   }
+}
+
+void say_all(const std::vector<std::string>& sentences) {
+  for (const std::string& sentence : sentences) say(sentence);
 }
 
 }  // namespace
@@ -31,7 +36,7 @@ std::string text_line(const Message& message) {
   return line + "#" + std::to_string(message.sequence()) + ": " + printable(message.text()) + "\n";
 }
 
-std::string json_line(const Message& message) {
+std::string json_line(const Message& message, std::optional<std::uint64_t> missed) {
   JsonWriter json;
   json.begin_object().member("from", message.from().text());
   if (!message.service().empty()) json.member("service", message.service());
@@ -41,14 +46,16 @@ std::string json_line(const Message& message) {
     json.member("sent_ns", *sent);
     json.member("age_us", static_cast<double>(message.arrival_ns() - *sent) / 1000.0);
   }
+  if (missed) json.member("missed", *missed);
   json.member("size", message.size()).bytes_member("text", message.data()).end_object();
   return json.str() + "\n";
 }
 
-ExitCode print_messages(Session& session, const Receive& receive) {
+ExitCode print_messages(Session& session, const Receive& receive, MissedMessages* missed) {
   const Bounds bounds(session.options());
   ConnectionWatch watch(session.node());
   std::uint64_t printed = 0;
+  Failure failure;
   while (!bounds.enough(printed) && !bounds.late() && !session.stopped()) {
     auto message = receive(kNoWait);
     if (!message && message.is(Status::timeout)) {
@@ -56,15 +63,21 @@ ExitCode print_messages(Session& session, const Receive& receive) {
       if (!session.output().ok()) break;
       message = receive(bounds.wait(kLookAtConnection));
     }
+    if (missed != nullptr) say_all(missed->news(steady_now_ns()));
     if (!message && message.is(Status::timeout)) {
       watch.look();
       continue;
     }
-    if (!message) return session.fail(message.failure());
-    print(session, *message);
+    if (!message) {
+      failure = message.failure();
+      break;
+    }
+    print(session, *message, missed != nullptr ? std::optional(missed->take(*message)) : std::nullopt);
     ++printed;
     if (!session.output().ok()) break;
   }
+  if (missed != nullptr) say_all(missed->rest());
+  if (!failure.sentence.empty()) return session.fail(failure);
   return session.finish_stream(bounds, printed);
 }
 

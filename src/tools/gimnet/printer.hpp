@@ -1,23 +1,28 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/exit_code.hpp"
+#include "tools/gimnet/missed_messages.hpp"
 #include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {
 
 /// A message as a line, for people and as an object.
 [[nodiscard]] std::string text_line(const Message& message);
-[[nodiscard]] std::string json_line(const Message& message);
+/// `missed`: how many of its service did not come, where somebody counted.
+[[nodiscard]] std::string json_line(const Message& message, std::optional<std::uint64_t> missed = std::nullopt);
 
 /// Takes the next message; waits for it at most so long.
 using Receive = std::function<Outcome<Message>(Timeout)>;
 
 /// Prints what comes, until as many have come or as much time has passed as the options say. Writes at the latest when
-/// nothing more is there at once. Says so when the connection breaks and when it is back.
-[[nodiscard]] ExitCode print_messages(Session& session, const Receive& receive);
+/// nothing more is there at once. Says so when the connection breaks and when it is back, and what did not come where
+/// `missed` is given.
+[[nodiscard]] ExitCode print_messages(Session& session, const Receive& receive, MissedMessages* missed = nullptr);
 
 }  // namespace gimnet::tool

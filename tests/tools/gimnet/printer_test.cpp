@@ -18,5 +18,9 @@ TEST(Printer, AnObjectForPrograms) {
             "\n");
 }
 
+TEST(Printer, AnObjectTellsWhatDidNotCome) {
+  EXPECT_NE(json_line(test::make_message("x", 3), 941).find(R"("missed":941,"size":1)"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace gimnet::tool

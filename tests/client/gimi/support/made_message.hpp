@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "client/gimi/message_access.hpp"
@@ -17,8 +19,9 @@ inline Message make_counted(std::uint32_t group, std::uint32_t epoch) {
   return MessageAccess::make(in, {}, nullptr);
 }
 
-/// A message that NIF knows nothing of. `text` must outlive it.
-inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {}) {
+/// A message that NIF knows nothing of, of a service if one is named. `text` must outlive it.
+inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {},
+                            const std::string& service = "") {
   nif_incoming in{};
   in.from = (7u << 20) | 5;
   in.key = key.type | (static_cast<std::uint64_t>(key.instance) << 32);
@@ -27,7 +30,7 @@ inline Message make_message(std::string_view text, std::uint32_t sequence = 1, M
   proto::gimi::MessageView view;
   view.header.sequence = sequence;
   view.data = std::as_bytes(std::span(text.data(), text.size()));
-  return MessageAccess::make(in, view, nullptr);
+  return MessageAccess::make(in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service));
 }
 
 }  // namespace gimnet::test
