@@ -162,6 +162,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_ping(app, options);
   add_lists(app, options);
   add_ctl(app, options.ctl);
+  app.require_subcommand(0, 1);  // the name of a second one is an argument: nodes may be called as commands are
   for (CLI::App* command : app.get_subcommands({})) {
     command->fallthrough();
     command->footer(help::kEverywhere);

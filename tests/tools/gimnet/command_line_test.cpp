@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <initializer_list>
+#include <string>
 #include <vector>
+
+#include "tools/gimnet/command_options.hpp"
 
 namespace gimnet::tool {
 namespace {
@@ -61,6 +65,31 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"ping", "B", "-c", "1000", "-i", "0.001"}).pings, 1000u);
   EXPECT_EQ(options({"services", "robot/*"}).target, "robot/*");
   EXPECT_EQ(options({"status"}).command, Command::status);
+}
+
+TEST(CommandLine, NodesMayBeCalledAsCommandsAre) {
+  for (const auto& [word, command] : kCommands) {
+    const std::string name(word);
+    const std::string service = name + "/" + name;
+    EXPECT_EQ(options({"nodes", name.c_str()}).target, name);
+    EXPECT_EQ(options({"--json", "services", name.c_str(), "--hub", "tcp://h:1"}).target, name);
+    EXPECT_EQ(options({"ping", name.c_str(), "-c", "1"}).target, name);
+    EXPECT_EQ(options({"send", name.c_str(), "--name", name.c_str()}).target, name);
+    EXPECT_EQ(options({"recv", "--name", name.c_str()}).name, name);
+    EXPECT_EQ(options({"watch", "-n", "1", name.c_str()}).target, name);
+    EXPECT_EQ(options({"echo", service.c_str()}).target, service);
+    EXPECT_EQ(options({"ctl", "kick", name.c_str()}).ctl.node, name);
+  }
+  EXPECT_EQ(options({"ctl", "kick", "drain"}).ctl.action, CtlAction::kick);
+}
+
+TEST(CommandLine, ASecondCommandIsOneWordTooMany) {
+  EXPECT_NE(refusal({"ping", "B", "status", "-c", "1"}).find("'status' is one word too many for gimnet ping"),
+            std::string::npos);
+  EXPECT_NE(refusal({"--json", "status", "nodes"}).find("'nodes' is one word too many for gimnet status"),
+            std::string::npos);
+  EXPECT_NE(refusal({"ctl", "drain", "reload"}).find("'reload' is one word too many for gimnet ctl drain"),
+            std::string::npos);
 }
 
 TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
