@@ -24,11 +24,15 @@ void write(JsonWriter& json, const Counters& counters) {
   json.end_object();
 }
 
-void write(JsonWriter& json, const Ledger& ledger) {
+void write_parts(JsonWriter& json, const Ledger& ledger) {
   json.begin_object().member("accepted", ledger.accepted).member("copies", ledger.copies);
   json.member("delivered", ledger.delivered)
       .member("dropped", ledger.dropped)
       .member("queued", static_cast<std::int64_t>(ledger.queued));
+}
+
+void write(JsonWriter& json, const Ledger& ledger) {
+  write_parts(json, ledger);
   json.member("exact", ledger.exact()).end_object();
 }
 
@@ -43,7 +47,9 @@ void write(JsonWriter& json, const std::vector<ShardCounts>& shards) {
   for (const ShardCounts& shard : shards) {
     if (shard.shard == ShardCounts::kConductor) continue;  // no shard; the sums have it
     json.begin_object().member("shard", shard.shard);
-    write(json.key("ledger"), ledger_of(shard.counters));
+    // Frames go from one shard to another: only the sum can be exact.
+    write_parts(json.key("ledger"), ledger_of(shard.counters));
+    json.end_object();
     write(json.key("counters"), shard.counters);
     json.end_object();
   }
