@@ -29,6 +29,7 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
   std::string_view best;
   std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string_view candidate : candidates) {
+    if (candidate == word) continue;  // it came in the meantime: what was meant is what was said
     const std::size_t distance = edit_distance(word, candidate);
     if (distance < least) {
       least = distance;

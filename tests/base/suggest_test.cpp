@@ -24,6 +24,12 @@ TEST(DidYouMean, NamesTheNearest) {
   EXPECT_EQ(did_you_mean("--shrads", kWords), "; did you mean --shards?");
 }
 
+TEST(DidYouMean, NeverNamesTheWordItself) {
+  constexpr std::array<std::string_view, 2> kWords{"robot", "robot2"};
+  EXPECT_EQ(did_you_mean("robot", kWords), "; did you mean robot2?");
+  EXPECT_EQ(did_you_mean("robot", std::array<std::string_view, 1>{"robot"}), "");
+}
+
 TEST(DidYouMean, IsSilentWhenNothingIsNear) {
   constexpr std::array<std::string_view, 2> kWords{"--listen", "--limit"};
   EXPECT_EQ(did_you_mean("--colour-scheme", kWords), "");

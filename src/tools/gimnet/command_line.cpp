@@ -55,6 +55,19 @@ CommandLineEnding unknown_command(std::string_view word) {
   return wrong("there is no command '" + std::string(word) + "'" + did_you_mean(word, names), {});
 }
 
+/// A line each: the whole help is longer than a screen.
+CommandLineEnding missing_command(const CLI::App& app) {
+  constexpr std::size_t kColumn = 10;
+  std::string text = "gimnet: the command is missing; these are there:\n";
+  for (const auto& [word, command] : kCommands) {
+    const std::string about = app.get_subcommand(std::string(word))->get_description();
+    text +=
+        "  " + std::string(word) + std::string(kColumn - word.size(), ' ') + about.substr(0, about.find('\n')) + "\n";
+  }
+  text += "`gimnet --help` shows examples and options, `gimnet COMMAND --help` those of one.\n";
+  return {ExitCode::usage, text};
+}
+
 CommandLineEnding unknown_action(std::string_view word) {
   return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" + did_you_mean(word, kCtlActions),
                {"ctl", ""});
@@ -133,6 +146,7 @@ std::string explained(const CLI::ParseError& error, const std::vector<const CLI:
   const std::string& takes = concerned->get_description();
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return name + " is missing: " + takes;
   const auto given = concerned->results();
+  if (given.size() > 1) return name + " is given " + std::to_string(given.size()) + " times: give it once";
   if (given.empty() || given.back().empty()) return name + " needs a value: " + takes;
   return "'" + given.back() + "' is no value for " + name + ": " + takes;
 }
@@ -165,7 +179,7 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   }
   if (called.command == "ctl" && !acts) return missing_action();
   if (!sentence.empty()) return wrong(sentence, called);
-  if (called.command.empty()) return CommandLineEnding{ExitCode::usage, app.help()};
+  if (called.command.empty()) return missing_command(app);
   options.command = known->second;
   if (sentence = contradiction(options); !sentence.empty()) return wrong(sentence, called);
   return options;

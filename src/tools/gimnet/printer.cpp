@@ -78,6 +78,7 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
   }
   if (missed != nullptr) say_all(missed->rest());
   if (!failure.sentence.empty()) return session.fail(failure);
+  watch.look();  // it may have broken and be back since the last look
   return session.finish_stream(bounds, printed);
 }
 

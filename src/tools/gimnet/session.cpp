@@ -1,5 +1,6 @@
 #include "tools/gimnet/session.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -19,7 +20,10 @@ std::optional<ExitCode> Session::join(NodeOptions how) {
   auto joined = Node::join(how);
   if (!joined) {
     Failure failure = joined.failure();
-    if (failure.status == Status::no_hub) failure.sentence += advice();
+    if (failure.status == Status::no_hub) {
+      if (!failure.sentence.ends_with('.')) failure.sentence += '.';
+      failure.sentence += advice();
+    }
     const ExitCode code = fail(failure);
     // Whoever answers there lets nobody in, or is no hub.
     const bool no_hub = failure.status == Status::timeout || failure.status == Status::protocol;
@@ -32,6 +36,7 @@ std::optional<ExitCode> Session::join(NodeOptions how) {
 
 std::optional<Peer> Session::find(std::string_view name) {
   auto peer = node_->find(name);
+  if (peer.is(Status::not_found) && is_listed(name)) peer = node_->find(name);  // it came in between
   if (peer) return *peer;
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
@@ -39,6 +44,11 @@ std::optional<Peer> Session::find(std::string_view name) {
   }
   code_ = fail(failure);
   return std::nullopt;
+}
+
+bool Session::is_listed(std::string_view name) {
+  const auto nodes = node_->nodes("**");
+  return nodes && std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
 }
 
 /// What to do where no hub answers.

@@ -57,6 +57,7 @@ class Session {
 
  private:
   [[nodiscard]] std::string advice() const;
+  [[nodiscard]] bool is_listed(std::string_view name);
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
 
   const Options& options_;

@@ -92,6 +92,22 @@ TEST(CommandLine, ASecondCommandIsOneWordTooMany) {
             std::string::npos);
 }
 
+TEST(CommandLine, SaysThatAnOptionIsGivenTwice) {
+  EXPECT_NE(refusal({"--hub", "tcp://a:1", "nodes", "--hub", "tcp://b:1"}).find("--hub is given 2 times: give it once"),
+            std::string::npos);
+}
+
+TEST(CommandLine, WithoutACommandItSaysThatAndNamesThem) {
+  const std::string text = refusal({});
+  EXPECT_TRUE(text.starts_with("gimnet: the command is missing; these are there:\n")) << text;
+  EXPECT_TRUE(text.ends_with("`gimnet --help` shows examples and options, `gimnet COMMAND --help` those of one.\n"))
+      << text;
+  for (const auto& [word, command] : kCommands) {
+    EXPECT_NE(text.find("\n  " + std::string(word) + " "), std::string::npos) << text;
+  }
+  EXPECT_LE(std::ranges::count(text, '\n'), 20);
+}
+
 TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
   EXPECT_NE(refusal({"sned", "B"}).find("did you mean send?"), std::string::npos);
   EXPECT_NE(refusal({"--hub", "tcp://h:1", "ehco"}).find("did you mean echo?"), std::string::npos);
