@@ -89,6 +89,19 @@ void join_and_leave(benchmark::State& state) {
 }
 BENCHMARK(join_and_leave)->Apply(sizes);
 
+/// A node that is there takes another name, and its own again.
+void register_name(benchmark::State& state) {
+  World& hub = world(state);
+  Session& session = *hub.membership.sessions().find(static_cast<std::uint32_t>(state.range(0)));
+  const std::string own = World::name(static_cast<std::size_t>(state.range(0)) - 1);
+  for (auto _ : state) {
+    static_cast<void>(hub.membership.rename(session, "hall-0/another", milliseconds{0}, hub.effects));
+    static_cast<void>(hub.membership.rename(session, own, milliseconds{0}, hub.effects));
+    hub.note();
+  }
+}
+BENCHMARK(register_name)->Apply(sizes);
+
 void advertise_and_withdraw(benchmark::State& state) {
   World& hub = world(state);
   Services& services = hub.membership.services();
@@ -130,12 +143,13 @@ void list_whole(benchmark::State& state) {
 }
 BENCHMARK(list_whole)->Apply(sizes);
 
-/// A snapshot of all nodes and services; items are records.
-void watch_snapshot(benchmark::State& state) {
+/// A snapshot of the nodes and services that fit.
+void watch_snapshot(benchmark::State& state, const char* pattern) {
   World& hub = world(state);
   for (auto _ : state) {
     proto::ns::Watch wanted;
     wanted.watch = 1;
+    wanted.pattern = pattern;
     static_cast<void>(hub.watches.watch(1, wanted));
     std::size_t frames = 1;
     while (frames != 0) {
@@ -146,9 +160,9 @@ void watch_snapshot(benchmark::State& state) {
     }
     static_cast<void>(hub.watches.unwatch(1, 1));
   }
-  state.SetItemsProcessed(state.iterations() * state.range(0) * 2);
 }
-BENCHMARK(watch_snapshot)->Apply(sizes)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(watch_snapshot, all, "")->Apply(sizes)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(watch_snapshot, one_hall, "hall-3/**")->Apply(sizes)->Unit(benchmark::kMillisecond);
 
 /// A node joins and leaves before 100 watches of which one is about it.
 void tell_100_watches(benchmark::State& state) {

@@ -27,12 +27,15 @@ std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& 
   std::size_t work = request.work;
   for (auto entry = by_name.lower_bound(beginning); entry != by_name.end(); ++entry) {
     if (!entry->first.starts_with(beginning)) break;
-    if (work-- == 0) return std::nullopt;
+    if (work == 0) return std::nullopt;
+    --work;
     if (!request.pattern->matches(entry->first)) continue;
     const std::uint32_t index = wanted(entry->second);
     if (index > request.after) found.push_back(index);
   }
-  return first_of(std::move(found), request.most);
+  Listed listed = first_of(std::move(found), request.most);
+  listed.looked_at = request.work - work;
+  return listed;
 }
 
 /// By id, from where the last piece ended.
@@ -50,29 +53,34 @@ Listed list_by_id(const ById& by_id, const ListingRequest& request, Wanted wante
     if (wanted(entry->second)) listed.indices.push_back(entry->first);
   }
   if (!listed.more) listed.next = 0;
+  listed.looked_at = request.work - work;
   return listed;
 }
 
 }  // namespace
 
-Listed list_nodes(const Membership& membership, const ListingRequest& request) {
+std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request) {
   const auto& sessions = membership.sessions();
-  const auto by_name =
-      list_by_name(membership.directory().names(), request, [&](const Directory::Holder& holder) -> std::uint32_t {
-        return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
-      });
-  if (by_name) return *by_name;
-  return list_by_id(sessions.all(), request, [&](const Session& session) {
+  return list_by_name(membership.directory().names(), request, [&](const Directory::Holder& holder) -> std::uint32_t {
+    return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
+  });
+}
+
+std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request) {
+  return list_by_name(services.by_name(), request,
+                      [](const Topic& topic) -> std::uint32_t { return topic.service ? topic.service->group : 0; });
+}
+
+Listed list_nodes(const Membership& membership, const ListingRequest& request) {
+  if (const auto few = list_few_nodes(membership, request)) return *few;
+  return list_by_id(membership.sessions().all(), request, [&](const Session& session) {
     if (request.connected_only && !session.connected) return false;
     return request.pattern == nullptr || (!session.name.empty() && request.pattern->matches(session.name));
   });
 }
 
 Listed list_services(const Services& services, const ListingRequest& request) {
-  const auto by_name = list_by_name(services.by_name(), request, [](const Topic& topic) -> std::uint32_t {
-    return topic.service ? topic.service->group : 0;
-  });
-  if (by_name) return *by_name;
+  if (const auto few = list_few_services(services, request)) return *few;
   return list_by_id(services.groups(), request, [&](const Topic* topic) {
     return request.pattern == nullptr || request.pattern->matches(topic->full_name);
   });

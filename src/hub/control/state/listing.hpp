@@ -18,7 +18,8 @@ namespace gimnet::hub {
 struct Listed {
   std::vector<std::uint32_t> indices;  ///< ascending; of nodes or groups
   bool more = false;
-  std::uint32_t next = 0;  ///< if there is more: continue after this index
+  std::uint32_t next = 0;     ///< if there is more: continue after this index
+  std::size_t looked_at = 0;  ///< nodes or services
 };
 
 struct ListingRequest {
@@ -31,5 +32,10 @@ struct ListingRequest {
 
 [[nodiscard]] Listed list_nodes(const Membership& membership, const ListingRequest& request);
 [[nodiscard]] Listed list_services(const Services& services, const ListingRequest& request);
+
+/// The same where all whose names begin as the pattern does are few: these alone are looked at, in one piece of work.
+/// Nothing: there is no pattern, it begins with a `*`, or they are more than `work`.
+[[nodiscard]] std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request);
+[[nodiscard]] std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request);
 
 }  // namespace gimnet::hub

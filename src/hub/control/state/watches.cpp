@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/log.hpp"
+#include "hub/control/state/listing.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -14,6 +15,8 @@ namespace ns = proto::ns;
 constexpr std::size_t kQuotedMax = 60;
 /// A page is full at this size; the longest change has about 5 KiB, so that no frame has more than 10.
 constexpr std::size_t kPageBytes = 4 * 1024;
+/// No page has more: the shortest record has more than 32 bytes.
+constexpr std::size_t kPageRecords = kPageBytes / 32;
 /// Of one watch, and of a node's together: what waits for a node that takes nothing leaves room for its answers. One
 /// frame each watch may always have, so that none waits for another.
 constexpr std::size_t kUnderWayMost = 4;
@@ -171,6 +174,7 @@ bool Watches::is_idle(const Watcher& watcher, const Watch& watch) const {
 void Watches::begin(Watch& watch) {
   watch.phase = Phase::nodes;
   watch.cursor = 0;
+  watch.few = true;
   watch.seen = watch.told = journal_.version();
 }
 
@@ -207,35 +211,72 @@ void Watches::add_changes(Watch& watch, Page& page, Turn& turn) const {
 }
 
 void Watches::add_nodes(Watch& watch, Page& page, Turn& turn) const {
+  if ((watch.subjects & ns::kWatchNodes) == 0) return next_phase(watch);
+  if (add_few(watch, page, turn)) return;
   const auto& all = turn.membership.sessions().all();
-  auto entry = (watch.subjects & ns::kWatchNodes) != 0 ? all.upper_bound(watch.cursor) : all.end();
+  auto entry = all.upper_bound(watch.cursor);
   for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
     watch.cursor = entry->first;
-    if (!fits(watch, entry->second.name)) continue;
-    ns::Change change;
-    change.kind = ns::ChangeKind::present;
-    change.version = journal_.version();
-    change.node = record_of(hub_, entry->second, turn.membership.services(), turn.now);
-    add(change, page);
+    if (fits(watch, entry->second.name)) add_node(entry->second, page, turn);
   }
-  if (entry != all.end()) return;
-  watch.phase = Phase::services;
-  watch.cursor = 0;
+  if (entry == all.end()) next_phase(watch);
 }
 
 void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
+  if ((watch.subjects & ns::kWatchServices) == 0) return next_phase(watch);
+  if (add_few(watch, page, turn)) return;
   const auto& all = turn.membership.services().groups();
-  auto entry = (watch.subjects & ns::kWatchServices) != 0 ? all.upper_bound(watch.cursor) : all.end();
+  auto entry = all.upper_bound(watch.cursor);
   for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
     watch.cursor = entry->first;
-    if (!fits(watch, entry->second->full_name)) continue;
-    ns::Change change;
-    change.kind = ns::ChangeKind::present;
-    change.version = journal_.version();
-    change.service = record_of(hub_, *entry->second);
-    add(change, page);
+    if (fits(watch, entry->second->full_name)) add_service(*entry->second, page);
   }
-  if (entry == all.end()) watch.phase = Phase::end;
+  if (entry == all.end()) next_phase(watch);
+}
+
+bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
+  if (!watch.few || !watch.pattern) return false;
+  if (page.full || turn.work == 0) return true;  // at another time
+  const bool of_nodes = watch.phase == Phase::nodes;
+  const ListingRequest request{&*watch.pattern, watch.cursor, false, kPageRecords, limits_.scan_records};
+  const std::optional<Listed> listed =
+      of_nodes ? list_few_nodes(turn.membership, request) : list_few_services(turn.membership.services(), request);
+  watch.few = listed.has_value();
+  if (!listed) return false;
+  turn.work -= std::min(turn.work, listed->looked_at);
+  for (const std::uint32_t index : listed->indices) {
+    if (page.full) return true;
+    watch.cursor = index;
+    if (of_nodes) {
+      add_node(*turn.membership.sessions().find(index), page, turn);
+    } else {
+      add_service(*turn.membership.services().find_group(index), page);
+    }
+  }
+  if (!listed->more) next_phase(watch);
+  return true;
+}
+
+void Watches::next_phase(Watch& watch) {
+  watch.phase = watch.phase == Phase::nodes ? Phase::services : Phase::end;
+  watch.cursor = 0;
+  watch.few = true;
+}
+
+void Watches::add_node(const Session& session, Page& page, const Turn& turn) const {
+  ns::Change change;
+  change.kind = ns::ChangeKind::present;
+  change.version = journal_.version();
+  change.node = record_of(hub_, session, turn.membership.services(), turn.now);
+  add(change, page);
+}
+
+void Watches::add_service(const Topic& topic, Page& page) const {
+  ns::Change change;
+  change.kind = ns::ChangeKind::present;
+  change.version = journal_.version();
+  change.service = record_of(hub_, topic);
+  add(change, page);
 }
 
 void Watches::add_mark(ns::ChangeKind kind, Page& page) const {

@@ -53,6 +53,7 @@ class Watches {
     std::optional<proto::Pattern> pattern;  ///< nothing: all
     Phase phase = Phase::begin;
     std::uint32_t cursor = 0;   ///< index of the last node or group that the snapshot looked at
+    bool few = true;            ///< may what the snapshot is about be found by name?
     std::uint64_t seen = 0;     ///< version up to which changes were looked at
     std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
     std::uint64_t told = 0;     ///< version of the last events
@@ -81,6 +82,12 @@ class Watches {
   void add_changes(Watch& watch, Page& page, Turn& turn) const;
   void add_nodes(Watch& watch, Page& page, Turn& turn) const;
   void add_services(Watch& watch, Page& page, Turn& turn) const;
+  /// By name, where those whose names begin as the pattern does are few. False: they are not, and nothing was added.
+  [[nodiscard]] bool add_few(Watch& watch, Page& page, Turn& turn) const;
+  void add_node(const Session& session, Page& page, const Turn& turn) const;
+  void add_service(const Topic& topic, Page& page) const;
+  /// What the snapshot is about next, behind the nodes or the services.
+  static void next_phase(Watch& watch);
   void add_mark(proto::ns::ChangeKind kind, Page& page) const;
   void add(const proto::ns::Change& change, Page& page) const;
   [[nodiscard]] proto::Payload finish(Watch& watch, Page page) const;

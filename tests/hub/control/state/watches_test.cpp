@@ -345,11 +345,39 @@ TEST_F(WatchesTest, OneServingIsABoundedPieceOfWork) {
   limits.scan_records = 64;
   Session& viewer = join("viewer");
   for (int i = 0; i < 1'000; ++i) join("robot-" + std::to_string(i));
-  ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "nobody/*"}), Status::done);
+  ASSERT_EQ(watch(viewer, {.watch = 1,
+                           .pattern = "*"
+                                      "/nobody"}),
+            Status::done);
   int pieces = 1;
   const auto send = [](std::uint32_t, const proto::Payload&) {};
   while (watches.serve(membership, now, send)) ++pieces;
   EXPECT_GE(pieces, 1'000 / 64);
+}
+
+TEST_F(WatchesTest, FewThatBeginAsThePatternDoesAreNotLookedForAmongAll) {
+  limits.scan_records = 64;
+  Session& viewer = join("viewer");
+  for (int i = 0; i < 1'000; ++i) join("yard/robot-" + std::to_string(i));
+  for (int i = 0; i < 60; ++i) advertise(join("hall/robot-" + std::to_string(i)), "odom");
+  std::map<ChangeKind, int> told;
+  ASSERT_EQ(watch(viewer, {.watch = 1,
+                           .pattern = "hall/"
+                                      "**"}),
+            Status::done);
+  int pieces = 0;
+  for (; told[ChangeKind::end] == 0 && pieces < 1'000; ++pieces) {
+    static_cast<void>(watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
+      const auto events = proto::decode<ns::WatchEvents>(payload);
+      ASSERT_TRUE(events);
+      for (const Change& change : events->changes) ++told[change.kind];
+    }));
+    watches.taken(viewer.index, {1, 4});
+  }
+  EXPECT_EQ(told[ChangeKind::begin], 1);
+  EXPECT_EQ(told[ChangeKind::present], 120);
+  EXPECT_EQ(told[ChangeKind::end], 1);
+  EXPECT_LT(pieces, 1'000 / 64) << "all nodes would take more";
 }
 
 }  // namespace
