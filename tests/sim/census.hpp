@@ -58,6 +58,7 @@ enum class Happening : std::uint8_t {
   name_registered,
   name_unregistered,
   watch_snapshot,
+  watch_snapshot_by_pattern,
   watch_change,
   watch_began_again,
   watch_went_on,

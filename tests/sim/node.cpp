@@ -15,6 +15,8 @@ constexpr Time kQuietEnd = 2s;
 constexpr Time kLastDial = 1s;
 /// After the faults nodes act so many times as slowly.
 constexpr std::uint64_t kCalm = 4;
+/// Among which names are spread.
+constexpr std::uint64_t kHalls = 8;
 /// One node in so many administers the hub; of the others' acts so many thousandths are tries to.
 constexpr std::uint32_t kAdministrators = 20;
 constexpr std::uint64_t kTries = 5;
@@ -34,7 +36,24 @@ SimNode::SimNode(const Around& around, std::uint32_t number) : around_(around), 
 }
 
 std::string SimNode::some_name() {
-  return "robot/" + std::to_string(around_.setting.random.below(around_.setting.plan.names));
+  const std::uint64_t number = around_.setting.random.below(around_.setting.plan.names);
+  return "hall-" + std::to_string(number % kHalls) + "/robot-" + std::to_string(number);
+}
+
+/// Of names, or of the full names of services in it.
+std::string SimNode::some_pattern(bool of_services) {
+  Random& random = around_.setting.random;
+  const std::string hall = "hall-" + std::to_string(random.below(kHalls));
+  switch (random.below(4)) {
+    case 0:
+      return {};
+    case 1:
+      return hall + (of_services ? "/*/s1" : "/*");
+    case 2:
+      return hall + "/**";
+    default:
+      return of_services ? "**/s1" : "*/robot-1";
+  }
 }
 
 bool SimNode::faulty() const { return around_.setting.agenda.now() < around_.setting.plan.faults_until; }
@@ -160,7 +179,7 @@ void SimNode::misbehave() {
   } else if (how == 2) {
     send(Kind::route, 0, proto::encode(ns::Resolve{"x"}, 1));
   } else {
-    for (std::uint64_t i = 0; i < setting.plan.limits.requests + 8; ++i) ask(ns::Resolve{"robot/0"}, {});
+    for (std::uint64_t i = 0; i < setting.plan.limits.requests + 8; ++i) ask(ns::Resolve{"hall-0/robot-0"}, {});
   }
 }
 
@@ -303,7 +322,8 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
     links_.erase(wire->number);
     give_up_others();
     links_[wire->number] = std::move(kept);
-    forgot_ = false;
+    // With a token it may be the same session under another id, with all that it had subscribed to.
+    if (token_.empty()) forgot_ = false;
   }
   token_ = welcome.token;
   id_ = welcome.node;

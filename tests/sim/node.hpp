@@ -119,6 +119,7 @@ class SimNode {
   void on_data(const Link& from, const proto::FrameHeader& header);
   void learn(NodeId node);
   [[nodiscard]] std::string some_name();
+  [[nodiscard]] std::string some_pattern(bool of_services);
 
   const Around around_;
   const std::uint32_t number_;

@@ -36,6 +36,8 @@ void SimNode::flood() {
 }
 
 void SimNode::watch() {
+  Random& random = around_.setting.random;
+  if (!wants_watch_) view_ = {some_pattern(random.chance(500)), static_cast<std::uint8_t>(random.between(1, 3))};
   wants_watch_ = true;
   ask(view_.request(kWatch), {});
 }

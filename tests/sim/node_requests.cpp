@@ -48,14 +48,14 @@ void SimNode::ask_about_names(std::uint64_t choice) {
   if (choice < 13 && !known_.empty()) return ask(ns::Reverse{random.pick(known_)}, {});
   if (choice < 17) {
     ns::List list;
-    list.pattern = random.chance(500) ? "" : "robot/*";
+    list.pattern = some_pattern(false);
     list.records_max = static_cast<std::uint32_t>(random.between(1, 50));
     if (!known_.empty() && random.chance(500)) list.after = random.pick(known_);
     return ask(list, {});
   }
   if (choice < 20) {
     ns::Services list;
-    list.pattern = random.chance(500) ? "" : "robot/*/s1";
+    list.pattern = some_pattern(true);
     list.records_max = static_cast<std::uint32_t>(random.between(1, 50));
     return ask(list, {});
   }

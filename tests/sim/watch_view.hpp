@@ -9,9 +9,14 @@
 
 namespace gimnet::sim {
 
-/// What a node knows of all nodes and services by watching them. Thread safety: none. Errors: Broken.
+/// What a node knows of nodes and services by watching them, all or those that fit a pattern. Thread safety: none.
+/// Errors: Broken.
 class WatchView {
  public:
+  WatchView() = default;
+  /// `pattern`: "" for all. `subjects` as in WATCH.
+  WatchView(std::string pattern, std::uint8_t subjects) : pattern_(std::move(pattern)), subjects_(subjects) {}
+
   /// The node asked to be told everything from here on.
   [[nodiscard]] proto::ns::Watch request(std::uint32_t number) const;
   /// The answer came: with a snapshot, or the hub goes on where this view is.
@@ -22,6 +27,12 @@ class WatchView {
 
  private:
   void take_one(const proto::ns::Change& change, Census& census);
+  void require_nodes(const Model& model) const;
+  void require_services(const Model& model) const;
+  [[nodiscard]] bool fits(const std::string& name) const;
+
+  std::string pattern_;
+  std::uint8_t subjects_ = proto::ns::kWatchAll;
 
   std::uint64_t epoch_ = 0;
   std::uint64_t version_ = 0;
