@@ -67,8 +67,13 @@ class Column {
   int row_;
 };
 
-std::string_view driver_text(const Monitor& monitor, const ScreenState& state) {
-  if (monitor.info() && monitor.info()->is_log()) return monitor.info()->ended ? "log has ended" : "recorded";
+std::string driver_text(const Monitor& monitor, const ScreenState& state) {
+  if (monitor.info() && monitor.info()->is_log()) {
+    const RobotInfo& info = *monitor.info();
+    if (!info.ended) return "recorded";
+    // It also ends because the time is up, or the user quits.
+    return info.played_s < info.duration_s ? fmt::format("stopped after {:.0f} s", info.played_s) : "log has ended";
+  }
   return state.autopilot ? "autopilot" : "driven by you";
 }
 

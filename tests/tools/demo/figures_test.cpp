@@ -37,6 +37,22 @@ TEST(Figures, SayWhoDrives) {
   EXPECT_THAT(panel(busy_monitor(), state, 22), HasSubstr("autopilot"));
 }
 
+TEST(Figures, TellALogThatHasEndedFromOneThatWasStopped) {
+  Monitor monitor = busy_monitor();
+  RobotInfo info;
+  info.source = "a.log";
+  info.duration_s = 879.0;
+  info.played_s = 10.2;
+  monitor.take(info, 0);
+  EXPECT_THAT(panel(monitor, at_one_second(), 22), HasSubstr("recorded"));
+  info.ended = true;
+  monitor.take(info, 0);
+  EXPECT_THAT(panel(monitor, at_one_second(), 22), HasSubstr("stopped after 10 s"));
+  info.played_s = info.duration_s;
+  monitor.take(info, 0);
+  EXPECT_THAT(panel(monitor, at_one_second(), 22), HasSubstr("log has ended"));
+}
+
 TEST(Figures, ShowDropsAndAnOpenLedger) {
   Monitor monitor = busy_monitor();
   HubCounters counters;
