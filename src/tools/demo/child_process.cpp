@@ -148,8 +148,8 @@ std::optional<int> ChildProcess::wait(std::int64_t wait_ns) {
   return status_;
 }
 
-std::optional<Error> ChildProcess::ended() {
-  if (!wait(0)) return std::nullopt;
+std::optional<Error> ChildProcess::ended(std::int64_t wait_ns) {
+  if (!wait(wait_ns)) return std::nullopt;
   if (*status_ >= 128) {
     return Error{fmt::format("{} was ended by signal {} ({}); its last words: {}", command_.title, *status_ - 128,
                              ::strsignal(*status_ - 128), last_words())};

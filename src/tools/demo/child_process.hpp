@@ -39,8 +39,8 @@ class ChildProcess {
   /// One line of its standard output, without the end. Errors: none within `wait_ns`, or it ended; with its last words.
   [[nodiscard]] Result<std::string> read_line(std::int64_t wait_ns);
 
-  /// Why it ended, with its last words, if it did by itself; does not wait.
-  [[nodiscard]] std::optional<Error> ended();
+  /// Why it ended, with its last words, if it did by itself; waits for that at most so long.
+  [[nodiscard]] std::optional<Error> ended(std::int64_t wait_ns = 0);
 
   /// Asks it to end (SIGTERM), waits, and kills it if need be. Harmless where it has ended.
   void end();

@@ -73,8 +73,8 @@ Result<OwnNetwork> OwnNetwork::start(const Options& options, const std::string& 
   return network;
 }
 
-std::optional<Error> OwnNetwork::trouble() {
-  if (std::optional<Error> error = hub_.ended()) return error;
+std::optional<Error> OwnNetwork::trouble(std::int64_t wait_ns) {
+  if (std::optional<Error> error = hub_.ended(wait_ns)) return error;
   return robot_ ? robot_->ended() : std::nullopt;
 }
 

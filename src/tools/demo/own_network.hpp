@@ -21,8 +21,8 @@ class OwnNetwork {
   /// Where the viewer connects: the TCP address.
   [[nodiscard]] const std::string& hub_url() const { return hub_url_; }
 
-  /// What happened to hub or robot, if one of them ended by itself.
-  [[nodiscard]] std::optional<Error> trouble();
+  /// What happened to hub or robot, if one of them ended by itself; waits for the hub's end at most so long.
+  [[nodiscard]] std::optional<Error> trouble(std::int64_t wait_ns = 0);
 
  private:
   OwnNetwork(TemporaryFolder folder, ChildProcess hub) : folder_(std::move(folder)), hub_(std::move(hub)) {}

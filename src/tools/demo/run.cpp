@@ -116,7 +116,7 @@ ExitCode run_viewer(const Options& options) {
     }
     network.emplace(std::move(*started));
     viewing.hub_url = network->hub_url();
-    viewing.trouble = [&network] { return network->trouble(); };
+    viewing.trouble = [&network](std::int64_t wait_ns) { return network->trouble(wait_ns); };
   }
   Result<std::unique_ptr<NodePort>> port = connect_viewer({viewing.hub_url, options.robot});
   if (!port) {
@@ -134,10 +134,8 @@ ExitCode run_viewer(const Options& options) {
   Viewer viewer(**port, terminal.get(), std::move(viewing));
   const std::optional<Error> error = viewer.run();
   terminal.reset();
-  if (error) {
-    complain(*error);
-    return ExitCode::kLost;
-  }
+  if (error) complain(*error);
+  if (error && !viewer.monitor().info()) return ExitCode::kLost;
   print_summary(viewer, style, interactive);
   return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood : ExitCode::kLost;
 }

@@ -42,7 +42,8 @@ std::string rate(std::uint64_t count, double seconds) {
 
 std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecord& run) {
   std::vector<std::string> complaints;
-  if (!monitor.info()) return {"the robot was never heard; did its process start?"};
+  if (!run.broken.empty()) complaints.push_back(run.broken);
+  if (!monitor.info()) return {run.broken.empty() ? "the robot was never heard; did its process start?" : run.broken};
   const RobotInfo& info = *monitor.info();
   const auto stream = [&](std::string_view name, const StreamRecord& record, std::uint64_t sent) {
     if (record.missed != 0) complaints.push_back(fmt::format("{}: {} messages were missed", name, record.missed));

@@ -20,6 +20,8 @@ struct RunRecord {
   bool finished = false;
   /// Nobody else uses the hub: what it dropped was lost by this run.
   bool own_hub = true;
+  /// Why it ended before its time; "" if it did not.
+  std::string broken;
 };
 
 /// Everything that went wrong, a sentence each; empty: nothing was lost. Messages are counted at both ends, drops by

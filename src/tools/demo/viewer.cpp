@@ -129,7 +129,7 @@ std::optional<Error> Viewer::step(std::int64_t wait_ns) {
   }
   draw(now_ns);
   report_progress(now_ns);
-  return options_.trouble ? options_.trouble() : std::nullopt;
+  return options_.trouble ? options_.trouble(0) : std::nullopt;
 }
 
 bool Viewer::time_is_over() const {
@@ -140,6 +140,16 @@ bool Viewer::time_is_over() const {
 }
 
 std::optional<Error> Viewer::run() {
+  std::optional<Error> error = watch();
+  if (!error) return std::nullopt;
+  if (ended_ns_ == 0) ended_ns_ = port_.now_ns();
+  // The connection notices the end of a process before the process is seen to end, and knows less.
+  if (std::optional<Error> why = options_.trouble ? options_.trouble(kWhy_ns) : std::nullopt) error = why;
+  broken_ = error->sentence;
+  return error;
+}
+
+std::optional<Error> Viewer::watch() {
   const std::int64_t start_ns = steady_now_ns();
   while (!quit_ && stop_signal() == 0 && !time_is_over()) {
     if (std::optional<Error> error = step(kWait_ns)) return error;
@@ -183,7 +193,7 @@ std::optional<Error> Viewer::finish() {
 RunRecord Viewer::record() const {
   const std::int64_t end_ns = ended_ns_ != 0 ? ended_ns_ : port_.now_ns();
   const double seconds = first_heard_ns_ == 0 ? 0.0 : static_cast<double>(end_ns - first_heard_ns_) * 1e-9;
-  return {options_.hub_url, seconds, commands_, driver_.corners_reached(), finished_, options_.own_robot};
+  return {options_.hub_url, seconds, commands_, driver_.corners_reached(), finished_, options_.own_robot, broken_};
 }
 
 std::string Viewer::last_picture(Extent extent) const {

@@ -26,8 +26,8 @@ struct ViewerOptions {
   bool own_robot = true;
   std::string hub_url;
   TerminalStyle style;
-  /// Answers what happened to the other processes; may be empty.
-  std::function<std::optional<Error>()> trouble;
+  /// Answers what happened to the other processes, and waits for it at most so long; may be empty.
+  std::function<std::optional<Error>(std::int64_t wait_ns)> trouble;
   /// Takes a line now and then where there is no terminal; may be empty.
   std::function<void(const std::string&)> on_progress;
 };
@@ -40,6 +40,8 @@ class Viewer {
   static constexpr std::int64_t kCountersPeriod_ns = 1'000'000'000;
   /// How long the last messages may take.
   static constexpr std::int64_t kFinish_ns = 3'000'000'000;
+  /// How long a broken connection waits to be explained by the end of a process.
+  static constexpr std::int64_t kWhy_ns = 10'000'000'000;
   /// How long the robot may take to be heard for the first time.
   static constexpr std::int64_t kFirstSign_ns = 15'000'000'000;
 
@@ -56,6 +58,7 @@ class Viewer {
 
  private:
   [[nodiscard]] std::optional<Error> step(std::int64_t wait_ns);
+  [[nodiscard]] std::optional<Error> watch();
   [[nodiscard]] std::optional<Error> finish();
   [[nodiscard]] bool time_is_over() const;
   [[nodiscard]] bool everything_arrived() const;
@@ -77,6 +80,7 @@ class Viewer {
   bool help_ = false;
   bool quit_ = false;
   bool finished_ = false;
+  std::string broken_;
   std::int64_t first_heard_ns_ = 0;
   std::int64_t ended_ns_ = 0;
   std::int64_t next_frame_ns_ = 0;

@@ -125,6 +125,23 @@ TEST_F(RunTest, ClosesDownWhereNobodyReadsAnyMore) {
   EXPECT_EQ(files_left(), 1);
 }
 
+TEST_F(RunTest, SaysThatTheHubEndedAndWhatWasHeardBefore) {
+  Result<ChildProcess> demo = start({"--seconds", "86400"});
+  ASSERT_TRUE(demo);
+  while (said().find("odom") == std::string::npos) ASSERT_FALSE(demo->ended());
+  // Its first child is the hub.
+  const std::string id = std::to_string(demo->id());
+  std::ifstream children("/proc/" + id + "/task/" + id + "/children");
+  pid_t hub = 0;
+  ASSERT_TRUE(children >> hub);
+  ASSERT_EQ(::kill(hub, SIGKILL), 0);
+  const Outcome outcome = ended(*demo);
+  EXPECT_NE(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("the hub was ended by signal 9"));
+  EXPECT_THAT(outcome.out, HasSubstr("simulation for "));
+  EXPECT_THAT(outcome.out, HasSubstr("Not as it should be:"));
+}
+
 TEST_F(RunTest, BadArgumentsAreExplained) {
   const Outcome outcome = run({"--sceonds", "2"});
   EXPECT_EQ(outcome.status, 2);

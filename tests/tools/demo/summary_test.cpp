@@ -38,7 +38,7 @@ Monitor heard(std::uint64_t received, std::uint64_t sent) {
   return monitor;
 }
 
-RunRecord run() { return {"tcp://127.0.0.1:1", 2.0, 5, 1, true}; }
+RunRecord run() { return {"tcp://127.0.0.1:1", 2.0, 5, 1, true, true, ""}; }
 
 TEST(Summary, IsContentWhereEverythingArrived) {
   EXPECT_THAT(complaints_about(heard(80, 80), run()), IsEmpty());
@@ -99,6 +99,14 @@ TEST(Summary, TheLedgerMustAddUp) {
   counters.add("accepted", 1);
   monitor.take(counters);
   EXPECT_THAT(complaints_about(monitor, run()), Contains(HasSubstr("ledger does not add up")));
+}
+
+TEST(Summary, SaysWhyARunWasBroken) {
+  RunRecord broken = run();
+  broken.finished = false;
+  broken.broken = "the hub was ended by signal 9";
+  EXPECT_THAT(complaints_about(heard(80, 80), broken), testing::ElementsAre("the hub was ended by signal 9"));
+  EXPECT_THAT(complaints_about(Monitor(0), broken), testing::ElementsAre("the hub was ended by signal 9"));
 }
 
 TEST(Summary, SilenceIsALoss) {

@@ -61,11 +61,27 @@ TEST_F(ViewerTest, ReportsProgressAndPaints) {
 }
 
 TEST_F(ViewerTest, EndsWhenAnotherProcessIsInTrouble) {
-  options_.trouble = [] { return std::optional(Error{"the hub ended"}); };
+  options_.trouble = [](std::int64_t) { return std::optional(Error{"the hub ended"}); };
   Viewer viewer(network_.viewer, nullptr, options_);
   const std::optional<Error> error = viewer.run();
   ASSERT_TRUE(error);
   EXPECT_EQ(error->sentence, "the hub ended");
+}
+
+TEST_F(ViewerTest, ABrokenConnectionIsExplainedByTheEndOfAProcess) {
+  // The process is not seen to have ended when the connection breaks, only a moment later.
+  options_.trouble = [](std::int64_t wait_ns) {
+    return wait_ns > 0 ? std::optional(Error{"the hub was ended by signal 9"}) : std::nullopt;
+  };
+  options_.on_progress = [this](const std::string&) { network_.broken = Error{"cannot send to 1.1"}; };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  network_.viewer.when_idle = [this] { static_cast<void>(robot_.step()); };
+  const std::optional<Error> error = viewer.run();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->sentence, "the hub was ended by signal 9");
+  EXPECT_GT(viewer.monitor().odometry_stream().received, 0U) << "what was heard before";
+  const std::string summary = summary_text(viewer.monitor(), viewer.record(), true);
+  EXPECT_THAT(summary, HasSubstr("Not as it should be:\n  the hub was ended by signal 9"));
 }
 
 TEST_F(ViewerTest, WithoutAUserItEndsWithTheLog) {
