@@ -155,7 +155,7 @@ CASES = {
     ),
     rules.no_machine_paths: (
         [{"docs/a.md": "perf/work/a and the network/root/a\n"}],
-        [{"docs/a.md": "see /work/a\n"}, {"src/a.cpp": '"/root/a"\n'}, {"README.md": "cd /tmp/wt\n"}, {"dev": "cd /home/me/\n"}],
+        [{"docs/a.md": "see /work/a\n"}, {"src/a.cpp": '"/root/a"\n'}, {"dev": "cd /home/me/\n"}],
     ),
     rules.nothing_left_for_later: (
         [{"src/a.cpp": "int todos;\n"}],
