@@ -73,8 +73,7 @@ TEST(Requests, AnswersThatAreNeverTakenAreCapped) {
     silent[0].flush();
     ++asked;
     static_cast<void>(wait_for(
-        observer,
-        [&](const Statistics& now) { return now["too_many_requests"] != 0 || now["names.list"] >= asked; },
+        observer, [&](const Statistics& now) { return now["too_many_requests"] != 0 || now["names.list"] >= asked; },
         "the hub's answer"));
   }
   EXPECT_GT(asked, 1u);

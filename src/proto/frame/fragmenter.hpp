@@ -17,7 +17,8 @@ inline constexpr std::uint32_t kFragmentPayload = 32 * 1024;
 inline constexpr std::uint32_t kUncutMessageMax = 8 * 1024;
 /// A larger message has a fragment header, even if it travels as one frame, so that a hub may cut it finer.
 inline constexpr std::uint32_t kPlainMessageMax = 4 * 1024;
-/// Largest message of the protocol: 1 GiB of an application's data, and room for the headers that a library puts before.
+/// Largest message of the protocol: 1 GiB of an application's data, and room for the headers that a library puts
+/// before.
 inline constexpr std::uint32_t kMessageBytesMax = (std::uint32_t{1} << 30) + 64 * 1024;
 
 /// True for messages over 4 KiB.

@@ -178,8 +178,7 @@ TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, robot_.id}).status, Status::taken);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(HubId{8}, 5)}).status, Status::bad_request);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 0)}).status, Status::bad_request);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex)}).status,
-            Status::bad_request);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex)}).status, Status::bad_request);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{admin_.id, make_id<NodeId>(kHub, 9)}).status, Status::bad_request);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{make_id<NodeId>(kHub, 50), make_id<NodeId>(kHub, 51)}).status,
             Status::not_found);
@@ -240,8 +239,8 @@ TEST_F(AdministerTest, ReloadSwapsLimitsHereAndOnEveryShard) {
   };
   const auto answer = request(admin_, ctrl::Reload{});
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->changes, (std::vector<ctrl::ChangeRecord>{{"limits.page_records", "256", "7", false},
-                                                              {"shards", "2", "3", true}}));
+  EXPECT_EQ(answer->changes,
+            (std::vector<ctrl::ChangeRecord>{{"limits.page_records", "256", "7", false}, {"shards", "2", "3", true}}));
   EXPECT_EQ(limits.page_records, 7u);
   ASSERT_THAT(shards.all<LimitsCommand>(), SizeIs(2));
   EXPECT_EQ(shards.all<LimitsCommand>()[1]->limits.page_records, 7u);
