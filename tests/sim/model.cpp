@@ -139,6 +139,7 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   past_.tokens[attach.welcome.token] = {index, session.token_number, session.name, session.identity,
                                         session.token_expiry};
   session.connected = true;
+  session.renumbered = false;
   ++session.attachment;
   require(attach.welcome.node == attach.node && attach.welcome.name == session.name, Checker::names,
           "WELCOME says another id or name than the session has");

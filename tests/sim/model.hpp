@@ -84,6 +84,7 @@ class Model final : public Witness {
     Allowance oddities;
     proto::Role role{};
     bool connected = false;
+    bool renumbered = false;  ///< and not welcomed since
     std::uint32_t attachment = 0;
     std::string name;
     std::string description;

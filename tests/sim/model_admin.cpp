@@ -83,7 +83,8 @@ void Model::judge_reassign(const Asked& asked) {
   const bool legal = (owner == hub_ || owner == kOwnHub) && to != kHubIndex && to < kEveryIndex;
   if (index == asked.index || !legal) return require_status(asked, Status::bad_request, Checker::answers);
   const auto resting = resting_ids_.find(to);
-  if (sessions_.contains(to) || (resting != resting_ids_.end() && resting->second > asked.now)) {
+  const bool rests = resting != resting_ids_.end() && resting->second > asked.now;
+  if (sessions_.contains(to) || rests || sessions_.at(index).renumbered) {
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);
   }
@@ -101,6 +102,7 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
   node.key() = to;
   Session& session = sessions_.insert(std::move(node)).position->second;
   moved_[index] = {to, session.token_number};
+  session.renumbered = true;
   session.token_number = ++past_.token_numbers;
   least_[to] = std::max(least_[to], session.token_number);
   session.watches.clear();

@@ -119,6 +119,7 @@ std::uint64_t Reference::came(const Stranger& who, const ControlHub& hub,
   session.token_expiry = hub.wall() + milliseconds{limits_.token_ms};
   session.watches.clear();
   session.connected = true;
+  session.renumbered = false;
   FUZZ_MUST(attach.attachment == ++session.attachment);
   const proto::Welcome& welcome = attach.welcome;
   FUZZ_MUST(welcome.node == attach.node && welcome.name == session.name && !welcome.name_provisional);

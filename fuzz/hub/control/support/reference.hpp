@@ -31,6 +31,7 @@ class Reference {
     std::uint64_t number = 0;  ///< in its tokens
     Seat seat;
     bool connected = false;
+    bool renumbered = false;  ///< and not welcomed since
     std::uint32_t attachment = 0;
     proto::Role role{};
     std::string name;

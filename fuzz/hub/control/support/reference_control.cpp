@@ -206,7 +206,8 @@ void Reference::on_reassign(const Asked& asked) {
   const std::optional<std::uint32_t> target = own_index(wanted->new_node);
   const bool legal = target && id != asked.id && *target != kHubIndex && *target < kEveryIndex;
   if (!legal) return require_status(asked.answer, Status::bad_request);
-  const bool free = !by_index_.contains(*target) && is_free(resting_nodes_, *target, asked.hub.now);
+  const bool free =
+      !by_index_.contains(*target) && is_free(resting_nodes_, *target, asked.hub.now) && !sessions_.at(id).renumbered;
   require_status(asked.answer, free ? Status::done : Status::taken);
   if (free) renumber(id, *target, asked.hub.now);
 }
@@ -223,6 +224,7 @@ void Reference::renumber(std::uint64_t id, std::uint32_t index, milliseconds now
   resting_nodes_.erase(index);
   nodes_given_.insert(index);
   session.index = index;
+  session.renumbered = true;
   session.number = ++numbers_;
   session.watches.clear();
   least_[index] = std::max(least_[index], session.number);

@@ -141,6 +141,11 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
     return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to 1048574"};
   }
   const std::uint32_t former = session.index;
+  // Messages for an id that the node never learned of would wait for it, and it would take none of them.
+  if (session.renumbered) {
+    return Failure{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
+                                             " and has not come back under it yet; try again when it has"};
+  }
   if (!sessions_.renumber(session, index, now)) {
     const Session* holder = sessions_.find(index);
     const std::string id = to_string(make_id<NodeId>(hub_of(sessions_.node_id(session)), index));

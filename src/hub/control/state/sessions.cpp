@@ -115,6 +115,7 @@ void Sessions::remember_kicked(const Session& session) {
 void Sessions::attach(Session& session, milliseconds now) {
   if (!session.connected) ++connected_;
   session.connected = true;
+  session.renumbered = false;
   session.connected_at = now;
   ++session.attachment;
 }
@@ -145,6 +146,7 @@ bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now)
   node.key() = index;
   sessions_.insert(std::move(node));
   session.index = index;
+  session.renumbered = true;
   // Not older than any that had this index before.
   session.number = ++last_number_;
   floor_.raise(index, session.number);

@@ -48,8 +48,9 @@ struct Session {
   Place place;
   proto::Role role{};
   bool connected = false;
-  bool came_back = false;  ///< with a token, to this hub or to this hub before its restart
-  CompactText name;        ///< "" for a node without one
+  bool renumbered = false;  ///< since its latest connection was admitted: no WELCOME has told it its id yet
+  bool came_back = false;   ///< with a token, to this hub or to this hub before its restart
+  CompactText name;         ///< "" for a node without one
   CompactText description;
   CompactText identity;                      ///< who its peer is; nobody else can claim it
   CompactText token_name;                    ///< for which its latest token was written

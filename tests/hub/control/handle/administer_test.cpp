@@ -186,6 +186,11 @@ TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
   // The former id rests; a node can be named by it all the same.
   const Node other = join("other");
   EXPECT_EQ(refused(admin_, ctrl::Reassign{other.id, robot_.id}).status, Status::taken);
+  // Another id is for a node that knows the one that it has.
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status, Status::taken);
+  detach(robot_, false, proto::GoodbyeCode::renumbered);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status, Status::taken);
+  static_cast<void>(rejoin(robot_, "robot"));
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}));
   EXPECT_TRUE(nodes.find(500).exists());
 }
