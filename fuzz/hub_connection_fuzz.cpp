@@ -226,7 +226,9 @@ class PacedWorld final : public fuzzing::ShardWorld {
     begin_pace();
     for (int i = 0; i < 3; ++i) publish(0);
     settle(true);
-    FUZZ_MUST(counts_.ended() - before == 1);
+    // The first may count as one that was due before, up to one interval: then the next follows at once.
+    const std::uint64_t came = counts_.ended() - before;
+    FUZZ_MUST(came == 1 || came == 2);
     terms_.interval_us = 0;
     begin_pace();
   }
