@@ -50,7 +50,7 @@ class Provider:
     """Publishes numbered messages of a service, one when it is told to."""
 
     def __init__(self, test, hub, delivery, window=None, retain=False):
-        self.client = Client(test, hub).join("A")
+        self.client = Client(test, hub).join("A", shard=0)
         self.group = advertise(self.client, "B", delivery, window, retain)[3]
         self.flags = FLAG_KEYED | (LATEST if delivery == LATEST_DELIVERY else 0)
         self.sequence = 0
@@ -66,8 +66,8 @@ class Provider:
 class Subscriber:
     """Counts what comes; with `credits` it says that it took each message before it takes the next."""
 
-    def __init__(self, test, proxy, provider, credits, **pace):
-        self.client = Client(test, proxy, receive_bytes=4096).join()
+    def __init__(self, test, proxy, provider, credits, shard=0, **pace):
+        self.client = Client(test, proxy, receive_bytes=4096).join(shard=shard)
         self.group, self.credits, self.provider = provider.group, credits, provider
         self.answer = subscribe(self.client, "A/B", **pace)
         self.got, self.stale = [], []
@@ -100,15 +100,15 @@ class Subscriber:
 
 
 class Rates(unittest.TestCase):
-    """A provider, and three subscribers at 10, 1 and 0.1 Mbit/s."""
+    """A provider, and three subscribers at 10, 1 and 0.1 Mbit/s, on its shard and on another."""
 
-    def run_rates(self, delivery, window):
-        hub = Hub(self)
+    def run_rates(self, delivery, window, shards):
+        hub = Hub(self, shards=shards)
         provider = Provider(self, hub, delivery, window)
         proxies = [RateProxy(hub.port, down_bits_per_s=rate) for rate in (10e6, 1e6, 1e5)]
         for proxy in proxies:
             self.addCleanup(proxy.close)
-        subscribers = [Subscriber(self, proxy, provider, window is not None) for proxy in proxies]
+        subscribers = [Subscriber(self, proxy, provider, window is not None, shard=shards - 1) for proxy in proxies]
         fast = subscribers[0]
         count = 1000 if FULL else 200
         for _ in range(count):
@@ -125,13 +125,16 @@ class Rates(unittest.TestCase):
         return subscribers
 
     def test_sync_gives_each_the_newest_at_its_own_rate(self):
-        subscribers = self.run_rates(SYNC_DELIVERY, 1)
-        for each in subscribers:
-            self.assertEqual(each.answer[8], 1, "the window in force")
-            self.assertEqual(each.stale, [], "what it got was older than what its hub had when it credited")
+        for shards in (1, 2):
+            with self.subTest(shards=shards):
+                for each in self.run_rates(SYNC_DELIVERY, 1, shards):
+                    self.assertEqual(each.answer[8], 1, "the window in force")
+                    self.assertEqual(each.stale, [], "what it got was older than what its hub had when it credited")
 
     def test_latest_gives_each_the_newest_at_its_own_rate(self):
-        self.run_rates(LATEST_DELIVERY, None)
+        for shards in (1, 2):
+            with self.subTest(shards=shards):
+                self.run_rates(LATEST_DELIVERY, None, shards)
 
 
 class Windows(unittest.TestCase):
