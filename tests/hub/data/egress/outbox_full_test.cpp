@@ -20,7 +20,6 @@ using testing::TestFrame;
 
 constexpr std::uint8_t kBlock = 1;
 constexpr std::uint8_t kDrop = 2;
-constexpr std::uint8_t kLatest = 3 | proto::kFlagKeyed;
 constexpr std::uint32_t kKiB = 1024;
 
 Limits small_limits() {
