@@ -72,8 +72,10 @@ class Ctl(Case):
     def test_each_mistake_has_its_words_and_its_exit_code(self):
         hub = self.hub()
         start_recv(self, hub, "B")
+        start_recv(self, hub, "D")
+        held = self.id_of(hub, "D")
         for code, part, words in ((4, "there is no node 'C'", ("kick", "C")), (4, "7.99", ("kick", "7.99")),
-                                  (2, "is no id", ("reassign", "B", "x")), (1, "another node", ("reassign", "B", "7.1")),
+                                  (2, "is no id", ("reassign", "B", "x")), (1, "another node", ("reassign", "B", held)),
                                   (2, "did you mean debug?", ("log", "debgu"))):
             refused = self.ctl(*words)
             self.assertEqual(refused.code, code, (words, refused.err))
