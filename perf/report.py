@@ -17,6 +17,9 @@ def main() -> int:
         print(__doc__, file=sys.stderr)
         return 2
     result = json.loads(pathlib.Path(sys.argv[1]).read_text())
+    if any("rounds" not in row for row in result["results"]):
+        print(f"{sys.argv[1]} does not hold the runs of each row: measure anew with ./dev perf --json", file=sys.stderr)
+        return 1
     target = pathlib.Path(sys.argv[2]) if len(sys.argv) == 3 else DOCUMENT
     write_report(result, target)
     return 0

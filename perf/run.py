@@ -24,6 +24,10 @@ from driver.summary import absence_lines, make_absences, make_rows, text_table  
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 0.5
+RUNS = 3
+RUNS_MAX = 9  # of what lies far apart, as long as there is time:
+QUICK_EXTRA_SECONDS = 45
+WHOLE_EXTRA_SECONDS = 150
 SMOKE_SECONDS = 0.1
 SMOKE_CLIENTS = 200
 SMOKE_PATIENCE_SECONDS = 30
@@ -48,7 +52,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--size", nargs="+", action="extend", type=int, default=[], metavar="BYTES")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
     parser.add_argument("--seconds", type=float, help="length of each measurement")
-    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3)")
+    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3, and more where they lie far apart)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
                         help="more for the hub's command line; repeatable, write --hub-argument=--shards")
@@ -82,7 +86,9 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
 def make_settings(arguments: argparse.Namespace) -> Settings:
     usual = SMOKE_SECONDS if arguments.smoke else QUICK_SECONDS if arguments.quick else WHOLE_SECONDS
     return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
-                    runs=arguments.runs or (1 if arguments.smoke else 3),
+                    runs=arguments.runs or (1 if arguments.smoke else RUNS),
+                    runs_max=0 if arguments.smoke or arguments.runs else RUNS_MAX,
+                    extra_seconds=QUICK_EXTRA_SECONDS if arguments.quick else WHOLE_EXTRA_SECONDS,
                     clients=SMOKE_CLIENTS if arguments.smoke else None, hub_arguments=arguments.hub_argument,
                     tries_max=1 if arguments.smoke else 2,
                     patience_seconds=SMOKE_PATIENCE_SECONDS if arguments.smoke else Settings.patience_seconds)
@@ -153,7 +159,7 @@ def measure(arguments: argparse.Namespace) -> int:
     document = {"results": rows, "absent": absences, "machine": describe_machine(), "version": program_version(),
                 "versions": catalogue.rival_versions(list(chosen_subjects(arguments))),
                 "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-                "seconds": settings.seconds, "hub_arguments": settings.hub_arguments}
+                "seconds": settings.seconds, "runs": settings.runs, "runs_max": settings.runs_max, "hub_arguments": settings.hub_arguments}
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:

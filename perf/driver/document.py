@@ -2,8 +2,11 @@
 
 import pathlib
 
-from driver.goals import FIELD_TITLES, GOALS, RIVAL_FIELDS, Goal
-from driver.summary import COLUMNS, absence_lines, cells, shown
+from driver.figures import shown_with_spread
+from driver.markdown import table
+from driver.repetition import APART_MAX
+from driver.summary import DOCUMENT_COLUMNS, absence_lines, document_cells
+from driver.verdicts import EXPLANATION, goal_table
 
 FINDINGS = pathlib.Path(__file__).resolve().parent.parent / "findings.md"
 INTRODUCTION = """# Performance
@@ -17,8 +20,9 @@ nothing here is edited by hand, but for the findings, which are those of `perf/f
 with the hub's socket options and on the hub's processor. It moves connection 2k to 2k+1, or connection 0 to all others, and it is given
 byte for byte the frames that the hub is given. **Cost** is the processor time (user and system) of the measured process
 divided by the messages that arrived; every message is compared byte for byte at its receiver, and what did not arrive is counted. The subject has one
-processor for itself and the generator another, except in `ping_one_cpu`. Each run has a fresh process; hub and null relay take turns, and a
-row is the median of its runs. What is measured is `build/release/bin/tcphub` as it starts by default. Absolute figures differ from
+processor for itself and the generator another, except in `ping_one_cpu`. Each run has a fresh process. A round is one run of each subject,
+one right after the other, and every second round goes the other way; what is compared with each other is compared within each round, and the median is taken of
+the ratios. Where the runs of a subject lie more than 1.5 times apart, it is run again with those that it is compared with, as far as there is time. What is measured is `build/release/bin/tcphub` as it starts by default. Absolute figures differ from
 machine to machine; the ratios of one run are what counts.
 
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
@@ -56,94 +60,13 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 """
 
 
-def with_derived(rows: list[dict]) -> list[dict]:
-    """Adds the figures that need two rows."""
-    return with_libraries(with_rivals(with_idle_latency(with_null_seconds(rows))))
-
-
-def with_libraries(rows: list[dict]) -> list[dict]:
-    """How a library with its hub does beside the best of the others over TCP: rates, and system time of all processes."""
-    derived = []
-    for row in rows:
-        rivals = [other for other in rows if other["scenario"] == row["scenario"] and other["size"] == row["size"]
-                  and other["transport"] == "tcp" and other["subject"] != "tcphub" and "system_ns_per_message" in other]
-        extra = {}
-        if row["subject"] == "tcphub" and rivals:
-            extra["rate_over_best"] = row["messages_per_second"] / max(other["messages_per_second"] for other in rivals)
-            extra["cpu_over_best"] = row["cpu_ns_per_message"] / min(other["cpu_ns_per_message"] for other in rivals)
-            if least := min(other["system_ns_per_message"] for other in rivals):
-                extra["system_over_best"] = row["system_ns_per_message"] / least
-        derived.append(row | extra)
-    return derived
-
-
-def with_rivals(rows: list[dict]) -> list[dict]:
-    """How many times as much another hub takes for the same."""
-    costs = {(row["subject"], row["scenario"], row["size"], row["transport"]): row["cpu_ns_per_message"] for row in rows}
-    derived = []
-    for row in rows:
-        extra = {}
-        for rival in RIVAL_FIELDS:
-            cost = costs.get((rival, row["scenario"], row["size"], row["transport"]))
-            if cost and row["cpu_ns_per_message"]:
-                extra[RIVAL_FIELDS[rival]] = cost / row["cpu_ns_per_message"]
-        derived.append(row | extra)
-    return derived
-
-
-def with_idle_latency(rows: list[dict]) -> list[dict]:
-    """The 99th percentile of a ping under load, in that of the same subject without."""
-    idle = {(row["subject"], row["transport"]): row["p99_us"] for row in rows if row["scenario"] == "ping_two_cpus"}
-    return [row | ({"p99_over_idle": row["p99_us"] / idle[row["subject"], row["transport"]]}
-                   if row["scenario"].startswith("ping_under") and idle.get((row["subject"], row["transport"])) else {})
-            for row in rows]
-
-
-def with_null_seconds(rows: list[dict]) -> list[dict]:
-    null_seconds = {(row["scenario"], row["transport"]): row["seconds"] for row in rows
-                    if row["subject"] == "null" and "seconds" in row}
-    derived = []
-    for row in rows:
-        other = null_seconds.get((row["scenario"], row["transport"]))
-        extra = {"seconds_over_null": row["seconds"] - other} if other is not None and row["subject"] != "null" else {}
-        derived.append(row | extra)
-    return derived
-
-
-def table(titles: list[str], lines: list[list[str]]) -> str:
-    head = ["| " + " | ".join(titles) + " |", "| " + " | ".join("---" for _ in titles) + " |"]
-    return "\n".join(head + ["| " + " | ".join(line) + " |" for line in lines])
-
-
-def verdict(goal: Goal, value: float) -> str:
-    if goal.holds(value, goal.goal):
-        return "goal met"
-    if goal.bound is None:
-        return "goal open"
-    return "bound met, goal open" if goal.holds(value, goal.bound) else "**bound missed**"
-
-
-def goal_table(rows: list[dict]) -> str:
-    measured = {(row["subject"], row["scenario"], row["size"], row["transport"]): row for row in rows}
-    lines = []
-    for goal in GOALS:
-        row = measured.get((goal.subject, goal.scenario, goal.size, goal.transport))
-        value = row.get(goal.field) if row is not None else None
-        sign = ">=" if goal.at_least else "<="
-        lines.append([goal.subject, goal.scenario, str(goal.size), goal.transport, FIELD_TITLES[goal.field],
-                      f"{sign} {shown(goal.bound)}" if goal.bound is not None else "", f"{sign} {shown(goal.goal)}",
-                      shown(value) if value is not None else "not measured",
-                      verdict(goal, value) if value is not None else ""])
-    return table(["subject", "scenario", "bytes", "transport", "figure", "bound", "goal", "measured", ""], lines)
-
-
 def other_figures(rows: list[dict]) -> str:
     """Memory, rates and times that have no column of their own."""
     names = {"rate_kept": "rate kept", "rss_growth_bytes": "bytes grown by meanwhile",
              "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
              "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s",
              "cpu_share": "of a processor used"}
-    lines = [[row["subject"], row["transport"], row["scenario"], title, shown(row[name])] for row in rows
+    lines = [[row["subject"], row["transport"], row["scenario"], title, shown_with_spread(row, name)] for row in rows
              for name, title in names.items() if name in row and (name != "cpu_share" or row["scenario"] == "idle_10000")]
     return table(["subject", "transport", "scenario", "figure", "median"], lines)
 
@@ -153,15 +76,21 @@ def library_figures(rows: list[dict]) -> str:
     parts = ["sender_user", "sender_system", "receiver_user", "receiver_system", "hub_user", "hub_system", "system"]
     titles = ["subject", "transport", "scenario", "size", "messages/s", *(f"{part.replace('_', ' ')} ns" for part in parts[:-1]),
               "all system ns", "all CPU ns"]
-    lines = [[row["subject"], row["transport"], row["scenario"], str(row["size"]), shown(row["messages_per_second"]),
-              *(shown(row[f"{part}_ns_per_message"]) for part in parts), shown(row["cpu_ns_per_message"])]
+    lines = [[row["subject"], row["transport"], row["scenario"], str(row["size"]), shown_with_spread(row, "messages_per_second"),
+              *(shown_with_spread(row, f"{part}_ns_per_message") for part in parts), shown_with_spread(row, "cpu_ns_per_message")]
              for row in rows if "system_ns_per_message" in row]
     return table(titles, lines)
 
 
+def runs_of(result: dict) -> str:
+    """How many runs, and how long."""
+    wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart" if result["runs_max"] > result["runs"] else ""
+    return f"{result['runs']} runs{wild}, of {result['seconds']} s each"
+
+
 def make_document(result: dict, pictures: list[str] | None = None) -> str:
     """`pictures`: links in Markdown."""
-    rows = with_derived(result["results"])
+    rows = result["results"]
     machine = result["machine"]
     hub = " ".join(result["hub_arguments"]) or "none"
     versions = "".join(f"; {name} {version}" for name, version in result.get("versions", {}).items())
@@ -169,18 +98,18 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         INTRODUCTION,
         "## Where and when", "",
         f"{result['date']}; {machine['processor']}, {machine['cpus_allowed']} processors, {machine['system']}, "
-        f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}{versions}; {result['seconds']} s a run; "
+        f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}{versions}; {runs_of(result)}; "
         f"further arguments of the hub: {hub}.", "",
         "## Bounds and goals", "",
-        "A bound must hold; a goal is where the hub is to get.", "",
+        EXPLANATION, "",
         goal_table(rows), "",
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         FINDINGS.read_text(),
         "## All figures", "",
-        "`x null`, `min` and `max` are of the CPU cost; of the median round trip for pings, of its 99th percentile for pings",
-        "under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000 and join_under_load. Peak bytes are the",
-        "hub's. The CPU of library scenarios is that of hub and programs together, in round trips for each way.", "",
-        table([title for _, title in COLUMNS], [cells(row) for row in rows]), "",
+        "Medians of the runs, with the smallest and the largest. `x null` is of the CPU cost; of the median round trip for pings, of its 99th",
+        "percentile for pings under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000 and join_under_load. Peak bytes",
+        "are the hub's. The CPU of library scenarios is that of hub and programs together, in round trips for each way.", "",
+        table([title for _, title in DOCUMENT_COLUMNS], [document_cells(row) for row in rows]), "",
         other_figures(rows), "",
         "## Libraries", "",
         "Processor time a message of the two programs and of the hub; in round trips each way is a message.", "",

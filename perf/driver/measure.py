@@ -4,15 +4,19 @@ import json
 import pathlib
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 
 from driver.catalogue import make_subject, why_absent
 from driver.library import run_pair
+from driver.repetition import to_repeat
 from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
 from driver.suite import Case, Plan
 
 # A generator that takes this much longer than its measurement hangs.
 EXTRA_SECONDS = 35
+# Of the time for runs that are made again, one group takes at most this much of what is left.
+GROUP_SHARE = 0.2
 
 
 @dataclass
@@ -24,6 +28,8 @@ class Settings:
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
     patience_seconds: float = 2.0  # a message that takes longer is lost
+    runs_max: int = 0  # of those whose runs lie far apart; not above `runs`: none of them is made again
+    extra_seconds: float = 0  # what is left for such runs
 
 
 @dataclass
@@ -35,6 +41,14 @@ class Outcome:
     findings: list[dict[str, float]] = field(default_factory=list)
     error: str | None = None
     is_absent: bool = False  # `error` says why it was not even tried
+    rounds: list[int] = field(default_factory=list)  # of each finding: what has the same number can be compared
+
+    def __post_init__(self) -> None:
+        self.rounds = self.rounds or list(range(len(self.findings)))
+
+    def add(self, number: int, found: dict[str, float]) -> None:
+        self.rounds.append(number)
+        self.findings.append(found)
 
 
 def say(text: str) -> None:
@@ -80,25 +94,45 @@ def run_patiently(outcome: Outcome, settings: Settings) -> dict[str, float]:
     raise AssertionError("not reached")
 
 
+def run_round(members: list[Outcome], number: int, settings: Settings) -> None:
+    """One run each. Every second round goes the other way, so that nobody profits from always being behind somebody."""
+    for outcome in members if number % 2 == 0 else reversed(members):
+        if outcome.error is not None:
+            continue
+        say(f"  {outcome.subject}: {outcome.case} ({number + 1}/{max(settings.runs, number + 1)})")
+        try:
+            outcome.add(number, run_patiently(outcome, settings))
+        except SubjectError as error:
+            outcome.error = str(error)
+            say(f"error: {outcome.case}: {outcome.error}")
+
+
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
-    for run in range(settings.runs):
-        for outcome in outcomes:
-            if outcome.error is not None:
-                continue
-            say(f"  {outcome.subject}: {outcome.case} ({run + 1}/{settings.runs})")
-            try:
-                outcome.findings.append(run_patiently(outcome, settings))
-            except SubjectError as error:
-                outcome.error = str(error)
-                say(f"error: {outcome.case}: {outcome.error}")
+    for number in range(settings.runs):
+        run_round(outcomes, number, settings)
+    repeat_wild(outcomes, settings)
 
 
-def make_group(baseline: Case, members: list[tuple[Case, tuple[str, ...]]], build: pathlib.Path) -> list[Outcome]:
-    """The null relay, if somebody is compared with it, then the others, case by case."""
-    group = []
-    if any("null" in subjects for _, subjects in members):
-        group.append(Outcome("null", baseline))
-    group += [Outcome(name, case) for case, subjects in members for name in subjects if name != "null"]
+def repeat_wild(outcomes: list[Outcome], settings: Settings) -> None:
+    """More runs of what lies far apart, as long as there is time for that: no group takes more than its share of it."""
+    left_for_others = settings.extra_seconds * (1 - GROUP_SHARE)
+    for number in range(settings.runs, settings.runs_max):
+        again = to_repeat(outcomes)
+        if not again or settings.extra_seconds <= left_for_others:
+            return
+        begin = time.monotonic()
+        run_round(again, number, settings)
+        settings.extra_seconds -= time.monotonic() - begin
+
+
+def make_group(members: list[tuple[Case, tuple[str, ...]]], build: pathlib.Path) -> list[Outcome]:
+    """Case by case, each behind the null relay that it is compared with, if that is asked for and was not there before."""
+    group: list[Outcome] = []
+    for case, subjects in members:
+        null = Outcome("null", case.baseline or case)
+        if "null" in subjects and not any(each.subject == "null" and each.case == null.case for each in group):
+            group.append(null)
+        group += [Outcome(name, case) for name in subjects if name != "null"]
     for outcome in group:
         outcome.error = why_absent(outcome.subject, outcome.case, build)
         outcome.is_absent = outcome.error is not None
@@ -106,13 +140,13 @@ def make_group(baseline: Case, members: list[tuple[Case, tuple[str, ...]]], buil
 
 
 def run_cases(plan: Plan, settings: Settings) -> list[Outcome]:
-    """Cases with the same baseline are one group, whose subjects take turns: null relay, hub, others, null relay, ..."""
+    """Cases that are compared with each other are one group, whose subjects take turns: null relay, hub, others, ..."""
     groups: dict[Case, list[tuple[Case, tuple[str, ...]]]] = {}
     for case, subjects in plan.items():
         groups.setdefault(case.group, []).append((case, subjects))
     outcomes = []
-    for baseline, members in groups.items():
-        group = make_group(baseline, members, settings.build)
+    for members in groups.values():
+        group = make_group(members, settings.build)
         run_group(group, settings)
         outcomes += group
     return outcomes

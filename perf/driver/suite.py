@@ -18,6 +18,7 @@ class Scenario:
     sizes: tuple[int, ...] = (16,)
     unix_sizes: tuple[int, ...] = (16,)  # over Unix sockets; none: not measured there
     seconds_factor: float = 1  # measured longer than others
+    beside: str | None = None  # takes turns also with this scenario, since their figures are compared
     roles: tuple[str, str] | None = None  # of two programs that talk by means of a library, the answering one first
 
     def sizes_over(self, transport: str) -> tuple[int, ...]:
@@ -40,8 +41,8 @@ SCENARIOS = {
     "ping_one_cpu": Scenario(metric="p50_us", one_cpu=True),
     "ping_two_cpus": Scenario(metric="p50_us"),
     "ping_paced": Scenario(metric="p50_us", seconds_factor=4),
-    "ping_under_bulk": Scenario(metric="p99_us"),
-    "ping_under_300MBps": Scenario(metric="p99_us"),
+    "ping_under_bulk": Scenario(metric="p99_us", beside="ping_two_cpus"),
+    "ping_under_300MBps": Scenario(metric="p99_us", beside="ping_two_cpus"),
     "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), unix_sizes=()),
     "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", unix_sizes=()),
     "connect_10000": Scenario(metric="seconds", unix_sizes=()),
@@ -82,10 +83,8 @@ class Case:
 
     @property
     def group(self) -> "Case":
-        """Cases of one group take turns: those that are compared with each other."""
-        if self.spec.roles is not None:
-            return Case(self.scenario, self.size, "tcp")  # with the other libraries' TCP
-        return self.baseline or self
+        """Cases of one group take turns: those that are compared with each other, over a Unix socket with TCP too."""
+        return Case(self.spec.beside or self.spec.baseline or self.scenario, self.size, "tcp")
 
     def among(self, subjects: tuple[str, ...]) -> tuple[str, ...]:
         """Those of the subjects that it is about."""

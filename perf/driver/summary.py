@@ -1,51 +1,25 @@
 """From outcomes to the rows of the JSON document and of the table."""
 
-import statistics
-
+from driver.derived import add_derived
+from driver.figures import shown, shown_with_spread, summarise
 from driver.measure import Outcome
-from driver.suite import Case
-
-COUNTED = ("lost", "wrong", "dropped_frames", "ledger_gap")
 
 
-def median_of(outcome: Outcome, name: str) -> float | None:
-    values = [found[name] for found in outcome.findings if name in found]
-    return statistics.median(values) if values else None
-
-
-def make_row(outcome: Outcome, baseline: Outcome | None, null_tcp: Outcome | None) -> dict:
-    """`min`, `max` and `ratio_to_null` are of the figure that `metric` names."""
+def make_row(outcome: Outcome) -> dict:
+    """`rounds` are its runs as they were; figures that need two rows, and medians, come later."""
     case = outcome.case
-    metric = case.spec.metric
-    values = [found[metric] for found in outcome.findings]
-    row = {"subject": outcome.subject, "transport": case.transport, "scenario": case.scenario, "size": case.size,
-           "cpu_ns_per_message": None, "ratio_to_null": None, "messages_per_second": None}
-    for name in outcome.findings[0]:
-        if name in COUNTED:
-            row[name] = int(sum(found[name] for found in outcome.findings))
-        else:
-            row[name] = median_of(outcome, name)
-    row |= {"metric": metric, "runs": len(values), "min": min(values), "max": max(values)}
-    if baseline is not None and (of_null := median_of(baseline, metric)):
-        row["ratio_to_null"] = statistics.median(values) / of_null
-        row["baseline"] = baseline.case.scenario
-    if null_tcp is not None and (of_null := median_of(null_tcp, metric)):
-        row["ratio_to_null_tcp"] = statistics.median(values) / of_null
-    return row
+    return {"subject": outcome.subject, "transport": case.transport, "scenario": case.scenario, "size": case.size,
+            "cpu_ns_per_message": None, "ratio_to_null": None, "messages_per_second": None, "metric": case.spec.metric,
+            "rounds": [{"round": number} | found for number, found in zip(outcome.rounds, outcome.findings, strict=True)]}
 
 
 def make_rows(outcomes: list[Outcome]) -> list[dict]:
-    nulls = {outcome.case: outcome for outcome in outcomes if outcome.subject == "null" and outcome.findings}
-    rows = []
-    for outcome in outcomes:
-        if not outcome.findings:
-            continue
-        case = outcome.case
-        baseline = nulls.get(case.baseline) if case.baseline is not None else None
-        null_tcp = None
-        if case.transport == "unix" and case.baseline is not None:
-            null_tcp = nulls.get(Case(case.baseline.scenario, case.size, "tcp"))
-        rows.append(make_row(outcome, baseline, null_tcp))
+    """`min` and `max` are of the figure that `metric` names; `spread` has those of all."""
+    rows = [make_row(outcome) for outcome in outcomes if outcome.findings]
+    add_derived(rows)
+    rows = [summarise(row) for row in rows]
+    for row in rows:
+        row["min"], row["max"] = row["spread"][row["metric"]]
     return rows
 
 
@@ -56,23 +30,20 @@ def make_absences(outcomes: list[Outcome]) -> list[dict]:
             for outcome in outcomes if outcome.error is not None and not outcome.findings]
 
 
-def shown(value: float | None) -> str:
-    """Three digits that matter, without an exponent."""
-    if value is None:
-        return ""
-    if abs(value) >= 100:
-        return f"{value:,.0f}"
-    return f"{value:.3g}"
-
-
 COLUMNS = (("subject", "subject"), ("transport", "transport"), ("scenario", "scenario"), ("size", "size"),
            ("cpu_ns_per_message", "CPU ns/message"), ("ratio_to_null", "x null"), ("min", "min"), ("max", "max"),
            ("messages_per_second", "messages/s"), ("p50_us", "p50 us"), ("p99_us", "p99 us"),
-           ("p999_us", "p99.9 us"), ("rss_peak_bytes", "peak bytes"), ("lost", "lost"))
+           ("p999_us", "p99.9 us"), ("rss_peak_bytes", "peak bytes"), ("lost", "lost"), ("runs", "runs"))
+# With the spread beside each figure, that of one needs no columns.
+DOCUMENT_COLUMNS = tuple(column for column in COLUMNS if column[0] not in ("min", "max"))
 
 
 def cells(row: dict) -> list[str]:
-    return [str(row[key]) if isinstance(row.get(key), (str, int)) else shown(row.get(key)) for key, _ in COLUMNS]
+    return [row[key] if isinstance(row.get(key), str) else shown(row.get(key)) for key, _ in COLUMNS]
+
+
+def document_cells(row: dict) -> list[str]:
+    return [row[key] if isinstance(row.get(key), str) else shown_with_spread(row, key) for key, _ in DOCUMENT_COLUMNS]
 
 
 def absence_lines(absences: list[dict]) -> list[str]:

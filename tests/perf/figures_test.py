@@ -1,0 +1,212 @@
+#!/usr/bin/env python3
+"""What perf/driver makes of several runs: medians of ratios, spreads, verdicts, and which runs are made again."""
+
+import unittest
+
+from support import outcome, result_of
+from driver import measure, suite
+from driver.document import make_document
+from driver.figures import decisive, shown, shown_with_spread, summarise
+from driver.goals import GOALS, Goal
+from driver.measure import Outcome, Settings, run_group
+from driver.repetition import to_repeat
+from driver.summary import make_rows, text_table
+from driver.verdicts import verdict
+
+ONE_TO_ONE = suite.Case("one_to_one", 16, "tcp")
+
+
+class Rows(unittest.TestCase):
+    def test_a_ratio_is_the_median_of_the_rounds_ratios(self):
+        # The ratio of the medians would be 3: the machine was three times as slow in the third round, for both.
+        rows = make_rows([outcome("null", ONE_TO_ONE, [10, 20, 60]), outcome("tcphub", ONE_TO_ONE, [60, 40, 120])])
+        self.assertEqual([row["ratio_to_null"] for row in rows], [1.0, 2.0])
+        self.assertEqual(rows[1]["spread"]["ratio_to_null"], [2.0, 6.0])
+        self.assertEqual((rows[1]["min"], rows[1]["max"], rows[1]["runs"]), (40, 120, 3))
+
+    def test_rounds_that_only_one_of_two_has_are_not_compared(self):
+        hub = outcome("tcphub", ONE_TO_ONE, [30, 30])
+        hub.add(7, {"cpu_ns_per_message": 99})
+        null = outcome("null", ONE_TO_ONE, [10, 15, 20])
+        null.add(7, {"cpu_ns_per_message": 33})
+        row = make_rows([null, hub])[1]
+        self.assertEqual([found.get("ratio_to_null") for found in row["rounds"]], [3, 2, 3])
+        self.assertEqual((row["ratio_to_null"], row["cpu_ns_per_message"], row["runs"]), (3, 30, 3))
+
+    def test_unix_is_compared_with_tcp_too(self):
+        unix = suite.Case("one_to_one", 16, "unix")
+        rows = make_rows([outcome("null", ONE_TO_ONE, [10]), outcome("null", unix, [8]), outcome("tcphub", unix, [4])])
+        self.assertEqual((rows[2]["ratio_to_null"], rows[2]["ratio_to_null_tcp"]), (0.5, 0.4))
+        self.assertNotIn("ratio_to_null_tcp", rows[0])
+
+    def test_in_turns_is_compared_with_the_null_one_to_one(self):
+        rows = make_rows([outcome("null", ONE_TO_ONE, [10]), outcome("tcphub", suite.Case("in_turns", 16, "tcp"), [25])])
+        self.assertEqual((rows[1]["ratio_to_null"], rows[1]["baseline"]), (2.5, "one_to_one"))
+
+    def test_losses_of_all_runs_are_summed(self):
+        self.assertEqual(make_rows([outcome("tcphub", ONE_TO_ONE, [1, 2], lost=3)])[0]["lost"], 6)
+
+    def test_a_failed_case_has_no_row(self):
+        self.assertEqual(make_rows([Outcome("tcphub", ONE_TO_ONE, [], "it died")]), [])
+
+    def test_a_row_without_a_baseline_has_no_ratio(self):
+        self.assertIsNone(make_rows([outcome("tcphub", suite.Case("idle_10000", 16, "tcp"), [300])])[0]["ratio_to_null"])
+
+    def test_every_figure_has_its_spread(self):
+        case = suite.Case("ping_paced", 16, "tcp")
+        hub = Outcome("tcphub", case, [{"p50_us": each, "p999_us": 10 * each} for each in (1, 3, 2)])
+        self.assertEqual(make_rows([hub])[0]["spread"], {"p50_us": [1, 3], "p999_us": [10, 30]})
+
+    def test_table_has_a_line_a_row(self):
+        self.assertEqual(len(text_table(make_rows([outcome("null", ONE_TO_ONE, [10])])).splitlines()), 2)
+
+
+class Derived(unittest.TestCase):
+    def test_how_much_cheaper_than_another_hub(self):
+        row = make_rows([outcome("null", ONE_TO_ONE, [10, 10]), outcome("tcphub", ONE_TO_ONE, [20, 40]),
+                         outcome("nats", ONE_TO_ONE, [300, 200])])[1]
+        self.assertEqual((row["times_nats"], row["spread"]["times_nats"]), (10, [5, 15]))
+        self.assertNotIn("times_redis", row)
+
+    def test_what_load_does_to_a_ping(self):
+        idle, loaded = (suite.Case(name, 16, "tcp") for name in ("ping_two_cpus", "ping_under_bulk"))
+        rows = make_rows([outcome("tcphub", idle, [50, 50], p99_us=100), outcome("tcphub", loaded, [150, 130])])
+        self.assertEqual((rows[1]["p99_over_idle"], rows[1]["spread"]["p99_over_idle"]), (1.4, [1.3, 1.5]))
+
+    def test_the_time_beyond_the_null_relay(self):
+        case = suite.Case("connect_10000", 16, "tcp")
+        rows = make_rows([outcome("null", case, [0.25, 0.5]), outcome("tcphub", case, [0.75, 0.75])])
+        self.assertEqual((rows[1]["seconds_over_null"], rows[1]["spread"]["seconds_over_null"]), (0.375, [0.25, 0.5]))
+        self.assertNotIn("seconds_over_null", rows[0])
+
+    def test_how_a_library_does_beside_the_best_other_one_of_each_round(self):
+        def runs(subject, transport, rates):
+            return Outcome(subject, suite.Case("library_burst", 16, transport),
+                           [{"messages_per_second": rate, "cpu_ns_per_message": 2e8 / rate, "system_ns_per_message": 1e8 / rate}
+                            for rate in rates])
+        rows = make_rows([runs("tcphub", "unix", [6e6, 8e6]), runs("nats", "tcp", [2e6, 1e6]), runs("mosquitto", "tcp", [1e6, 2e6]),
+                          runs("mosquitto", "unix", [9e6, 9e6])])
+        self.assertEqual(rows[0]["spread"]["rate_over_best"], [3, 4])
+        self.assertEqual(rows[0]["rate_over_best"], 3.5)
+        self.assertAlmostEqual(rows[0]["spread"]["system_over_best"][0], 1 / 4)
+        self.assertNotIn("rate_over_best", rows[1])
+
+
+class Figures(unittest.TestCase):
+    def test_the_outermost_of_many_runs_decide_nothing(self):
+        self.assertEqual(decisive([3, 1, 2]), (1, 3))
+        self.assertEqual(decisive([9, 1, 2, 3, 4, 5, 6, 7]), (1, 9))
+        self.assertEqual(decisive([9, 1, 2, 3, 4, 5, 6, 7, 8]), (2, 8))
+
+    def test_are_short(self):
+        self.assertEqual([shown(value) for value in (None, 0.01234, 12.34, 1234.5)], ["", "0.0123", "12.3", "1,234"])
+
+    def test_show_their_spread_where_there_are_several_runs(self):
+        row = summarise({"rounds": [{"round": 0, "a": 1.0, "b": 5.0}, {"round": 1, "a": 3.0}]})
+        self.assertEqual([shown_with_spread(row, name) for name in ("a", "b", "c")], ["2 (1 to 3)", "5", ""])
+
+
+class Verdicts(unittest.TestCase):
+    GOAL = Goal("one_to_one", 16, "tcp", "ratio_to_null", 2.0, 1.25)
+    ONLY_GOAL = Goal("one_to_one", 16, "tcp", "times_nats", None, 15, at_least=True)
+
+    def test_a_limit_itself_is_met(self):
+        self.assertTrue(self.GOAL.holds(1.25, self.GOAL.goal))
+        self.assertFalse(self.GOAL.holds(1.26, self.GOAL.goal))
+
+    def test_runs_that_agree_decide(self):
+        for values, expected in (([1.1, 1.2, 1.25], "goal met"), ([1.3, 1.9, 1.6], "bound met, goal open"),
+                                 ([2.1, 2.2, 2.3], "**bound missed**")):
+            self.assertEqual(verdict(self.GOAL, values), expected)
+        self.assertEqual(verdict(self.ONLY_GOAL, [15, 16, 17]), "goal met")
+        self.assertEqual(verdict(self.ONLY_GOAL, [11, 12, 14]), "goal open")
+
+    def test_runs_on_both_sides_of_a_limit_decide_nothing(self):
+        self.assertEqual(verdict(self.GOAL, [1.1, 1.2, 1.3]), "bound met, goal undecided")
+        self.assertEqual(verdict(self.GOAL, [1.9, 1.9, 2.1]), "**bound undecided**")
+        self.assertEqual(verdict(self.ONLY_GOAL, [14, 16, 16]), "undecided")
+
+    def test_one_wild_run_of_nine_does_not_count(self):
+        self.assertEqual(verdict(self.GOAL, [1.1] * 8 + [5]), "goal met")
+        self.assertEqual(verdict(self.GOAL, [1.1] * 7 + [1.3, 5]), "bound met, goal undecided")
+
+    def test_the_document_shows_what_was_measured_its_spread_and_its_runs(self):
+        rows = make_rows([outcome("null", ONE_TO_ONE, [10, 10, 10]), outcome("tcphub", ONE_TO_ONE, [15, 14, 16])])
+        document = make_document(result_of(rows))
+        self.assertIn("| tcphub | one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | 1.4 to 1.6 | 3 | "
+                      "bound met, goal open |", document)
+        self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart, of 1 s each", document)
+        self.assertIn("15 (14 to 16)", document)
+        self.assertIn("not measured", document)
+
+
+class Repetition(unittest.TestCase):
+    def group(self, *subjects_and_costs):
+        return [outcome(subject, ONE_TO_ONE, costs) for subject, costs in subjects_and_costs]
+
+    def repeated(self, group):
+        return [each.subject for each in to_repeat(group)]
+
+    def test_runs_that_lie_close_together_are_not_repeated(self):
+        self.assertEqual(self.repeated(self.group(("null", [10, 12, 15]), ("tcphub", [10, 11, 12]), ("nats", [99, 98, 97]))), [])
+
+    def test_what_is_wild_comes_with_what_it_is_compared_with(self):
+        calm, wild = [10, 11, 12], [10, 11, 16]
+        self.assertTrue(any(goal.scenario == "one_to_one" and goal.field == "times_nats" for goal in GOALS))
+        self.assertEqual(self.repeated(self.group(("null", calm), ("tcphub", wild), ("nats", calm), ("mosquitto", calm))),
+                         ["null", "tcphub", "nats"])
+        self.assertEqual(self.repeated(self.group(("null", calm), ("tcphub", calm), ("nats", calm), ("mosquitto", wild))),
+                         ["null", "tcphub", "mosquitto"])
+
+    def test_a_ping_under_load_comes_with_that_without(self):
+        idle, loaded = (suite.Case(name, 16, "tcp") for name in ("ping_two_cpus", "ping_under_bulk"))
+        self.assertEqual(loaded.group, idle)
+        group = [Outcome(subject, case, [{"p50_us": 1, "p99_us": p99} for p99 in (1, 9)]) for case in (idle, loaded)
+                 for subject in ("null", "tcphub", "nats")]
+        for each in group[3:5]:
+            each.findings[1]["p99_us"] = 1
+        self.assertEqual([(each.subject, each.case.scenario) for each in to_repeat(group)],
+                         [("null", "ping_two_cpus"), ("nats", "ping_two_cpus"), ("null", "ping_under_bulk"),
+                          ("tcphub", "ping_under_bulk"), ("nats", "ping_under_bulk")])
+
+    def test_what_failed_is_not_tried_again(self):
+        group = self.group(("null", [10, 10]), ("tcphub", [10, 20]))
+        group[1].error = "it died"
+        self.assertEqual(self.repeated(group), [])
+
+
+class Rounds(unittest.TestCase):
+    """run_group() with runs that are written down instead of made."""
+
+    def setUp(self):
+        self.order = []
+        self.costs = {}
+        self.addCleanup(setattr, measure, "run_patiently", measure.run_patiently)
+        self.addCleanup(setattr, measure, "say", measure.say)
+        measure.run_patiently = self.run_patiently
+        measure.say = lambda text: None
+
+    def run_patiently(self, outcome, settings):
+        self.order.append(outcome.subject)
+        costs = self.costs.get(outcome.subject, [1])
+        return {"cpu_ns_per_message": costs[self.order.count(outcome.subject) % len(costs)]}
+
+    def test_every_second_round_goes_the_other_way(self):
+        run_group([Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "nats")], Settings(build=None, runs=3))
+        self.assertEqual(self.order, ["null", "tcphub", "nats", "nats", "tcphub", "null", "null", "tcphub", "nats"])
+
+    def test_what_lies_far_apart_is_run_again_while_there_is_time(self):
+        self.costs = {"mosquitto": [1, 2]}
+        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "nats", "mosquitto")]
+        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=60))
+        self.assertEqual([each.rounds for each in group], [list(range(9)), list(range(9)), [0, 1, 2], list(range(9))])
+
+    def test_without_time_for_it_nothing_is_run_again(self):
+        self.costs = {"tcphub": [1, 2]}
+        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub")]
+        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=0))
+        self.assertEqual([len(each.findings) for each in group], [3, 3])
+
+
+if __name__ == "__main__":
+    unittest.main()
