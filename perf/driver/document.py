@@ -2,6 +2,7 @@
 
 import pathlib
 
+from driver import yardstick
 from driver.figures import shown_with_spread
 from driver.markdown import table
 from driver.repetition import APART_MAX
@@ -100,6 +101,9 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         f"{result['date']}; {machine['processor']}, {machine['cpus_allowed']} processors, {machine['system']}, "
         f"Linux {machine['kernel']}; GIMnet {result.get('version', '')}{versions}; {runs_of(result)}; "
         f"further arguments of the hub: {hub}.", "",
+        "## The machine", "",
+        yardstick.EXPLANATION, "",
+        yardstick.yardstick_table(rows), "",
         "## Bounds and goals", "",
         EXPLANATION, "",
         goal_table(rows), "",

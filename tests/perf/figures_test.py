@@ -12,6 +12,7 @@ from driver.measure import Outcome, Settings, run_group
 from driver.repetition import to_repeat
 from driver.summary import make_rows, text_table
 from driver.verdicts import verdict
+from driver.yardstick import ELSEWHERE, yardstick_table
 
 ONE_TO_ONE = suite.Case("one_to_one", 16, "tcp")
 
@@ -138,6 +139,22 @@ class Verdicts(unittest.TestCase):
         self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart, of 1 s each", document)
         self.assertIn("15 (14 to 16)", document)
         self.assertIn("not measured", document)
+
+
+class Yardstick(unittest.TestCase):
+    def test_the_null_relay_stands_beside_that_of_a_known_machine(self):
+        paced = suite.Case("ping_paced", 16, "tcp")
+        rows = make_rows([outcome("null", ONE_TO_ONE, [22, 11, 33]), outcome("tcphub", ONE_TO_ONE, [99]), outcome("null", paced, [76])])
+        lines = yardstick_table(rows).splitlines()[2:]
+        self.assertEqual(lines, ["| one_to_one | 16 | CPU, us a message | 0.022 | 0.011 to 0.033 | 0.011 | 2 |",
+                                 "| ping_paced | 16 | round trip, us, median | 76 |  | 152 | 0.5 |"])
+
+    def test_it_is_measured_in_the_whole_suite(self):
+        for scenario, size, _, _ in ELSEWHERE:
+            self.assertIn("null", suite.whole_plan(("null", "tcphub"))[suite.Case(scenario, size, "tcp")])
+
+    def test_without_a_null_relay_there_is_no_table(self):
+        self.assertEqual(yardstick_table(make_rows([outcome("tcphub", ONE_TO_ONE, [99])])), "")
 
 
 class Repetition(unittest.TestCase):
