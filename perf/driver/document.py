@@ -4,6 +4,7 @@ import pathlib
 
 from driver import yardstick
 from driver.figures import shown_with_spread
+from driver.floor import floor_text
 from driver.markdown import table
 from driver.repetition import APART_MAX
 from driver.summary import DOCUMENT_COLUMNS, absence_lines, document_cells
@@ -107,6 +108,7 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         "## Bounds and goals", "",
         EXPLANATION, "",
         goal_table(rows), "",
+        *floor_text(rows),
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         FINDINGS.read_text(),
         "## All figures", "",
