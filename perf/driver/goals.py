@@ -44,7 +44,9 @@ GOALS = (
     Goal("one_to_one", 16, "tcp", RIVAL_FIELDS["zeromq"], None, 20, at_least=True),
     Goal("one_to_one", 65536, "tcp", RIVAL_FIELDS["nats"], None, 3, at_least=True),
     Goal("in_turns", 16, "tcp", RIVAL_FIELDS["nats"], None, 10, at_least=True),
+    Goal("fan_out_10", 16, "tcp", RIVAL_FIELDS["nats"], None, 8, at_least=True),
     Goal("fan_out_100", 16, "tcp", RIVAL_FIELDS["nats"], None, 8, at_least=True),
+    Goal("fan_out_1000", 16, "tcp", RIVAL_FIELDS["nats"], None, 8, at_least=True),
     Goal("ping_two_cpus", 16, "tcp", NULL, None, 0.35, subject="tcphub_spinning"),
     Goal("ping_paced", 16, "tcp", "p999_us", None, 250, subject="tcphub_spinning"),
     Goal("ping_under_bulk", 16, "tcp", "p99_over_idle", None, 1.5),
@@ -60,6 +62,13 @@ GOALS = (
     Goal("library_round_trip_one_cpu", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
     Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
 )
+
+
+def rivals_in_goals(scenario: str, size: int, transport: str) -> set[str]:
+    """The other hubs that a goal compares ours with in this case."""
+    of_case = {goal.field for goal in GOALS if (goal.scenario, goal.size, goal.transport) == (scenario, size, transport)}
+    return {rival for rival, field in RIVAL_FIELDS.items() if field in of_case}
+
 
 FIELD_TITLES = {
     NULL: "times the null relay",

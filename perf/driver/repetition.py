@@ -1,6 +1,6 @@
 """Which runs of a group are made again because those that there are say too little."""
 
-from driver.goals import GOALS, RIVAL_FIELDS
+from driver.goals import rivals_in_goals
 
 # Runs that lie further apart come from more than one state of the machine or of the subject: three may all have met one.
 APART_MAX = 1.5
@@ -13,12 +13,6 @@ def times_apart(values: list[float]) -> float:
 def is_wild(outcome) -> bool:
     metric = outcome.case.spec.metric
     return outcome.error is None and times_apart([found[metric] for found in outcome.findings if metric in found]) > APART_MAX
-
-
-def rivals_in_goals(scenario: str, size: int, transport: str) -> set[str]:
-    """The other hubs that a goal compares ours with in this case."""
-    of_case = {goal.field for goal in GOALS if (goal.scenario, goal.size, goal.transport) == (scenario, size, transport)}
-    return {rival for rival, field in RIVAL_FIELDS.items() if field in of_case}
 
 
 def to_repeat(group: list) -> list:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from driver.goals import rivals_in_goals
+
 SIZES = (16, 256, 1024, 4096, 65536, 1048576)
 TRANSPORTS = ("tcp", "unix")
 CPU = "cpu_ns_per_message"
@@ -122,9 +124,10 @@ QUICK_OF_SPINNING = frozenset({Case("ping_two_cpus", 16, "tcp"), Case("ping_pace
 
 
 def quick_plan(subjects: tuple[str, ...]) -> Plan:
-    """All subjects in the cases that compare them; the others in the cases that goals are set for."""
+    """All subjects in the cases that compare them; ours in those that goals are set for, with the others that these name."""
     def among(case: Case, name: str) -> bool:
-        return name in OURS or case in QUICK_OF_ALL or (name == "tcphub_spinning" and case in QUICK_OF_SPINNING)
+        return (name in OURS or case in QUICK_OF_ALL or (name == "tcphub_spinning" and case in QUICK_OF_SPINNING)
+                or name in rivals_in_goals(case.scenario, case.size, case.transport))
 
     return {case: tuple(name for name in subjects if among(case, name)) for case in quick_cases()}
 

@@ -9,7 +9,7 @@ from support import ROOT, outcome, result_of
 import run
 from driver import against, catalogue, plots, suite
 from driver.document import make_document
-from driver.goals import GOALS
+from driver.goals import GOALS, RIVAL_FIELDS
 from driver.measure import Outcome, make_group
 from driver.statistics_of_pairs import compare, signed_rank_p
 from driver.summary import absence_lines, make_absences
@@ -31,9 +31,18 @@ class Suite(unittest.TestCase):
 
     def test_quick_measures_every_goal_of_the_hub(self):
         quick, whole = set(suite.quick_cases()), set(suite.whole_cases())
+        plan = suite.quick_plan(catalogue.SUBJECTS)
+        of_field = {field: rival for rival, field in RIVAL_FIELDS.items()}
         for goal in GOALS:
             case = suite.Case(goal.scenario, goal.size, goal.transport)
             self.assertIn(case, whole if case.spec.roles is not None else quick)
+            if case in quick:
+                self.assertIn(goal.subject, plan[case])
+                self.assertIn(of_field.get(goal.field, "tcphub"), plan[case])
+
+    def test_every_fan_out_is_to_be_cheaper_than_that_of_nats(self):
+        self.assertEqual({goal.scenario for goal in GOALS if goal.field == "times_nats" and goal.scenario.startswith("fan_out")},
+                         {"fan_out_10", "fan_out_100", "fan_out_1000"})
 
     def test_the_whole_suite_has_every_size_and_the_hub_s_variants_where_they_are_for(self):
         plan = suite.whole_plan(catalogue.SUBJECTS)
@@ -58,7 +67,8 @@ class Suite(unittest.TestCase):
         for case in (suite.Case("one_to_one", 16, "tcp"), suite.Case("one_to_one", 65536, "tcp"),
                      suite.Case("fan_out_100", 16, "tcp")):
             self.assertEqual(plan[case], catalogue.SUBJECTS)
-        self.assertEqual(plan[suite.Case("fan_out_10", 16, "tcp")], ("null", "tcphub"))
+        self.assertEqual(plan[suite.Case("fan_out_10", 16, "tcp")], ("null", "tcphub", "nats"))
+        self.assertEqual(plan[suite.Case("list_100", 16, "tcp")], ("null", "tcphub"))
         self.assertIn("tcphub_spinning", plan[suite.Case("ping_two_cpus", 16, "tcp")])
 
     def test_smoke_runs_the_hub_in_every_case_and_each_subject_in_some(self):
