@@ -67,19 +67,30 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   std::size_t size = header.frame_size();
   std::uint32_t frames = 1;
   if (may_form_run(header)) {
-    const auto addresses = load_le<std::uint64_t>(begin + 4);
-    const auto attributes = load_le<std::uint32_t>(begin + 12);
+    std::size_t frame_size = size;
+    auto length_and_dst = load_le<std::uint64_t>(begin);
+    const auto dst = load_le<std::uint32_t>(begin + 4);
+    const auto src_and_attributes = load_le<std::uint64_t>(begin + 8);
+    while (true) {
+      // Most frames are as long as the one before. Where the next one begins is then known without waiting for what
+      // this one says, so that several are compared at a time: half the time of a run of small frames.
 #if defined(GIMNET_BUG_PARSER_RUN_PAST_END)
-    while (available - size >= kHeaderSize - 1) {
+      while (available - size >= frame_size - 1 &&
 #else
-    while (available - size >= kHeaderSize) {
+      while (available - size >= frame_size &&
 #endif
+             load_le<std::uint64_t>(begin + size) == length_and_dst &&
+             load_le<std::uint64_t>(begin + size + 8) == src_and_attributes) {
+        size += frame_size;
+        ++frames;
+      }
+      if (available - size < kHeaderSize) break;
       const std::byte* next = begin + size;
+      if (load_le<std::uint32_t>(next + 4) != dst || load_le<std::uint64_t>(next + 8) != src_and_attributes) break;
       const auto length = load_le<std::uint32_t>(next);
-      if (load_le<std::uint64_t>(next + 4) != addresses || load_le<std::uint32_t>(next + 12) != attributes) break;
       if (length > max_length || kHeaderSize + length > available - size) break;
-      size += kHeaderSize + length;
-      ++frames;
+      frame_size = kHeaderSize + length;
+      length_and_dst = load_le<std::uint64_t>(next);
     }
   }
   return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0};
