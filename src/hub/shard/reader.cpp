@@ -60,7 +60,13 @@ void Reader::wait_for_room(Connection& connection) {
 bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   const std::byte* next = received.begin;
+  state_.router.begin_bytes();
   while (true) {
+    const proto::RunView repeats = state_.router.append_repeats(next, received.end);
+    if (repeats.frames != 0) {
+      count(connection, repeats);
+      next += repeats.size;
+    }
     proto::NextRun found = proto::next_run(next, received.end, length_max);
     if (found.found == proto::Found::run) {
       if (!handle_run(connection, found.run)) return false;
@@ -124,13 +130,17 @@ bool Reader::refuse(Connection& connection, const proto::RunView& view, proto::D
 }
 
 void Reader::route(Connection& connection, const proto::RunView& view) {
-  state_.tally.accepted += view.frames;
-  if (connection.resume) count_taken(connection, view);
+  count(connection, view);
   if (state_.router.append(view.bytes, view.size, view.frames)) return;
   const proto::FrameHeader header = proto::load_header(view.bytes);
   if (header.has(proto::kFlagExt)) fill_trace(view);
   const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
   state_.router.route(run, header);
+}
+
+void Reader::count(Connection& connection, const proto::RunView& view) {
+  state_.tally.accepted += view.frames;
+  if (connection.resume) count_taken(connection, view);
 }
 
 void Reader::count_taken(Connection& connection, const proto::RunView& view) {

@@ -33,6 +33,8 @@ class Reader {
   [[nodiscard]] bool take_bad_credit(Connection& connection);
   void on_confirm(Connection& connection, const proto::flow::Confirm& confirm);
   void on_skip(Connection& connection, const proto::flow::Skip& skip);
+  /// Data frames that it sent, admitted.
+  void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);
   void fill_trace(const proto::RunView& view);
   [[nodiscard]] bool refuse(Connection& connection, const proto::RunView& view, proto::DropReason reason,

@@ -70,7 +70,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   Entry entry;
   entry.extended = header.has(proto::kFlagExt);
   // An extension may be a TRACE, which each recipient gets filled in on its own.
-  const bool by_copy = (run.size < kCopyBytesMax && !handover.fan_out) || entry.extended;
+  const bool by_copy = (run.size < kAppendBytesMax && !handover.fan_out) || entry.extended;
   entry.run = by_copy ? copy(run, context) : run.share();
   entry.size = run.size;
   entry.frames = run.frames;
@@ -91,10 +91,13 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
 
 void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context) {
   const std::size_t lane = header.lane & proto::kLaneMask;
-  if (!handover.fan_out && append(run.bytes, run.size, run.frames, context.tally)) return;
+  context.tally.queued += run.frames;
+  if (!handover.fan_out && append(run.bytes, run.size, run.frames)) {
+    context.tally.copied_bytes += run.size;
+    return;
+  }
   Lanes& lanes = this->lanes();
   lanes.open.close();
-  context.tally.queued += run.frames;
   Entry entry = make_entry(run, header, handover, context);
   if (entry.fragmented) {
     if (entry.touched && join_message(entry, header, context)) return;

@@ -30,14 +30,15 @@ class Outbox {
 
   /// The usual case of small messages, made short: frames like those that came last are copied right behind them.
   /// False: nothing was done, push() them. REQUIRES: as push(), of which one was made in this turn.
-  [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count, Tally& tally) {
-    if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kCopyBytesMax) return false;
+  /// The caller counts them as queued and copied.
+  [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
+    if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kAppendBytesMax) return false;
     lanes_->open.append(frames, size, count);
     chunk_used_ += size;
-    tally.queued += count;
-    tally.copied_bytes += size;
     return true;
   }
+  /// Runs below this are cheaper to copy than to reference (bench/hub/data/egress/outbox_bench.cpp).
+  static constexpr std::uint32_t kAppendBytesMax = 1024;
   /// Data frames for this connection. Every frame ends in a lane or in the drop book.
   /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if FRAGMENT, EXT or LATEST.
   void push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context);
@@ -120,8 +121,6 @@ class Outbox {
   /// A sender that can't be held (its own CONFIRM is waited for) and does not pause: beyond so many reserves its
   /// messages are dropped, BLOCK or not.
   static constexpr std::uint64_t kReservesMax = 8;
-  /// Runs below this are cheaper to copy than to reference (bench/hub/data/egress/outbox_bench.cpp).
-  static constexpr std::uint32_t kCopyBytesMax = 1024;
   /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
   static constexpr std::uint32_t kSettleBytesMax = 16 * 1024;
 

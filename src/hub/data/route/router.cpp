@@ -49,7 +49,12 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool han
 void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
   const std::byte* next = frames.bytes;
   const std::byte* const end = frames.bytes + frames.size;
-  while (next < end) {
+  begin_bytes();
+  while (true) {
+    const proto::RunView repeats = append_repeats(next, end);
+    next += repeats.size;
+    fanout_.context().tally.queued -= repeats.frames;
+    if (next == end) return;
     const proto::NextRun found = proto::next_run(next, end, length_max);
     GIMNET_CHECK(found.found == proto::Found::run);  // the sending shard parsed them
     next += found.run.size;

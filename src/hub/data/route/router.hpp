@@ -9,6 +9,7 @@
 #include "hub/data/fanout/retained_messages.hpp"
 #include "hub/data/route/group_table.hpp"
 #include "hub/data/route/node_table.hpp"
+#include "hub/data/route/recent_recipients.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
@@ -44,7 +45,19 @@ class Router {
     // No session has generation 0, so that nobody is found where none exists.
     Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
     if (recipient == nullptr || size - proto::kHeaderSize > recipient->frame_bytes) return false;
-    return recipient->outbox.append(frames, size, count, fanout_.context().tally);
+    if (!recipient->outbox.append(frames, size, count)) return false;
+    fanout_.context().tally.queued += count;
+    fanout_.context().tally.copied_bytes += size;
+    recent_.note(*recipient, frames);
+    return true;
+  }
+
+  /// Other bytes are looked at from here on than before.
+  void begin_bytes() { recent_.forget(); }
+  /// Shorter still: frames from `begin` on that are like those that append() took from the same bytes, to different
+  /// nodes in turns. Returns what was done. REQUIRES: begin <= end; begin_bytes() was called for them.
+  [[nodiscard]] proto::RunView append_repeats(const std::byte* begin, const std::byte* end) {
+    return recent_.append(begin, end, fanout_.context().tally);
   }
 
   /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for the length, alone if
@@ -83,6 +96,7 @@ class Router {
   Fanout& fanout_;
   Pacer& pacer_;
   RetainedMessages& retained_;
+  RecentRecipients recent_;
 };
 
 }  // namespace gimnet::hub

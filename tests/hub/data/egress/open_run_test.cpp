@@ -20,7 +20,10 @@ class OpenRunTest : public ::testing::Test {
   /// Was it appended?
   bool offer(const std::vector<std::string>& payloads, const TestFrame& frame = {}) {
     const hub::Run run = rig.run(payloads, frame);
-    if (connection.outbox.append(run.bytes, run.size, run.frames, rig.tally)) return true;
+    if (connection.outbox.append(run.bytes, run.size, run.frames)) {
+      rig.tally.queued += run.frames;
+      return true;
+    }
     connection.outbox.push(run, run.header(), {}, rig.context);
     return false;
   }
