@@ -149,6 +149,7 @@ void set_log_level(Configuration& configuration, const Given& given, Faults& fau
 
 std::string show_listen(const HubOptions& options) {
   std::vector<std::string> urls;
+  urls.reserve(options.listen.size());
   for (const ListenUrl& url : options.listen) urls.push_back(url.text());
   if (urls.empty()) urls = default_addresses();
   std::string list;
@@ -183,6 +184,7 @@ constexpr std::array kSettings{
 std::string nearest_key(std::string_view key) {
   std::vector<std::string_view> keys;
   std::vector<std::string> limits;
+  keys.reserve(kSettings.size() + limit_table().size() + 1);
   for (const Setting& setting : kSettings) keys.push_back(setting.key);
   for (const LimitInfo& limit : limit_table()) limits.push_back(std::string{kLimits} + std::string{limit.name});
   keys.emplace_back("limits");

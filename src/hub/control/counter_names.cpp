@@ -82,8 +82,8 @@ void for_each_counter(const RefusalCounters& counters,
 
 void for_each_counter(const NameCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take) {
-  for (std::uint16_t operation = 0; operation < counters.by_operation.size(); ++operation) {
-    const char* name = proto::ns::operation_name(operation);
+  for (std::size_t operation = 0; operation < counters.by_operation.size(); ++operation) {
+    const char* name = proto::ns::operation_name(static_cast<std::uint16_t>(operation));
     if (name != nullptr) take(std::string{"names."} + name, counters.by_operation[operation].value());
   }
   take("names.unknown", counters.unknown.value());

@@ -59,7 +59,7 @@ BufferRef BufferPool::take_slab() {
 }
 
 BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
-  for (std::uint8_t size_class = 0; size_class < chunk_bytes_.size(); ++size_class) {
+  for (std::size_t size_class = 0; size_class < chunk_bytes_.size(); ++size_class) {
     if (bytes > chunk_bytes_[size_class]) continue;
     Buffer* chunk = free_chunks_[size_class].pop();
     if (chunk == nullptr && !lent_.empty() && chunk_bytes_[size_class] >= kTakeBackBytes) {
@@ -68,7 +68,7 @@ BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
     }
     if (chunk == nullptr) {
       chunk = allocate(chunk_bytes_[size_class], BufferKind::chunk);
-      chunk->size_class = size_class;
+      chunk->size_class = static_cast<std::uint8_t>(size_class);
     }
     return BufferRef(chunk);
   }
