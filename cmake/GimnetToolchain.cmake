@@ -41,3 +41,10 @@ find_program(GIMNET_MOLD mold)
 if(GIMNET_MOLD)
   add_link_options(-fuse-ld=mold)
 endif()
+
+if(CMAKE_CXX_CLANG_TIDY)
+  # What clang-tidy has passed is not looked at again before it, or a header of it, changes; nor before the rules do.
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/.clang-tidy)
+  file(SHA256 ${CMAKE_SOURCE_DIR}/.clang-tidy _rules)
+  add_compile_definitions(GIMNET_LINT_RULES=${_rules})
+endif()
