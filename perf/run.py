@@ -204,7 +204,7 @@ def compare_versions(arguments: argparse.Namespace) -> int:
     if arguments.scenario or arguments.size or arguments.transport:
         cases = list(suite.chosen_plan(arguments.scenario, arguments.size, arguments.transport, ()))
     try:
-        document = against.compare_versions(ROOT, arguments.against, cases, arguments.runs or against.PAIRS, settings)
+        document = against.compare_versions(ROOT, arguments.against, cases, arguments.runs, settings)
     except (against.BuildError, SubjectError) as error:
         say(f"error: {error}")
         return 1

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from driver.measure import Settings, run_once, say
-from driver.statistics_of_pairs import PAIRS_MIN, Comparison, compare
+from driver.statistics_of_pairs import CONFIDENCE, Comparison, compare_all, pairs_min
 from driver.subjects import TcpHub, allowed_cpus
 from driver.suite import Case
 
@@ -57,34 +57,50 @@ def measure_once(build: pathlib.Path, case: Case, settings: Settings) -> float:
     return run_once(TcpHub(build, allowed_cpus()[:1], settings.hub_arguments), case, settings)[case.spec.metric]
 
 
-def compare_case(case: Case, other: pathlib.Path, pairs: int, settings: Settings) -> Comparison:
-    """A pair is both versions one after the other, the first of which changes from pair to pair."""
-    old, new = [], []
-    for pair in range(pairs):
-        order = [(other, old), (settings.build, new)]
-        for build, figures in order if pair % 2 == 0 else reversed(order):
-            figures.append(measure_once(build, case, settings))
-    return compare(old, new)
+def measure_pairs(case: Case, other: pathlib.Path, count: int, settings: Settings) -> list[tuple[float, float]]:
+    """Old and new. A pair is both versions one after the other, the first of which changes from pair to pair."""
+    pairs = []
+    for number in range(count):
+        builds = (other, settings.build)
+        if number % 2 == 0:
+            pairs.append(tuple(measure_once(build, case, settings) for build in builds))
+        else:
+            pairs.append(tuple(measure_once(build, case, settings) for build in reversed(builds))[::-1])
+    return pairs
 
 
 def describe(case: Case, comparison: Comparison) -> str:
     change, low, high = ((each - 1) * 100 for each in (comparison.ratio, comparison.low, comparison.high))
-    return (f"{str(case):32} {case.spec.metric:20} {change:+6.1f} %  (95 %: {low:+.1f} to {high:+.1f})  "
+    return (f"{str(case):32} {case.spec.metric:20} {change:+6.1f} %  (between {low:+.1f} and {high:+.1f} %)  "
             f"{comparison.verdict}, confidence {comparison.confidence:.1%}, {comparison.pairs} pairs")
 
 
-def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], pairs: int, settings: Settings) -> dict:
-    """The JSON document. Raises BuildError, SubjectError."""
-    if pairs < PAIRS_MIN:
-        raise BuildError(f"{pairs} pairs cannot show a difference: at least {PAIRS_MIN}")
+def explain(cases: int) -> str:
+    """What the confidence is of."""
+    of_all = f"that of all {cases} cases together (Holm's method)" if cases > 1 else "that of Wilcoxon's signed-rank test"
+    called = "one of them" if cases > 1 else "it"
+    return (f"The confidence is {of_all}: if the versions were equally fast, {called} would be called faster or slower in fewer than "
+            f"{(1 - CONFIDENCE) * 100:.0f} of 100 such comparisons.\n'No difference' says that there is none that so many pairs show; the "
+            "brackets say how large it could be.")
+
+
+def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count: int | None, settings: Settings) -> dict:
+    """The JSON document; `count` pairs of each case, None: as many as usual. Raises BuildError, SubjectError."""
+    if not cases:
+        raise BuildError("none of the scenarios asked for exists in that size and on that transport")
+    least = pairs_min(len(cases))
+    count = count or max(PAIRS, least)
+    if count < least:
+        raise BuildError(f"{count} pairs cannot show a difference in one of {len(cases)} cases: at least {least} (--runs)")
     commit, other = build_version(root, revision)
-    say(f"this version against {revision} ({commit[:12]}):")
-    comparisons = []
+    measured = []
     for case in cases:
-        comparison = compare_case(case, other, pairs, settings)
-        say(describe(case, comparison))
-        comparisons.append({"scenario": case.scenario, "size": case.size, "transport": case.transport,
-                            "metric": case.spec.metric, "ratio": comparison.ratio, "low": comparison.low,
-                            "high": comparison.high, "confidence": comparison.confidence,
-                            "pairs": comparison.pairs, "verdict": comparison.verdict})
-    return {"against": revision, "commit": commit, "comparisons": comparisons}
+        say(f"  {case}: {count} pairs")
+        measured.append(measure_pairs(case, other, count, settings))
+    comparisons = compare_all(measured)
+    say("\n".join([f"this version against {revision} ({commit[:12]}):", *map(describe, cases, comparisons), explain(len(cases))]))
+    return {"against": revision, "commit": commit, "confidence_of_all": CONFIDENCE, "comparisons": [
+        {"scenario": case.scenario, "size": case.size, "transport": case.transport, "metric": case.spec.metric,
+         "ratio": each.ratio, "low": each.low, "high": each.high, "p": each.p, "p_of_all": each.p_of_all,
+         "confidence": each.confidence, "pairs": each.pairs, "verdict": each.verdict}
+        for case, each in zip(cases, comparisons)]}

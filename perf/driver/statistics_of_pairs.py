@@ -5,10 +5,17 @@ import random
 import statistics
 from dataclasses import dataclass
 
+# Of all cases of one comparison together: were there no difference anywhere, in so many of them none would be called one.
 CONFIDENCE = 0.95
-RESAMPLES = 2000
-# Fewer pairs cannot reach that confidence, whatever they say.
-PAIRS_MIN = 6
+RESAMPLES = 10_000
+
+
+def pairs_min(cases: int) -> int:
+    """Fewer pairs cannot reach that confidence among so many cases, whatever they say: all on one side are 2 of 2^n."""
+    pairs = 1
+    while 2 / 2**pairs > (1 - CONFIDENCE) / cases:
+        pairs += 1
+    return pairs
 
 
 @dataclass(frozen=True)
@@ -16,14 +23,20 @@ class Comparison:
     """`ratio` is new to old, of a figure of which less is better."""
 
     ratio: float
-    low: float  # 95 % of resampled medians lie between low and high
+    low: float  # between low and high lie the medians of resampled pairs, with CONFIDENCE for all cases together
     high: float
-    confidence: float  # that there is a difference at all: 1 - p of Wilcoxon's signed-rank test
+    p: float  # of Wilcoxon's signed-rank test, for this case alone
+    p_of_all: float  # the same among all cases, by Holm
     pairs: int
 
     @property
+    def confidence(self) -> float:
+        """That there is a difference at all."""
+        return 1 - self.p_of_all
+
+    @property
     def verdict(self) -> str:
-        if self.confidence < CONFIDENCE or self.low <= 1 <= self.high:
+        if self.p_of_all > 1 - CONFIDENCE or self.low <= 1 <= self.high:
             return "no difference"
         return "faster" if self.ratio < 1 else "slower"
 
@@ -47,12 +60,31 @@ def signed_rank_p(differences: list[float]) -> float:
     return min(1.0, 2 * tail / 2 ** len(ranks))
 
 
-def compare(old: list[float], new: list[float]) -> Comparison:
-    """REQUIRES: as many of each, in pairs, all above 0."""
-    logarithms = [math.log(b / a) for a, b in zip(old, new, strict=True)]
+def holm(ps: list[float]) -> list[float]:
+    """What each p is worth where so many were looked at: Holm's method, so that looking often finds nothing by itself."""
+    adjusted = [0.0] * len(ps)
+    least = 0.0
+    for rank, index in enumerate(sorted(range(len(ps)), key=ps.__getitem__)):
+        least = max(least, min(1.0, (len(ps) - rank) * ps[index]))
+        adjusted[index] = least
+    return adjusted
+
+
+def logarithms_of(pairs: list[tuple[float, float]]) -> list[float]:
+    return [math.log(new / old) for old, new in pairs]
+
+
+def interval(logarithms: list[float], cases: int) -> tuple[float, float]:
+    """Of the median, from resampled pairs, widened for the number of cases by Bonferroni's method."""
     chance = random.Random(len(logarithms))  # the same pairs give the same answer
     medians = sorted(statistics.median(chance.choices(logarithms, k=len(logarithms))) for _ in range(RESAMPLES))
-    outside = int(RESAMPLES * (1 - CONFIDENCE) / 2)
-    return Comparison(ratio=math.exp(statistics.median(logarithms)), low=math.exp(medians[outside]),
-                      high=math.exp(medians[-1 - outside]), confidence=1 - signed_rank_p(logarithms),
-                      pairs=len(logarithms))
+    outside = int(RESAMPLES * (1 - CONFIDENCE) / cases / 2)
+    return math.exp(medians[outside]), math.exp(medians[-1 - outside])
+
+
+def compare_all(cases: list[list[tuple[float, float]]]) -> list[Comparison]:
+    """REQUIRES: of each case pairs of old and new, all above 0."""
+    found = [logarithms_of(pairs) for pairs in cases]
+    ps = [signed_rank_p(logarithms) for logarithms in found]
+    return [Comparison(math.exp(statistics.median(logarithms)), *interval(logarithms, len(cases)), p, p_of_all, len(logarithms))
+            for logarithms, p, p_of_all in zip(found, ps, holm(ps), strict=True)]

@@ -5,13 +5,12 @@ import pathlib
 import tempfile
 import unittest
 
-from support import ROOT, outcome, result_of
+from support import outcome, result_of
 import run
-from driver import against, catalogue, plots, suite
+from driver import catalogue, plots, suite
 from driver.document import make_document
 from driver.goals import GOALS, RIVAL_FIELDS
 from driver.measure import Outcome, make_group
-from driver.statistics_of_pairs import compare, signed_rank_p
 from driver.summary import absence_lines, make_absences
 
 
@@ -175,42 +174,6 @@ class Pictures(unittest.TestCase):
             self.assertEqual([name for name, _ in drawn], ["cost_by_size.png", "cost_by_subscribers.png"])
             for name, _ in drawn:
                 self.assertTrue(pathlib.Path(folder, name).read_bytes().startswith(b"\x89PNG"))
-
-
-class Pairs(unittest.TestCase):
-    OLD = [100.0, 104.0, 98.0, 101.0, 99.0, 130.0, 100.5, 102.0, 97.0, 100.0, 103.0, 99.5]
-
-    def test_signed_ranks_are_exact(self):
-        # All of six on one side: 2 of 64 choices of signs. One of six on the other, and the smallest: 4 of 64.
-        self.assertAlmostEqual(signed_rank_p([1, 2, 3, 4, 5, 6]), 2 / 64)
-        self.assertAlmostEqual(signed_rank_p([-1, 2, 3, 4, 5, 6]), 4 / 64)
-        self.assertEqual(signed_rank_p([0, 0]), 1)
-        self.assertEqual(signed_rank_p([1, -1, 1, -1]), 1)
-
-    def test_the_same_version_is_not_different(self):
-        noise = [1.01, 0.985, 1.002, 0.999, 1.02, 0.98, 0.995, 1.004, 1.015, 0.99, 0.997, 1.006]
-        self.assertEqual(compare(self.OLD, [a * b for a, b in zip(self.OLD, noise)]).verdict, "no difference")
-        self.assertEqual(compare(self.OLD, self.OLD).verdict, "no difference")
-
-    def test_a_change_beyond_the_noise_is_seen_with_its_size(self):
-        noise = [1.01, 0.985, 1.002, 0.999, 1.02, 0.98, 0.995, 1.004, 1.015, 0.99, 0.997, 1.006]
-        for factor, verdict in ((1.05, "slower"), (0.95, "faster")):
-            found = compare(self.OLD, [a * b * factor for a, b in zip(self.OLD, noise)])
-            self.assertEqual(found.verdict, verdict)
-            self.assertGreater(found.confidence, 0.99)
-            self.assertLess(found.low, factor)
-            self.assertGreater(found.high, factor)
-
-    def test_one_wild_pair_decides_nothing(self):
-        self.assertEqual(compare(self.OLD, [self.OLD[0] * 9, *self.OLD[1:]]).verdict, "no difference")
-
-    def test_too_few_pairs_are_refused(self):
-        with self.assertRaisesRegex(against.BuildError, "at least 6"):
-            against.compare_versions(ROOT, "HEAD", [], 5, None)
-
-    def test_an_unknown_version_is_named(self):
-        with self.assertRaisesRegex(against.BuildError, "no version 'nonsense~'"):
-            against.compare_versions(ROOT, "nonsense~", [], 6, None)
 
 
 class Document(unittest.TestCase):

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""./dev perf --against without its builds: when two versions are told apart, alone and among many cases."""
+
+import pathlib
+import random
+import unittest
+
+from support import ROOT
+from driver import against, suite
+from driver.statistics_of_pairs import CONFIDENCE, compare_all, holm, pairs_min, signed_rank_p
+
+OLD = [100.0, 104.0, 98.0, 101.0, 99.0, 130.0, 100.5, 102.0, 97.0, 100.0, 103.0, 99.5]
+NOISE = [1.01, 0.985, 1.002, 0.999, 1.02, 0.98, 0.995, 1.004, 1.015, 0.99, 0.997, 1.006]
+
+
+def pairs(factor: float) -> list[tuple[float, float]]:
+    return [(old, old * noise * factor) for old, noise in zip(OLD, NOISE)]
+
+
+class Pairs(unittest.TestCase):
+    def test_signed_ranks_are_exact(self):
+        # All of six on one side: 2 of 64 choices of signs. One of six on the other, and the smallest: 4 of 64.
+        self.assertAlmostEqual(signed_rank_p([1, 2, 3, 4, 5, 6]), 2 / 64)
+        self.assertAlmostEqual(signed_rank_p([-1, 2, 3, 4, 5, 6]), 4 / 64)
+        self.assertEqual(signed_rank_p([0, 0]), 1)
+        self.assertEqual(signed_rank_p([1, -1, 1, -1]), 1)
+
+    def test_the_same_version_is_not_different(self):
+        for case in (pairs(1), [(old, old) for old in OLD]):
+            self.assertEqual(compare_all([case])[0].verdict, "no difference")
+
+    def test_a_change_beyond_the_noise_is_seen_with_its_size_also_among_many_cases(self):
+        for factor, verdict in ((1.05, "slower"), (0.95, "faster")):
+            found = compare_all([pairs(1), pairs(factor), *[pairs(1)] * 5])
+            self.assertEqual([each.verdict for each in found], ["no difference", verdict, *["no difference"] * 5])
+            self.assertGreater(found[1].confidence, 0.99)
+            self.assertLess(found[1].low, factor)
+            self.assertGreater(found[1].high, factor)
+
+    def test_one_wild_pair_decides_nothing(self):
+        wild = [(OLD[0], OLD[0] * 9), *((old, old) for old in OLD[1:])]
+        self.assertEqual(compare_all([wild])[0].verdict, "no difference")
+
+
+class ManyCases(unittest.TestCase):
+    def test_holm_multiplies_the_smallest_the_most_and_keeps_the_order(self):
+        self.assertEqual([round(each, 9) for each in holm([0.04, 0.01, 0.03])], [0.06, 0.03, 0.06])
+        self.assertEqual(holm([0.9, 0.8]), [1, 1])
+
+    def test_what_would_be_a_difference_alone_is_none_among_many(self):
+        # Seven pairs all on one side: p is 2 of 128, times seven it is above one in twenty.
+        doubtful = [(100.0, 101.0 + step) for step in range(7)]
+        alone, among = compare_all([doubtful])[0], compare_all([doubtful, *[pairs(1)] * 6])[0]
+        self.assertEqual((alone.verdict, among.verdict), ("slower", "no difference"))
+        self.assertAlmostEqual(among.p_of_all, 7 * alone.p)
+
+    def test_noise_in_seven_cases_is_seldom_called_a_difference(self):
+        chance = random.Random(7)
+        comparisons = 200
+        false_alarms = 0
+        for _ in range(comparisons):
+            ps = [signed_rank_p([chance.gauss(0, 1) for _ in range(12)]) for _ in range(7)]
+            self.assertTrue(all(adjusted >= p for p, adjusted in zip(ps, holm(ps))))
+            false_alarms += min(holm(ps)) <= 1 - CONFIDENCE
+        self.assertLessEqual(false_alarms, 2 * (1 - CONFIDENCE) * comparisons)
+
+    def test_more_cases_need_more_pairs(self):
+        self.assertEqual([pairs_min(cases) for cases in (1, 2, 7)], [6, 7, 9])
+        self.assertLessEqual(pairs_min(len(against.CASES)), against.PAIRS)
+        with self.assertRaisesRegex(against.BuildError, "8 pairs .* one of 7 cases: at least 9"):
+            against.compare_versions(ROOT, "HEAD", list(against.CASES), 8, None)
+
+    def test_nothing_to_compare_is_said(self):
+        with self.assertRaisesRegex(against.BuildError, "none of the scenarios"):
+            against.compare_versions(ROOT, "HEAD", [], None, None)
+
+    def test_an_unknown_version_is_named(self):
+        with self.assertRaisesRegex(against.BuildError, "no version 'nonsense~'"):
+            against.compare_versions(ROOT, "nonsense~", list(against.CASES), None, None)
+
+
+class Report(unittest.TestCase):
+    """compare_versions() with figures that are given instead of measured."""
+
+    def setUp(self):
+        for name in ("build_version", "measure_once", "say"):
+            self.addCleanup(setattr, against, name, getattr(against, name))
+        self.said = []
+        self.order = []
+        against.build_version = lambda root, revision: ("c0ffee", pathlib.Path("old"))
+        against.measure_once = self.measure_once
+        against.say = self.said.append
+
+    def measure_once(self, build, case, settings):
+        self.order.append(str(build))
+        return (100.0 if build == pathlib.Path("old") else 110.0) + len(self.order) % 7
+
+    def test_says_the_verdict_of_each_case_and_what_the_confidence_is_of(self):
+        settings = against.Settings(build=pathlib.Path("new"))
+        document = against.compare_versions(ROOT, "HEAD~1", [suite.Case("one_to_one", size, "tcp") for size in (16, 256)], 8, settings)
+        self.assertEqual(self.order[:6], ["old", "new", "new", "old", "old", "new"])
+        self.assertEqual([each["verdict"] for each in document["comparisons"]], ["slower", "slower"])
+        self.assertIn("slower, confidence 98.4%, 8 pairs", self.said[-1])
+        self.assertIn("all 2 cases together (Holm's method)", self.said[-1])
+        self.assertIn("in fewer than 5 of 100", self.said[-1])
+
+
+if __name__ == "__main__":
+    unittest.main()
