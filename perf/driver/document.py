@@ -3,10 +3,11 @@
 import pathlib
 
 from driver import yardstick
-from driver.figures import shown_with_spread
+from driver.figures import shown, shown_with_spread
 from driver.floor import floor_text
 from driver.markdown import table
 from driver.repetition import APART_MAX
+from driver.suite import SCENARIOS
 from driver.summary import DOCUMENT_COLUMNS, absence_lines, document_cells
 from driver.verdicts import EXPLANATION, goal_table
 
@@ -28,8 +29,7 @@ the ratios. Where the runs of a subject lie more than 1.5 times apart, it is run
 machine to machine; the ratios of one run are what counts.
 
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
-fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`. Runs of `ping_paced` are four times, of
-libraries twice as long as the others.
+fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`.
 
 **Other hubs** (`perf/driver/rivals.py`): Debian's packages as their documentation would have them for messages that need not be kept, and in their favour:
 nothing on disk, no passwords, TCP_NODELAY; nats-server; mosquitto at QoS 0; redis-server with RESP 3 and without replies to PUBLISH; ZeroMQ's XPUB/XSUB
@@ -51,7 +51,7 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 | ping_one_cpu | round trips of 16 B, generator and hub on one processor: the software's path without idle wake-ups |
 | ping_two_cpus, ping_paced | round trips between two processors, without a pause, and at 1 kHz |
 | ping_under_bulk, ping_under_300MBps | round trips in lane 0 while another pair moves 64 KiB messages in lane 2, at full speed and at 300 MB/s |
-| stalled_subscriber | a service at line rate with a subscriber that does not read beside one that does |
+| stalled_subscriber | a service at line rate: one subscriber, and the same with another one that does not read, in turns |
 | idle_10000 | 10,000 nodes that say nothing but keep-alives |
 | connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
 | join_under_load | the time until 1,000 nodes have joined while one_to_one goes on, and what is left of its rate |
@@ -65,6 +65,8 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 def other_figures(rows: list[dict]) -> str:
     """Memory, rates and times that have no column of their own."""
     names = {"rate_kept": "rate kept", "rss_growth_bytes": "bytes grown by meanwhile",
+             "publisher_pause_ms": "longest time without a write, ms",
+             "publisher_pause_ms_alone": "longest time without a write, alone, ms",
              "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
              "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s",
              "cpu_share": "of a processor used"}
@@ -87,7 +89,8 @@ def library_figures(rows: list[dict]) -> str:
 def runs_of(result: dict) -> str:
     """How many runs, and how long."""
     wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart" if result["runs_max"] > result["runs"] else ""
-    return f"{result['runs']} runs{wild}, of {result['seconds']} s each"
+    longer = [f"{name} {shown(result['seconds'] * spec.seconds_factor)}" for name, spec in SCENARIOS.items() if spec.seconds_factor != 1]
+    return f"{result['runs']} runs{wild}, of {result['seconds']} s each ({', '.join(longer)} s)"
 
 
 def make_document(result: dict, pictures: list[str] | None = None) -> str:

@@ -51,6 +51,10 @@ GOALS = (
     Goal("ping_paced", 16, "tcp", "p999_us", None, 250, subject="tcphub_spinning"),
     Goal("ping_under_bulk", 16, "tcp", "p99_over_idle", None, 1.5),
     Goal("stalled_subscriber", 1024, "tcp", "rate_kept", None, 0.95, at_least=True),
+    # What the hub may hold at all (budget_bytes), and what may wait for one node (a lane and the reserve) with the buffers it lies in.
+    Goal("stalled_subscriber", 1024, "tcp", "rss_growth_bytes", 256 << 20, 4 << 20),
+    # A publisher that is blocked stands still as long as the stalled one does (0.75 s); one that is not, as long as the system lets it.
+    Goal("stalled_subscriber", 1024, "tcp", "publisher_pause_ms", None, 100),
     Goal("idle_10000", 16, "tcp", "rss_bytes_per_connection", 1024, 1024),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
     Goal("library_burst", 16, "tcp", "rate_over_best", None, 2, at_least=True),
@@ -77,6 +81,8 @@ FIELD_TITLES = {
     "p999_us": "99.9th percentile, us",
     "p99_over_idle": "99th percentile, times that of ping_two_cpus",
     "rate_kept": "of the healthy subscriber's rate kept",
+    "rss_growth_bytes": "bytes grown by for the stalled one",
+    "publisher_pause_ms": "the publisher's longest time without a write, ms",
     "rss_bytes_per_connection": "resident bytes a connection",
     "seconds_over_null": "seconds longer than the null relay",
     "rate_over_best": "messages/s, times the best other library on TCP",

@@ -45,7 +45,8 @@ SCENARIOS = {
     "ping_paced": Scenario(metric="p50_us", seconds_factor=4),
     "ping_under_bulk": Scenario(metric="p99_us", beside="ping_two_cpus"),
     "ping_under_300MBps": Scenario(metric="p99_us", beside="ping_two_cpus"),
-    "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), unix_sizes=()),
+    # Four phases, alone and beside a stalled one in turns.
+    "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), unix_sizes=(), seconds_factor=6),
     "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", unix_sizes=()),
     "connect_10000": Scenario(metric="seconds", unix_sizes=()),
     "join_under_load": Scenario(metric="seconds", unix_sizes=()),

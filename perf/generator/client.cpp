@@ -7,7 +7,12 @@
 
 namespace gimnet::perf {
 
-Client::~Client() { ::close(socket_); }
+Client::~Client() { close(); }
+
+void Client::close() {
+  if (socket_ >= 0) ::close(socket_);
+  socket_ = -1;
+}
 
 bool Client::send_some(std::span<const std::byte>& bytes) {
   const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);

@@ -29,6 +29,8 @@ class Client {
   /// The bytes after the last message end; the next recv continues them.
   [[nodiscard]] std::vector<std::byte>& carry() { return carry_; }
 
+  /// Closes the connection. Nothing may be sent or read after.
+  void close();
   /// Sends what was begun. False: the kernel takes no more now, or the connection is broken.
   bool flush();
   /// Begins to write `bytes` with one system call. REQUIRES: flush() was true. Valid until: flush() is true.
@@ -41,7 +43,7 @@ class Client {
   bool is_in_group = false;  ///< provides or subscribes, as asked
   bool is_side = false;      ///< another client's publishing side
   bool is_reading = true;    ///< a stalled client is not read
-  bool is_closed = false;    ///< by the subject
+  bool is_closed = false;    ///< by the subject, or by close()
   /// PAUSEs that were not lifted yet (one RESUME lifts any number for its target): nothing is published meanwhile.
   std::vector<proto::flow::Target> paused;
 
@@ -49,7 +51,7 @@ class Client {
   bool send_some(std::span<const std::byte>& bytes);
 
   const std::size_t index_;
-  const int socket_;
+  int socket_;
   Client* publishing_side_ = nullptr;
   std::vector<std::byte> carry_;
   std::span<const std::byte> begun_;

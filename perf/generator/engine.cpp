@@ -16,7 +16,6 @@ constexpr std::size_t kReadBytes = 256 * 1024;
 /// The longest incomplete message that is carried over to the next read.
 constexpr std::size_t kCarryBytesMax = 2 * 1024 * 1024;
 constexpr std::size_t kEventsMax = 512;
-constexpr std::size_t kJoiningMax = 64;
 constexpr std::chrono::milliseconds kKeepAlive{900};
 
 }  // namespace
@@ -125,6 +124,11 @@ void Engine::stop_reading(Client& client) {
   epoll_event event{};
   event.data.ptr = &client;
   if (::epoll_ctl(epoll_, EPOLL_CTL_MOD, client.socket(), &event) != 0) fail("epoll_ctl", errno);
+}
+
+void Engine::close(Client& client) {
+  client.is_closed = true;
+  client.close();  // which takes it out of the epoll, too
 }
 
 void Engine::read(Client& client) {

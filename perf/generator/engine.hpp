@@ -47,6 +47,8 @@ class Engine {
   /// Whether a client that the subject closes ends the program, which is the default.
   void tolerate_closing(bool tolerated) { is_closing_tolerated_ = tolerated; }
   void stop_reading(Client& client);
+  /// Closes its connection, whatever is unread. REQUIRES: nothing is published by it any more.
+  void close(Client& client);
   /// What stays away for longer is lost; 2 s unless set. More where nothing is timed, and a busy machine no fault.
   void set_patience(std::chrono::nanoseconds patience) { patience_ = patience; }
   [[nodiscard]] std::chrono::nanoseconds patience() const { return patience_; }

@@ -71,21 +71,30 @@ bool Flood::publish() {
       any = true;
     }
   }
+  if (any) last_write_ = Clock::now();
   return any;
+}
+
+/// What comes after it was given up was late, not lost.
+void Flood::settle(std::uint64_t count) {
+  settled_ += count;
+  if (settled_ + missing_ > expected_) missing_ -= std::min(missing_, settled_ + missing_ - expected_);
 }
 
 std::uint64_t Flood::turn(std::chrono::nanoseconds patience) {
   const bool any = publish();
   const std::uint64_t settled = engine_.poll(any ? std::chrono::nanoseconds(0) : patience);
-  settled_ += settled;
+  settle(settled);
   return settled;
 }
 
 void Flood::run_for(std::chrono::nanoseconds duration) {
   const auto deadline = Clock::now() + duration;
   auto last_settled = Clock::now();
+  last_write_ = last_settled;
   while (Clock::now() < deadline) {
     const auto now = Clock::now();
+    longest_pause_ = std::max(longest_pause_, now - last_write_);
     if (turn(kPatience) != 0) {
       last_settled = now;
     } else if (now - last_settled > engine_.patience()) {
@@ -101,7 +110,7 @@ void Flood::drain() {
   while (expected_ > settled_ + missing_) {
     for (auto& publisher : publishers_) publisher.client().flush();
     const std::uint64_t settled = engine_.poll(kPatience);
-    settled_ += settled;
+    settle(settled);
     const auto now = Clock::now();
     if (settled != 0) last_settled = now;
     if (now - last_settled > engine_.patience()) missing_ = expected_ - settled_;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "generator/engine.hpp"
@@ -33,11 +34,16 @@ class Flood {
   void forget_settled(std::uint64_t foreign) { settled_ -= foreign; }
   [[nodiscard]] std::uint64_t expected() const { return expected_; }
   [[nodiscard]] std::uint64_t missing() const { return missing_; }
+  /// The longest time within run_for() without a write, since this was asked last.
+  [[nodiscard]] std::chrono::nanoseconds take_longest_pause() {
+    return std::exchange(longest_pause_, std::chrono::nanoseconds(0));
+  }
   /// At most so many bytes are under way: for recipients whose queue drops what does not fit.
   void set_window(std::size_t bytes) { window_bytes_ = bytes; }
 
  private:
   bool publish();
+  void settle(std::uint64_t count);
   /// Messages that may be under way.
   [[nodiscard]] std::uint64_t window() const;
   /// For which it has room.
@@ -56,6 +62,8 @@ class Flood {
   std::uint64_t expected_ = 0;     ///< deliveries
   std::uint64_t settled_ = 0;      ///< deliveries
   std::uint64_t missing_ = 0;      ///< deliveries given up
+  Clock::time_point last_write_;
+  std::chrono::nanoseconds longest_pause_{0};
 };
 
 }  // namespace gimnet::perf

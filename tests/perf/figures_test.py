@@ -12,7 +12,7 @@ from driver.goals import GOALS, Goal
 from driver.measure import Outcome, Settings, run_group
 from driver.repetition import to_repeat
 from driver.summary import make_rows, text_table
-from driver.verdicts import verdict
+from driver.verdicts import goal_table, verdict
 from driver.yardstick import ELSEWHERE, yardstick_table
 
 ONE_TO_ONE = suite.Case("one_to_one", 16, "tcp")
@@ -128,6 +128,13 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(verdict(self.GOAL, [1.9, 1.9, 2.1]), "**bound undecided**")
         self.assertEqual(verdict(self.ONLY_GOAL, [14, 16, 16]), "undecided")
 
+    def test_a_stalled_subscriber_is_judged_by_rate_memory_and_the_publisher(self):
+        case = suite.Case("stalled_subscriber", 1024, "tcp")
+        hub = Outcome("tcphub", case, [{"cpu_ns_per_message": 1, "rate_kept": kept, "rss_growth_bytes": 3 << 20, "publisher_pause_ms": 700}
+                                       for kept in (0.94, 0.97)])
+        lines = [line for line in goal_table(make_rows([hub])).splitlines() if "stalled" in line]
+        self.assertEqual([line.split(" | ")[-1] for line in lines], ["undecided |", "goal met |", "goal open |"])
+
     def test_one_wild_run_of_nine_does_not_count(self):
         self.assertEqual(verdict(self.GOAL, [1.1] * 8 + [5]), "goal met")
         self.assertEqual(verdict(self.GOAL, [1.1] * 7 + [1.3, 5]), "bound met, goal undecided")
@@ -137,7 +144,7 @@ class Verdicts(unittest.TestCase):
         document = make_document(result_of(rows))
         self.assertIn("| tcphub | one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | 1.4 to 1.6 | 3 | "
                       "bound met, goal open |", document)
-        self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart, of 1 s each", document)
+        self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart, of 1 s each (ping_paced 4, stalled_subscriber 6, ", document)
         self.assertIn("15 (14 to 16)", document)
         self.assertIn("not measured", document)
 
