@@ -52,7 +52,8 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 | ping_two_cpus, ping_paced | round trips between two processors, without a pause, and at 1 kHz |
 | ping_under_bulk, ping_under_300MBps | round trips in lane 0 while another pair moves 64 KiB messages in lane 2, at full speed and at 300 MB/s |
 | stalled_subscriber | a service at line rate: one subscriber, and the same with another one that does not read, in turns |
-| idle_10000 | 10,000 nodes that say nothing but keep-alives |
+| idle_10000 | 10,000 nodes that say nothing but keep-alives, each 0.9 s; and then five rounds of keep-alives without a pause, to know what one costs |
+| idle_alone | nobody is connected |
 | connect_10000 | the time until 10,000 nodes have joined, and a message has gone through the last two |
 | join_under_load | the time until 1,000 nodes have joined while one_to_one goes on, and what is left of its rate |
 | ping_beside_joins | round trips of two nodes while 1,000 others join, and without that (`_alone`) |
@@ -69,9 +70,12 @@ def other_figures(rows: list[dict]) -> str:
              "publisher_pause_ms_alone": "longest time without a write, alone, ms",
              "rss_bytes_per_connection": "resident bytes a connection", "seconds": "seconds",
              "cpu_ns_per_connection": "CPU ns a connection", "bulk_bytes_per_second": "bulk bytes/s",
-             "cpu_share": "of a processor used"}
+             "cpu_share": "of a processor used", "context_switches_per_second": "context switches/s",
+             "keep_alives_per_second": "keep-alives/s, word and answer", "keep_alive_ns": "CPU ns a keep-alive",
+             "keep_alive_ns_busy": "CPU ns a keep-alive, one round after the other",
+             "cpu_share_beyond_keep_alives": "of a processor used beyond keep-alives"}
     lines = [[row["subject"], row["transport"], row["scenario"], title, shown_with_spread(row, name)] for row in rows
-             for name, title in names.items() if name in row and (name != "cpu_share" or row["scenario"] == "idle_10000")]
+             for name, title in names.items() if name in row and (name != "cpu_share" or row["scenario"].startswith("idle"))]
     return table(["subject", "transport", "scenario", "figure", "median"], lines)
 
 
@@ -116,8 +120,8 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         FINDINGS.read_text(),
         "## All figures", "",
         "Medians of the runs, with the smallest and the largest. `x null` is of the CPU cost; of the median round trip for pings, of its 99th",
-        "percentile for pings under bulk; of bytes a connection for idle_10000, and of seconds for connect_10000 and join_under_load. Peak bytes",
-        "are the hub's. The CPU of library scenarios is that of hub and programs together, in round trips for each way.", "",
+        "percentile for pings under bulk; of bytes a connection for idle_10000, of context switches for idle_alone, and of seconds for",
+        "connect_10000 and join_under_load. Peak bytes are the hub's. The CPU of library scenarios is that of hub and programs together, in round trips for each way.", "",
         table([title for _, title in DOCUMENT_COLUMNS], [document_cells(row) for row in rows]), "",
         other_figures(rows), "",
         "## Libraries", "",

@@ -47,7 +47,9 @@ SCENARIOS = {
     "ping_under_300MBps": Scenario(metric="p99_us", beside="ping_two_cpus"),
     # Four phases, alone and beside a stalled one in turns.
     "stalled_subscriber": Scenario(relay_mode=None, sizes=(1024,), unix_sizes=(), seconds_factor=6),
-    "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", unix_sizes=()),
+    # Several rounds of keep-alives, one of which is said each 0.9 s.
+    "idle_10000": Scenario(relay_mode=None, metric="rss_bytes_per_connection", unix_sizes=(), seconds_factor=10),
+    "idle_alone": Scenario(relay_mode=None, metric="context_switches_per_second", unix_sizes=(), seconds_factor=6),
     "connect_10000": Scenario(metric="seconds", unix_sizes=()),
     "join_under_load": Scenario(metric="seconds", unix_sizes=()),
     "ping_beside_joins": Scenario(metric="p99_us", unix_sizes=()),
@@ -139,7 +141,7 @@ def quick_cases() -> list[Case]:
                 ("fan_out_100", 16), ("fan_out_1000", 16), ("fan_out_1000", 1024), ("list_100", 16),
                 ("broadcast_100", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16), ("ping_paced", 16),
                 ("ping_under_bulk", 16),
-                ("stalled_subscriber", 1024), ("idle_10000", 16), ("connect_10000", 16)]
+                ("stalled_subscriber", 1024), ("idle_10000", 16), ("idle_alone", 16), ("connect_10000", 16)]
     over_unix = [("one_to_one", 16), ("one_to_one", 65536), ("one_to_one_unbatched", 16), ("ping_one_cpu", 16)]
     return [Case(*case, "tcp") for case in over_tcp] + [Case(*case, "unix") for case in over_unix]
 

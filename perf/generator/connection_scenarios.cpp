@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <thread>
 
 #include "generator/flood.hpp"
 #include "generator/process.hpp"
@@ -12,6 +13,10 @@ constexpr std::size_t kClients = 10'000;
 constexpr std::size_t kClientsUnderLoad = 1'000;
 /// Long enough for every client's first keep-alive.
 constexpr std::chrono::seconds kSettling{2};
+/// Of all clients, one after the other, to learn what a keep-alive costs a subject that is busy with them.
+constexpr int kBusyRounds = 5;
+/// A subject that has just started still does what belongs to that.
+constexpr std::chrono::milliseconds kStarting{500};
 
 std::size_t count_of(const RunOptions& options, std::size_t usual = kClients) {
   return options.client_count == 0 ? usual : options.client_count;
@@ -19,24 +24,85 @@ std::size_t count_of(const RunOptions& options, std::size_t usual = kClients) {
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
+bool never() { return false; }
+
+/// Of a subject that answers none, or needs none, there is nothing to wait for.
+void await_answers(Engine& engine) {
+  const KeepAlives& words = engine.wire().keep_alives();
+  const bool answered = engine.poll_until([&words] { return words.answered == words.said; }, engine.answer_limit());
+  if (!answered) fail("the subject did not answer all keep-alives in time");
+}
+
+/// What the subject used meanwhile, from rest to rest, and for how many keep-alives: word and answer are one.
+struct KeepAlivesUsed {
+  double cpu_ns = 0;
+  double seconds = 0;
+  double keep_alives = 0;
+};
+
+template <class Meanwhile>
+KeepAlivesUsed use_of(Engine& engine, const RunOptions& options, const Meanwhile& meanwhile) {
+  await_answers(engine);
+  const KeepAlives before = engine.wire().keep_alives();
+  const auto cpu_begin_ns = cpu_time_ns(options.process);
+  const auto begin = Clock::now();
+  meanwhile();
+  await_answers(engine);
+  const KeepAlives& after = engine.wire().keep_alives();
+  const std::uint64_t count = after.answered - before.answered + after.asked - before.asked;
+  return {.cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns),
+          .seconds = seconds_since(begin),
+          .keep_alives = static_cast<double>(count)};
+}
+
 }  // namespace
 
-/// Resident bytes and processor share of connections that say nothing but keep-alives.
+/// Resident bytes and processor time of connections that say nothing but keep-alives, and what one of these costs there
+/// and among as many that follow each other at once.
 Findings idle(Engine& engine, const RunOptions& options) {
-  const std::size_t count = count_of(options);
+  const auto count = static_cast<double>(count_of(options));
   const auto resident_before = resident_bytes(options.process);
-  engine.connect(count);
-  const auto never = [] { return false; };
+  engine.connect(count_of(options));
   std::ignore = engine.poll_until(never, std::min<std::chrono::nanoseconds>(2 * options.duration, kSettling));
-  const auto cpu_begin_ns = cpu_time_ns(options.process);
-  std::ignore = engine.poll_until(never, options.duration);
-  const auto cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns);
+  const KeepAlivesUsed idle =
+      use_of(engine, options, [&] { std::ignore = engine.poll_until(never, options.duration); });
   const auto resident = static_cast<double>(resident_bytes(options.process) - resident_before);
 
   Findings findings;
-  findings.add("rss_bytes_per_connection", resident / static_cast<double>(count));
-  findings.add("cpu_share", cpu_ns / static_cast<double>(options.duration.count()));
-  findings.add("connections", static_cast<double>(count));
+  findings.add("rss_bytes_per_connection", resident / count);
+  findings.add("cpu_share", idle.cpu_ns / 1e9 / idle.seconds);
+  findings.add("connections", count);
+  if (idle.keep_alives == 0) return findings;
+  const KeepAlivesUsed busy = use_of(engine, options, [&] {
+    for (int round = 0; round < kBusyRounds; ++round) {
+      engine.keep_alive();
+      await_answers(engine);
+    }
+  });
+  const double busy_ns = busy.cpu_ns / busy.keep_alives;
+  findings.add("keep_alives_per_second", idle.keep_alives / idle.seconds);
+  findings.add("keep_alive_ns", idle.cpu_ns / idle.keep_alives);
+  findings.add("keep_alive_ns_busy", busy_ns);
+  findings.add("keep_alive_over_busy", idle.cpu_ns / idle.keep_alives / busy_ns);
+  findings.add("cpu_share_beyond_keep_alives", (idle.cpu_ns - idle.keep_alives * busy_ns) / 1e9 / idle.seconds);
+  return findings;
+}
+
+/// What a subject does to which nobody is connected.
+Findings idle_alone(Engine& engine, const RunOptions& options) {
+  std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(options.duration, kStarting));
+  const auto switches_begin = context_switches(options.process);
+  const auto cpu_begin_ns = cpu_time_ns(options.process);
+  const auto begin = Clock::now();
+  std::this_thread::sleep_for(options.duration);
+  const auto cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns);
+  const auto switches = static_cast<double>(context_switches(options.process) - switches_begin);
+  const double seconds = seconds_since(begin);
+  engine.connect(1);  // it still answers, and tells its ledger
+
+  Findings findings;
+  findings.add("cpu_share", cpu_ns / 1e9 / seconds);
+  findings.add("context_switches_per_second", switches / seconds);
   return findings;
 }
 

@@ -41,6 +41,8 @@ class Engine {
   /// Waits at most `timeout` for something to read, then reads every ready client once. Returns the messages that
   /// were settled (delivered or known as lost) by that.
   std::uint64_t poll(std::chrono::nanoseconds timeout);
+  /// Lets every client say that it is there, as poll() does when it is time to.
+  void keep_alive();
   /// Polls until `done` holds; false after `limit`.
   [[nodiscard]] bool poll_until(const std::function<bool()>& done, std::chrono::nanoseconds limit);
 
@@ -64,7 +66,6 @@ class Engine {
   void watch(Client& client) const;
   void read(Client& client);
   void on_closed(Client& client);
-  void keep_alive();
 
   Wire& wire_;
   const Endpoint endpoint_;

@@ -159,6 +159,9 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
     const proto::flow::Pong pong{.sequence = ping->sequence, .sent_ns = ping->sent_ns, .now_ns = wall_clock_ns()};
     const std::size_t size = proto::flow::encode_frame(pong, NodeId{node_id(client)}, frame);
     client.write_control(std::span<const std::byte>(frame).first(size));
+    ++keep_alives_.asked;
+  } else if (std::holds_alternative<proto::flow::Pong>(*message)) {
+    ++keep_alives_.answered;
   } else if (const auto* const pause = std::get_if<proto::flow::Pause>(&*message)) {
     if (std::ranges::find(client.paused, pause->target) == client.paused.end()) client.paused.push_back(pause->target);
   } else if (const auto* const resume = std::get_if<proto::flow::Resume>(&*message)) {
@@ -168,6 +171,7 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
 
 void GimnetWire::keep_alive(Client& client) {
   std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
+  ++keep_alives_.said;
   const proto::flow::Ping ping{.sequence = ++sessions_[client.index()].pings, .sent_ns = wall_clock_ns()};
   const std::size_t size = proto::flow::encode_frame(ping, NodeId{node_id(client)}, frame);
   client.write_control(std::span<const std::byte>(frame).first(size));

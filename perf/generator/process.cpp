@@ -2,8 +2,10 @@
 
 #include <time.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
+#include <system_error>
 
 #include "net/socket.hpp"
 
@@ -28,6 +30,20 @@ std::int64_t cpu_time_ns(pid_t process) {
     fail("the measured process is gone");
   }
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
+}
+
+std::int64_t context_switches(pid_t process) {
+  std::error_code error;
+  std::int64_t sum = 0;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", error)) {
+    std::ifstream status(thread.path() / "status");
+    for (std::string word; status >> word;) {
+      std::int64_t count = 0;
+      if (word.ends_with("voluntary_ctxt_switches:") && status >> count) sum += count;
+    }
+  }
+  if (error) fail("the measured process is gone");
+  return sum;
 }
 
 CpuMeter::CpuMeter(pid_t process) : process_(process), begin_(read(process)) {}

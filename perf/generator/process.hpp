@@ -10,6 +10,9 @@ namespace gimnet::perf {
 
 /// User and system time of the whole process, in nanoseconds.
 [[nodiscard]] std::int64_t cpu_time_ns(pid_t process);
+/// How often the threads that it has now were put on a processor or taken from it: those that do nothing are not.
+[[nodiscard]] std::int64_t context_switches(pid_t process);
+
 /// What a process has used since this was made, user and system time apart. The sum is exact; their ratio is the
 /// kernel's, which looks 100 times a second.
 class CpuMeter {
@@ -32,6 +35,7 @@ class CpuMeter {
   pid_t process_;
   Reading begin_;
 };
+
 /// Resident memory in bytes.
 [[nodiscard]] std::int64_t resident_bytes(pid_t process);
 /// The most that was resident at any time since its start, in bytes.

@@ -41,6 +41,7 @@ constexpr Named kScenarios[] = {
     {"ping_under_300MBps", ping_under_300MBps},
     {"stalled_subscriber", stalled_subscriber},
     {"idle_10000", idle},
+    {"idle_alone", idle_alone},
     {"connect_10000", connect_many},
     {"join_under_load", join_under_load},
     {"ping_beside_joins", ping_beside_joins},

@@ -66,6 +66,7 @@ Findings stalled_subscriber(Engine& engine, const RunOptions& options);
 
 // connection_scenarios.cpp: what many connections cost.
 Findings idle(Engine& engine, const RunOptions& options);
+Findings idle_alone(Engine& engine, const RunOptions& options);
 Findings connect_many(Engine& engine, const RunOptions& options);
 Findings join_under_load(Engine& engine, const RunOptions& options);
 

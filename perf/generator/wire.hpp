@@ -31,6 +31,13 @@ struct Ledger {
   std::uint64_t queued = 0;
 };
 
+/// Words that only say that somebody is there.
+struct KeepAlives {
+  std::uint64_t said = 0;      ///< by the clients
+  std::uint64_t answered = 0;  ///< of those, by the subject
+  std::uint64_t asked = 0;     ///< by the subject of its own accord; each is answered
+};
+
 /// How one subject is spoken to: the seam behind which each wire protocol is. Scenarios know clients, targets and
 /// messages; a wire knows bytes. Virtual calls are per read buffer and per block, never per message.
 class Wire {
@@ -57,6 +64,9 @@ class Wire {
   /// Clients that were admitted so far, publishing sides not among them.
   [[nodiscard]] std::size_t joined_count() const { return joined_count_; }
 
+  /// All so far; none where clients of this protocol need not say anything.
+  [[nodiscard]] const KeepAlives& keep_alives() const { return keep_alives_; }
+
   /// Asks for the ledger; false: this subject keeps none. take() sets ledger().
   virtual bool ask_for_ledger(Client&) { return false; }
   [[nodiscard]] const std::optional<Ledger>& ledger() const { return ledger_; }
@@ -70,6 +80,7 @@ class Wire {
   }
 
   std::optional<Ledger> ledger_;
+  KeepAlives keep_alives_;
 
  private:
   std::size_t joined_count_ = 0;

@@ -135,6 +135,13 @@ class Verdicts(unittest.TestCase):
         lines = [line for line in goal_table(make_rows([hub])).splitlines() if "stalled" in line]
         self.assertEqual([line.split(" | ")[-1] for line in lines], ["undecided |", "goal met |", "goal open |"])
 
+    def test_an_idle_hub_is_to_do_nothing_at_all(self):
+        case = suite.Case("idle_alone", 16, "tcp")
+        for switches, expected in ((0, "goal met |"), (2, "goal open |")):
+            hub = Outcome("tcphub", case, [{"context_switches_per_second": switches, "cpu_share": 0}] * 3)
+            lines = [line for line in goal_table(make_rows([hub])).splitlines() if "idle_alone" in line]
+            self.assertEqual([line.split(" | ")[-1] for line in lines], ["goal met |", expected])
+
     def test_one_wild_run_of_nine_does_not_count(self):
         self.assertEqual(verdict(self.GOAL, [1.1] * 8 + [5]), "goal met")
         self.assertEqual(verdict(self.GOAL, [1.1] * 7 + [1.3, 5]), "bound met, goal undecided")
