@@ -35,7 +35,7 @@ def run_pair(subject: Subject, case: Case, settings) -> dict[str, float]:
     """What the asking program found. Raises SubjectError."""
     answering, asking = case.spec.roles
     cpus = allowed_cpus()[:1] if case.spec.one_cpu else allowed_cpus()
-    seconds = settings.seconds * case.spec.seconds_factor
+    seconds = settings.length_of(subject.name, case)
     command = [str(settings.build / "bin" / CLIENTS[subject.name]), "--connect", subject.urls[case.transport],
                "--size", str(case.size), "--seconds", str(seconds),
                "--patience", str(settings.patience_seconds), "--hub", str(subject.pid)]

@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from driver.catalogue import make_subject, why_absent
@@ -22,7 +23,8 @@ GROUP_SHARE = 0.2
 @dataclass
 class Settings:
     build: pathlib.Path
-    seconds: float = 1.0
+    seconds: float = 1.0  # of each measurement, times the scenario's factor
+    seconds_of: Callable[[str, Case], float] | None = None  # of one subject and case, if not `seconds`
     runs: int = 3
     clients: int | None = None  # of idle_10000, connect_10000, join_under_load and ping_beside_joins
     hub_arguments: list[str] = field(default_factory=list)
@@ -30,6 +32,12 @@ class Settings:
     patience_seconds: float = 2.0  # a message that takes longer is lost
     runs_max: int = 0  # of those whose runs lie far apart; not above `runs`: none of them is made again
     extra_seconds: float = 0  # what is left for such runs
+
+    def length_of(self, subject: str, case: Case) -> float:
+        """Of one measurement, in seconds."""
+        if self.seconds_of is not None:
+            return self.seconds_of(subject, case)
+        return self.seconds * case.spec.seconds_factor
 
 
 @dataclass
@@ -60,8 +68,9 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         with subject:
             return run_pair(subject, case, settings)
     cpus = allowed_cpus()
+    seconds = settings.length_of(subject.name, case)
     command = [str(settings.build / "bin" / "load_generator"), "--wire", subject.wire, "--scenario", case.scenario,
-               "--size", str(case.size), "--seconds", str(settings.seconds * case.spec.seconds_factor),
+               "--size", str(case.size), "--seconds", str(seconds),
                "--patience", str(settings.patience_seconds)]
     if settings.clients is not None:
         command += ["--clients", str(settings.clients)]
@@ -69,7 +78,7 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
         if case.transport in subject.publish_urls:
             command += ["--publish-to", subject.publish_urls[case.transport]]
-        limit = 3 * settings.seconds * case.spec.seconds_factor + 5 * settings.patience_seconds + EXTRA_SECONDS
+        limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
                                   preexec_fn=child_setup([cpus[0] if case.spec.one_cpu else cpus[-1]]))

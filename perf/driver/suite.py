@@ -155,6 +155,8 @@ def smoke_cases() -> list[Case]:
     return cases
 
 
+SMOKE_SECONDS = 1
+SMOKE_MOMENT_SECONDS = 0.1
 # In a smoke run nothing is compared: the null relay is run in each of its modes, so that it cannot rot, and the other
 # subjects in what they do differently.
 SMOKE_OF_NULL = frozenset({Case("one_to_one", 16, "tcp"), Case("fan_out_10", 16, "tcp"), Case("ping_one_cpu", 16, "tcp")})
@@ -171,6 +173,13 @@ def smoke_plan(subjects: tuple[str, ...]) -> Plan:
         return name == "tcphub" or case in (SMOKE_OF_NULL if name == "null" else SMOKE_OF_OTHERS)
 
     return {case: tuple(name for name in subjects if among(case, name)) for case in smoke_cases()}
+
+
+def smoke_seconds(subject: str, case: Case) -> float:
+    """Every scenario of the hub for a second, over TCP in its first size; what is left of a smoke run for a moment, so that
+    all of it takes a minute."""
+    is_first = case == Case(case.scenario, case.spec.sizes[0], "tcp")
+    return SMOKE_SECONDS if subject == "tcphub" and is_first else SMOKE_MOMENT_SECONDS
 
 
 def chosen_plan(scenarios: list[str], sizes: list[int], transports: list[str], subjects: tuple[str, ...]) -> Plan:

@@ -76,6 +76,21 @@ class Suite(unittest.TestCase):
         self.assertEqual({name for subjects in plan.values() for name in subjects}, set(catalogue.SUBJECTS))
 
 
+    def test_smoke_gives_the_hub_a_second_of_every_scenario(self):
+        settings = run.make_settings(run.parse_arguments(["--smoke"]))
+        lengths = {(case, name): settings.length_of(name, case) for case, subjects in suite.smoke_plan(catalogue.SUBJECTS).items()
+                   for name in subjects}
+        self.assertEqual({case.scenario for (case, _), seconds in lengths.items() if seconds == 1}, set(suite.SCENARIOS))
+        self.assertLess(sum(lengths.values()), 35)
+        self.assertLess(settings.clients, 1000)
+
+    def test_some_scenarios_are_measured_longer(self):
+        settings = run.make_settings(run.parse_arguments(["--seconds", "2"]))
+        self.assertEqual([settings.length_of("tcphub", suite.Case(name, 16, "tcp")) for name in ("one_to_one", "ping_paced")], [2, 8])
+        self.assertEqual(run.make_settings(run.parse_arguments(["--smoke", "--seconds", "2"])).length_of(
+            "nats", suite.Case("one_to_one", 16, "tcp")), 2)
+
+
 class Subjects(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
