@@ -45,10 +45,18 @@ class Suite(unittest.TestCase):
 
     def test_the_whole_suite_has_every_size_and_the_hub_s_variants_where_they_are_for(self):
         plan = suite.whole_plan(catalogue.SUBJECTS)
-        self.assertEqual({case.size for case in plan if case.scenario == "one_to_one"}, set(suite.SIZES))
+        for name in ("one_to_one", "in_turns", "fan_out_10"):
+            self.assertEqual({case.size for case in plan if case.scenario == name and case.transport == "tcp"}, set(suite.SIZES))
+        for name in ("one_to_one_unbatched", "four_to_four", "fan_out_100"):
+            self.assertGreaterEqual({case.size for case in plan if case.scenario == name}, {16, 1024, 4096})
         self.assertEqual(plan[suite.Case("one_to_one", 16, "tcp")], catalogue.SUBJECTS)
         self.assertNotIn("tcphub_2_shards", plan[suite.Case("one_to_one", 16, "unix")])
         self.assertNotIn("tcphub_spinning", plan[suite.Case("fan_out_10", 16, "tcp")])
+        self.assertIn("tcphub_2_shards", plan[suite.Case("stalled_subscriber", 1024, "tcp")])
+        self.assertIn("redis", plan[suite.Case("one_to_one", 4096, "unix")])
+        self.assertEqual(plan[suite.Case("fan_out_10", 16, "unix")], ("null", "tcphub"))
+        runs = sum(len(subjects) for subjects in plan.values())
+        self.assertLess(runs, 420, "three of each, of a second, shall take no more than twenty minutes")
         self.assertIn("tcphub_spinning", plan[suite.Case("ping_paced", 16, "tcp")])
 
     def test_what_is_asked_for_is_measured_on_every_subject(self):
