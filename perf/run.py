@@ -25,7 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 0.5
 RUNS = 3
-RUNS_MAX = 9  # of what lies far apart, as long as there is time:
+RUNS_MAX = 9  # of what lies far apart or decides nothing, as long as there is time:
 QUICK_EXTRA_SECONDS = 45
 WHOLE_EXTRA_SECONDS = 120
 SMOKE_CLIENTS = 200  # of scenarios with 10,000 or 1,000: in a smoke run it is not counted how long they take
@@ -51,7 +51,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--size", nargs="+", action="extend", type=int, default=[], metavar="BYTES")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
     parser.add_argument("--seconds", type=float, help="length of each measurement")
-    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3, and more where they lie far apart)")
+    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3, and more where they decide nothing)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
                         help="more for the hub's command line; repeatable, write --hub-argument=--shards")

@@ -25,7 +25,8 @@ byte for byte the frames that the hub is given. **Cost** is the processor time (
 divided by the messages that arrived; every message is compared byte for byte at its receiver, and what did not arrive is counted. The subject has one
 processor for itself and the generator another, except in `ping_one_cpu`. Each run has a fresh process. A round is one run of each subject,
 one right after the other, and every second round goes the other way; what is compared with each other is compared within each round, and the median is taken of
-the ratios. Where the runs of a subject lie more than 1.5 times apart, it is run again with those that it is compared with, as far as there is time. What is measured is `build/release/bin/tcphub` as it starts by default. Absolute figures differ from
+the ratios. Where the runs of a subject lie more than 1.5 times apart, or some meet a goal and others do not, it is run up to nine times, with
+those that it is compared with, as far as there is time. What is measured is `build/release/bin/tcphub` as it starts by default. Absolute figures differ from
 machine to machine; the ratios of one run are what counts.
 
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
@@ -92,7 +93,7 @@ def library_figures(rows: list[dict]) -> str:
 
 def runs_of(result: dict) -> str:
     """How many runs, and how long."""
-    wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart" if result["runs_max"] > result["runs"] else ""
+    wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart or do not agree on a goal" if result["runs_max"] > result["runs"] else ""
     longer = [f"{name} {shown(result['seconds'] * spec.seconds_factor)}" for name, spec in SCENARIOS.items() if spec.seconds_factor != 1]
     runs = "one run" if result["runs"] == 1 else f"{result['runs']} runs"
     return f"{runs}{wild}, of {result['seconds']} s each ({', '.join(longer)} s)"

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 from driver.catalogue import make_subject, why_absent
 from driver.library import run_pair
-from driver.repetition import to_repeat
+from driver.outcome import Outcome
+from driver.repetition import find_undecided, to_repeat
 from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
 from driver.suite import Case, Plan
 
@@ -30,7 +31,7 @@ class Settings:
     hub_arguments: list[str] = field(default_factory=list)
     tries_max: int = 2  # of each run
     patience_seconds: float = 2.0  # a message that takes longer is lost
-    runs_max: int = 0  # of those whose runs lie far apart; not above `runs`: none of them is made again
+    runs_max: int = 0  # of those whose runs lie far apart or decide nothing; not above `runs`: none of them is made again
     extra_seconds: float = 0  # what is left for such runs
 
     def length_of(self, subject: str, case: Case) -> float:
@@ -38,25 +39,6 @@ class Settings:
         if self.seconds_of is not None:
             return self.seconds_of(subject, case)
         return self.seconds * case.spec.seconds_factor
-
-
-@dataclass
-class Outcome:
-    """What the runs of one case on one subject found, or why there is nothing."""
-
-    subject: str
-    case: Case
-    findings: list[dict[str, float]] = field(default_factory=list)
-    error: str | None = None
-    is_absent: bool = False  # `error` says why it was not even tried
-    rounds: list[int] = field(default_factory=list)  # of each finding: what has the same number can be compared
-
-    def __post_init__(self) -> None:
-        self.rounds = self.rounds or list(range(len(self.findings)))
-
-    def add(self, number: int, found: dict[str, float]) -> None:
-        self.rounds.append(number)
-        self.findings.append(found)
 
 
 def say(text: str) -> None:
@@ -119,14 +101,16 @@ def run_round(members: list[Outcome], number: int, settings: Settings) -> None:
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:
     for number in range(settings.runs):
         run_round(outcomes, number, settings)
-    repeat_wild(outcomes, settings)
+    repeat(outcomes, settings)
 
 
-def repeat_wild(outcomes: list[Outcome], settings: Settings) -> None:
-    """More runs of what lies far apart, as long as there is time for that: no group takes more than its share of it."""
+def repeat(outcomes: list[Outcome], settings: Settings) -> None:
+    """More runs of what lies far apart or decides nothing, as long as there is time for that: no group takes more than its share
+    of it. What decides nothing is looked up once: to stop as soon as something is decided would be to choose the answer."""
     left_for_others = settings.extra_seconds * (1 - GROUP_SHARE)
+    undecided = find_undecided(outcomes) if settings.runs < settings.runs_max else []
     for number in range(settings.runs, settings.runs_max):
-        again = to_repeat(outcomes)
+        again = to_repeat(outcomes, undecided)
         if not again or settings.extra_seconds <= left_for_others:
             return
         begin = time.monotonic()

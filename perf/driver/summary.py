@@ -2,7 +2,7 @@
 
 from driver.derived import add_derived
 from driver.figures import shown, shown_with_spread, summarise
-from driver.measure import Outcome
+from driver.outcome import Outcome
 
 
 def make_row(outcome: Outcome) -> dict:

@@ -10,7 +10,7 @@ from driver.figures import decisive, shown, shown_with_spread, summarise
 from driver.floor import floor_text
 from driver.goals import GOALS, Goal
 from driver.measure import Outcome, Settings, run_group
-from driver.repetition import to_repeat
+from driver.repetition import find_undecided, to_repeat
 from driver.summary import make_rows, text_table
 from driver.verdicts import goal_table, verdict
 from driver.yardstick import ELSEWHERE, yardstick_table
@@ -151,7 +151,7 @@ class Verdicts(unittest.TestCase):
         document = make_document(result_of(rows))
         self.assertIn("| tcphub | one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | 1.4 to 1.6 | 3 | "
                       "bound met, goal open |", document)
-        self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart, of 1 s each (ping_paced 4, stalled_subscriber 6, ", document)
+        self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart or do not agree on a goal, of 1 s each (ping_paced 4, stalled_subscriber 6, ", document)
         self.assertIn("15 (14 to 16)", document)
         self.assertIn("not measured", document)
 
@@ -210,18 +210,23 @@ class Repetition(unittest.TestCase):
         return [outcome(subject, ONE_TO_ONE, costs) for subject, costs in subjects_and_costs]
 
     def repeated(self, group):
-        return [each.subject for each in to_repeat(group)]
+        return [each.subject for each in to_repeat(group, find_undecided(group))]
 
     def test_runs_that_lie_close_together_are_not_repeated(self):
-        self.assertEqual(self.repeated(self.group(("null", [10, 12, 15]), ("tcphub", [10, 11, 12]), ("nats", [99, 98, 97]))), [])
+        self.assertEqual(self.repeated(self.group(("null", [10, 12, 13]), ("tcphub", [10, 12, 15]), ("nats", [599, 598, 597]))), [])
 
     def test_what_is_wild_comes_with_what_it_is_compared_with(self):
-        calm, wild = [10, 11, 12], [10, 11, 16]
+        calm, wild = [10, 10, 10], [30, 40, 50]
         self.assertTrue(any(goal.scenario == "one_to_one" and goal.field == "times_nats" for goal in GOALS))
         self.assertEqual(self.repeated(self.group(("null", calm), ("tcphub", wild), ("nats", calm), ("mosquitto", calm))),
                          ["null", "tcphub", "nats"])
         self.assertEqual(self.repeated(self.group(("null", calm), ("tcphub", calm), ("nats", calm), ("mosquitto", wild))),
                          ["null", "tcphub", "mosquitto"])
+
+    def test_what_does_not_agree_on_a_goal_is_repeated_with_what_it_is_compared_with(self):
+        group = self.group(("null", [10, 10, 10]), ("tcphub", [12, 13, 13]), ("nats", [400, 400, 400]), ("mosquitto", [900, 900, 900]))
+        self.assertEqual([each.subject for each in find_undecided(group)], ["tcphub"])
+        self.assertEqual(self.repeated(group), ["null", "tcphub", "nats"])
 
     def test_a_ping_under_load_comes_with_that_without(self):
         idle, loaded = (suite.Case(name, 16, "tcp") for name in ("ping_two_cpus", "ping_under_bulk"))
@@ -230,7 +235,7 @@ class Repetition(unittest.TestCase):
                  for subject in ("null", "tcphub", "nats")]
         for each in group[3:5]:
             each.findings[1]["p99_us"] = 1
-        self.assertEqual([(each.subject, each.case.scenario) for each in to_repeat(group)],
+        self.assertEqual([(each.subject, each.case.scenario) for each in to_repeat(group, [])],
                          [("null", "ping_two_cpus"), ("nats", "ping_two_cpus"), ("null", "ping_under_bulk"),
                           ("tcphub", "ping_under_bulk"), ("nats", "ping_under_bulk")])
 
@@ -265,6 +270,12 @@ class Rounds(unittest.TestCase):
         group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "nats", "mosquitto")]
         run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=60))
         self.assertEqual([each.rounds for each in group], [list(range(9)), list(range(9)), [0, 1, 2], list(range(9))])
+
+    def test_what_decides_nothing_is_run_again_to_the_end_and_not_until_it_does(self):
+        self.costs = {"null": [10], "tcphub": [13, 13, 12] + [13] * 20}
+        group = [Outcome(name, ONE_TO_ONE) for name in ("null", "tcphub", "mosquitto")]
+        run_group(group, Settings(build=None, runs=3, runs_max=9, extra_seconds=60))
+        self.assertEqual([len(each.findings) for each in group], [9, 9, 3])
 
     def test_without_time_for_it_nothing_is_run_again(self):
         self.costs = {"tcphub": [1, 2]}
