@@ -12,6 +12,7 @@
 #include <sstream>
 #include <vector>
 
+#include "tests/client/nif/support/runtime_folder.hpp"
 #include "tests/tools/demo/temporary_file.hpp"
 #include "tools/demo/child_process.hpp"
 #include "tools/demo/own_network.hpp"
@@ -67,6 +68,8 @@ class RunTest : public testing::Test {
     return std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator());
   }
 
+  // What the demo's nodes keep for their next life is not among its own files.
+  const nif::test::RuntimeFolder runtime_;
   TemporaryFolder folder_ = std::move(TemporaryFolder::make().value());
 };
 
