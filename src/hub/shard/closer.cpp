@@ -52,6 +52,7 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   }
   connection.connected = false;
   connection.blocked = false;
+  connection.write_failed = false;
   connection.missed_resume = false;
   connection.must_confirm = false;
   connection.draining = false;

@@ -50,6 +50,7 @@ inline constexpr std::size_t kFormerNodesMax = 8;
 struct Connection : Recipient {
   Interest armed;
   bool blocked = false;         ///< the transport took less than was offered: wait for it
+  bool write_failed = false;    ///< takes nothing any more: read to its end, which tells that it broke
   bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
   bool must_confirm = false;    ///< nothing more can be written before its CONFIRM: read even if held
   bool gauged = false;          ///< its queue gauge is not 0

@@ -62,7 +62,7 @@ void Flusher::flush(Connection& connection) {
       again_.push_back(&connection);
       return;
     case Flush::failed:
-      return closer_.on_broken(connection);
+      return on_write_failed(connection);
   }
 }
 
@@ -89,6 +89,17 @@ void Flusher::on_blocked(Connection& connection) {
   watch(connection);
 }
 
+/// Frames that the kernel has taken for the hub would go with the descriptor: its own, if it sent them, said GOODBYE
+/// and left, and those of a sender that is not read because of BLOCK, which promises that nothing is lost.
+void Flusher::on_write_failed(Connection& connection) {
+  if (connection.draining) return closer_.on_broken(connection);  // it is read no more
+  let_wait(connection);
+  connection.write_failed = connection.blocked = true;
+  connection.on_read_again(state_.now_ms);
+  state_.signals.arm(connection);
+  watch(connection);
+}
+
 void Flusher::watch(Connection& connection) {
   if (connection.progress) return;
   connection.progress = std::make_unique<Progress>();
@@ -98,6 +109,7 @@ void Flusher::watch(Connection& connection) {
 }
 
 void Flusher::on_writable(Connection& connection) {
+  if (connection.write_failed) return;
   connection.blocked = false;
   state_.signals.arm(connection);
   state_.recipients.mark_dirty(connection);
@@ -105,6 +117,8 @@ void Flusher::on_writable(Connection& connection) {
 
 void Flusher::look_after(Connection& connection) {
   if (!connection.connected || !connection.progress) return;
+  // Nobody is slow whom nothing reaches any more: what waits for it waits as it will while it is away.
+  if (connection.write_failed && connection.waits_when_away) return;
   Progress& progress = *connection.progress;
   // Where messages were dropped because it took nothing, an empty queue does not say that it has caught up.
   const bool caught_up = taken_bytes(connection) >= progress.owed_bytes;
@@ -127,7 +141,7 @@ void Flusher::look_after(Connection& connection) {
   if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
     progress.taken_bytes = taken;
     progress.since_ms = state_.now_ms;
-  } else if (state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
+  } else if (!connection.write_failed && state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
     state_.counters.slow_consumers.add(1);
     closer_.close(connection, proto::GoodbyeCode::slow_consumer,
                   "took less than " + std::to_string(state_.limits.slow_consumer_bytes) + " bytes in " +

@@ -27,6 +27,8 @@ class Flusher {
  private:
   void let_wait(Connection& connection);
   void on_blocked(Connection& connection);
+  /// Nothing more can be written. What the peer sent before it went is still read to its end.
+  void on_write_failed(Connection& connection);
   /// From here on look_after() asks whether the connection gets on.
   void watch(Connection& connection);
   void on_emptied(Connection& connection);

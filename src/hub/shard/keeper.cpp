@@ -32,6 +32,7 @@ void Keeper::look_at(Connection& connection) {
   }
   const bool heard = connection.holds == 0 && !connection.waits_for_room && !connection.draining;
   if (heard && state_.now_ms - connection.last_heard_ms >= limits.silent_ms) {
+    if (connection.write_failed) return closer_.on_broken(connection);
     state_.counters.silent.add(1);
     return closer_.close(connection, proto::GoodbyeCode::silent,
                          "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");

@@ -11,6 +11,8 @@ namespace {
 epoll_event make_event(std::uint64_t token, Interest interest) {
   epoll_event event{};
   event.events = (interest.read ? EPOLLIN | EPOLLRDHUP : 0u) | (interest.write ? EPOLLOUT : 0u);
+  // The kernel tells the end of a connection to those who did not ask, too, at each wait. Nobody looks at it now.
+  if (!interest.read && !interest.write) event.events = EPOLLONESHOT;
   event.data.u64 = token;
   return event;
 }

@@ -39,6 +39,7 @@ class Poller {
 
   /// Returns false if the kernel refuses (out of memory or watches).
   [[nodiscard]] bool add(int descriptor, std::uint64_t token, Interest interest);
+  /// Waited for nothing, a descriptor shows its end or error once, or not at all, until it is changed again.
   void change(int descriptor, std::uint64_t token, Interest interest);
   void remove(int descriptor);
 

@@ -41,7 +41,8 @@ void Reader::read(Connection& connection) {
   if (result.status == IoStatus::would_block) return;
   if (result.status != IoStatus::ok) return closer_.on_broken(connection);
   state_.tally.received_bytes += result.bytes;
-  connection.last_heard_ms = state_.now_ms;
+  // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
+  if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
   const bool open = process(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
   state_.fanout.post_all();
   const std::uint64_t posted = state_.fanout.take_posted();

@@ -107,7 +107,7 @@ void Signals::arm(Connection& connection) {
   // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would wait for ever.
   const bool may_read = connection.holds == 0 || connection.must_confirm;
   const Interest wanted{.read = may_read && !connection.draining && !connection.waits_for_room,
-                        .write = connection.blocked};
+                        .write = connection.blocked && !connection.write_failed};
   if (wanted == connection.armed) return;
   connection.armed = wanted;
   const int descriptor = connection.transport->descriptor();

@@ -54,6 +54,24 @@ TEST_F(PollerTest, AClosedPeerShowsAsReadable) {
   EXPECT_TRUE(ready[0].readable);
 }
 
+TEST_F(PollerTest, TellsAnEndOnceToWhoWaitsForNothing) {
+  ASSERT_TRUE(poller.add(ends[0], 1, {}));
+  write_one();
+  ::close(ends[1]);
+  ends[1] = -1;
+  EXPECT_LE(poller.wait(1'000).size(), 1u);
+  for (int again = 0; again < 3; ++again) EXPECT_TRUE(poller.wait(0).empty());
+  poller.change(ends[0], 1, {.read = true});
+  for (int again = 0; again < 2; ++again) {
+    const auto ready = poller.wait(1'000);
+    ASSERT_EQ(ready.size(), 1u) << "what it sent is still there";
+    EXPECT_TRUE(ready[0].readable);
+  }
+  poller.change(ends[0], 1, {});
+  EXPECT_LE(poller.wait(0).size(), 1u);
+  EXPECT_TRUE(poller.wait(0).empty());
+}
+
 TEST_F(PollerTest, RefusesWhatTheKernelRefuses) {
   EXPECT_FALSE(poller.add(-1, 1, {.read = true}));
   ASSERT_TRUE(poller.add(ends[0], 1, {}));
