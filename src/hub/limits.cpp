@@ -103,6 +103,8 @@ constexpr std::array kTable{
               "kept for watches that are behind; one that is further behind gets a new snapshot", true},
     LimitInfo{"watch_bytes", "bytes", &Limits::watch_bytes, 64 * kKiB, 16 * kGiB, "memory of watch_changes", true},
     LimitInfo{"drain_ms", "ms", &Limits::drain_ms, 0, kHour, "time for what waits to be written at the end", true},
+    LimitInfo{"farewell_ms", "ms", &Limits::farewell_ms, 0, 60'000,
+              "time for who was told GOODBYE to read it and close, before the hub does"},
     LimitInfo{"log_lines_per_s", "lines/s", &Limits::log_lines_per_s, 1, 1'000'000,
               "written to the log, twice as many at once; those that are left out are counted", true},
     LimitInfo{"peer_log_lines_per_s", "lines/s", &Limits::peer_log_lines_per_s, 1, 1'000'000,

@@ -67,6 +67,7 @@ struct Limits {
   std::uint64_t watch_changes = 65'536;
   std::uint64_t watch_bytes = 16ull << 20;
   std::uint64_t drain_ms = 10'000;
+  std::uint64_t farewell_ms = 1'000;
   // The log
   std::uint64_t log_lines_per_s = 100;
   std::uint64_t peer_log_lines_per_s = 10;

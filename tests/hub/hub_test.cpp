@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -64,6 +65,11 @@ bool reads_goodbye(int descriptor) {
   return goodbye && goodbye->code == proto::GoodbyeCode::draining;
 }
 
+bool is_over(int descriptor, int patience_ms) {
+  pollfd end{descriptor, 0, 0};
+  return ::poll(&end, 1, patience_ms) == 1;
+}
+
 TEST(Hub, SaysWhereItListens) {
   const TestFolder folder;
   const auto hub = Hub::start(options(folder, {"tcp://127.0.0.1:0", "unix:" + folder.path("s")}));
@@ -104,6 +110,33 @@ TEST(Hub, WelcomesNodesAndDrainsAtASignal) {
   EXPECT_TRUE(dismissed);
   *hub = nullptr;
   EXPECT_FALSE(std::filesystem::exists(folder.path("s")));
+}
+
+// A hub that ended with bytes of a node unread would reset the connection, and take GOODBYE with it.
+TEST(Hub, EndsWhenThoseWhomItToldGoodbyeHaveLeft) {
+  const TestFolder folder;
+  HubOptions wanted = options(folder, {"unix:" + folder.path("s")});
+  wanted.limits.farewell_ms = 60'000;
+  auto hub = Hub::start(wanted);
+  ASSERT_TRUE(hub);
+  bool ended_early = true;
+  bool dismissed = false;
+  std::thread node([&] {
+    const int descriptor = dial_and_greet(folder.path("s"));
+    ::kill(::getpid(), SIGTERM);
+    pollfd goodbye{descriptor, POLLIN, 0};
+    if (::poll(&goodbye, 1, 60'000) == 1) {
+      const std::byte late[1'000]{};
+      static_cast<void>(::send(descriptor, late, sizeof late, MSG_NOSIGNAL));
+      ended_early = is_over(descriptor, 1'000);
+      dismissed = reads_goodbye(descriptor);
+    }
+    ::close(descriptor);
+  });
+  (*hub)->run();
+  node.join();
+  EXPECT_FALSE(ended_early);
+  EXPECT_TRUE(dismissed);
 }
 
 }  // namespace

@@ -2,11 +2,12 @@
 """A hub's start and end: drain by SIGTERM, a port freed by kill -9, addresses in use; nodes that leave and come back."""
 
 import os
+import select
 import signal
 import unittest
 
 from support.processes import TCPHUB, Hub, Process, run_gimnet, start_gimnet, start_recv
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 from support.wire import Client, Closed
 
 
@@ -26,6 +27,19 @@ class Ends(unittest.TestCase):
         self.assertEqual(sender.goodbye(), "draining")
         self.assertEqual(hub.process.wait(), 0, hub.process.err)
         self.assertFalse(os.path.exists(hub.socket_path))
+
+    def test_who_reads_late_hears_goodbye(self):
+        hub = Hub(self, "--limit", "farewell_ms=60000", shards=2)
+        late = [Client(self, hub).join(shard=shard) for shard in (0, 1)]
+        hub.process.signal(signal.SIGTERM)
+        for client in late:
+            self.assertTrue(select.select([client.socket], [], [], PATIENCE_S)[0], "a GOODBYE")
+            client.send(bytes(1000))  # it was on its way
+        for client in late:
+            self.assertIsNone(hub.process.popen.poll())
+            self.assertEqual(client.goodbye(), "draining")
+            client.socket.close()
+        self.assertEqual(hub.process.wait(), 0, hub.process.err)
 
     def test_sigint_too(self):
         hub = Hub(self)

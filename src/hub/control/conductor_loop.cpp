@@ -112,6 +112,7 @@ struct ConductorLoop::Impl {
       for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
       serve_watches();
       arm_timer();
+      end_if_all_left();
       watch_strangers();
     });
   }
@@ -122,7 +123,7 @@ struct ConductorLoop::Impl {
     serve_watches();
     arm_timer();
     if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
-    if (wiring.conductor.drained()) context.stop();
+    end_if_all_left();
     if (wiring.inbox.empty()) {
       wiring.inbox.waker().prepare_to_sleep();
       if (wiring.inbox.empty()) {
@@ -172,6 +173,7 @@ struct ConductorLoop::Impl {
       strangers.tick(now());
       serve_watches();
       arm_timer();
+      end_if_all_left();
     });
   }
 
@@ -205,9 +207,19 @@ struct ConductorLoop::Impl {
     drain_deadline.emplace(context, milliseconds{wiring.limits.drain_ms} + kDrainMargin);
     drain_deadline->async_wait([this](const error_code& error) {
       if (error) return;
+      if (wiring.conductor.drained()) return;
       log_warning("draining took too long: ending without waiting");
-      context.stop();
+      gave_up = true;
+      end_if_all_left();
     });
+    arm_timer();
+  }
+
+  /// The shards write nothing any more, and whoever was told GOODBYE has left or had its time: closed before that, a
+  /// connection on which it had sent something would be reset, and the GOODBYE lost.
+  void end_if_all_left() {
+    const bool all_told = wiring.conductor.drained() || gave_up;
+    if (all_told && strangers.leaving() == 0 && leaving.empty()) context.stop();
   }
 
   const Wiring wiring;
@@ -223,6 +235,7 @@ struct ConductorLoop::Impl {
   asio::signal_set reloads;
   std::vector<std::unique_ptr<Door>> doors;
   bool stopping = false;
+  bool gave_up = false;          ///< a shard did not drain in time
   bool serving_watches = false;  ///< a piece of it is posted
 };
 

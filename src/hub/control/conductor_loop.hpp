@@ -27,7 +27,7 @@ class ConductorLoop {
   ConductorLoop(const ConductorLoop&) = delete;
   ConductorLoop& operator=(const ConductorLoop&) = delete;
 
-  /// Returns when the hub has drained or a second signal came.
+  /// Returns when the hub has drained and all who were told GOODBYE have left or had their time, or at a second signal.
   void run();
 
  private:

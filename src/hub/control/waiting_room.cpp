@@ -22,8 +22,7 @@ using std::chrono::milliseconds;
 
 constexpr int kBatch = 64;
 /// Closing at once would reset the connection where the peer sent more than was read, and the reset could overtake
-/// GOODBYE. So the peer has this long to read it and close, and may send this much that nobody looks at.
-constexpr milliseconds kLeavingTime{1'000};
+/// GOODBYE. So the peer has limits.farewell_ms to read it and close, and may send this much that nobody looks at.
 constexpr std::size_t kDiscardedMax = 64 * 1'024;
 
 }  // namespace
@@ -82,8 +81,8 @@ void WaitingRoom::tick(milliseconds now) {
 }
 
 void WaitingRoom::dismiss_all(const Goodbye& goodbye, milliseconds now) {
+  closing_ = true;
   while (!waiting_.empty()) turn_away(waiting_.front(), goodbye, now);
-  keep_leaving_few();
 }
 
 std::optional<milliseconds> WaitingRoom::next_deadline() const {
@@ -150,6 +149,8 @@ void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now
 }
 
 void WaitingRoom::keep_leaving_few() {
+  // At the end there are no more than there were nodes, and nobody waits for their places.
+  if (closing_) return;
   while (leaving_.size() > limits_.handshakes) remove(leaving_.front());
 }
 
@@ -168,7 +169,7 @@ void WaitingRoom::see_off(std::unique_ptr<Transport> transport, milliseconds now
 
 void WaitingRoom::begin_leaving(Peer& peer, milliseconds now) {
   ::shutdown(peer.stranger.transport->descriptor(), SHUT_WR);
-  peer.deadline = now + kLeavingTime;
+  peer.deadline = now + milliseconds{limits_.farewell_ms};
 }
 
 void WaitingRoom::remove(Peer& peer) {

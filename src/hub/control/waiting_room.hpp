@@ -17,7 +17,7 @@ namespace gimnet::hub {
 /// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else. Those who say HELLO are
 /// judged; those who are refused are told why, and given a moment to read it.
 /// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes; one more
-/// ends the oldest. Time is an argument.
+/// ends the oldest, of those who leave, too. Time is an argument.
 class WaitingRoom {
  public:
   /// Takes the stranger's transport and returns nothing, or leaves it and says why not.
@@ -37,7 +37,7 @@ class WaitingRoom {
   bool serve(std::chrono::milliseconds now);
   /// Ends those whose time is over.
   void tick(std::chrono::milliseconds now);
-  /// Refuses everybody, as at the end of the hub.
+  /// Refuses everybody, as at the end of the hub: nobody enters any more, and each of those who leave has its time.
   void dismiss_all(const proto::Goodbye& goodbye, std::chrono::milliseconds now);
 
   /// Readable when serve() has something to do.
@@ -73,6 +73,7 @@ class WaitingRoom {
   const Judge judge_;
   RefusalCounters& refusals_;
   int poll_;
+  bool closing_ = false;
   Peers waiting_;  ///< both in the order of their deadlines
   Peers leaving_;
 };

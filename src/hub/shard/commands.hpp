@@ -117,7 +117,8 @@ struct LimitsCommand {
   Limits limits;
 };
 
-/// Say GOODBYE `draining` to everybody after what waits was written, or at the deadline; then answer DrainedEvent.
+/// Read nothing more; when all shards have taken theirs, say GOODBYE `draining` to everybody after what waits was
+/// written, or at the deadline; then answer DrainedEvent.
 struct DrainCommand {
   std::uint64_t deadline_ms = 0;  ///< from now
 };
@@ -158,7 +159,7 @@ struct FarewellEvent {
   std::unique_ptr<Transport> transport;
 };
 
-/// The shard has nothing left to write (answer to DrainCommand).
+/// The shard has nothing left to write, nor any other for it (answer to DrainCommand).
 struct DrainedEvent {};
 
 /// The shard that tells it has taken all that shard `fence.of` handed over to it before it carried out FenceCommand.

@@ -78,7 +78,7 @@ void Flusher::on_emptied(Connection& connection) {
   connection.outbox.on_emptied(state_.egress);
   connection.outbox.signal_room(state_.egress);
   if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
-  if (connection.draining) {
+  if (connection.draining && state_.nothing_follows) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
   }
 }

@@ -107,6 +107,7 @@ void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
   state_.shared.quiescence.enter(state_.self.value());
   take_commands();
   take_mail();
+  keeper_.look_for_others();
   serve(ready);
   read_waiting();
   keeper_.tick();

@@ -1,5 +1,7 @@
 #include "hub/shard/keeper.hpp"
 
+#include <bit>
+
 #include "base/clock.hpp"
 #include "hub/shard/reader.hpp"
 
@@ -15,14 +17,14 @@ void Keeper::tick() {
 }
 
 int Keeper::next_tick_ms() const {
-  if (state_.counters.connections.value() == 0 && drain_deadline_ms_ == 0) return -1;
+  if (state_.counters.connections.value() == 0 && (!draining_ || drained_told_)) return -1;
   return next_tick_at_ms_ > state_.now_ms ? static_cast<int>(next_tick_at_ms_ - state_.now_ms) : 0;
 }
 
 void Keeper::look_at(Connection& connection) {
   const Limits& limits = state_.limits;
   const bool written = connection.outbox.empty() && !connection.writer.in_frame();
-  if (drain_deadline_ms_ != 0 && (state_.now_ms >= drain_deadline_ms_ || written)) {
+  if (draining_ && (state_.now_ms >= drain_deadline_ms_ || (written && state_.nothing_follows))) {
     return closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down; dial again");
   }
   if (connection.missed_resume) {
@@ -64,18 +66,35 @@ void Keeper::say_ping(Connection& connection) {
 }
 
 void Keeper::drain(std::uint64_t deadline_ms) {
+  draining_ = true;
   drain_deadline_ms_ = state_.now_ms + deadline_ms;
   next_tick_at_ms_ = 0;
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
     if (connection == nullptr || !connection->connected) continue;
+    if (connection->write_failed) {
+      closer_.on_broken(*connection);
+      continue;
+    }
     connection->draining = true;
     state_.signals.arm(*connection);
-    state_.recipients.mark_dirty(*connection);
+  }
+  state_.fanout.post_last();
+  state_.done_shards |= std::uint64_t{1} << state_.self.value();
+}
+
+void Keeper::look_for_others() {
+  if (!draining_ || state_.nothing_follows) return;
+  const std::size_t shards = state_.fanout.shards();
+  if (static_cast<std::size_t>(std::popcount(state_.done_shards)) != shards) return;
+  state_.nothing_follows = true;
+  for (const std::unique_ptr<Connection>& connection : state_.connections) {
+    if (connection != nullptr && connection->connected) state_.recipients.mark_dirty(*connection);
   }
 }
 
 bool Keeper::take_drained() {
-  if (drain_deadline_ms_ == 0 || drained_told_ || state_.counters.connections.value() != 0) return false;
+  const bool over = state_.nothing_follows || state_.now_ms >= drain_deadline_ms_;
+  if (!draining_ || drained_told_ || !over || state_.counters.connections.value() != 0) return false;
   drained_told_ = true;
   return true;
 }

@@ -20,9 +20,12 @@ class Keeper {
   /// ms until the next tick, or -1 if there is nobody to look at.
   [[nodiscard]] int next_tick_ms() const;
 
-  /// Every connection ends once what waits for it was written, or at the deadline.
+  /// Nothing is read any more. Every connection ends once all shards drain and what waits for it was written, or at the
+  /// deadline.
   void drain(std::uint64_t deadline_ms);
-  /// True once after drain(): the last connection ended.
+  /// After mail was taken: do all shards drain?
+  void look_for_others();
+  /// True once after drain(): the last connection ended, and no other shard has anything for one.
   [[nodiscard]] bool take_drained();
 
  private:
@@ -33,7 +36,8 @@ class Keeper {
   Closer& closer_;
   Flusher& flusher_;
   std::uint64_t next_tick_at_ms_ = 0;
-  std::uint64_t drain_deadline_ms_ = 0;  ///< 0: not draining
+  std::uint64_t drain_deadline_ms_ = 0;
+  bool draining_ = false;
   bool drained_told_ = false;
 };
 

@@ -248,6 +248,9 @@ void Reader::take_mail(const Mail& mail) {
       return state_.retained.on_start(word_of<GroupStart>(mail));
     case MailKind::fence:
       return state_.tell_conductor({state_.self, FencePassedEvent{word_of<Fence>(mail)}});
+    case MailKind::last:
+      state_.done_shards |= std::uint64_t{1} << word_of<Fence>(mail).of.value();
+      return;
     case MailKind::retained:
       return state_.retained.on_handed(word_of<GroupStart>(mail),
                                        {state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});

@@ -68,6 +68,8 @@ struct ShardState {
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
   std::uint64_t now_ms = 0;
+  std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
+  bool nothing_follows = false;   ///< this shard drains, and so do all others: what waits is all that is to be written
 
   [[nodiscard]] Connection* find(SessionRef session) const;
   /// A node whose session is on this shard; nullptr if it is not.

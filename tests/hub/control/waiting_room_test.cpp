@@ -99,6 +99,18 @@ TEST_F(WaitingRoomTest, WhoDoesNotCloseAfterGoodbyeIsClosed) {
   EXPECT_EQ(room_.leaving(), 0u);
 }
 
+TEST_F(WaitingRoomTest, TheTimeToLeaveIsALimit) {
+  for (const auto& time : {0ms, 60'000ms}) {
+    limits_.farewell_ms = static_cast<std::uint64_t>(time.count());
+    enter(1s).send(opening_and(hello("unwelcome")));
+    serve(1s);
+    room_.tick(1s + time - 1ms);
+    EXPECT_EQ(room_.leaving(), 1u);
+    room_.tick(1s + time);
+    EXPECT_EQ(room_.leaving(), 0u);
+  }
+}
+
 TEST_F(WaitingRoomTest, WhoGoesOnTalkingAfterGoodbyeIsClosedBeforeItsTime) {
   Peer& peer = enter();
   peer.send(opening_and(hello("unwelcome")));
@@ -229,6 +241,23 @@ TEST_F(WaitingRoomTest, AtTheEndEverybodyIsDismissed) {
   EXPECT_EQ(room_.waiting(), 0u);
   EXPECT_EQ(a.receive_goodbye()->code, GoodbyeCode::draining);
   EXPECT_EQ(b.receive_goodbye()->code, GoodbyeCode::draining);
+}
+
+TEST_F(WaitingRoomTest, AtTheEndAllWhoLeaveHaveTheirTime) {
+  limits_.handshakes = 1;
+  const auto see_off = [this] {
+    peers_.push_back(std::make_unique<Peer>(limits_));
+    room_.see_off(peers_.back()->take_stranger().transport, 0ms);
+  };
+  see_off();
+  see_off();
+  EXPECT_EQ(room_.leaving(), 1u);
+  room_.dismiss_all({GoodbyeCode::draining, "bye"}, 0ms);
+  for (int i = 0; i < 9; ++i) see_off();
+  serve();
+  EXPECT_EQ(room_.leaving(), 10u);
+  room_.tick(1s);
+  EXPECT_EQ(room_.leaving(), 0u);
 }
 
 }  // namespace

@@ -250,6 +250,19 @@ TEST_P(GonePeer, BreaksWhereItDidNotSayGoodbye) {
   EXPECT_EQ(rig_.sum(&ShardCounters::connections), 0u);
 }
 
+TEST_P(GonePeer, DelaysNoDrain) {
+  FakeNode& to = rig_.join(0);
+  join();
+  to.pipe.set_room(0);
+  fill(to);
+  vanish();
+  rig_.now_ms += 1'100;
+  turn();  // PING cannot be written
+  rig_.command(0, DrainCommand{60'000});
+  deliver(to);
+  EXPECT_EQ(rig_.sum(&ShardCounters::connections), 0u);
+}
+
 /// Only a Unix socket tells that its far end takes nothing any more and goes on sending.
 TEST_P(GonePeer, WhoTakesNothingAndGoesOnSendingIsNotKept) {
   if (GetParam() != Family::unix_socket) GTEST_SKIP();

@@ -185,6 +185,56 @@ TEST(Keeper, DrainsAnEmptyShard) {
   EXPECT_TRUE(drained(rig));
 }
 
+// The command comes to each shard in its own time: what another one has taken until then is still written.
+TEST(Keeper, ClosesNobodyBeforeAllShardsDrain) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(1);
+  FakeNode& b = rig.join(0);
+  rig.command(0, DrainCommand{10'000});
+  rig.turn_shard(0);
+  rig.send(a, b.id.value(), "taken before its shard was told");
+  rig.turn_shard(1);
+  rig.turn_shard(0);
+  EXPECT_FALSE(b.pipe.transport_gone());
+  rig.command(1, DrainCommand{10'000});
+  rig.send(a, b.id.value(), "not read any more");
+  rig.turn_shard(1);
+  rig.turn_shard(0);
+  b.read();
+  EXPECT_EQ(b.texts(), std::vector<std::string>{"taken before its shard was told"});
+  EXPECT_TRUE(b.goodbye);
+  rig.settle();
+  EXPECT_EQ(a.goodbye ? a.goodbye->code : GoodbyeCode::done, GoodbyeCode::draining);
+  EXPECT_TRUE(a.pipe.transport_readable());
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+TEST(Keeper, IsNotDrainedBeforeAllShardsDrain) {
+  HubRig rig(3);
+  for (const std::size_t shard : {2u, 0u}) {
+    rig.command(shard, DrainCommand{10'000});
+    rig.settle();
+    EXPECT_FALSE(drained(rig)) << "shard 1 was not told yet";
+  }
+  rig.command(1, DrainCommand{10'000});
+  rig.settle();
+  std::size_t told = 0;
+  for (const ShardEvent& event : rig.take_events()) told += std::holds_alternative<DrainedEvent>(event.what) ? 1 : 0;
+  EXPECT_EQ(told, 3u);
+}
+
+TEST(Keeper, DoesNotWaitForOtherShardsBeyondItsDeadline) {
+  HubRig rig(2);
+  FakeNode& a = rig.join(0);
+  rig.command(0, DrainCommand{2'000});
+  rig.pass_ms(1'900);
+  EXPECT_FALSE(a.pipe.transport_gone());
+  EXPECT_FALSE(drained(rig));
+  rig.pass_ms(200);
+  EXPECT_TRUE(a.pipe.transport_gone());
+  EXPECT_TRUE(drained(rig));
+}
+
 // A frame of which the first bytes are with the kernel is finished, however long its reader takes.
 TEST(Keeper, DrainsASlowReaderToTheLastByte) {
   HubRig rig;

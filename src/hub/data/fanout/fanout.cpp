@@ -167,12 +167,15 @@ void Fanout::look_for_room() {
   }
 }
 
-void Fanout::post_fence(std::uint32_t ticket) {
+void Fanout::post_fence(std::uint32_t ticket) { post_behind(MailKind::fence, {self_, ticket}); }
+
+void Fanout::post_last() { post_behind(MailKind::last, {self_, 0}); }
+
+void Fanout::post_behind(MailKind kind, const Fence& fence) {
   post_all();
-  const Fence fence{self_, ticket};
   static_assert(std::is_trivially_copyable_v<Fence> && sizeof fence <= sizeof Mail::small);
   Mail mail;
-  mail.kind = MailKind::fence;
+  mail.kind = kind;
   mail.small_size = sizeof fence;
   std::memcpy(mail.small, &fence, sizeof fence);
   for (std::size_t shard = 0; shard < mailboxes_.size(); ++shard) {

@@ -24,6 +24,7 @@ enum class MailKind : std::uint8_t {
   start,         ///< it begins here: what came before in this mailbox is not for it, what comes after is
   fence,         ///< all that was handed over before was taken when this is: `small` is a Fence
   retained,      ///< frames of the last message, for that one subscriber
+  last,          ///< the sending shard drains and hands over nothing more: `small` is a Fence
 };
 
 /// A subscriber that begins with the last message of a group (RetainedMessages).
