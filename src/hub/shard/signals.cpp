@@ -104,9 +104,10 @@ void Signals::send_reports() {
 
 void Signals::arm(Connection& connection) {
   if (!connection.connected) return;
-  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would wait for ever.
-  const bool may_read = connection.holds == 0 || connection.must_confirm;
-  const Interest wanted{.read = may_read && !connection.draining && !connection.waits_for_room,
+  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would wait for ever. And
+  // what waits for that could not be written before the hub ends.
+  const bool may_read = (connection.holds == 0 && !connection.draining) || connection.must_confirm;
+  const Interest wanted{.read = may_read && !connection.waits_for_room,
                         .write = connection.blocked && !connection.write_failed};
   if (wanted == connection.armed) return;
   connection.armed = wanted;

@@ -223,6 +223,26 @@ TEST(Keeper, IsNotDrainedBeforeAllShardsDrain) {
   EXPECT_EQ(told, 3u);
 }
 
+// Without its CONFIRM nothing more could be written to it.
+TEST(Keeper, DrainsANodeThatHasToConfirm) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  for (int i = 0; i < 10; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  rig.settle();
+  EXPECT_LT(b.frames.size(), 10u);
+  rig.command(0, DrainCommand{60'000});
+  for (int i = 0; i < 10 && !b.pipe.transport_gone(); ++i) {
+    rig.send_flow(b, proto::flow::Confirm{b.data_frames});
+    rig.settle();
+  }
+  EXPECT_THAT(b.frames, SizeIs(10));
+  EXPECT_TRUE(b.goodbye);
+  EXPECT_EQ(rig.dropped(DropReason::link_lost), 0u);
+}
+
 TEST(Keeper, DoesNotWaitForOtherShardsBeyondItsDeadline) {
   HubRig rig(2);
   FakeNode& a = rig.join(0);
