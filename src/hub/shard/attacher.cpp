@@ -36,7 +36,7 @@ void Attacher::attach(AttachCommand command) {
   connection.ingress = IngressState{};
   connection.ingress.node = connection.node;
   connection.ingress.former_nodes = connection.former_nodes;
-  connection.posted_shards = ~std::uint64_t{0};
+  connection.posted_shards = kAllShards;
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
   connection.armed = Interest{.read = connection.holds == 0, .write = false};

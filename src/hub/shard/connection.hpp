@@ -29,6 +29,9 @@ struct ResumeState {
   std::uint32_t peer_resume_bytes = 0;  ///< a quarter of it without a CONFIRM is too much
 };
 
+/// A bit set of shards: any of them.
+inline constexpr std::uint64_t kAllShards = ~std::uint64_t{0};
+
 /// How a recipient that does not take everything at once gets on.
 struct Progress {
   std::uint64_t taken_bytes = 0;  ///< that left the send queue, when last looked at
@@ -60,11 +63,11 @@ struct Connection : Recipient {
   std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;  ///< that are unanswered
   std::uint32_t ping_sequence = 0;
-  std::uint32_t unsent_limit = 0;                   ///< of the transport; 0: not limited
-  std::unique_ptr<Transport> transport;             ///< nullptr: away
-  std::vector<NodeId> former_nodes;                 ///< under which it may still send, the latest last
-  TokenBucket oddities;                             ///< CREDITs of no use
-  std::uint64_t posted_shards = ~std::uint64_t{0};  ///< that its last read sent to; all, before the first
+  std::uint32_t unsent_limit = 0;            ///< of the transport; 0: not limited
+  std::unique_ptr<Transport> transport;      ///< nullptr: away
+  std::vector<NodeId> former_nodes;          ///< under which it may still send, the latest last
+  TokenBucket oddities;                      ///< CREDITs of no use
+  std::uint64_t posted_shards = kAllShards;  ///< that its last read sent to; all, before the first
   GatherWriter writer;
   FrameTail tail;
   IngressState ingress;

@@ -97,8 +97,10 @@ bool IoShard::has_work() {
 /// by looking, and the next one wakes.
 bool IoShard::room_came() {
   if (state_.waiting_for_room.empty()) return false;
+  const std::uint64_t before = state_.fanout.crowded();
   state_.fanout.look_for_room();
-  return state_.fanout.crowded() == 0;
+  room_came_ = room_came_ || state_.fanout.crowded() != before;
+  return room_came_;
 }
 
 void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
@@ -155,12 +157,15 @@ void IoShard::serve(std::span<const Ready> ready) {
 
 void IoShard::read_waiting() {
   if (!room_came()) return;
-  for (Connection* connection : state_.waiting_for_room) {
+  room_came_ = false;
+  // Each waits for those shards only to which it sends.
+  std::erase_if(state_.waiting_for_room, [this](Connection* connection) {
+    if ((connection->posted_shards & state_.fanout.crowded()) != 0) return false;
     connection->waits_for_room = false;
     connection->on_read_again(state_.now_ms);
     state_.signals.arm(*connection);
-  }
-  state_.waiting_for_room.clear();
+    return true;
+  });
 }
 
 void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }

@@ -72,7 +72,8 @@ class IoShard {
   const Options options_;
   bool stopped_ = false;
   bool flush_again_ = false;
-  AllocationMeter meter_;  ///< of the thread that takes the turns
+  bool room_came_ = false;  ///< in a mailbox, since connections that wait for room were last looked at
+  AllocationMeter meter_;   ///< of the thread that takes the turns
   std::thread thread_;
 };
 

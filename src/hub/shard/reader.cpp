@@ -9,6 +9,9 @@
 namespace gimnet::hub {
 namespace {
 
+/// Where a newcomer sends to shows when it is read: so much of it, also where some shard has too much to do.
+constexpr std::uint64_t kFirstReadBytes = 4 * 1024;
+
 template <class Word>
 Word word_of(const Mail& mail) {
   Word word;
@@ -33,9 +36,13 @@ void send_confirm(ShardState& state, Connection& connection) {
 }
 
 void Reader::read(Connection& connection) {
-  if ((connection.posted_shards & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+  std::uint64_t most = state_.limits.turn_bytes;
+  if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
+    if (connection.posted_shards != kAllShards) return wait_for_room(connection);
+    most = kFirstReadBytes;
+  }
   const std::span<std::byte> room = state_.receive_buffer.prepare(connection.tail);
-  const std::span<std::byte> share = room.first(std::min<std::size_t>(room.size(), state_.limits.turn_bytes));
+  const std::span<std::byte> share = room.first(std::min<std::size_t>(room.size(), most));
   const IoResult result = connection.transport->receive(share);
   ++state_.tally.receive_calls;
   if (result.status == IoStatus::would_block) return;
