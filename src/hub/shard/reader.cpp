@@ -89,11 +89,37 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
     }
     if (connection.tail_since_ms == 0 || next != received.begin) connection.tail_since_ms = state_.now_ms;
     if (next == received.end) connection.tail_since_ms = 0;
-    if (state_.receive_buffer.keep(connection.tail, next, received.end, found.needed)) return true;
+    if (keep(connection, {next, received.end}, found.needed)) return true;
     closer_.close(connection, proto::GoodbyeCode::no_memory,
                   "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
     return false;
   }
+}
+
+/// Closed itself, a newcomer would pay for those who begin frames and never end them.
+bool Reader::keep(Connection& connection, std::span<const std::byte> begun, std::uint32_t needed) {
+  const std::byte* const end = begun.data() + begun.size();
+  while (!state_.receive_buffer.keep(connection.tail, begun.data(), end, needed)) {
+    Connection* const oldest = begun_before(connection);
+    if (oldest == nullptr) return false;
+    closer_.close(*oldest, proto::GoodbyeCode::no_memory,
+                  "the hub keeps too many begun frames, and this one was begun longest ago; write frames whole, or in "
+                  "smaller pieces");
+  }
+  return true;
+}
+
+Connection* Reader::begun_before(const Connection& connection) const {
+  Connection* oldest = nullptr;
+  std::uint64_t since_ms = connection.tail_since_ms;
+  for (const std::unique_ptr<Connection>& each : state_.connections) {
+    if (each == nullptr || each->tail.empty() || each->tail_since_ms >= since_ms) continue;
+    // Who is not read cannot end its frame.
+    if (each->holds != 0 || each->waits_for_room) continue;
+    since_ms = each->tail_since_ms;
+    oldest = each.get();
+  }
+  return oldest;
 }
 
 bool Reader::handle_run(Connection& connection, proto::RunView& view) {

@@ -21,6 +21,11 @@ class Reader {
   void wait_for_room(Connection& connection);
   /// False: the connection was closed.
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);
+  /// Keeps the frame that was begun; where too much is kept, those go whose frames were begun before. False: nobody is
+  /// left to go.
+  [[nodiscard]] bool keep(Connection& connection, std::span<const std::byte> begun, std::uint32_t needed);
+  /// Who began its frame longest ago, and before this one; nullptr: nobody.
+  [[nodiscard]] Connection* begun_before(const Connection& connection) const;
   /// May shorten `view` to the frames that it handled.
   [[nodiscard]] bool handle_run(Connection& connection, proto::RunView& view);
   [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view, Admission admission);

@@ -330,6 +330,21 @@ TEST(Reader, ClosesWhenTooMuchIsKeptForBegunFrames) {
   EXPECT_EQ(nodes[3]->goodbye->code, GoodbyeCode::no_memory);
 }
 
+TEST(Reader, WhoBeganAFrameLongestAgoMakesRoomForABegunFrame) {
+  Limits limits;
+  limits.partial_bytes = 1 << 20;
+  HubRig rig(1, limits);
+  std::vector<FakeNode*> nodes;
+  for (std::size_t i = 0; i < 5; ++i) {
+    FakeNode& node = *nodes.emplace_back(&rig.join(0));
+    const auto bytes = HubRig::frame(node, node.id.value(), std::string(5000, 'x'));
+    rig.write(node, std::span(bytes).first(4000));
+    rig.pass_ms(100, false);
+    rig.settle();
+    for (std::size_t j = 0; j <= i; ++j) EXPECT_EQ(nodes[j]->goodbye.has_value(), i - j >= 3) << j << " of " << i;
+  }
+}
+
 std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t total, std::size_t size) {
   std::string bytes(proto::kFragmentHeaderSize + size, 'x');
   proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()), {message, offset, total});
