@@ -257,10 +257,15 @@ void Pacer::on_new_epoch(Recipient& recipient) {
 
 void Pacer::on_away(Recipient& recipient) {
   if (!recipient.paced) return;
+  bool any = false;
   recipient.paced->for_each([&](PacedSubscription& each) {
     drop_held(each, DropReason::link_lost);
-    unschedule(each);
+    any = std::exchange(each.scheduled, false) || any;
   });
+  // At once for all of them: the schedule is that of the whole shard.
+  if (!any) return;
+  std::erase_if(scheduled_, [](const PacedSubscription* each) { return !each->scheduled; });
+  std::make_heap(scheduled_.begin(), scheduled_.end(), later);
 }
 
 void Pacer::forget(Recipient& recipient) {
