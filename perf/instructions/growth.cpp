@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "hub/control/state/directory.hpp"
+#include "hub/control/state/listing.hpp"
+#include "hub/control/state/membership.hpp"
 #include "hub/control/state/services.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/pattern.hpp"
@@ -127,6 +129,30 @@ Work topics(std::size_t count) {
   };
 }
 
+/// Looks for what is in hall-3 among so many names that begin with the same letters, as often.
+Work neighbours(std::size_t count) {
+  struct World {
+    Limits limits;
+    Membership membership{Sessions::Options{HubId{7}, 1, Placement::spread}, limits};
+  };
+  auto world = std::make_shared<World>();
+  Effects effects;
+  const auto join = [&](const std::string& name) {
+    JoinRequest request;
+    request.name = name;
+    if (!world->membership.join(request, milliseconds{0}, effects)) wrong("a node was refused");
+  };
+  join("hall-3/robot");
+  for (std::size_t i = 0; i < count; ++i) join((i % 2 == 0 ? "hall-3-" : "hall-3") + std::to_string(i));
+  const auto pattern = proto::Pattern::parse(std::string{"hall-3/"} + '*');
+  return [world, pattern, count] {
+    const ListingRequest request{&*pattern, 0, false, 10, world->limits.scan_records};
+    for (std::size_t i = 0; i < count; ++i) {
+      if (list_nodes(world->membership, request).indices.size() != 1) wrong("one node is in hall-3");
+    }
+  };
+}
+
 /// The pattern with the most ways to fit, and names that fit none of them but at their last part.
 Work patterns(std::size_t count) {
   std::string text = "**/a";
@@ -168,6 +194,7 @@ constexpr Script kScripts[] = {
     {"nested_bomb", nested_bomb},
     {"names", names},
     {"topics", topics},
+    {"neighbours", neighbours},
     {"patterns", patterns},
     {"pattern_parts", pattern_parts},
 };

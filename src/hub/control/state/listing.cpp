@@ -1,6 +1,7 @@
 #include "hub/control/state/listing.hpp"
 
 #include <algorithm>
+#include <string>
 #include <string_view>
 
 namespace gimnet::hub {
@@ -17,21 +18,32 @@ Listed first_of(std::vector<std::uint32_t> indices, std::size_t most) {
   return listed;
 }
 
-/// By name: all whose names begin as the pattern does, if those are few. `wanted` says the index of an entry that is to
-/// be listed, or 0. Nothing: they are too many.
+/// By name: all whose names begin with the same parts as the pattern, if those are few. `wanted` says the index of an
+/// entry that is to be listed, or 0. Nothing: they are too many.
 template <class ByName, class Wanted>
 std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& request, Wanted wanted) {
   if (request.pattern == nullptr || request.pattern->beginning().empty()) return std::nullopt;
   const std::string_view beginning = request.pattern->beginning();
   std::vector<std::uint32_t> found;
   std::size_t work = request.work;
-  for (auto entry = by_name.lower_bound(beginning); entry != by_name.end(); ++entry) {
-    if (!entry->first.starts_with(beginning)) break;
-    if (work == 0) return std::nullopt;
+  const auto look_at = [&](const auto& entry) {
     --work;
-    if (!request.pattern->matches(entry->first)) continue;
-    const std::uint32_t index = wanted(entry->second);
+    if (!request.pattern->matches(entry.first)) return;
+    const std::uint32_t index = wanted(entry.second);
     if (index > request.after) found.push_back(index);
+  };
+  // What only begins with the same letters, as hall-30 does for hall-3/*, may be any number of names.
+  if (const auto exact = by_name.find(beginning); exact != by_name.end()) {
+    if (work == 0) return std::nullopt;
+    look_at(*exact);
+  }
+  if (!request.pattern->is_name()) {
+    const std::string within = std::string{beginning} + '/';
+    for (auto entry = by_name.lower_bound(within); entry != by_name.end(); ++entry) {
+      if (!entry->first.starts_with(within)) break;
+      if (work == 0) return std::nullopt;
+      look_at(*entry);
+    }
   }
   Listed listed = first_of(std::move(found), request.most);
   listed.looked_at = request.work - work;

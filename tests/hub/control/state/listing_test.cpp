@@ -82,6 +82,33 @@ TEST_F(ListingTest, FindsTheSameByNameAndById) {
             0u);
 }
 
+TEST_F(ListingTest, LooksAtNothingThatOnlyBeginsWithTheSameLetters) {
+  const std::uint32_t hall = join("hall-3").index;
+  const std::uint32_t robot = join("hall-3/robot").index;
+  const std::uint32_t arm = join("hall-3/robot/arm").index;
+  for (int i = 0; i < 100; ++i) {
+    // In the order of names, '-' and '.' stand before '/', digits and letters behind it.
+    for (const char* between : {"-", ".", "", "x"}) join("hall-3" + std::string{between} + std::to_string(i));
+    join("hall-3-" + std::to_string(i) + "/robot");
+  }
+  const auto few = [this](const std::string& pattern, std::size_t work) {
+    const auto parsed = proto::Pattern::parse(pattern);
+    return list_few_nodes(membership_, {.pattern = &*parsed, .most = 10, .work = work});
+  };
+  const std::string in_hall = "hall-3/";
+  ASSERT_TRUE(few(in_hall + "*", 3));
+  EXPECT_EQ(few(in_hall + "*", 3)->indices, std::vector{robot}) << "a part is not no part";
+  EXPECT_EQ(few(in_hall + "*", 3)->looked_at, 3u);
+  EXPECT_FALSE(few(in_hall + "*", 2)) << "one more than may be looked at";
+  EXPECT_EQ(few(in_hall + "**", 3)->indices, (std::vector{hall, robot, arm}));
+  EXPECT_EQ(few(in_hall + "robot/" + "**", 2)->indices, (std::vector{robot, arm}));
+  EXPECT_EQ(few(in_hall + "*/arm", 3)->indices, std::vector{arm});
+  EXPECT_EQ(few("hall-3", 1)->indices, std::vector{hall});
+  EXPECT_FALSE(few("hall-3", 0));
+  EXPECT_TRUE(few("hall-4/" + std::string{"**"}, 0)->indices.empty());
+  EXPECT_FALSE(few("*", 1'000)) << "any part, any name";
+}
+
 TEST_F(ListingTest, WhatChangesBetweenPiecesHidesAndRepeatsNothingElse) {
   std::set<std::uint32_t> stay;
   std::vector<Session*> go;
