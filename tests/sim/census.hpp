@@ -86,6 +86,7 @@ enum class Happening : std::uint8_t {
   group_delivered,
   group_of_another,
   service_frame_delivered,
+  service_frame_refused,
   shard_paused,
   conductor_paused,
   slow_reader,

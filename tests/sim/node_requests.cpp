@@ -106,6 +106,8 @@ void SimNode::change_services(std::uint64_t choice) {
 void SimNode::advertise(const std::string& service, bool anew) {
   ns::Advertise offer;
   offer.service = service;
+  // Two of eight take data, one of them among those that others subscribe to.
+  if (service == "s3" || service == "s7") offer.direction = ns::Direction::accepts;
   const auto known = provides_.find(service);
   if (known != provides_.end()) offer = known->second.offer;
   offer.former_group = GroupId{};
@@ -131,7 +133,7 @@ void SimNode::send_something() {
   }
   for (const auto& [full_name, group] : subscribes_) {
     if (group == GroupId{}) continue;
-    // Only the provider may send to its subscribers; everybody may send to the provider.
+    // Only the provider may send to its subscribers; everybody may send to the provider, if its service takes data.
     const bool legal = random.chance(700);
     return send(legal ? Kind::service : Kind::group, group.value(), payload);
   }

@@ -161,7 +161,9 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
 
 void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
   const GroupMembers* members = parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
-  if (members != nullptr && !members->ends()) to_node(index, frame, index_of(members->provider), handed_over);
+  if (members == nullptr || members->ends()) return;
+  if (!members->accepts) return setting_.census.add(Happening::service_frame_refused);
+  to_node(index, frame, index_of(members->provider), handed_over);
 }
 
 void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {

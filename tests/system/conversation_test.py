@@ -79,7 +79,7 @@ def ask_about_names(viewer, robot):
     viewer.watched()
 
 
-def exchange_messages(viewer, robot, odom, chart):
+def exchange_messages(viewer, robot, odom, chart, drive):
     viewer.numbered(NS, 10, text(3, "robot/odom"))
     robot.event(33)
     viewer.numbered(NS, 10, text(3, "robot/map") + number(4, 4, 1) + number(5, 4, 2))
@@ -89,7 +89,7 @@ def exchange_messages(viewer, robot, odom, chart):
     robot.send(robot.frame(chart, b"the hall", kind=GROUP))
     viewer.next_data()
     viewer.send(viewer.frame(0, struct.pack("<B3xIQ", CREDIT, chart, 1), kind=FLOW))
-    viewer.send(viewer.frame(odom, b"to the provider", kind=SERVICE))
+    viewer.send(viewer.frame(drive, b"to who accepts", kind=SERVICE))
     robot.next_data()
     viewer.send(viewer.frame(robot.id, struct.pack("<II", 5, 0) + b"keyed", flags=FLAG_KEYED, lane=0))
     robot.next_data()
@@ -127,8 +127,9 @@ def converse(test, hub):
     odom = robot.numbered(NS, 7, offer)[3]
     offer = text(3, "map") + number(4, 4, 4) + number(5, 4, 0) + number(6, 2, 0) + number(7, 2, 2) + number(10, 4, 2)
     chart = robot.numbered(NS, 7, offer + number(11, 1, True))[3]
+    drive = robot.numbered(NS, 7, text(3, "drive") + number(6, 2, 1))[3]
     ask_about_names(viewer, robot)
-    exchange_messages(viewer, robot, odom, chart)
+    exchange_messages(viewer, robot, odom, chart, drive)
     change_names_and_end_services(viewer, robot, odom, chart)
     for operation in (1, 2, 3, 9):
         viewer.numbered(CTRL, operation)

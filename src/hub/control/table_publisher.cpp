@@ -1,6 +1,7 @@
 #include "hub/control/table_publisher.hpp"
 
 #include "base/check.hpp"
+#include "proto/control/ns.hpp"
 
 namespace gimnet::hub {
 
@@ -32,6 +33,7 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     members->provider_shard = provider->place.shard;
     members->by_shard.resize(shards_);
     members->retain = topic->service->terms.retain;
+    members->accepts = static_cast<proto::ns::Direction>(topic->service->terms.direction) == proto::ns::Direction::accepts;
     for (const std::uint32_t subscriber : topic->subscribers) {
       const Session* session = membership.sessions().find(subscriber);
       GIMNET_CHECK(session != nullptr);

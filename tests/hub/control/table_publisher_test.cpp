@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/control/ns.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -56,6 +58,17 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   EXPECT_EQ(members[0].slot, viewer.place.slot);
   EXPECT_EQ(members[0].generation, viewer.place.generation);
   EXPECT_TRUE(groups_.find(1)->by_shard[robot.place.shard.value()].empty());
+}
+
+TEST_F(TablePublisherTest, PublishesWhichServicesTakeData) {
+  const Session& robot = join("robot");
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  ServiceTerms terms;
+  terms.direction = static_cast<std::uint8_t>(proto::ns::Direction::accepts);
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/drive", terms, 0ms, effects_));
+  for (const std::uint32_t group : {1u, 2u}) publisher_.publish_group(group, membership_);
+  EXPECT_FALSE(groups_.find(1)->accepts);
+  EXPECT_TRUE(groups_.find(2)->accepts);
 }
 
 TEST_F(TablePublisherTest, AGroupEndsInTwoStepsWhereItHasMembersElsewhere) {

@@ -103,7 +103,7 @@ TEST(IoShard, ServiceReachesTheProvider) {
     HubRig rig(2);
     FakeNode& provider = rig.join(shard);
     FakeNode& client = rig.join(0);
-    rig.publish_group(5, provider.id, {});
+    rig.publish_group(5, provider.id, {}, true);
     rig.send(client, HubRig::group(5), "request", {.kind = Kind::service});
     rig.settle();
     EXPECT_THAT(provider.texts(), ElementsAre("request"));

@@ -203,5 +203,23 @@ TEST(Signals, AHeldNodeThatMustConfirmIsRead) {
   EXPECT_FALSE(rig.connection(confirmer)->armed.read) << "with nothing left to write it is held as any other";
 }
 
+TEST(Signals, WhoSendsToAServiceThatOnlyProvidesIsTold) {
+  for (const std::size_t shard : {0u, 1u}) {
+    HubRig rig(2);
+    FakeNode& provider = rig.join(shard);
+    FakeNode& client = rig.join(0);
+    rig.publish_group(5, provider.id, {&client});
+    rig.send(client, HubRig::group(5), "request", {.kind = Kind::service, .flags = proto::kFlagReport});
+    rig.settle();
+    rig.pass_ms(100);
+    client.read();
+    EXPECT_THAT(provider.frames, IsEmpty());
+    EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
+    ASSERT_EQ(client.reports().size(), 1u);
+    EXPECT_EQ(client.reports()[0].reason, DropReason::not_allowed);
+    EXPECT_EQ(client.reports()[0].header.dst, HubRig::group(5));
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::hub

@@ -40,6 +40,8 @@ class Data(Case):
         commands = provider.advertise("drive", direction=put(6, U8, 1))[3]
         subscriber.write(SERVICE, commands, b"go")
         self.assertEqual(provider.data(SERVICE).body, b"go")
+        subscriber.write(SERVICE, group, b"go", flags=wire.F_REPORT)
+        self.assertEqual(subscriber.report()[0], 9, "it gives data and takes none")
         provider.ask(NS, 8, u32(3, group))
         self.assertEqual(subscriber.event(32).get(5, 0), 0)
 

@@ -106,6 +106,7 @@ void Reference::compare_group(const hub::GroupMembers& members, const Topic& top
   const Service& service = *topic.service;
   FUZZ_MUST(members.provider == id_of(sessions_.at(service.provider).index));
   FUZZ_MUST(members.retain == service.terms.retain);
+  FUZZ_MUST(members.accepts == (service.terms.direction == ns::Direction::accepts));
   Members plain;
   Members paced;
   for (const auto& [subscriber, terms] : topic.subscribers) {

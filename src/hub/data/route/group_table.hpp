@@ -33,6 +33,7 @@ struct GroupMembers {
   /// Those of which the shard paces what they get; empty if there are none.
   std::vector<std::vector<PacedMember>> paced_by_shard;
   bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
+  bool accepts = false;  ///< the service takes data: frames of kind SERVICE go to its provider
 
   /// It has no provider any more: nothing is taken in for it, but what was handed over before is delivered.
   [[nodiscard]] bool ends() const { return provider == NodeId{}; }

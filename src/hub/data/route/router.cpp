@@ -163,6 +163,7 @@ void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool 
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   if (members->ends()) return drop(run, proto::DropReason::no_such_group);
+  if (!members->accepts) return drop(run, proto::DropReason::not_allowed);
   to_node(run, header, members->provider, handed_over);
 }
 

@@ -167,11 +167,23 @@ TEST_F(RouterTest, LargeFramesAreNeverCopied) {
 
 TEST_F(RouterTest, ServiceGoesToTheProvider) {
   Recipient& provider = rig.add_here(2);
-  rig.publish_group(5, 2, {}, {});
+  rig.publish_group(5, 2, {}, {}, true);
   rig.route(kHub | 5, {"request"}, {.kind = Kind::service});
   EXPECT_FALSE(provider.outbox.empty());
   rig.route(kHub | 6, {"request"}, {.kind = Kind::service});
   EXPECT_EQ(dropped(DropReason::no_such_group), 1u);
+}
+
+TEST_F(RouterTest, ServiceIsRefusedWhereTheServiceOnlyProvides) {
+  const Recipient& provider = rig.add_here(2);
+  rig.add_there(3);
+  rig.publish_group(5, 2, {}, {});
+  rig.route(kHub | 5, {"one", "two"}, {.kind = Kind::service});
+  EXPECT_TRUE(provider.outbox.empty());
+  rig.publish_group(5, 3, {}, {});
+  rig.route(kHub | 5, {"to another shard"}, {.kind = Kind::service});
+  EXPECT_THAT(rig.take_mail(), IsEmpty());
+  EXPECT_EQ(dropped(DropReason::not_allowed), 3u);
 }
 
 TEST_F(RouterTest, ListHereThereAndNowhere) {

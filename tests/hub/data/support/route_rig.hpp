@@ -42,7 +42,8 @@ class RouteRig {
   void add_there(std::uint32_t index) { nodes.publish(index, {ShardIndex{1}, ConnectionSlot{index}, index}); }
 
   void publish_group(std::uint32_t index, std::uint32_t provider, const std::vector<std::uint32_t>& here,
-                     const std::vector<std::uint32_t>& there) {
+                     const std::vector<std::uint32_t>& there, bool accepts = false) {
+    members.accepts = accepts;
     members.provider = make_id<NodeId>(HubId{7}, provider);
     members.by_shard.assign(2, {});
     for (const std::uint32_t member : here) members.by_shard[0].push_back({ConnectionSlot{member}, member});

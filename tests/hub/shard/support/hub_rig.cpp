@@ -162,9 +162,10 @@ void HubRig::renumber(FakeNode& node, std::uint32_t index) {
 
 void HubRig::command(std::size_t shard, ShardCommand command) { shards_[shard]->send(std::move(command)); }
 
-void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members) {
+void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members, bool accepts) {
   auto group = std::make_unique<GroupMembers>();
   group->provider = provider;
+  group->accepts = accepts;
   group->by_shard.resize(shards_.size());
   for (const FakeNode* member : members) {
     group->by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});

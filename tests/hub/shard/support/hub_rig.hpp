@@ -102,8 +102,8 @@ class HubRig {
   /// Gives the node another id. Its connection is closed in the next turn.
   void renumber(FakeNode& node, std::uint32_t index);
   void command(std::size_t shard, ShardCommand command);
-  /// Makes `provider` the owner of a group with these members.
-  void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members);
+  /// Makes `provider` the owner of a group with these members. `accepts`: it takes data.
+  void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members, bool accepts = false);
   /// The same with members that are paced: each needs pace() too.
   void publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
                            bool retain = false, bool was_plain = false);
