@@ -96,7 +96,7 @@ void EffectRunner::run(const PaceDue& effect) {
   if (session == nullptr) return;
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
   parts_.shards.send(session->place.shard,
-                     PaceCommand{ref_of(session->place), group_id(effect.group), terms, effect.retained});
+                     PaceCommand{ref_of(session->place), group_id(effect.group), terms, effect.retained, effect.was_plain});
 }
 
 void EffectRunner::run(const PaceEnded& effect) {

@@ -79,12 +79,13 @@ struct ReleaseCommand {
 };
 
 /// The session's subscription to that group is paced from now on, or has other terms. `retained`: it begins with the
-/// last message.
+/// last message. `was_plain`: until then it got everything.
 struct PaceCommand {
   SessionRef session;
   GroupId group;
   PaceTerms terms;
   bool retained = false;
+  bool was_plain = false;
 };
 
 /// A paced subscription ended. `group_gone`: so did the group, and its id may be another's later.

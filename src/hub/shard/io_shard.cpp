@@ -226,7 +226,8 @@ void IoShard::begin_pace(const PaceCommand& command) {
   Connection* connection = state_.find(command.session);
   if (connection == nullptr) return;
   const bool begins = Pacer::find(*connection, command.group) == nullptr;
-  PacedSubscription& subscription = state_.pacer.subscribe(*connection, command.group, command.terms);
+  PacedSubscription& subscription =
+      state_.pacer.subscribe(*connection, command.group, command.terms, command.was_plain);
   subscription.retained = command.retained;
   if (begins && command.retained) state_.retained.ask_start(subscription);
 }

@@ -295,9 +295,19 @@ TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
   };
   rig.publish_group(5, provider.id, {&viewer});
   say("plain");
+  const auto say_part = [&](std::uint32_t offset, const std::string& part) {
+    std::string fragment(proto::kFragmentHeaderSize, '\0');
+    proto::store_fragment_header(reinterpret_cast<std::byte*>(fragment.data()), {1, offset, 4});
+    rig.send(provider, HubRig::group(5), fragment + part, {.kind = Kind::group, .flags = proto::kFlagFragment});
+    rig.settle();
+  };
   rig.publish_paced_group(5, provider.id, {&viewer}, false, true);
   say("published");
-  rig.pace(viewer, 5, {.depth = 3, .interval_us = 1'000'000});
+  say_part(0, "ab");
+  rig.pace(viewer, 5, {.depth = 3, .interval_us = 1'000'000}, false, true);
+  say_part(2, "cd");
+  ASSERT_EQ(viewer.frames.size(), 4u) << "a message in the middle of which the pace began";
+  viewer.frames.resize(2);
   say("paced");
   for (const char* text : {"held 1", "held 2", "held 3"}) say(text);
   EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced"));

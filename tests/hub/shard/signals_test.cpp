@@ -209,11 +209,11 @@ TEST(Signals, WhoSendsToAServiceThatOnlyProvidesIsTold) {
     FakeNode& provider = rig.join(shard);
     FakeNode& client = rig.join(0);
     rig.publish_group(5, provider.id, {&client});
-    rig.send(client, HubRig::group(5), "request", {.kind = Kind::service, .flags = proto::kFlagReport});
+    rig.send(client, HubRig::group(5), "request", {.kind = proto::Kind::service, .flags = proto::kFlagReport});
     rig.settle();
     rig.pass_ms(100);
     client.read();
-    EXPECT_THAT(provider.frames, IsEmpty());
+    EXPECT_TRUE(provider.frames.empty());
     EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
     ASSERT_EQ(client.reports().size(), 1u);
     EXPECT_EQ(client.reports()[0].reason, DropReason::not_allowed);

@@ -65,7 +65,8 @@ struct PaceDue {
   std::uint32_t subscriber = 0;
   std::uint32_t group = 0;
   SubscriberTerms terms;
-  bool retained = false;  ///< it begins with the last message
+  bool retained = false;   ///< it begins with the last message
+  bool was_plain = false;  ///< it got everything before, in this group
 };
 /// A subscription that was paced ended; `group_gone`: so did the group.
 struct PaceEnded {

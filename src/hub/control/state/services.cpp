@@ -326,7 +326,9 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
 
 void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects) {
   const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
-  if (pace) effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain});
+  if (!pace) return;
+  effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain,
+                               topic.once_plain.contains(subscriber)});
 }
 
 /// The topic's group is gone. First from the table: a frame that is read before the provider's shard forgets the last

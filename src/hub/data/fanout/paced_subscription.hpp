@@ -64,6 +64,7 @@ class PacedSubscription {
   struct Open {
     enum class State : std::uint8_t {
       none,
+      plain,     ///< it may have begun before the pace, when everything came: what comes of it passes
       passing,   ///< its fragments go to the subscriber as they come
       arriving,  ///< they are kept until the message is whole, or may go
       cut,       ///< the rest is dropped

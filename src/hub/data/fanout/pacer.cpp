@@ -24,14 +24,16 @@ Run take_frame(Run& run) {
 
 }  // namespace
 
-PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms) {
+PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms, bool was_plain) {
   if (!recipient.paced) {
     recipient.paced = std::make_unique<PacedBook>(recipient, ripe_);
     recipient.outbox.set_counted_groups(recipient.paced.get());
   }
   PacedSubscription* known = recipient.paced->find(group);
-  if (known == nullptr) return recipient.paced->add(group, terms);
+  const bool begins = known == nullptr || !known->active;
+  if (known == nullptr) known = &recipient.paced->add(group, terms);
   known->active = true;
+  if (begins && was_plain) begin_plain(*known);
   if (!(known->terms() == terms)) known->set_terms(terms);
   // What may go now is not too much, however little may be held from now on.
   release(*known);
@@ -74,6 +76,14 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
   return true;
 }
 
+/// A message is the subscriber's whole or not at all, also where its pace begins in the middle of one.
+void Pacer::begin_plain(PacedSubscription& subscription) const {
+  for (Open& open : subscription.open()) {
+    open.state = State::plain;
+    open.came_ms = context_.now_ms;
+  }
+}
+
 /// A message that its provider gave up in one lane while it goes on in another would keep its place for ever.
 void Pacer::give_up_stalled(PacedSubscription& subscription) {
   for (Open& open : subscription.open()) {
@@ -111,6 +121,11 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, cons
   const proto::FragmentHeader& fragment = *frame->fragment;
   const auto size = static_cast<std::uint32_t>(frame->payload.size());
   const bool ends = frame->ends_message();
+  if (open.state == State::plain) {
+    open.state = State::passing;
+    open.number = fragment.message;
+    open.next_offset = fragment.offset;
+  }
   if (fragment.offset == 0) {
     abandon(open, DropReason::cut_message);
     begin_message(subscription, open, fragment.message);
@@ -134,6 +149,7 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, cons
       if (ends) end_message(subscription, open);
       return;
     case State::cut:
+    case State::plain:
     case State::none:
       context_.drops.drop(run.bytes, run.size, 1, DropReason::cut_message);
       if (ends) open.state = State::none;

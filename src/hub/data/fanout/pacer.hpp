@@ -16,8 +16,9 @@ class Pacer {
  public:
   explicit Pacer(Fanout& fanout) : fanout_(fanout), context_(fanout.context()) {}
 
-  /// A subscription begins, or has new terms. Returns it.
-  PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms);
+  /// A subscription begins, or has new terms. Returns it. `was_plain`: the recipient got everything until it began, so
+  /// that it has the beginning of what is just coming.
+  PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms, bool was_plain = false);
   /// It ends. Its counts are kept for the next one on this connection, unless the group is gone.
   void unsubscribe(Recipient& recipient, GroupId group, bool group_gone);
   /// The subscription of that group; nullptr if the recipient has none that is active.
@@ -54,6 +55,7 @@ class Pacer {
                    Handover handover);
   void offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                       Handover handover);
+  void begin_plain(PacedSubscription& subscription) const;
   void give_up_stalled(PacedSubscription& subscription);
   void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);
   void end_message(PacedSubscription& subscription, Open& open);

@@ -40,7 +40,7 @@ std::vector<std::string> words(const Effects& effects) {
     } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
       result.push_back("pace " + std::to_string(pace->subscriber) + " of " + std::to_string(pace->group) + ": " +
                        std::to_string(pace->terms.window) + "/" + std::to_string(pace->terms.depth) +
-                       (pace->retained ? " retained" : ""));
+                       (pace->retained ? " retained" : "") + (pace->was_plain ? ", once plain" : ""));
     } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
       result.push_back("no pace " + std::to_string(ended->subscriber) + " of " + std::to_string(ended->group) +
                        (ended->group_gone ? ", gone" : ""));
@@ -312,11 +312,11 @@ TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("group 1", "group 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 2 of 1: 0/1"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 2 of 1: 0/1, once plain"));
   EXPECT_THAT(services_.find_group(1)->once_plain, ElementsAre(kViewer)) << "until then it gets everything";
   // It stays paced: what is held for it goes before what comes.
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1"));
+  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1, once plain"));
   EXPECT_TRUE(services_.find_group(1)->pace_of(kViewer));
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
   EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1", "left 2 of 1: 0"));

@@ -172,6 +172,29 @@ TEST_F(PacerTest, AMessageWithoutAnEndGivesItsPlaceBack) {
   EXPECT_THAT(sent(), ElementsAre("later")) << "of another lane: the time";
 }
 
+TEST_F(PacerTest, AMessageThatBeganBeforeThePaceIsNotCut) {
+  PacedSubscription& one = rig.pacer.subscribe(recipient, kGroup, {.interval_us = 20'000}, true);
+  offer_fragment(one, 1, 2, 6, "cd");
+  offer_fragment(one, 1, 4, 6, "ef");
+  EXPECT_THAT(sent(), ElementsAre("cd", "ef")) << "it has the beginning";
+  EXPECT_EQ(dropped(DropReason::cut_message), 0u);
+  offer_fragment(one, 2, 2, 4, "gh");
+  EXPECT_EQ(dropped(DropReason::cut_message), 1u) << "what has no beginning now never had one";
+  offer(one, {"other"}, 2);
+  offer_fragment(one, 3, 2, 4, "ij", 2);
+  offer_fragment(one, 4, 0, 4, "kl", 3);
+  offer_fragment(one, 5, 2, 4, "mn", 3);
+  EXPECT_EQ(dropped(DropReason::cut_message), 4u) << "in other lanes the next message has begun";
+  EXPECT_THAT(sent(), ElementsAre("other"));
+  // New terms change nothing, and another beginning of the subscription is none of the pace.
+  rig.pacer.subscribe(recipient, kGroup, {.interval_us = 10'000}, true);
+  offer_fragment(one, 6, 2, 4, "op");
+  rig.pacer.unsubscribe(recipient, kGroup, false);
+  PacedSubscription& anew = subscribe({.interval_us = 10'000});
+  offer_fragment(anew, 7, 2, 4, "qr");
+  EXPECT_EQ(dropped(DropReason::cut_message), 6u);
+}
+
 TEST_F(PacerTest, WhatTheOutboxDropsCountsAsTaken) {
   PacedSubscription& one = subscribe({.window = 2});
   offer(one, {"1", "2", "3"});

@@ -196,8 +196,8 @@ void HubRig::publish(std::uint32_t index, std::unique_ptr<GroupMembers> group) {
 
 void HubRig::withdraw_group(std::uint32_t index) { static_cast<void>(groups_.exchange(index, nullptr)); }
 
-void HubRig::pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained) {
-  command(node.shard.value(), PaceCommand{node.session, GroupId{group(index)}, terms, retained});
+void HubRig::pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained, bool was_plain) {
+  command(node.shard.value(), PaceCommand{node.session, GroupId{group(index)}, terms, retained, was_plain});
 }
 
 std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,
