@@ -32,6 +32,7 @@ struct GroupStart {
   GroupId group;
   ConnectionSlot slot;
   std::uint32_t generation = 0;
+  std::uint32_t ticket = 0;  ///< numbers the starts that its shard asked for
   ShardIndex shard;
 };
 

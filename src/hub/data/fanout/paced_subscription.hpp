@@ -89,8 +89,9 @@ class PacedSubscription {
 
   /// The subscription ended; its counts go on if it begins again on the same connection.
   bool active = true;
-  /// Nothing is for it before so many starts came from the provider's shard (RetainedMessages).
-  std::uint32_t awaited_starts = 0;
+  /// The start that it asked the provider's shard for last (RetainedMessages), and that nothing is for it before that.
+  std::uint32_t start_ticket = 0;
+  bool awaits_start = false;
   bool retained = false;   ///< of a service whose last message is kept
   bool ripe = false;       ///< is in the pacer's list of those that may have room
   bool scheduled = false;  ///< is in the pacer's list of those that wait for their time

@@ -47,9 +47,7 @@ void Pacer::unsubscribe(Recipient& recipient, GroupId group, bool group_gone) {
   drop_held(*known, DropReason::no_subscriber);
   unschedule(*known);
   known->active = false;
-  // A start that is still under way would be taken for the next subscription's, which began later.
-  const bool too_many = recipient.paced->size() > kEndedMax && known->awaited_starts == 0;
-  if (group_gone || too_many) recipient.paced->erase(*known);
+  if (group_gone || recipient.paced->size() > kEndedMax) recipient.paced->erase(*known);
 }
 
 PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
@@ -59,7 +57,7 @@ PacedSubscription* Pacer::find(const Recipient& recipient, GroupId group) {
 
 bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                   Handover handover) {
-  if (subscription.awaited_starts != 0) return false;
+  if (subscription.awaits_start) return false;
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
     context_.drops.drop(run.bytes, run.size, run.frames, DropReason::away);

@@ -115,22 +115,27 @@ void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message)
 
 void RetainedMessages::ask_start(PacedSubscription& subscription) {
   const GroupMembers* members = groups_.find(index_of(subscription.group()));
-  ++subscription.awaited_starts;
+  subscription.start_ticket = ++starts_;
+  subscription.awaits_start = true;
   if (members == nullptr) return;  // the subscription is about to end
   const Recipient& recipient = subscription.recipient();
-  const GroupStart start{subscription.group(), recipient.slot, recipient.generation, fanout_.self()};
+  const GroupStart start{subscription.group(), recipient.slot, recipient.generation, subscription.start_ticket,
+                         fanout_.self()};
   if (members->provider_shard == fanout_.self()) return on_start_wanted(start);
   fanout_.post_word(members->provider_shard, mail_about(MailKind::start_wanted, start));
 }
 
+/// nullptr: it has asked for a later start since, or ended, and so, perhaps, has the group, whose id is another's now.
 PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) const {
   const Recipient* recipient = fanout_.recipients().find(start.slot, start.generation);
-  return recipient != nullptr && recipient->paced ? recipient->paced->find(start.group) : nullptr;
+  if (recipient == nullptr || !recipient->paced) return nullptr;
+  PacedSubscription* found = recipient->paced->find(start.group);
+  return found != nullptr && found->start_ticket == start.ticket ? found : nullptr;
 }
 
 void RetainedMessages::on_start(const GroupStart& start) {
   PacedSubscription* subscription = subscription_of(start);
-  if (subscription != nullptr && subscription->awaited_starts != 0) --subscription->awaited_starts;
+  if (subscription != nullptr) subscription->awaits_start = false;
 }
 
 void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {

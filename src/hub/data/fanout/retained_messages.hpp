@@ -71,6 +71,7 @@ class RetainedMessages {
   Fanout& fanout_;
   Pacer& pacer_;
   EgressContext& context_;
+  std::uint32_t starts_ = 0;  ///< asked for
   boost::unordered_flat_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
 };
 

@@ -137,8 +137,7 @@ TEST_F(RetainedMessagesTest, IsGivenWhileTheProviderIsRenumbered) {
   EXPECT_EQ(got(late), (Texts{"2"}));
 }
 
-// Counts of ended subscriptions are let go where there are too many, but none whose start is under way: it would begin
-// the next one, which then gets the message of both.
+// Counts of ended subscriptions are let go where there are too many.
 TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterSubscriptions) {
   FakeNode& node = rig.join(1);
   for (std::uint32_t group = 100; group < 1'200; ++group) {
@@ -154,6 +153,22 @@ TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterSubscriptions) {
   rig.pace(node, 1, {}, true);
   rig.turn_shard(1);
   EXPECT_EQ(got(node), (Texts{"1"}));
+}
+
+// A shard that is late finds both groups in its mailbox, and was told of both before.
+TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterGroupsOfThatId) {
+  publish("of the former group");
+  FakeNode& node = subscriber(1);
+  rig.turn_shard(1);
+  rig.turn_shard(0);
+  rig.withdraw_group(1);
+  rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}});
+  rig.command(1, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, true});
+  rig.publish_paced_group(1, provider.id, members, true);
+  rig.pace(node, 1, {}, true);
+  rig.send(provider, HubRig::group(1), "new", {.kind = Kind::group});
+  rig.turn_shard(0);
+  EXPECT_EQ(got(node), (Texts{"new"}));
 }
 
 TEST_F(RetainedMessagesTest, IsChargedAndFreedWithItsService) {
