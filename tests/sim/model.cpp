@@ -280,7 +280,11 @@ void Model::end(std::uint32_t index, milliseconds now) {
   names_.erase(session.name);
   generations_.erase(index);
   sessions_.erase(index);
-  for (const std::uint32_t each : former(index)) moved_.erase(each);
+  for (const std::uint32_t each : former(index)) {
+    std::uint64_t& least = least_[each];
+    least = std::max(least, moved_.at(each).token_number + 1);
+    moved_.erase(each);
+  }
   ended_.push_back(index);
   rest(resting_ids_, index, now);
 }

@@ -228,7 +228,12 @@ void Reference::end(std::uint64_t id, milliseconds now) {
   note_node(ChangeKind::left, session);
   names_.erase(session.name);
   by_index_.erase(session.index);
-  std::erase_if(moved_, [id](const auto& entry) { return entry.second.session == id; });
+  std::erase_if(moved_, [this, id](const auto& entry) {
+    const auto& [index, moved] = entry;
+    if (moved.session != id) return false;
+    least_[index] = std::max(least_[index], moved.number + 1);
+    return true;
+  });
   released_.push_back(session.seat);
   resting_nodes_[session.index] = rests_until(now);
   sessions_.erase(id);

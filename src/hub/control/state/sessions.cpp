@@ -173,7 +173,11 @@ void Sessions::spend_token(const Session& session) {
 }
 
 void Sessions::end(Session& session, milliseconds now) {
-  for (const std::uint32_t former : former_indices(session)) renumbered_.erase(former);
+  // It may come back under the id that it had last, and no other: else one node could be two.
+  for (const std::uint32_t former : former_indices(session)) {
+    floor_.raise(former, renumbered_.at(former).number + 1);
+    renumbered_.erase(former);
+  }
   if (session.connected) --connected_;
   const std::uint32_t index = session.index;
   slots_.give_back(session.place);

@@ -130,7 +130,8 @@ class Sessions {
   /// The indices that the session's node had before.
   [[nodiscard]] std::vector<std::uint32_t> former_indices(const Session& session) const;
 
-  /// The session is over: its slot is free at once, its index after it has rested.
+  /// The session is over: its slot is free at once, its index after it has rested. Tokens of indices that it had before
+  /// count as none from now on.
   void end(Session& session, std::chrono::milliseconds now);
 
   /// A session whose grace time is over, or nullptr. The caller ends it and asks again.

@@ -133,6 +133,24 @@ TEST_F(SessionsTest, RemembersAsManyKickedOnesAsTheLimitAllows) {
   EXPECT_EQ(sessions_.kicked()[1].index, first + 2);
 }
 
+TEST_F(SessionsTest, AFormerIdsTokenIsGoodAsLongAsTheSession) {
+  Session& session = create();
+  sessions_.renew_token(session, 0ms);
+  const std::vector<std::byte> former = sessions_.token_of(session);
+  const std::uint32_t former_index = session.index;
+  ASSERT_TRUE(sessions_.renumber(session, 70, 0ms));
+  const std::vector<std::byte> latest = sessions_.token_of(session);
+  EXPECT_EQ(claim(former), &session) << "it may not know of the other id yet";
+  EXPECT_EQ(claim(latest), &session);
+  sessions_.end(session, 0ms);
+  for (const std::chrono::milliseconds later : {0ms, 1'000'000ms}) {
+    const auto forgotten = sessions_.claim({former, "", "open", later});
+    EXPECT_EQ(forgotten.session, nullptr);
+    EXPECT_FALSE(forgotten.token) << "the node would have two ids: " << former_index << " and 70";
+    EXPECT_TRUE(sessions_.claim({latest, "", "open", later}).token);
+  }
+}
+
 TEST_F(SessionsTest, ASpentTokenClaimsNothing) {
   Session& session = create();
   const std::vector<std::byte> token = sessions_.token_of(session);
