@@ -18,6 +18,7 @@
 #include "hub/control/state/listing.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/services.hpp"
+#include "hub/control/table_publisher.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/pattern.hpp"
 
@@ -129,6 +130,45 @@ Work topics(std::size_t count) {
   };
 }
 
+/// Each of so many subscribers of one service ends its subscription and begins it again, and each time the table is
+/// published.
+Work subscribers(std::size_t count) {
+  struct World {
+    Limits limits;
+    Membership membership{Sessions::Options{HubId{7}, 2, Placement::spread}, limits};
+    NodeTable nodes;
+    GroupTable groups;
+    Quiescence quiescence{2};
+    TablePublisher publisher{HubId{7}, 2, {nodes, groups, quiescence}};
+    std::vector<std::uint32_t> subscribers;
+    Effects effects;
+  };
+  auto world = std::make_shared<World>();
+  for (std::size_t i = 0; i <= count; ++i) {
+    const auto joined = world->membership.join({}, milliseconds{0}, world->effects);
+    if (!joined) wrong("a node was refused");
+    world->subscribers.push_back((*joined).session->index);
+  }
+  Services& services = world->membership.services();
+  if (!services.advertise(world->subscribers[0], "robot/odom", {}, milliseconds{0}, world->effects)) wrong("a service");
+  for (std::size_t i = 1; i <= count; ++i) {
+    if (!services.subscribe(world->subscribers[i], "robot/odom", world->effects)) wrong("a subscription was refused");
+  }
+  world->publisher.publish_group(1, world->membership);
+  world->effects.clear();
+  return [world, &services, count] {
+    for (std::size_t i = 0; i < count; ++i) {
+      // In no order: a step that shares no factor with the number of them.
+      const std::uint32_t node = world->subscribers[1 + i * 7'919 % count];
+      if (services.unsubscribe(node, "robot/odom", world->effects)) wrong("it had subscribed");
+      if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
+      if (!services.subscribe(node, "robot/odom", world->effects)) wrong("a subscription was refused");
+      if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
+      world->effects.clear();
+    }
+  };
+}
+
 /// Looks for what is in hall-3 among so many names that begin with the same letters, as often.
 Work neighbours(std::size_t count) {
   struct World {
@@ -194,6 +234,7 @@ constexpr Script kScripts[] = {
     {"nested_bomb", nested_bomb},
     {"names", names},
     {"topics", topics},
+    {"subscribers", subscribers},
     {"neighbours", neighbours},
     {"patterns", patterns},
     {"pattern_parts", pattern_parts},

@@ -18,6 +18,7 @@ SCRIPTS = {
     "nested_bomb": (1_000, 100_000, 1.2),
     "names": (1_000, 100_000, 2.5),
     "topics": (1_000, 100_000, 2.5),
+    "subscribers": (50, 1_500, 1.6),
     "neighbours": (40, 1_000, 1.5),
     "patterns": (10, 1_000, 1.2),
     "pattern_parts": (2, 16, 16),

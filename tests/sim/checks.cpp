@@ -225,10 +225,8 @@ bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topi
   if (count != topic->subscribers.size()) return false;
   return std::all_of(topic->subscribers.begin(), topic->subscribers.end(), [&](std::uint32_t index) {
     const NodePlace place = subject_.nodes.find(index);
-    const auto& list = members->by_shard[place.shard.value()];
-    return std::any_of(list.begin(), list.end(), [&place](const hub::GroupMember& member) {
-      return member.slot == place.slot && member.generation == place.generation;
-    });
+    const hub::GroupMember* member = members->by_shard[place.shard.value()].find(place.slot);
+    return member != nullptr && member->generation == place.generation;
   });
 }
 

@@ -143,14 +143,14 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   }
   require(witness_->provides(index_of(NodeId{header.src}), group), Checker::group_table,
           "a node sends to a group that is not of a service of its own");
-  for (const GroupMember& member : members->by_shard[index]) {
+  members->by_shard[index].for_each([&](const GroupMember& member) {
     Seat* seat = find(index, member.slot, member.generation);
-    if (seat == nullptr) continue;
+    if (seat == nullptr) return;
     const std::uint32_t node = index_of(seat->node);
     require(witness_->subscribes(node, group), Checker::right_session,
             "a frame of a service goes to a node that has not subscribed to it");
     deliver(index, *seat, frame, witness_->session_of(node));
-  }
+  });
   if (handed_over) return;
   for (std::size_t other = 0; other < shards_.size(); ++other) {
     if (other == index || members->by_shard[other].empty()) continue;

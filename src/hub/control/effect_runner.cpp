@@ -58,6 +58,12 @@ void EffectRunner::run(const GroupChanged& effect) {
   }
 }
 
+void EffectRunner::run(const MemberChanged& effect) {
+  if (!parts_.publisher.publish_member(effect.group, effect.subscriber, parts_.membership)) {
+    run(GroupChanged{effect.group});
+  }
+}
+
 void EffectRunner::fence_passed(const FencePassedEvent& event) {
   for (const std::uint32_t group : endings_.on_passed(event)) {
     parts_.publisher.clear_group(group);
@@ -95,8 +101,8 @@ void EffectRunner::run(const PaceDue& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
-  parts_.shards.send(session->place.shard,
-                     PaceCommand{ref_of(session->place), group_id(effect.group), terms, effect.retained, effect.was_plain});
+  parts_.shards.send(session->place.shard, PaceCommand{ref_of(session->place), group_id(effect.group), terms,
+                                                       effect.retained, effect.was_plain});
 }
 
 void EffectRunner::run(const PaceEnded& effect) {

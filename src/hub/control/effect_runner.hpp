@@ -38,6 +38,7 @@ class EffectRunner {
  private:
   void run(const NodeChanged& effect);
   void run(const GroupChanged& effect);
+  void run(const MemberChanged& effect);
   void run(const SessionEnded& effect);
   void run(const RenumberDue& effect);
   void run(const ServiceMovedDue& effect);

@@ -1,5 +1,7 @@
 #include "hub/control/table_publisher.hpp"
 
+#include <algorithm>
+
 #include "base/check.hpp"
 #include "proto/control/ns.hpp"
 
@@ -33,21 +35,48 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     members->provider_shard = provider->place.shard;
     members->by_shard.resize(shards_);
     members->retain = topic->service->terms.retain;
-    members->accepts = static_cast<proto::ns::Direction>(topic->service->terms.direction) == proto::ns::Direction::accepts;
+    members->accepts =
+        static_cast<proto::ns::Direction>(topic->service->terms.direction) == proto::ns::Direction::accepts;
     for (const std::uint32_t subscriber : topic->subscribers) {
-      const Session* session = membership.sessions().find(subscriber);
-      GIMNET_CHECK(session != nullptr);
-      const Place& place = session->place;
-      if (!topic->pace_of(subscriber)) {
-        members->by_shard[place.shard.value()].push_back({place.slot, place.generation});
-        continue;
-      }
-      members->paced_by_shard.resize(shards_);
-      const bool was_plain = topic->once_plain.contains(subscriber);
-      members->paced_by_shard[place.shard.value()].push_back({place.slot, place.generation, was_plain});
+      const NodePlace place = place_of(subscriber, membership);
+      GIMNET_CHECK(place.exists());
+      put(*members, *topic, subscriber, place);
     }
   }
   replace(index, std::move(members));
+}
+
+bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscriber, const Membership& membership) {
+  const auto found = published_.find(index);
+  const Topic* topic = membership.services().find_group(index);
+  const NodePlace place = place_of(subscriber, membership);
+  if (found == published_.end() || found->second->ends() || topic == nullptr || !place.exists()) return false;
+  auto members = std::make_unique<GroupMembers>(*found->second);
+  members->by_shard[place.shard.value()].erase(place.slot);
+  auto& paced = members->paced_by_shard;
+  if (!paced.empty() && paced[place.shard.value()].erase(place.slot)) {
+    if (std::ranges::all_of(paced, [](const auto& list) { return list.empty(); })) paced.clear();
+  }
+  if (std::ranges::binary_search(topic->subscribers, subscriber)) put(*members, *topic, subscriber, place);
+  replace(index, std::move(members));
+  return true;
+}
+
+NodePlace TablePublisher::place_of(std::uint32_t node, const Membership& membership) const {
+  const Session* session = membership.sessions().find(node);
+  if (session == nullptr) return tables_.nodes.find(node);
+  return {session->place.shard, session->place.slot, session->place.generation};
+}
+
+void TablePublisher::put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber,
+                         const NodePlace& place) const {
+  if (!topic.pace_of(subscriber)) {
+    members.by_shard[place.shard.value()].put({place.slot, place.generation});
+    return;
+  }
+  members.paced_by_shard.resize(shards_);
+  const bool was_plain = topic.once_plain.contains(subscriber);
+  members.paced_by_shard[place.shard.value()].put({place.slot, place.generation, was_plain});
 }
 
 std::optional<ShardIndex> TablePublisher::end_group(std::uint32_t index) {

@@ -31,8 +31,12 @@ class TablePublisher {
 
   /// Publishes what `membership` says of the node now.
   void publish_node(std::uint32_t index, const Membership& membership);
-  /// Publishes what `membership` says of the group now.
+  /// Publishes what `membership` says of the group now: as much work as the group has members.
   void publish_group(std::uint32_t index, const Membership& membership);
+  /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little work, whatever the
+  /// group's size. False: nothing was done, since the group, or where the node lives, is not published; publish_group()
+  /// is due. REQUIRES: the node lives where the table of nodes says, if its session is over.
+  [[nodiscard]] bool publish_member(std::uint32_t index, std::uint32_t subscriber, const Membership& membership);
 
   /// The group has no provider any more. Where it has members on other shards than its provider's, the table says so
   /// and keeps them for what is on its way there, until clear_group(): returns the provider's shard. Otherwise it is
@@ -49,6 +53,9 @@ class TablePublisher {
     std::uint64_t ticket;
     std::unique_ptr<const GroupMembers> members;
   };
+  /// Where the node lives, or lived until now.
+  [[nodiscard]] NodePlace place_of(std::uint32_t node, const Membership& membership) const;
+  void put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber, const NodePlace& place) const;
   void replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members);
 
   const HubId hub_;

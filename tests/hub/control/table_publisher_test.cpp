@@ -55,8 +55,8 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   publisher_.publish_group(1, membership_);
   const auto& members = groups_.find(1)->by_shard[viewer.place.shard.value()];
   ASSERT_EQ(members.size(), 1u);
-  EXPECT_EQ(members[0].slot, viewer.place.slot);
-  EXPECT_EQ(members[0].generation, viewer.place.generation);
+  ASSERT_NE(members.find(viewer.place.slot), nullptr);
+  EXPECT_EQ(members.find(viewer.place.slot)->generation, viewer.place.generation);
   EXPECT_TRUE(groups_.find(1)->by_shard[robot.place.shard.value()].empty());
 }
 
@@ -91,6 +91,70 @@ TEST_F(TablePublisherTest, AGroupEndsInTwoStepsWhereItHasMembersElsewhere) {
   publisher_.clear_group(1);
   EXPECT_EQ(groups_.find(1), nullptr);
   EXPECT_FALSE(publisher_.end_group(1));
+}
+
+TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeStaysAsItWas) {
+  const Session& robot = join("robot");
+  const Session& far = join("far");
+  const Session& near = join("near");
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  EXPECT_FALSE(publisher_.publish_member(1, far.index, membership_)) << "all of it is due";
+  publisher_.publish_group(1, membership_);
+  quiescence_.enter(0);
+  subscribe(far, "robot/odom");
+  subscribe(near, "robot/odom");
+  ASSERT_TRUE(publisher_.publish_member(1, far.index, membership_));
+  const GroupMembers* before = groups_.find(1);
+  EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
+  EXPECT_TRUE(before->by_shard[near.place.shard.value()].empty()) << "its own effect is to come";
+  ASSERT_TRUE(publisher_.publish_member(1, near.index, membership_));
+  EXPECT_EQ(groups_.find(1)->by_shard[near.place.shard.value()].size(), 1u);
+  ASSERT_FALSE(membership_.services().unsubscribe(far.index, "robot/odom", effects_));
+  ASSERT_TRUE(publisher_.publish_member(1, far.index, membership_));
+  EXPECT_TRUE(groups_.find(1)->by_shard[far.place.shard.value()].empty());
+  EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
+  EXPECT_EQ(groups_.find(1)->provider, make_id<NodeId>(HubId{7}, robot.index));
+}
+
+TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
+  const Session& robot = join("robot");
+  const Session& viewer = join("viewer");
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  publisher_.publish_group(1, membership_);
+  const auto paced = [&]() -> const PacedMember* {
+    const auto& lists = groups_.find(1)->paced_by_shard;
+    return lists.empty() ? nullptr : lists[viewer.place.shard.value()].find(viewer.place.slot);
+  };
+  const auto want = [&](const SubscriberTerms& terms) {
+    ASSERT_TRUE(membership_.services().subscribe(viewer.index, "robot/odom", terms, effects_));
+    ASSERT_TRUE(publisher_.publish_member(1, viewer.index, membership_));
+  };
+  want({});
+  EXPECT_EQ(paced(), nullptr);
+  want({.interval_us = 1'000});
+  ASSERT_NE(paced(), nullptr);
+  EXPECT_TRUE(paced()->was_plain);
+  EXPECT_TRUE(groups_.find(1)->by_shard[viewer.place.shard.value()].empty());
+  ASSERT_FALSE(membership_.services().unsubscribe(viewer.index, "robot/odom", effects_));
+  ASSERT_TRUE(publisher_.publish_member(1, viewer.index, membership_));
+  EXPECT_TRUE(groups_.find(1)->paced_by_shard.empty()) << "a group without any pays nothing for it";
+}
+
+TEST_F(TablePublisherTest, AMemberWhoseSessionIsOverIsFoundWhereItLived) {
+  const Session& robot = join("robot");
+  Session& viewer = join("viewer");
+  const std::uint32_t index = viewer.index;
+  const Place place = viewer.place;
+  publisher_.publish_node(index, membership_);
+  ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
+  subscribe(viewer, "robot/odom");
+  publisher_.publish_group(1, membership_);
+  membership_.connection_ended(viewer, {true, proto::GoodbyeCode::done, ""}, 0ms, effects_);
+  ASSERT_EQ(membership_.sessions().find(index), nullptr);
+  ASSERT_TRUE(publisher_.publish_member(1, index, membership_));
+  EXPECT_TRUE(groups_.find(1)->by_shard[place.shard.value()].empty());
+  publisher_.publish_node(index, membership_);
+  EXPECT_FALSE(publisher_.publish_member(1, index, membership_)) << "nobody knows where it lived";
 }
 
 TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {

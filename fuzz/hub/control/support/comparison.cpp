@@ -25,14 +25,14 @@ Seat seat_of(std::uint8_t shard, const hub::SessionRef& ref) { return {shard, re
 using Members = std::vector<std::pair<Seat, bool>>;
 
 template <class Member>
-Members members_of(const std::vector<std::vector<Member>>& by_shard) {
+Members members_of(const std::vector<hub::MemberList<Member>>& by_shard) {
   Members members;
   for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
-    for (const Member& member : by_shard[shard]) {
+    by_shard[shard].for_each([&](const Member& member) {
       bool was_plain = false;
       if constexpr (requires { member.was_plain; }) was_plain = member.was_plain;
       members.emplace_back(Seat{static_cast<std::uint8_t>(shard), member.slot.value(), member.generation}, was_plain);
-    }
+    });
   }
   return members;
 }

@@ -23,6 +23,11 @@ struct NodeChanged {
 struct GroupChanged {
   std::uint32_t index = 0;
 };
+/// Publish whether and how that node is a member of this group.
+struct MemberChanged {
+  std::uint32_t group = 0;
+  std::uint32_t subscriber = 0;
+};
 /// Tell the shard that the session is over.
 struct SessionEnded {
   Place place;
@@ -114,8 +119,8 @@ struct ServiceNoted {
 };
 
 using Effect =
-    std::variant<NodeChanged, GroupChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded, RetainedDropped,
-                 SubscriberDue, CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
+    std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded,
+                 RetainedDropped, SubscriberDue, CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

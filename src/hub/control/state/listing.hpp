@@ -33,9 +33,9 @@ struct ListingRequest {
 [[nodiscard]] Listed list_nodes(const Membership& membership, const ListingRequest& request);
 [[nodiscard]] Listed list_services(const Services& services, const ListingRequest& request);
 
-/// The same where all whose names begin with the pattern's parts before its first `*` are few: these alone are looked at,
-/// in one piece of work, whatever else begins with the same letters. Nothing: there is no pattern, it begins with a `*`,
-/// or they are more than `work`.
+/// The same where all whose names begin with the pattern's parts before its first `*` are few: these alone are looked
+/// at, in one piece of work, whatever else begins with the same letters. Nothing: there is no pattern, it begins with a
+/// `*`, or they are more than `work`.
 [[nodiscard]] std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request);
 [[nodiscard]] std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request);
 

@@ -168,7 +168,7 @@ Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std:
   list.insert(std::lower_bound(list.begin(), list.end(), node_index), node_index);
   if (terms != SubscriberTerms{}) entry.terms[node_index] = terms;
   if (entry.service) {
-    effects.emplace_back(GroupChanged{entry.service->group});
+    effects.emplace_back(MemberChanged{entry.service->group, node_index});
     begin_pace(entry, node_index, effects);
     effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group, node_index,
                                        static_cast<std::uint32_t>(list.size()), true});
@@ -351,7 +351,7 @@ void Services::change_terms(Topic& topic, std::uint32_t subscriber, const Subscr
   if (before == after) return;
   if (!before) {
     topic.once_plain.insert(subscriber);
-    effects.emplace_back(GroupChanged{topic.service->group});
+    effects.emplace_back(MemberChanged{topic.service->group, subscriber});
   }
   begin_pace(topic, subscriber, effects);
 }
@@ -387,7 +387,7 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
 #endif
   if (topic.service) {
 #ifndef GIMNET_BUG_LEFT_NOT_PUBLISHED
-    effects.emplace_back(GroupChanged{topic.service->group});
+    effects.emplace_back(MemberChanged{topic.service->group, node});
 #endif
     if (paced) effects.emplace_back(PaceEnded{node, topic.service->group, false});
     effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node, number, false});

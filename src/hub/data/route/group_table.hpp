@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/ids.hpp"
+#include "hub/data/route/member_list.hpp"
 
 namespace gimnet::hub {
 
@@ -23,16 +24,17 @@ struct PacedMember {
   bool was_plain = false;
 };
 
-/// The recipients of one group at one moment. Thread safety: immutable once published. Ownership: the table
-/// publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
+/// The recipients of one group at one moment. A copy shares the lists, so that one member more or less is cheap in a
+/// group of any size. Thread safety: immutable once published. Ownership: the table publisher, which frees it when no
+/// shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
   ShardIndex provider_shard;  ///< constant while the group lives, whatever id its provider has
   /// One entry per shard of the hub, each with the members that live there.
-  std::vector<std::vector<GroupMember>> by_shard;
+  std::vector<MemberList<GroupMember>> by_shard;
   /// Those of which the shard paces what they get; empty if there are none.
-  std::vector<std::vector<PacedMember>> paced_by_shard;
-  bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
+  std::vector<MemberList<PacedMember>> paced_by_shard;
+  bool retain = false;   ///< the provider's shard keeps the last message; then all members are paced
   bool accepts = false;  ///< the service takes data: frames of kind SERVICE go to its provider
 
   /// It has no provider any more: nothing is taken in for it, but what was handed over before is delivered.

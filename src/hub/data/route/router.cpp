@@ -111,15 +111,15 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
   if (!handed_over && members->provider != NodeId{header.src} && !still_goes_by(members->provider, header)) {
     return drop(run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
-  const std::vector<GroupMember>& here = members->by_shard[fanout_.self().value()];
+  const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
-  for (const GroupMember& member : here) {
+  here.for_each([&](const GroupMember& member) {
     Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
-    if (recipient == nullptr) continue;
+    if (recipient == nullptr) return;
     fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
-  }
+  });
   const bool paced = !members->paced_by_shard.empty();
   if (paced) outcomes += to_paced(run, header, members->paced_by_shard[fanout_.self().value()]);
   if (!handed_over) {
@@ -135,12 +135,12 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
 }
 
 /// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one without the other.
-std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const std::vector<PacedMember>& here) {
+std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const MemberList<PacedMember>& here) {
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
-  for (const PacedMember& member : here) {
+  here.for_each([&](const PacedMember& member) {
     Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
-    if (recipient == nullptr) continue;
+    if (recipient == nullptr) return;
     PacedSubscription* subscription = Pacer::find(*recipient, GroupId{header.dst});
     if (subscription != nullptr) {
       if (pacer_.offer(*subscription, run, header, handover)) ++outcomes;
@@ -148,7 +148,7 @@ std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header,
       fanout_.deliver(*recipient, run, header, handover);
       ++outcomes;
     }
-  }
+  });
   return outcomes;
 }
 

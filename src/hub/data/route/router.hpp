@@ -79,7 +79,7 @@ class Router {
   [[nodiscard]] bool still_goes_by(NodeId node, const proto::FrameHeader& header) const;
   void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
-                                       const std::vector<PacedMember>& here);
+                                       const MemberList<PacedMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);

@@ -205,7 +205,9 @@ TEST_F(AdministerTest, ServicesAndSubscriptionsFollowTheId) {
   ASSERT_NE(members, nullptr);
   EXPECT_EQ(members->provider, make_id<NodeId>(kHub, 70));
   ASSERT_THAT(members->by_shard[viewer.shard.value()], SizeIs(1));
-  EXPECT_EQ(members->by_shard[viewer.shard.value()][0].generation, viewer.session.generation);
+  const GroupMember* member = members->by_shard[viewer.shard.value()].find(viewer.session.slot);
+  ASSERT_NE(member, nullptr);
+  EXPECT_EQ(member->generation, viewer.session.generation);
   const auto joined = events<ns::SubscriberJoined>();
   ASSERT_THAT(joined, SizeIs(2));
   EXPECT_EQ(joined[1].node, make_id<NodeId>(kHub, 60));

@@ -31,6 +31,8 @@ std::vector<std::string> words(const Effects& effects) {
   for (const Effect& effect : effects) {
     if (const auto* group = std::get_if<GroupChanged>(&effect)) {
       result.push_back("group " + std::to_string(group->index));
+    } else if (const auto* member = std::get_if<MemberChanged>(&effect)) {
+      result.push_back("member " + std::to_string(member->subscriber) + " of " + std::to_string(member->group));
     } else if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
       result.push_back("moved " + std::to_string(moved->subscriber) + ": " + std::to_string(moved->old_group) + "->" +
                        std::to_string(moved->new_group));
@@ -124,7 +126,7 @@ TEST_F(ServicesTest, SubscribingToAServicePublishesItsGroupBeforeItsProviderIsTo
   advertise(kRobot, "robot/odom");
   take_words();
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "joined 2 of 1: 1"));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "joined 2 of 1: 1"));
   EXPECT_THAT(services_.find_group(1)->subscribers, ElementsAre(kViewer));
 }
 
@@ -154,7 +156,7 @@ TEST_F(ServicesTest, UnsubscribingTellsTheProvider) {
   subscribe(kViewer, "robot/odom");
   take_words();
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "left 2 of 1: 0"));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "left 2 of 1: 0"));
   const auto again = services_.unsubscribe(kViewer, "robot/odom", effects_);
   ASSERT_TRUE(again);
   EXPECT_EQ(again->status, Status::not_found);
@@ -216,7 +218,7 @@ TEST_F(ServicesTest, WhoLeavesTakesEverythingAlong) {
   subscribe(kRobot, "viewer/view");
   take_words();
   services_.node_left(kRobot, now_, effects_);
-  EXPECT_THAT(take_words(), ElementsAre("group 2", "left 1 of 2: 0", "group 1", "moved 2: 1->0"));
+  EXPECT_THAT(take_words(), ElementsAre("member 1 of 2", "left 1 of 2: 0", "group 1", "moved 2: 1->0"));
   services_.node_left(kViewer, now_, effects_);
   EXPECT_EQ(services_.topics(), 0u);
   EXPECT_TRUE(services_.groups().empty());
@@ -276,13 +278,13 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), 1u);
   EXPECT_THAT(take_words(), ElementsAre("moved 2: 0->1", "group 1", "pace 2 of 1: 2/3 retained"));
   EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 3 of 1: 4/1 retained", "joined 3 of 1: 2"));
+  EXPECT_THAT(take_words(), ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "joined 3 of 1: 2"));
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
   EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", {.window = 9}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 4/1 retained")) << "at most what the service allows";
   EXPECT_FALSE(services_.unsubscribe(kLogger, "robot/map", effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 3 of 1", "left 3 of 1: 1"));
+  EXPECT_THAT(take_words(), ElementsAre("member 3 of 1", "no pace 3 of 1", "left 3 of 1: 1"));
   // In the table first: a frame that is read before the last message is forgotten must not make it anew.
   EXPECT_EQ(advertise(kRobot, "robot/map"), 2u);
   EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1, gone", "forget 1", "moved 2: 1->2", "group 2"));
@@ -310,19 +312,19 @@ TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
 TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "group 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "member 2 of 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "pace 2 of 1: 0/1, once plain"));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "pace 2 of 1: 0/1, once plain"));
   EXPECT_THAT(services_.find_group(1)->once_plain, ElementsAre(kViewer)) << "until then it gets everything";
   // It stays paced: what is held for it goes before what comes.
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1, once plain"));
   EXPECT_TRUE(services_.find_group(1)->pace_of(kViewer));
   EXPECT_FALSE(services_.unsubscribe(kViewer, "robot/odom", effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1", "left 2 of 1: 0"));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "no pace 2 of 1", "left 2 of 1: 0"));
   // Who begins again begins as anybody else.
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "joined 2 of 1: 1"));
+  EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "joined 2 of 1: 1"));
   EXPECT_FALSE(services_.find_group(1)->pace_of(kViewer));
 }
 

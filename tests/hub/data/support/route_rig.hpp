@@ -46,8 +46,8 @@ class RouteRig {
     members.accepts = accepts;
     members.provider = make_id<NodeId>(HubId{7}, provider);
     members.by_shard.assign(2, {});
-    for (const std::uint32_t member : here) members.by_shard[0].push_back({ConnectionSlot{member}, member});
-    for (const std::uint32_t member : there) members.by_shard[1].push_back({ConnectionSlot{member}, member});
+    for (const std::uint32_t member : here) members.by_shard[0].put({ConnectionSlot{member}, member});
+    for (const std::uint32_t member : there) members.by_shard[1].put({ConnectionSlot{member}, member});
     static_cast<void>(groups.exchange(index, &members));
   }
 

@@ -168,7 +168,7 @@ void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vect
   group->accepts = accepts;
   group->by_shard.resize(shards_.size());
   for (const FakeNode* member : members) {
-    group->by_shard[member->shard.value()].push_back({member->session.slot, member->session.generation});
+    group->by_shard[member->shard.value()].put({member->session.slot, member->session.generation});
   }
   publish(index, std::move(group));
 }
@@ -181,8 +181,7 @@ void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std
   group->by_shard.resize(shards_.size());
   group->paced_by_shard.resize(shards_.size());
   for (const FakeNode* member : paced) {
-    group->paced_by_shard[member->shard.value()].push_back(
-        {member->session.slot, member->session.generation, was_plain});
+    group->paced_by_shard[member->shard.value()].put({member->session.slot, member->session.generation, was_plain});
   }
   publish(index, std::move(group));
 }

@@ -108,8 +108,7 @@ class HubRig {
   void publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
                            bool retain = false, bool was_plain = false);
   void withdraw_group(std::uint32_t index);
-  void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false,
-            bool was_plain = false);
+  void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false, bool was_plain = false);
 
   void write(FakeNode& node, std::span<const std::byte> bytes) { node.pipe.write(bytes); }
   void send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec = {});
