@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <tuple>
+#include <vector>
+
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
@@ -14,6 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using proto::Status;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 namespace ctrl = proto::ctrl;
@@ -213,6 +217,49 @@ TEST_F(AdministerTest, ServicesAndSubscriptionsFollowTheId) {
   EXPECT_EQ(joined[1].node, make_id<NodeId>(kHub, 60));
   EXPECT_EQ(joined[1].subscribers, 1u);
   EXPECT_EQ(events<ns::SubscriberLeft>().back().node, viewer.id);
+}
+
+// A provider that hears of no subscribers stops; one that hears of two waits for both.
+TEST_F(AdministerTest, ASubscriberThatIsRenumberedIsOneAllTheTime) {
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"}));
+  const Node viewer = join("viewer");
+  const Node other = join("other");
+  for (const Node& node : {viewer, other}) ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"robot/odom"}));
+  const auto told = [this] {
+    std::vector<std::tuple<bool, NodeId, std::uint32_t>> found;
+    for (const auto* command : shards.all<SendControlCommand>()) {
+      const auto payload = payload_of(*command);
+      if (const auto joined = proto::decode<ns::SubscriberJoined>(payload)) {
+        found.emplace_back(true, joined->node, joined->subscribers);
+      } else if (const auto left = proto::decode<ns::SubscriberLeft>(payload)) {
+        found.emplace_back(false, left->node, left->subscribers);
+      }
+    }
+    shards.sent.clear();
+    return found;
+  };
+  static_cast<void>(told());
+  const NodeId second = make_id<NodeId>(kHub, 60);
+  ASSERT_TRUE(request(admin_, ctrl::Reassign{viewer.id, second}));
+  EXPECT_THAT(told(), ElementsAre(std::tuple{true, second, 2u}, std::tuple{false, viewer.id, 2u}));
+  detach(viewer, false, proto::GoodbyeCode::renumbered);
+  const Node again = rejoin(viewer, "viewer");
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"})->subscribers, 2u);
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(again, ns::Subscribe{"robot/odom"}));
+  EXPECT_THAT(told(), SizeIs(0)) << "it declares what is known";
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(again, ns::Unsubscribe{"robot/odom"}));
+  EXPECT_THAT(told(), ElementsAre(std::tuple{false, second, 1u}));
+  // One that does not come back, and one whose provider is given another id meanwhile.
+  ASSERT_TRUE(request(admin_, ctrl::Reassign{other.id, make_id<NodeId>(kHub, 61)}));
+  ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 62)}));
+  detach(other, false, proto::GoodbyeCode::renumbered);
+  detach(robot_, false, proto::GoodbyeCode::renumbered);
+  const Node provider = rejoin(robot_, "robot");
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(provider, ns::Advertise{.service = "odom"})->subscribers, 1u);
+  static_cast<void>(told());
+  now += std::chrono::milliseconds{limits.grace_ms};
+  conductor.tick(now);
+  EXPECT_THAT(told(), ElementsAre(std::tuple{false, make_id<NodeId>(kHub, 61), 0u}));
 }
 
 TEST_F(AdministerTest, AnIdThatIsHandedOutAgainLeadsToItsNewNode) {
