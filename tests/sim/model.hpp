@@ -84,7 +84,7 @@ class Model final : public Witness {
     Allowance oddities;
     proto::Role role{};
     bool connected = false;
-    bool renumbered = false;  ///< and not welcomed since
+    bool renumbered = false;  ///< and not heard of since it was welcomed
     std::uint32_t attachment = 0;
     std::string name;
     std::string description;
@@ -128,6 +128,7 @@ class Model final : public Witness {
   };
   void admitted(const Hello& hello, const hub::AttachCommand& attach, milliseconds now);
   void refused(const Hello& hello, const proto::Goodbye& goodbye, milliseconds now);
+  void heard(const hub::HeardEvent& event);
   void detached(const hub::DetachedEvent& event, milliseconds now);
   void ticked(milliseconds now);
   /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.

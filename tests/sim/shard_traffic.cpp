@@ -38,6 +38,10 @@ void SimShards::read(std::size_t index, Seat& seat) {
   for (std::uint64_t most = setting_.random.between(1, 6); most > 0 && !wire->at_hub.empty(); --most) {
     Bytes frame = std::move(wire->at_hub.front());
     wire->at_hub.pop_front();
+    if (std::exchange(seat.tell_heard, false)) {
+      push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                         hub::HeardEvent{seat.session, seat.attachment, seat.node}});
+    }
     if (!handle(index, seat, std::move(frame))) return;
   }
   if (!wire->at_hub.empty()) return has_something(*wire);

@@ -162,6 +162,7 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   seat.attachment = command.attachment;
   seat.wire = wire;
   seat.waits_when_away = command.resume_wanted;
+  seat.tell_heard = command.tell_heard;
   wire->attached = true;
   wire->shard = index;
   wire->slot = command.session.slot.value();

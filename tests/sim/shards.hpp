@@ -87,6 +87,7 @@ class SimShards final : public hub::ShardProxy {
     std::uint32_t attachment = 0;
     WirePointer wire;
     bool waits_when_away = false;
+    bool tell_heard = false;
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
     std::deque<Data> data;

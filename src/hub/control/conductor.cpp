@@ -109,6 +109,7 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   command.known_taken = hello.resume_taken;
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
+  command.tell_heard = session.renumbered;
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
@@ -143,6 +144,8 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
 void Conductor::on_event(ShardEvent event, milliseconds now) {
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
     on_frame(*frame, now);
+  } else if (const auto* heard = std::get_if<HeardEvent>(&event.what)) {
+    on_heard(*heard);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
     on_detached(*detached, now);
   } else if (const auto* passed = std::get_if<FencePassedEvent>(&event.what)) {
@@ -200,6 +203,11 @@ void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
   close(*session, GoodbyeCode::oddities,
         "more than " + std::to_string(limits_.oddities_burst) +
             " requests were answered bad_request, not_supported or denied in a short time; look at the answers");
+}
+
+void Conductor::on_heard(const HeardEvent& event) {
+  Session* session = find(event.session, event.node);
+  if (session != nullptr && event.attachment == session->attachment) session->renumbered = false;
 }
 
 void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {

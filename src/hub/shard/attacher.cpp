@@ -30,6 +30,7 @@ void Attacher::attach(AttachCommand command) {
   connection.unsent_limit = kFirstUnsentBytes;
   connection.attachment = command.attachment;
   connection.connected = true;
+  connection.tell_heard = command.tell_heard;
   connection.frame_bytes = command.peer_frame_bytes;
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
   connection.tail_since_ms = 0;

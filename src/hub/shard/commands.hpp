@@ -54,6 +54,8 @@ struct AttachCommand {
   std::uint64_t known_taken = 0;
   std::uint32_t peer_resume_bytes = 0;
   std::uint32_t peer_frame_bytes = 0;
+  /// Whether the shard says so, with HeardEvent, when it first hears of the node on this connection.
+  bool tell_heard = false;
 };
 
 /// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how many of the
@@ -141,6 +143,13 @@ struct ControlFrameEvent {
   std::vector<std::byte> frame;
 };
 
+/// Something came by this connection: its node has read WELCOME, since it says nothing before. Where that was wanted.
+struct HeardEvent {
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  NodeId node;
+};
+
 /// A session has no connection any more. `code` is `done` only if the node said so itself: then the session is over,
 /// otherwise its grace time begins. `said_by_peer` tells who said GOODBYE; `sentence` is for the record. A connection
 /// that broke without a GOODBYE has code `done` and `said_by_peer` false. None is sent for a connection that was fenced
@@ -170,7 +179,7 @@ struct FencePassedEvent {
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, DetachedEvent, FarewellEvent, DrainedEvent, FencePassedEvent> what;
+  std::variant<ControlFrameEvent, HeardEvent, DetachedEvent, FarewellEvent, DrainedEvent, FencePassedEvent> what;
 };
 
 }  // namespace gimnet::hub

@@ -50,12 +50,18 @@ void Reader::read(Connection& connection) {
   state_.tally.received_bytes += result.bytes;
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
   if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
+  if (connection.tell_heard) tell_heard(connection);
   const bool open = process(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
   state_.fanout.post_all();
   const std::uint64_t posted = state_.fanout.take_posted();
   if (!open) return;
   connection.posted_shards = posted;
   if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+}
+
+void Reader::tell_heard(Connection& connection) {
+  connection.tell_heard = false;
+  state_.tell_conductor({state_.self, HeardEvent{connection.session(), connection.attachment, connection.node}});
 }
 
 void Reader::wait_for_room(Connection& connection) {

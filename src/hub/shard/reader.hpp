@@ -18,6 +18,8 @@ class Reader {
 
  private:
   /// Not read until the shards that it sends to have room.
+  /// Apart from read(), of which nearly every call has no use for it.
+  [[gnu::noinline]] void tell_heard(Connection& connection);
   void wait_for_room(Connection& connection);
   /// False: the connection was closed.
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);

@@ -95,6 +95,10 @@ std::optional<proto::Goodbye> ControlHub::admit(const Stranger& stranger) {
   made.identity = stranger.identity;
   made.may_administer = stranger.may_administer;
   auto refusal = conductor.admit(made, stranger.hello, {now, std::chrono::nanoseconds{wall()}.count()});
+  for (const auto& [shard, attach] : all<hub::AttachCommand>()) {
+    if (!attach->tell_heard) continue;
+    conductor.on_event({ShardIndex{shard}, hub::HeardEvent{attach->session, attach->attachment, attach->node}}, now);
+  }
   pass_fences();
   return refusal;
 }

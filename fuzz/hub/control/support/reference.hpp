@@ -31,7 +31,7 @@ class Reference {
     std::uint64_t number = 0;  ///< in its tokens
     Seat seat;
     bool connected = false;
-    bool renumbered = false;  ///< and not welcomed since
+    bool renumbered = false;  ///< and not heard of since it was welcomed
     std::uint32_t attachment = 0;
     proto::Role role{};
     std::string name;

@@ -141,7 +141,8 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
     return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to 1048574"};
   }
   const std::uint32_t former = session.index;
-  // Messages for an id that the node never learned of would wait for it, and it would take none of them.
+  // Messages for an id that the node never learned of would wait for it, and it would take none of them. A WELCOME that
+  // was sent may have been lost: that is why it has to be heard of.
   if (session.renumbered) {
     return Failure{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
                                              " and has not come back under it yet; try again when it has"};

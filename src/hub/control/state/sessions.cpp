@@ -115,7 +115,6 @@ void Sessions::remember_kicked(const Session& session) {
 void Sessions::attach(Session& session, milliseconds now) {
   if (!session.connected) ++connected_;
   session.connected = true;
-  session.renumbered = false;
   session.connected_at = now;
   ++session.attachment;
 }

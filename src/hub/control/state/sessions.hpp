@@ -48,7 +48,7 @@ struct Session {
   Place place;
   proto::Role role{};
   bool connected = false;
-  bool renumbered = false;  ///< since its latest connection was admitted: no WELCOME has told it its id yet
+  bool renumbered = false;  ///< and not heard of since a WELCOME that told it its id
   bool came_back = false;   ///< with a token, to this hub or to this hub before its restart
   CompactText name;         ///< "" for a node without one
   CompactText description;
@@ -113,7 +113,7 @@ class Sessions {
   /// The session of a token whose index is free, under its former id. Errors: hub_full.
   [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
                                                   std::chrono::milliseconds now);
-  /// A connection was admitted for the session.
+  /// A connection was admitted for the session. What it says, or that the node was heard(), tells that it read WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
   void begin_grace(Session& session, std::chrono::milliseconds now);

@@ -140,6 +140,7 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.known_taken = new_session ? 0 : node.data_frames;
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
+  command.tell_heard = spec.tell_heard;
   node.welcome.reset();
   node.goodbye.reset();
   this->command(node.shard.value(), std::move(command));

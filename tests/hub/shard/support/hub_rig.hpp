@@ -38,6 +38,7 @@ struct JoinSpec {
   std::uint64_t epoch = 77;
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
+  bool tell_heard = false;
 };
 
 /// A node played by a test: the far end of its connection, and what came out of it.
