@@ -14,10 +14,14 @@
 #include <string_view>
 #include <vector>
 
+#include "client/gimi/ack_book.hpp"
+#include "client/nif/name_cache.hpp"
+#include "client/nif/pause_table.hpp"
 #include "hub/control/state/directory.hpp"
 #include "hub/control/state/listing.hpp"
 #include "hub/control/state/membership.hpp"
 #include "hub/control/state/services.hpp"
+#include "hub/control/state/session_token.hpp"
 #include "hub/control/table_publisher.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/pattern.hpp"
@@ -108,6 +112,49 @@ Work names(std::size_t count) {
   };
 }
 
+/// What answers of a hub name to a program that remembers it.
+Work remembered_names(std::size_t count) {
+  auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
+  return [all] {
+    nif::NameCache cache;
+    std::uint32_t id = 0;
+    for (const std::string& name : *all) {
+      cache.remember(name, ++id, 0);
+      if (!cache.id_of(name, 0) || !cache.name_of(id, 0)) wrong("a name was forgotten");
+    }
+  };
+}
+
+/// Numbers that a table of so many places has in one of them, wherever a hash is the number itself.
+constexpr std::uint32_t kPlaces = 10'273;
+
+/// Destinations that a hub pauses.
+Work pauses(std::size_t count) {
+  return [count] {
+    nif::PauseTable table;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      table.pause({proto::Kind::unicast, proto::Lane::normal, i * kPlaces});
+      if (!table.is_paused(nif::stream_code(proto::Kind::unicast, 1, i * kPlaces))) wrong("it was paused");
+    }
+  };
+}
+
+/// Keys of messages that one node sends, each of which wants an ACK: the numbers of above before a multiplication by
+/// the golden section.
+Work acks(std::size_t count) {
+  constexpr std::uint64_t kInverse = 0xF1DE83E19937733Du;
+  static_assert(kInverse * 0x9E3779B97F4A7C15u == 1);
+  return [count] {
+    gimi::AckBook book;
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const std::uint64_t key = i * kPlaces * kInverse;
+      const gimi::StreamName sender{
+          Peer{}, {static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32)}, 0};
+      if (!book.take(sender, 1) || book.acknowledge(sender).sequence != 1) wrong("it was due");
+    }
+  };
+}
+
 /// Subscribed to by a thousand nodes, so that none of them is at its limit.
 Work topics(std::size_t count) {
   struct World {
@@ -127,6 +174,21 @@ Work topics(std::size_t count) {
       world->services.node_left(static_cast<std::uint32_t>(node), milliseconds{0}, world->effects);
     }
     world->effects.clear();
+  };
+}
+
+/// Tokens of which so many bytes of the MAC are right, and the next one is wrong.
+Work wrong_tokens(std::size_t count) {
+  const Secret secret{};
+  const TokenHolder holder{HubId{7}, "robot", "open"};
+  auto token = std::make_shared<std::vector<std::byte>>(write_token({1, 2, milliseconds{3}}, holder, secret));
+  constexpr std::size_t kMacBytes = 32;
+  if (count > kMacBytes) wrong("a MAC has 32 bytes");
+  (*token)[token->size() - kMacBytes + count - 1] ^= std::byte{1};
+  return [token, holder, secret, count] {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (is_genuine(*token, holder, secret)) wrong("a byte of it is wrong");
+    }
   };
 }
 
@@ -234,6 +296,10 @@ constexpr Script kScripts[] = {
     {"nested_bomb", nested_bomb},
     {"names", names},
     {"topics", topics},
+    {"remembered_names", remembered_names},
+    {"pauses", pauses},
+    {"acks", acks},
+    {"wrong_tokens", wrong_tokens},
     {"subscribers", subscribers},
     {"neighbours", neighbours},
     {"patterns", patterns},

@@ -1,5 +1,6 @@
 #include "client/gimi/ack_book.hpp"
 
+#include <iterator>
 #include <utility>
 
 namespace gimnet::gimi {
@@ -23,7 +24,11 @@ void advance(AckBook::Entry& entry, std::uint32_t sequence) {
 }  // namespace
 
 bool AckBook::take(const StreamName& sender, std::uint32_t sequence) {
-  if (entries_.size() >= kStreamsMax && !entries_.contains(sender)) entries_.erase(entries_.begin());
+  if (entries_.size() >= kStreamsMax && !entries_.contains(sender)) {
+    // Who begins too many streams loses its own.
+    const auto above = entries_.lower_bound(sender);
+    entries_.erase(above != entries_.begin() ? std::prev(above) : above);
+  }
   const auto [place, is_new] = entries_.try_emplace(sender, Entry{sequence, 0, true});
   if (is_new) return true;
   Entry& entry = place->second;

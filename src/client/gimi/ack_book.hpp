@@ -1,8 +1,9 @@
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
+#include <map>
 
 #include "gimnet/gimi/message.hpp"
 #include "proto/gimi/message_header.hpp"
@@ -15,7 +16,7 @@ struct StreamName {
   Peer peer;
   MessageKey key;
   std::uint32_t group = 0;
-  friend bool operator==(const StreamName&, const StreamName&) = default;
+  friend auto operator<=>(const StreamName&, const StreamName&) = default;
 };
 struct StreamNameHash {
   std::size_t operator()(const StreamName& name) const noexcept {
@@ -27,8 +28,9 @@ struct StreamNameHash {
 };
 
 /// Which DATA of each sender were taken: the highest sequence and the 64 before it, which is what an ACK says.
-/// Thread safety: one thread at a time. Limits: `kStreamsMax` streams; beyond them one that is known is forgotten, and
-/// its next ACK speaks only of what came after.
+/// In the order of streams, which no choice of keys can make slow. Thread safety: one thread at a time. Limits:
+/// `kStreamsMax` streams; beyond them one is forgotten that is next to the new one, mostly of the same sender, and its
+/// next ACK speaks only of what came after.
 class AckBook {
  public:
   static constexpr std::size_t kStreamsMax = 65536;
@@ -46,7 +48,7 @@ class AckBook {
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
 
  private:
-  std::unordered_map<StreamName, Entry, StreamNameHash> entries_;
+  std::map<StreamName, Entry> entries_;
 };
 
 }  // namespace gimnet::gimi

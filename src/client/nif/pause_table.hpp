@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <unordered_set>
+#include <set>
 
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_header.hpp"
@@ -14,7 +14,8 @@ namespace gimnet::nif {
   return (static_cast<std::uint64_t>(kind) << 40) | (static_cast<std::uint64_t>(lane) << 32) | dst;
 }
 
-/// The destinations that the hub has paused. Thread safety: guarded by its owner.
+/// The destinations that the hub has paused. In order, which no choice of destinations can make slow. Thread safety:
+/// guarded by its owner.
 class PauseTable {
  public:
   /// A hub that pauses more than this is not obeyed further.
@@ -33,7 +34,7 @@ class PauseTable {
   static constexpr std::uint64_t code(const proto::flow::Target& target) {
     return stream_code(target.kind, static_cast<std::uint8_t>(target.lane), target.dst);
   }
-  std::unordered_set<std::uint64_t> paused_;
+  std::set<std::uint64_t> paused_;
 };
 
 }  // namespace gimnet::nif
