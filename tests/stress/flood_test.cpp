@@ -231,5 +231,77 @@ TEST(Flood, WhoWaitsForASlowPeerSteersAFastOne) {
   EXPECT_EQ(info.connected, 1u);
 }
 
+/// Receives until a message comes that was sent to this node alone.
+bool receive_unicast(Incoming& in, const NifNode& node) {
+  while (in.receive(node, kPatienceMs) == NIF_OK) {
+    if (in->type == NIF_MESSAGE && in->kind == NIF_UNICAST) return true;
+  }
+  return false;
+}
+
+void broadcast_until(const std::atomic<bool>& is_over, std::atomic<std::uint64_t>& broadcasts, RawNode storm) {
+  constexpr int kBurst = 64;
+  const std::vector<std::byte> payload(1'000);
+  while (!is_over.load()) {
+    if (storm.flush()) {
+      for (int i = 0; i < kBurst; ++i) storm.put(parts_of(proto::Kind::broadcast, 0xFFFFFFFF), payload);
+      broadcasts.fetch_add(kBurst);
+    } else {
+      wait_readable({storm.descriptor()}, 1);
+    }
+    storm.keep_alive();
+    storm.read_some();
+    while (storm.next()) {
+    }
+  }
+  storm.flush_all();
+}
+
+// One node broadcasts as fast as it can, and one of those who get it takes nothing: two others steer each other all the
+// while, since what they send waits for nobody and is dropped for nobody's sake.
+TEST(Flood, ABroadcastStormHindersNobody) {
+  const HubProcess hub(two_shards());
+  const NifNode operator_node(hub.tcp_url(), "operator", at_shard(0));
+  const NifNode robot(hub.tcp_url(), "robot", at_shard(1));
+  RawNode deaf(hub.tcp_url());
+  std::atomic<bool> is_over{false};
+  std::atomic<std::uint64_t> broadcasts{0};
+  std::thread storming([&] { broadcast_until(is_over, broadcasts, RawNode(hub.tcp_url())); });
+  std::thread answering([&] {
+    Incoming in;
+    for (std::uint64_t answered = 0; answered != kSteered && receive_unicast(in, robot);) {
+      std::memcpy(&answered, in->payload, sizeof answered);
+      static_cast<void>(nif_send_to(robot.get(), in->from, in->payload, in->size));
+    }
+  });
+  // The last one is asked when there were broadcasts enough.
+  Incoming in;
+  bool is_answered = true;
+  for (std::uint64_t steered = 1; steered <= kSteered && is_answered; ++steered) {
+    const Deadline deadline;
+    do {
+      deadline.check("a storm of broadcasts");
+      deaf.keep_alive();
+      std::this_thread::yield();
+    } while (broadcasts.load() * kSteered < flood_count() * steered);
+    is_answered = nif_send_to(operator_node.get(), robot.id(), &steered, sizeof steered) == NIF_OK &&
+                  receive_unicast(in, operator_node) && std::memcmp(in->payload, &steered, sizeof steered) == 0;
+  }
+  EXPECT_TRUE(is_answered) << in->text;
+  is_over.store(true);
+  storming.join();
+  if (!is_answered) {
+    constexpr std::uint64_t last = kSteered;
+    static_cast<void>(nif_send_to(operator_node.get(), robot.id(), &last, sizeof last));
+  }
+  answering.join();
+  deaf = RawNode();
+  RawNode observer(hub.unix_url());
+  const Statistics end = wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
+  EXPECT_TRUE(end.is_balanced()) << end.text();
+  EXPECT_GT(end["dropped.queue_full"], 0u) << "the deaf one's";
+  EXPECT_EQ(end["dropped.timed_out"], 0u);
+}
+
 }  // namespace
 }  // namespace gimnet::stress

@@ -79,6 +79,36 @@ TEST_F(SessionsTest, AForgedTokenClaimsNothing) {
   EXPECT_EQ(claim(longer), nullptr);
 }
 
+// Whoever cannot prove a token learns nothing by showing it: not whether it has expired, nor whether its session lives.
+TEST_F(SessionsTest, WhateverIsWrongWithATokenTheAnswerIsTheSame) {
+  Session& live = create();
+  Session& gone = create();
+  const std::chrono::milliseconds expired{limits_.token_ms};
+  std::vector<std::vector<std::byte>> wrong{{}, std::vector<std::byte>(1 << 20, std::byte{7})};
+  for (const Session* session : {&live, &gone}) {
+    const std::vector<std::byte> token = sessions_.token_of(*session);
+    wrong.emplace_back(token.begin(), token.end() - 1);
+    wrong.push_back(token);
+    wrong.back().push_back(std::byte{0});
+    wrong.push_back(token);
+    wrong.back().back() ^= std::byte{1};
+    wrong.push_back(token);
+    wrong.back()[4] ^= std::byte{1};  // of another index
+  }
+  const std::vector<std::byte> right = sessions_.token_of(gone);
+  sessions_.end(gone, 0ms);
+  ASSERT_TRUE(sessions_.claim({right, "", "open", 0ms}).token);
+  const auto is_nothing = [](const Sessions::Claim& claim) { return claim.session == nullptr && !claim.token; };
+  for (const std::vector<std::byte>& token : wrong) {
+    for (const std::chrono::milliseconds wall : {0ms, expired}) {
+      EXPECT_TRUE(is_nothing(sessions_.claim({token, "", "open", wall}))) << token.size();
+    }
+  }
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", "open", expired})));
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", "uid 1000", 0ms})));
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "another name", "open", 0ms})));
+}
+
 TEST_F(SessionsTest, AnotherIdentityClaimsNothing) {
   Session& session = create();
   EXPECT_EQ(claim(sessions_.token_of(session), "uid 1000"), nullptr);
