@@ -112,6 +112,7 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
     std::set<std::uint32_t>& subscribers = topics_.at(full_name).subscribers;
     subscribers.erase(index);
     subscribers.insert(to);
+    if (const Service* provided = service(full_name); provided != nullptr && provided->provider == to) continue;
     tell_provider(full_name, to, true);
     tell_provider(full_name, index, false);
   }

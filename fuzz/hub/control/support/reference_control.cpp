@@ -233,6 +233,8 @@ void Reference::renumber(std::uint64_t id, std::uint32_t index, milliseconds now
     note_service(ChangeKind::changed, topics_.at(full_name).service->group, full_name);
   }
   for (const auto& [full_name, life] : session.subscribes) {
+    const auto& service = topics_.at(full_name).service;
+    if (service && service->provider == id) continue;
     const std::size_t count = topics_.at(full_name).subscribers.size();
     tell_provider(full_name, index, true, count);
     tell_provider(full_name, former, false, count);

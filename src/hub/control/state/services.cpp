@@ -251,7 +251,8 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
     for (auto* changed : {&entry.once_plain, &entry.once_paced}) {
       if (changed->erase(node_index) != 0) changed->insert(new_index);
     }
-    if (!entry.service) continue;
+    // Its own provider does not know its new id yet, and asks how many there are when it does.
+    if (!entry.service || entry.service->provider == new_index) continue;
     // First the one that comes: a provider that hears of no subscribers stops.
     const auto count = static_cast<std::uint32_t>(list.size());
     for (const bool joined : {true, false}) {

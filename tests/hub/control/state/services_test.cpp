@@ -294,6 +294,18 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
   EXPECT_THAT(take_words(), ElementsAre("group 3", "no pace 2 of 3, gone", "forget 3", "moved 2: 3->0"));
 }
 
+TEST_F(ServicesTest, WhoSubscribesToItselfIsNotToldOfItsNewIdBeforeItKnowsIt) {
+  EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
+  EXPECT_EQ(subscribe(kRobot, "robot/odom"), Status::done);
+  EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
+  take_words();
+  services_.node_renumbered(kRobot, 40, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("group 1"));
+  EXPECT_THAT(services_.find_group(1)->subscribers, ElementsAre(kViewer, 40u));
+  services_.node_renumbered(kViewer, 41, effects_);
+  EXPECT_THAT(take_words(), ElementsAre("joined 41 of 1: 2", "left 2 of 1: 2"));
+}
+
 TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
   EXPECT_EQ(subscribe(kViewer, "robot/odom"), Status::done);
