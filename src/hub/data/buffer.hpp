@@ -9,6 +9,13 @@ namespace gimnet::hub {
 
 class BufferPool;
 
+/// Memory that a Buffer has before its bytes.
+inline constexpr std::uint32_t kBufferRoom = 64;
+/// Bytes of the largest chunk that several frames share. With its room it is the largest piece that jemalloc packs side
+/// by side (SC_SMALL_MAXCLASS): those from 16 KiB on begin at any line of a page, and so have a page more than their
+/// size, a fifth of the memory that thousands of waiting chunks take.
+inline constexpr std::uint32_t kSharedChunkBytes = 14 * 1024 - kBufferRoom;
+
 enum class BufferKind : std::uint8_t {
   slab,     ///< what connections read into; frames are routed where they lie
   chunk,    ///< smaller memory: for waiting frames that are copied, and for a frame that comes slowly
@@ -30,6 +37,7 @@ struct Buffer {
   Buffer* lender = nullptr;            ///< of a foreign buffer: what it stands for
   std::atomic<std::uint32_t> lent{0};  ///< foreign buffers and mailbox entries that stand for it
 };
+static_assert(sizeof(Buffer) <= kBufferRoom);
 
 /// One reference to a Buffer. Copying is spelled share(). Thread safety: none; one shard.
 class BufferRef {

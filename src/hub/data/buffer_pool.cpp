@@ -8,12 +8,10 @@
 namespace gimnet::hub {
 namespace {
 constexpr std::size_t kAlignment = 64;
-constexpr std::size_t kBufferRoom = 64;  // before its bytes
-static_assert(sizeof(Buffer) <= kBufferRoom);
 constexpr std::size_t kHeaderRoom = 16;  // a frame's header, which its length does not count
 constexpr std::size_t kFreeForeignMax = 4096;
 /// For a smaller chunk, looking through what is lent would cost more than a new one.
-constexpr std::uint32_t kTakeBackBytes = 16 * 1024;
+constexpr std::uint32_t kTakeBackBytes = kSharedChunkBytes;
 }  // namespace
 
 void BufferRef::recycle(Buffer& buffer) { buffer.pool->recycle(buffer); }
@@ -35,7 +33,8 @@ Buffer* BufferPool::FreeList::pop() {
 
 BufferPool::BufferPool(std::uint32_t frame_bytes, BudgetLease& budget)
     : slab_bytes_(static_cast<std::uint32_t>(kSlabReadBytes + kHeaderRoom + frame_bytes)),
-      chunk_bytes_{256, 1024, 4 * 1024, 16 * 1024, static_cast<std::uint32_t>(kHeaderRoom + frame_bytes)},
+      chunk_bytes_{256 - kBufferRoom, 1024 - kBufferRoom, 4 * 1024 - kBufferRoom, kSharedChunkBytes,
+                   static_cast<std::uint32_t>(kHeaderRoom + frame_bytes)},
       budget_(budget) {}
 
 BufferPool::~BufferPool() {
@@ -116,15 +115,15 @@ void BufferPool::end_loan(Buffer* lent) {
 void BufferPool::pin(Buffer& buffer) {
   if (buffer.pinned) return;
   buffer.pinned = true;
-  pinned_bytes_ += buffer.capacity;
-  budget_.take(buffer.capacity);
+  pinned_bytes_ += kBufferRoom + buffer.capacity;
+  budget_.take(kBufferRoom + buffer.capacity);
 }
 
 void BufferPool::unpin(Buffer& buffer) {
   if (!buffer.pinned) return;
   buffer.pinned = false;
-  pinned_bytes_ -= buffer.capacity;
-  budget_.give_back(buffer.capacity);
+  pinned_bytes_ -= kBufferRoom + buffer.capacity;
+  budget_.give_back(kBufferRoom + buffer.capacity);
 }
 
 void BufferPool::recycle(Buffer& buffer) {

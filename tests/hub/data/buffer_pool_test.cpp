@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <vector>
 
 namespace gimnet::hub {
@@ -44,18 +45,28 @@ TEST_F(BufferPoolTest, ChunksAreAtLeastAsLargeAsAskedFor) {
   }
 }
 
+// What the allocator rounds up, the budget would not know of.
+TEST_F(BufferPoolTest, ASharedChunkIsAsMuchMemoryAsTheAllocatorGives) {
+  for (const std::uint32_t bytes : {1u, 256 - kBufferRoom, 1'024 - kBufferRoom, 4'096 - kBufferRoom}) {
+    const BufferRef chunk = pool.take_chunk(bytes);
+    EXPECT_TRUE(std::has_single_bit(kBufferRoom + chunk->capacity)) << bytes;
+  }
+  EXPECT_EQ(kBufferRoom + pool.take_chunk(kSharedChunkBytes)->capacity, 14u * 1'024);
+  EXPECT_GT(pool.take_chunk(kSharedChunkBytes + 1)->capacity, kSharedChunkBytes);
+}
+
 TEST_F(BufferPoolTest, PinsABufferOnceUntilItIsFree) {
   BufferRef slab = pool.take_slab();
-  const std::uint64_t capacity = slab->capacity;
+  const std::uint64_t memory = kBufferRoom + slab->capacity;
   pool.pin(*slab.get());
   pool.pin(*slab.get());
-  EXPECT_EQ(pool.pinned_bytes(), capacity);
+  EXPECT_EQ(pool.pinned_bytes(), memory);
   const BufferRef second = slab.share();
   slab.reset();
-  EXPECT_EQ(pool.pinned_bytes(), capacity);
+  EXPECT_EQ(pool.pinned_bytes(), memory);
   BufferRef moved = second.share();
   moved.reset();
-  EXPECT_EQ(pool.pinned_bytes(), capacity);
+  EXPECT_EQ(pool.pinned_bytes(), memory);
 }
 
 TEST_F(BufferPoolTest, AFreedPinIsGivenBack) {
@@ -128,7 +139,7 @@ TEST_F(BufferPoolTest, ASlabThatIsBorrowedOftenIsPinnedOnce) {
     borrowed.push_back(other.adopt(BufferPool::lend(*slab.get())));
     other.pin(*borrowed.back().get());
   }
-  EXPECT_EQ(other.pinned_bytes(), slab->capacity);
+  EXPECT_EQ(other.pinned_bytes(), kBufferRoom + slab->capacity);
   borrowed.clear();
   EXPECT_EQ(other.pinned_bytes(), 0u);
   EXPECT_EQ(slab->lent.load(), 0u);

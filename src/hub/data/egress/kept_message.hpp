@@ -34,7 +34,7 @@ class KeptMessage {
 
  private:
   /// A stretch below this is copied out of the slab that it lies in.
-  static constexpr std::uint32_t kCopyBytesMax = 16 * 1024;
+  static constexpr std::uint32_t kCopyBytesMax = kSharedChunkBytes;
 
   [[nodiscard]] Run copy(const Run& frame, EgressContext& context);
 

@@ -9,9 +9,8 @@
 
 namespace gimnet::hub {
 namespace {
-constexpr std::uint32_t kFirstChunkBytes = 256;
+constexpr std::uint32_t kFirstChunkBytes = 256 - kBufferRoom;
 constexpr std::uint32_t kChunkGrowth = 4;  // from one size of the pool to the next
-constexpr std::uint32_t kChunkBytesMax = 16 * 1024;
 }  // namespace
 
 std::uint64_t Outbox::lane_limit(std::size_t lane, const Limits& limits) {
@@ -53,7 +52,7 @@ Run Outbox::copy(const Run& run, EgressContext& context) {
   if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
     // A large one saves entries and calls where there is room; where there is none, each outbox takes what it must.
     chunk_bytes_ =
-        context.budget.exhausted() ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kChunkBytesMax);
+        context.budget.exhausted() ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kSharedChunkBytes);
     chunk_ = context.pool.take_chunk(std::max(run.size, chunk_bytes_));
     chunk_used_ = 0;
     // At once where something waits: by the end of the turn many outboxes may have begun one.

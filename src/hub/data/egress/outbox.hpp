@@ -122,7 +122,7 @@ class Outbox {
   /// messages are dropped, BLOCK or not.
   static constexpr std::uint64_t kReservesMax = 8;
   /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
-  static constexpr std::uint32_t kSettleBytesMax = 16 * 1024;
+  static constexpr std::uint32_t kSettleBytesMax = kSharedChunkBytes;
 
   [[nodiscard]] Lanes& lanes() {
     if (!lanes_) lanes_ = std::make_unique<Lanes>();

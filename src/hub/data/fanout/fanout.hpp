@@ -48,8 +48,8 @@ class Fanout {
   void post_word(ShardIndex to, Mail mail);
 
  private:
-  static constexpr std::uint32_t kListChunkBytes = 16 * 1024;
-  static constexpr std::uint32_t kGatherChunkBytes = 16 * 1024;
+  static constexpr std::uint32_t kListChunkBytes = kSharedChunkBytes;
+  static constexpr std::uint32_t kGatherChunkBytes = kSharedChunkBytes;
   /// Frames below this are cheaper to copy than to give an entry of their own.
   static constexpr std::uint32_t kGatherBytesMax = 1024;
 

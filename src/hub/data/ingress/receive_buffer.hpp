@@ -56,7 +56,7 @@ class ReceiveBuffer {
   /// A begun frame up to this size is copied; keeping a slab for it would cost more than that.
   static constexpr std::uint32_t kCopyTailBytes = 1024;
   /// Of a frame from here on no payload byte is copied, as long as there is a slab to leave it in.
-  static constexpr std::uint32_t kLargeFrameBytes = 16 * 1024;
+  static constexpr std::uint32_t kLargeFrameBytes = kSharedChunkBytes;
   /// So many connections may have a slab to themselves.
   static constexpr std::size_t kOwnSlabsMax = 16;
   /// A slab with less room than this is not read into any more.
