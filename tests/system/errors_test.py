@@ -81,6 +81,9 @@ WRONG_HUBS = [
     (NO_CONNECTION, ["cannot connect to unix:{folder}/text: Connection refused"], "unix:{folder}/text"),
 ]
 
+# For nodes of the test, which keep alive only when they are told to: on a slow machine the hub would end them.
+NOBODY_IS_SILENT = ("--limit", "silent_ms=600000")
+
 # A hub with the nodes `robot` (takes at most 100,000 bytes a message) and `mute` (does nothing) and the service
 # robot2/odom: exit code, words, arguments, standard input.
 WITH_A_HUB = [
@@ -168,7 +171,7 @@ class Errors(Tool):
         self.assertIn("Start one with `tcphub`, or name yours with --hub", said)
 
     def test_with_a_hub(self):
-        hub = Hub(self)
+        hub = Hub(self, *NOBODY_IS_SILENT)
         start_recv(self, hub, "robot", "--max-size", "100000")
         self.places["robot"] = hub.wait_for_node("robot")["id"]
         Client(self, hub).join("mute")
@@ -178,7 +181,7 @@ class Errors(Tool):
             self.expect(code, words, ["--hub", hub.url, *arguments], stdin=stdin)
 
     def test_a_folder_as_standard_input(self):
-        hub = Hub(self)
+        hub = Hub(self, *NOBODY_IS_SILENT)
         Client(self, hub).join("B")
         for arguments in (["send", "B"], ["pub", "a/b"]):
             folder = os.open(self.places["folder"], os.O_RDONLY)
@@ -227,7 +230,7 @@ class Administration(Tool):
     ]
 
     def test_ctl(self):
-        hub = Hub(self)
+        hub = Hub(self, *NOBODY_IS_SILENT)
         start_recv(self, hub, "robot")
         self.places["robot"] = hub.wait_for_node("robot")["id"]
         Client(self, hub).join("mute")
@@ -288,7 +291,7 @@ class SentAway(unittest.TestCase):
     """The hub ends the session of a tool that waits: the tool ends too, and says why."""
 
     def setUp(self):
-        self.hub = Hub(self)
+        self.hub = Hub(self, *NOBODY_IS_SILENT)
         Client(self, self.hub).join("mute")
 
     def kick_the_tools(self):
