@@ -164,6 +164,7 @@ const LimitInfo* find_limit(std::string_view name) {
 
 std::string nearest_limit(std::string_view name) {
   std::vector<std::string_view> names;
+  names.reserve(kTable.size());
   for (const LimitInfo& limit : kTable) names.push_back(limit.name);
   return did_you_mean(name, names);
 }

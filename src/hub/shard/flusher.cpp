@@ -25,8 +25,8 @@ std::uint64_t taken_bytes(const Connection& connection) {
 bool Flusher::flush_dirty() {
   std::vector<Recipient*>& dirty = state_.recipients.dirty();
   // Flushing may mark others (a sender that is told to go on): they come at the end of the same list.
-  for (std::size_t i = 0; i < dirty.size(); ++i) {
-    auto& connection = static_cast<Connection&>(*dirty[i]);
+  for (std::size_t next = 0; next < dirty.size();) {
+    auto& connection = static_cast<Connection&>(*dirty[next++]);
     connection.dirty = false;
     flush(connection);
   }

@@ -62,8 +62,8 @@ class RetainedMessages {
   };
 
   [[nodiscard]] Entry& entry(const proto::FrameHeader& header);
-  void keep_fragment(Entry& entry, const Run& run, const proto::FrameHeader& header);
-  [[nodiscard]] bool may_keep(Entry& entry, std::uint64_t bytes);
+  void keep_fragment(Entry& kept, const Run& run, const proto::FrameHeader& header);
+  [[nodiscard]] bool may_keep(Entry& kept, std::uint64_t bytes);
   void hand(const GroupStart& start, const KeptMessage& message);
   [[nodiscard]] PacedSubscription* subscription_of(const GroupStart& start) const;
 
