@@ -64,6 +64,9 @@ FORBIDDEN_INCLUDES = {
 _SHARED_POINTER = re.compile(r"\b(shared_ptr|make_shared|weak_ptr|enable_shared_from_this|std::function)\b")
 _MEMORY_ORDER = re.compile(r"\bmemory_order(_|::)(relaxed|consume|acquire|release|acq_rel|seq_cst)\b")
 _SLEEP = re.compile(r"\b(sleep_for|sleep_until|usleep|nanosleep)\b|\b(time|asyncio)\.sleep\b|(?<![\w.])sleep\(")
+_CLOCK = re.compile(r"\b\w*clock::now\b|\b(clock_gettime|gettimeofday|timespec_get)\b|"
+                    r"(?<![\w.>])(?:std::|::)?time\(\s*(nullptr|NULL|0|&)")
+_RANDOM = re.compile(r"\brandom_device\b|\b(getrandom|getentropy|s?rand|drand48|arc4random)\s*\(")
 _UNFINISHED = re.compile(r"\b(TODO|FIXME|HACK|XXX)\b|\bfor now\b", re.IGNORECASE)
 _MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home)/")
 _PLANTED = re.compile(r"\bGIMNET_BUG_([A-Z0-9_]+)\b")
@@ -175,6 +178,22 @@ def memory_orders_name_their_partner(tree):
             near = file.lines[max(0, number - 3) : number + 1]
             if _MEMORY_ORDER.search(line) and not any("//" in text for text in near):
                 yield f"{file.path}:{number + 1}: a memory order without a comment on its partner operation"
+
+
+# Who may ask for the time, and for randomness that no seed gives: everybody else is handed them, and can be simulated.
+CLOCKS = ("src/base/clock.hpp",)
+RANDOMNESS = ("src/hub/config/start_state.cpp", "src/hub/shard/attacher.cpp", "src/client/nif/platform_linux.cpp")
+
+
+def time_and_chance_are_handed_in(tree):
+    for file in tree.files(("src",), CPP_SUFFIXES):
+        for number, line in enumerate(file.code_lines(), 1):
+            if file.path not in CLOCKS and _CLOCK.search(line):
+                yield f"{file.path}:{number}: reads a clock; only {CLOCKS[0]} does"
+            if file.path not in RANDOMNESS and _RANDOM.search(line):
+                yield f"{file.path}:{number}: takes randomness that no seed gives"
+            if _SLEEP.search(line):
+                yield f"{file.path}:{number}: sleeps; wait for what comes, with a deadline"
 
 
 def no_sleeps_in_tests(tree):
@@ -309,6 +328,7 @@ RULES = (
     file_length,
     function_length,
     memory_orders_name_their_partner,
+    time_and_chance_are_handed_in,
     no_sleeps_in_tests,
     no_machine_paths,
     nothing_left_for_later,

@@ -145,8 +145,23 @@ CASES = {
             {"src/a.cpp": "// Too far.\nint x;\nint y;\nint z;\na.load(std::memory_order::acquire);\n"},
         ],
     ),
+    rules.time_and_chance_are_handed_in: (
+        [
+            {"src/base/clock.hpp": "auto a = std::chrono::steady_clock::now();\n"},
+            {"src/hub/a.cpp": "// not steady_clock::now()\nauto a = message.time(0, 1);\nint random = brand(2);\n"},
+            {"tests/a_test.cpp": "std::random_device device{};\n"},
+        ],
+        [
+            {"src/hub/control/state/a.cpp": "auto a = std::chrono::steady_clock::now();\n"},
+            {"src/client/a.cpp": "::clock_gettime(CLOCK_REALTIME, &a);\n"},
+            {"src/tools/a.cpp": "auto a = std::time(nullptr);\n"},
+            {"src/hub/a.cpp": "std::random_device device{};\n"},
+            {"src/hub/a.cpp": "int a = rand();\n"},
+            {"src/hub/a.cpp": "std::this_thread::sleep_for(a);\n"},
+        ],
+    ),
     rules.no_sleeps_in_tests: (
-        [{"tests/support/wait.cpp": "std::this_thread::sleep_for(a);\n"}, {"src/a.cpp": "usleep(1);\n"}],
+        [{"tests/support/wait.cpp": "std::this_thread::sleep_for(a);\n"}, {"perf/a.cpp": "usleep(1);\n"}],
         [
             {"tests/a_test.cpp": "std::this_thread::sleep_for(a);\n"},
             {"tests/a_test.c": "usleep(1);\n"},
