@@ -72,6 +72,7 @@ void IoShard::run() {
     turn(ready, static_cast<std::uint64_t>(steady_now_ns() / kNsPerMs));
   }
   state_.shared.quiescence.leave(state_.self.value());
+  state_.egress.owner.let_go();  // who joins this thread clears up
 }
 
 int IoShard::sleep_ms() {
@@ -104,6 +105,7 @@ bool IoShard::room_came() {
 }
 
 void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
+  state_.egress.owner.check_here();
   state_.now_ms = state_.egress.now_ms = now_ms;
   state_.egress.now_wall_ns = wall_now_ns();
   state_.shared.quiescence.enter(state_.self.value());

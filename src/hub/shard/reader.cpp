@@ -36,6 +36,7 @@ void send_confirm(ShardState& state, Connection& connection) {
 }
 
 void Reader::read(Connection& connection) {
+  state_.egress.owner.check_here();
   std::uint64_t most = state_.limits.turn_bytes;
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
     if (connection.posted_shards != kAllShards) return wait_for_room(connection);

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "base/ids.hpp"
+#include "base/owner_thread.hpp"
 #include "hub/data/budget.hpp"
 #include "hub/data/buffer_pool.hpp"
 #include "hub/data/egress/drop_book.hpp"
@@ -37,6 +38,7 @@ struct EgressContext {
   std::uint64_t now_ms = 0;      ///< monotonic
   std::int64_t now_wall_ns = 0;  ///< since 1970, for AGE and TRACE
   HubId hub{};                   ///< for TRACE
+  OwnerThread owner{};           ///< the shard's: asked wherever the data plane is entered
 };
 
 }  // namespace gimnet::hub

@@ -39,6 +39,7 @@ void GatherWriter::Batch::add(Source source, const std::byte* begin, std::uint32
 }
 
 Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport, EgressContext& context) {
+  context.owner.check_here();
   Job job{outbox, resume, context};
   for (int round = 0; round < kBatchesPerTurn; ++round) {
     Batch batch;

@@ -89,6 +89,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
 }
 
 void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context) {
+  context.owner.check_here();
   const std::size_t lane = header.lane & proto::kLaneMask;
   context.tally.queued += run.frames;
   if (!handover.fan_out && append(run.bytes, run.size, run.frames)) {
@@ -125,6 +126,7 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
 }
 
 bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context) {
+  context.owner.check_here();
   if (control_bytes_ + frame.size() > context.limits.control_bytes) return false;
   Run run{BufferRef{}, frame.data(), static_cast<std::uint32_t>(frame.size()), 1};
   Run copied = copy(run, context);

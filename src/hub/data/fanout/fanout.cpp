@@ -15,6 +15,7 @@ Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable&
 }
 
 void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
+  context_.owner.check_here();
   if (!recipient.connected && !recipient.waits_when_away) {
     recipient.outbox.tell_lost(run);
     context_.drops.drop(run.bytes, run.size, run.frames, proto::DropReason::away);
@@ -45,6 +46,7 @@ void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader
 }
 
 void Fanout::hand_over(ShardIndex to, const Run& run) {
+  context_.owner.check_here();
   Stretch& stretch = stretches_[to.value()];
   if (stretch.open.frames != 0) {
     if (stretch.open.extend(run) || gather(stretch, run)) return;
@@ -146,6 +148,7 @@ void Fanout::put(ShardIndex to, const Run& run) {
 }
 
 Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size) {
+  context_.owner.check_here();
   const auto size = static_cast<std::uint32_t>(header.frame_size());
   if (lists_ && lists_->references == 1) lists_used_ = 0;
   if (!lists_ || lists_->capacity - lists_used_ < size) {

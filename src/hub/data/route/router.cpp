@@ -32,6 +32,7 @@ NodePlace Router::place_of(NodeId node) const {
 }
 
 void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+  fanout_.context().owner.check_here();
   switch (header.kind) {
     case proto::Kind::group:
       return to_group(run, header, handed_over);
@@ -47,6 +48,7 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool han
 }
 
 void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
+  fanout_.context().owner.check_here();
   const std::byte* next = frames.bytes;
   const std::byte* const end = frames.bytes + frames.size;
   begin_bytes();
