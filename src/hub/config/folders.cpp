@@ -17,7 +17,9 @@ std::string system_text(int error) { return std::generic_category().message(erro
 /// "" when there is a folder at `path` then; `info` describes it.
 std::string make_folder(const std::string& path, struct stat& info) {
   if (::mkdir(path.c_str(), kPrivate) != 0 && errno != EEXIST) {
-    return "cannot create the folder " + path + ": " + system_text(errno);
+    const std::string parent = path.substr(0, path.rfind('/'));
+    const std::string remedy = errno == ENOENT ? "; make " + parent + " first, or name another place" : "";
+    return "cannot create the folder " + path + ": " + system_text(errno) + remedy;
   }
   if (::lstat(path.c_str(), &info) != 0) return "cannot use the folder " + path + ": " + system_text(errno);
   return {};

@@ -208,7 +208,10 @@ void apply_limit(Configuration& configuration, const Given& given, std::string_v
     return;
   }
   std::string error = set_limit(configuration.options.limits, *limit, given.value.text);
-  if (!error.empty()) faults.push_back(fault(given, std::move(error)));
+  if (error.empty()) return;
+  // Of a file the place says where that stands; of the environment only the variable's name can.
+  if (given.origin.starts_with("environment ")) error = given.label + ": " + error;
+  faults.push_back(fault(given, std::move(error)));
 }
 
 void keep_origin(Configuration& configuration, const Given& given) {
@@ -244,8 +247,8 @@ void apply(Configuration& configuration, const Given& given, Faults& faults) {
     }
     return;
   } else {
-    faults.push_back({given.place, "there is no key '" + escaped(given.key, kQuotedMax) + "'" + nearest_key(given.key) +
-                                       "; tcphub --print-config shows all"});
+    faults.push_back(
+        {given.place, "there is no key '" + escaped(given.key, kQuotedMax) + "'" + nearest_key(given.key)});
   }
   if (faults.size() == before) keep_origin(configuration, given);
 }

@@ -119,7 +119,11 @@ void read_one(const std::string& path, ReadConfiguration& read) {
   Faults faults = std::move(toml.faults);
   for (const Given& given : toml.keys) apply(read.configuration, given, faults);
   std::ranges::sort(faults, {}, [](const Fault& fault) { return std::pair{position_in(fault.place), fault.sentence}; });
-  if (faults.size() > kConfigFaultsMax) faults.resize(kConfigFaultsMax);
+  if (faults.size() >= kConfigFaultsMax) {
+    faults.resize(kConfigFaultsMax);
+    faults.push_back({path, "no more than " + std::to_string(kConfigFaultsMax) +
+                                " faults of a file are told; mend these, then look again"});
+  }
   read.faults.insert(read.faults.end(), faults.begin(), faults.end());
 }
 

@@ -11,7 +11,7 @@ namespace gimnet::hub {
 
 /// Most bytes of one configuration file.
 inline constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20;
-/// Most faults that are told of one file.
+/// Most faults that are told of one file; one more says that there are others.
 inline constexpr std::size_t kConfigFaultsMax = 100;
 
 /// What a configuration file says, and what is no TOML in it.

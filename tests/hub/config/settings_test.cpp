@@ -101,7 +101,8 @@ TEST(Settings, TheWrongUnitIsToldWithTheRightNumber) {
 }
 
 TEST(Settings, AnUnknownKeyIsToldWithTheNearestOne) {
-  EXPECT_THAT(fault("shrads = 1"), HasSubstr("f:1:1: there is no key 'shrads'; did you mean shards?"));
+  EXPECT_EQ(fault("shrads = 1"),
+            "f:1:1: there is no key 'shrads'; did you mean shards? (tcphub --print-config shows all)");
   EXPECT_THAT(fault("[limits]\nnods = 1"), HasSubstr("f:2:1: there is no limit 'nods'; did you mean nodes?"));
   EXPECT_THAT(fault("nodes = 1"), HasSubstr("write it below [limits]"));
   EXPECT_THAT(fault("[limts]\nnodes = 1"), HasSubstr("did you mean limits?"));

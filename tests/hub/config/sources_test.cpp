@@ -92,6 +92,25 @@ TEST_F(SourcesTest, AWrongVariableIsNamed) {
   EXPECT_EQ(all.faults[0].line(), "tcphub: TCPHUB_SHARDS cannot be '0': give a whole number from 1 to 16");
 }
 
+TEST_F(SourcesTest, AWrongLimitOfTheEnvironmentNamesItsVariable) {
+  write("hub.toml", "");
+  environment({"TCPHUB_LIMITS_NODES=x"});
+  const ReadConfiguration all = read();
+  ASSERT_THAT(all.faults, SizeIs(1));
+  EXPECT_THAT(all.faults[0].line(), HasSubstr("tcphub: TCPHUB_LIMITS_NODES: limit nodes cannot be 'x': "));
+}
+
+TEST_F(SourcesTest, WhereFaultsAreLeftOutThatIsSaid) {
+  std::string text;
+  for (std::size_t i = 0; i + 1 < kConfigFaultsMax; ++i) text += "unknown_" + std::to_string(i) + " = 1\n";
+  write("hub.toml", text);
+  EXPECT_THAT(read().faults, SizeIs(kConfigFaultsMax - 1));
+  write("hub.toml", text + "one = 1\nanother = 2\n");
+  const ReadConfiguration all = read();
+  ASSERT_THAT(all.faults, SizeIs(kConfigFaultsMax + 1));
+  EXPECT_THAT(all.faults.back().line(), HasSubstr("no more than 100 faults of a file are told"));
+}
+
 TEST_F(SourcesTest, TheVariableNamesTheFileUnlessAFlagDoes) {
   sources_.file.clear();
   environment({"TCPHUB_CONFIG=/some/file"});
