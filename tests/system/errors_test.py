@@ -73,9 +73,9 @@ WRONG_HUBS = [
     (USAGE, ["an IPv6 address stands between [ and ]"], "tcp://[::1:7450"),
     (USAGE, ["'unix:': the path is missing"], "unix:"),
     (USAGE, ["the path is too long for a Unix socket"], "unix:/" + "x" * 108),
-    (NO_CONNECTION, ["cannot find the host of tcp://no.such.host.invalid:7450: ", ". Start one there with `tcphub`, or name another"],
+    (NO_CONNECTION, ["cannot find the host of tcp://no.such.host.invalid:7450: ", ". Look at its name, or name another with --hub"],
      "tcp://no.such.host.invalid:7450"),
-    (NO_CONNECTION, ["cannot connect to tcp://127.0.0.1:{port}: Connection refused", "Start one there with `tcphub`",
+    (NO_CONNECTION, ["cannot connect to tcp://127.0.0.1:{port}: Connection refused", "there? Start one there with `tcphub`",
                      "--hub"], "tcp://127.0.0.1:{port}"),
     (NO_CONNECTION, ["cannot connect to unix:{folder}/none: No such file", "tcphub"], "unix:{folder}/none"),
     (NO_CONNECTION, ["cannot connect to unix:{folder}/text: Connection refused"], "unix:{folder}/text"),
@@ -370,6 +370,19 @@ class TheHubGoes(unittest.TestCase):
         for tool in tools:
             wait_until(lambda tool=tool: tool.err, "the words that it waits")
         self.kill()
+        self.all_go_on(tools)
+
+    def test_those_that_publish_or_watch_say_so_too(self):
+        lines = start_gimnet(self, self.hub, "pub", "P/s", "--rate", "20", stdin=subprocess.PIPE).feed(b"x\n" * 5000)
+        stays = start_gimnet(self, self.hub, "pub", "Q/s", "--stay")
+        watch = start_gimnet(self, self.hub, "watch", "**", "--json")
+        for name in ("P", "Q"):
+            wait_until(lambda name=name: f'"name":"{name}"'.encode() in watch.out, f"the node {name}")
+        wait_until(lambda: "the service stays until Ctrl-C" in stays.err, "the end of its input")
+        self.kill()
+        self.all_go_on([lines, stays, watch])
+
+    def all_go_on(self, tools):
         for tool in tools:
             wait_until(lambda tool=tool: "the connection broke (" in tool.err, "the words that it broke")
             self.assertIn("trying to connect again", tool.err)

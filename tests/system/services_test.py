@@ -32,6 +32,17 @@ class Services(unittest.TestCase):
                 self.assertEqual(echo.out, data)
                 hub.quiet_status(self)
 
+    def test_the_last_line_stays_for_who_comes_late(self):
+        hub = Hub(self)
+        pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay", "--json",
+                           stdin=subprocess.PIPE).feed(b"old\nnew\n")
+        wait_until(lambda: "stays until Ctrl-C" in pub.err, "the end of its input")
+        self.assertEqual(json.loads(pub.out), {"published": 2, "subscribers": 0})
+        echo = run_gimnet(hub, "echo", "robot/map", "-n", "1", "--raw")
+        self.assertEqual((echo.code, echo.out), (0, b"new\n"), echo.err)
+        pub.signal(2)
+        self.assertEqual(pub.wait(), 130, pub.err)
+
     def test_json_of_a_message(self):
         hub = Hub(self)
         echo = start_gimnet(self, hub, "echo", "a/b/c", "-n", "2", "--json")

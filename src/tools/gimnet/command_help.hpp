@@ -53,7 +53,8 @@ Examples:
   gimnet pub robot/odom --rate 40 --wait 1 < lines
   gimnet pub robot/pose --delivery latest < lines
   gimnet pub robot/camera --delivery sync:2 < lines
-  gimnet pub robot/map --retain < lines     who comes late gets the last line
+  gimnet pub robot/map --retain --stay < lines
+                                            who comes later, while it stays, gets the last line
 )";
 
 inline constexpr const char* kEchoAbout = R"(Print the messages of services. A service need not exist yet.

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <string>
 #include <string_view>
@@ -18,6 +19,22 @@ void add_key(CLI::App& command, Options& options) {
   command.add_option("--instance", options.key.instance, "instance of the type, a whole number, default 0");
 }
 
+// The most that any hub can be told to take (docs/operations.md); what this one takes it says itself.
+constexpr std::uint32_t kSyncWindowMax = 1'000'000;
+constexpr std::uint32_t kDepthMax = 4'096;
+
+/// A number from `least` to `most`; unlike CLI::Range it takes no "nan".
+CLI::Validator within(double least, double most) {
+  const CLI::Validator range = CLI::Range(least, most);
+  return CLI::Validator(
+      [range](std::string& word) {
+        double number = 0.0;
+        const bool read = CLI::detail::lexical_cast(word, number);
+        return read && std::isnan(number) ? "Value " + word + " is no number" : range(word);
+      },
+      "");
+}
+
 void add_lane(CLI::App& command, Options& options) {
   static const std::map<std::string, Lane> kLanes{
       {"real_time", Lane::real_time}, {"normal", Lane::normal}, {"bulk", Lane::bulk}, {"background", Lane::background}};
@@ -29,7 +46,7 @@ void add_bounds(CLI::App& command, Options& options) {
   command.add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62));
   command.add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(within(0.001, 1e9));
 }
 
 void add_printing(CLI::App& command, Options& options) {
@@ -66,8 +83,12 @@ void read_delivery(const std::string& word, Options& options) {
   const char* end = word.data() + word.size();
   const char* begin = word.data() + std::min(kSync.size(), word.size());
   const auto [read, error] = std::from_chars(begin, end, options.window);
-  if (word.starts_with(kSync) && error == std::errc{} && read == end && options.window != 0) return;
-  throw CLI::ValidationError("--delivery", "'" + word + "' is none of stream, latest, sync and sync:N");
+  if (word.starts_with(kSync) && error == std::errc{} && read == end && options.window != 0 &&
+      options.window <= kSyncWindowMax)
+    return;
+  throw CLI::ValidationError(
+      "--delivery",
+      "'" + word + "' is none of stream, latest, sync and sync:N, with N from 1 to " + std::to_string(kSyncWindowMax));
 }
 
 void add_pub(CLI::App& app, Options& options) {
@@ -77,10 +98,12 @@ void add_pub(CLI::App& app, Options& options) {
       ->check(not_empty());
   pub.add_option_function<std::string>(
       "--delivery", [&options](const std::string& word) { read_delivery(word, options); },
-      "stream: all messages; latest: only the newest waits; sync:N: at most N that a subscriber has not taken");
+      "stream: all messages; latest: only the newest waits; sync:N: at most N, 1 to 1000000, that a subscriber has not "
+      "taken");
   pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
+  pub.add_flag("--stay", options.stay, "go on after the input has ended, until Ctrl-C: the service stays");
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
-      ->check(CLI::Range(0.001, 1e6));
+      ->check(within(0.001, 1e6));
   pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, 0 to 1000000, default 0")
       ->check(CLI::Range(std::size_t{0}, std::size_t{1'000'000}));
   add_lane(pub, options);
@@ -92,10 +115,12 @@ void add_echo(CLI::App& app, Options& options) {
   echo.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
       ->required()
       ->check(not_empty());
-  echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1");
-  echo.add_option("--depth", options.pace.depth, "newest messages that the hub holds meanwhile, 1 to 64, default 1");
+  echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1")
+      ->check(CLI::Range(std::uint32_t{1}, kSyncWindowMax));
+  echo.add_option("--depth", options.pace.depth, "newest messages that the hub holds meanwhile, 1 to 64, default 1")
+      ->check(CLI::Range(std::uint32_t{1}, kDepthMax));
   echo.add_option("--rate", options.pace.rate_hz, "messages a second at most, 0.001 to 1000, default all")
-      ->check(CLI::Range(0.001, 1e3));
+      ->check(within(0.001, 1e3));
   add_printing(echo, options);
 }
 
@@ -105,7 +130,7 @@ void add_meter(CLI::App& app, const char* name, const char* about, Options& opti
       ->required()
       ->check(not_empty());
   meter.add_option("--window", options.window_s, "seconds that a line speaks of, 0.001 to 3600, default 5")
-      ->check(CLI::Range(0.001, 3600.0));
+      ->check(within(0.001, 3600.0));
   add_bounds(meter, options);
 }
 
@@ -115,9 +140,9 @@ void add_ping(CLI::App& app, Options& options) {
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
       ->check(CLI::Range(1, 1'000'000'000));
   ping.add_option("-i,--interval", options.interval_s, "seconds between two, 0 to 3600, default 0.1")
-      ->check(CLI::Range(0.0, 3600.0));
+      ->check(within(0.0, 3600.0));
   ping.add_option("-W,--timeout", options.timeout_s, "seconds after which one is lost, 0.001 to 3600, default 1")
-      ->check(CLI::Range(0.001, 3600.0));
+      ->check(within(0.001, 3600.0));
   add_lane(ping, options);
 }
 

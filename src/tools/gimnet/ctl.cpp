@@ -123,6 +123,13 @@ ExitCode log(Session& session) {
     const ExitCode code = session.fail(before.failure());
     return before.failure().status == Status::bad_argument ? ExitCode::usage : code;
   }
+  if (session.options().json) {
+    JsonWriter json;
+    session.output().write(
+        json.begin_object().member("done", true).member("level", level).member("before", *before).end_object().str() +
+        "\n");
+    return session.finish();
+  }
   return done(session, {}, "log level " + level + ", before " + *before);
 }
 

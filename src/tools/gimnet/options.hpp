@@ -41,6 +41,7 @@ struct Options {
   Delivery delivery = Delivery::stream;
   std::uint32_t window = 1;  ///< of delivery sync
   bool retain = false;
+  bool stay = false;
   PaceOptions pace;  ///< of what is subscribed
   Lane lane = Lane::normal;
   MessageKey key;

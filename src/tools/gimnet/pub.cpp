@@ -6,6 +6,7 @@
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/connection_watch.hpp"
+#include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/line_input.hpp"
 #include "tools/gimnet/progress.hpp"
 
@@ -14,6 +15,10 @@ namespace {
 
 /// How long the last lines may take to leave.
 constexpr Timeout kDrain{10'000};
+/// How often somebody who waits for nothing but a signal looks at the connection.
+constexpr std::int64_t kLookNs = 200'000'000;
+/// Lines that come without a pause; after so many the connection is looked at.
+constexpr std::uint64_t kLinesPerLook = 1'000;
 
 Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   const double rate = session.options().rate_hz;
@@ -28,6 +33,10 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
+        // Lines may come while there is no hub: that is said, and they go on when it is back.
+        if ((!input.has_line() || publisher.published() % kLinesPerLook == 0) && !watch.goes_on()) {
+          return Session::gone();
+        }
         if (period_ns != 0 && !session.stop().wait_until(next_ns)) return {};
         next_ns += period_ns;
         if (auto sent = publisher.publish(line, period_ns == 0 && input.has_line() ? More::yes : More::no); !sent) {
@@ -43,6 +52,24 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
         return {};
     }
   }
+}
+
+/// The service stands, and with it what is retained, until a signal comes or the hub wants this node no more.
+Outcome<void> stay(Session& session) {
+  session.output().flush();
+  say("the input has ended; the service stays until Ctrl-C");
+  ConnectionWatch watch(session.node());
+  while (session.stop().wait_until(steady_now_ns() + kLookNs)) {
+    if (!watch.goes_on()) return Session::gone();
+  }
+  return {};
+}
+
+void write_counts(Session& session, const Publisher& publisher) {
+  if (!session.options().json) return;
+  JsonWriter json;
+  json.begin_object().member("published", publisher.published()).member("subscribers", publisher.subscribers());
+  session.output().write(json.end_object().str() + "\n");
 }
 
 }  // namespace
@@ -70,6 +97,8 @@ ExitCode run_pub(Session& session) {
   }
   auto sent = publish_lines(session, *publisher);
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
+  write_counts(session, *publisher);
+  if (sent && options.stay && !session.stopped()) sent = stay(session);
   if (!sent) return session.fail(sent.failure());
   return session.finish();
 }

@@ -1,6 +1,7 @@
 #include "tools/gimnet/session.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +12,8 @@
 
 namespace gimnet::tool {
 
-void say(const std::string& sentence) { std::fprintf(stderr, "gimnet: %s\n", sentence.c_str()); }
+// What a hub or another node says may have anything in it.
+void say(const std::string& sentence) { std::fprintf(stderr, "gimnet: %s\n", printable(sentence).c_str()); }
 
 std::optional<ExitCode> Session::join(NodeOptions how) {
   how.hub = options_.hub;
@@ -21,8 +23,9 @@ std::optional<ExitCode> Session::join(NodeOptions how) {
   if (!joined) {
     Failure failure = joined.failure();
     if (failure.status == Status::no_hub) {
-      if (!failure.sentence.ends_with('.')) failure.sentence += '.';
-      failure.sentence += advice();
+      if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?')) failure.sentence += '.';
+      failure.sentence += advice(
+          failure.sentence.starts_with("cannot find the host") ? "look at its name" : "start one there with `tcphub`");
     }
     const ExitCode code = fail(failure);
     // Whoever answers there lets nobody in, or is no hub.
@@ -51,13 +54,15 @@ bool Session::is_listed(std::string_view name) {
   return nodes && std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
 }
 
-/// What to do where no hub answers.
-std::string Session::advice() const {
+/// What to do where no hub answers: `remedy`, or name another.
+std::string Session::advice(std::string remedy) const {
   const char* named = std::getenv("GIMNET_HUB");
-  if (!options_.hub.empty()) return " Start one there with `tcphub`, or name another with --hub";
-  if (named != nullptr && *named != '\0')
-    return " That address is GIMNET_HUB's: start one there with `tcphub`, or change it";
-  return " Start one with `tcphub`, or name yours with --hub";
+  if (options_.hub.empty() && named != nullptr && *named != '\0') {
+    return " That address is GIMNET_HUB's: " + remedy + ", or change it";
+  }
+  if (options_.hub.empty()) return " Start one with `tcphub`, or name yours with --hub";
+  remedy[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(remedy[0])));
+  return " " + remedy + ", or name another with --hub";
 }
 
 std::string Session::nearest_name(const std::string& kind, std::string_view word) {

@@ -56,7 +56,7 @@ class Session {
   [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
 
  private:
-  [[nodiscard]] std::string advice() const;
+  [[nodiscard]] std::string advice(std::string remedy) const;
   [[nodiscard]] bool is_listed(std::string_view name);
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
 

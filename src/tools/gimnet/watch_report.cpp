@@ -49,6 +49,21 @@ std::string service_words(const ServiceRecord& service) {
   return printable(words);
 }
 
+// Of what is gone the hub tells only who it was (docs/protocol.md, section 6): nothing else is said here.
+void write_node(JsonWriter& json, const WatchEvent& event) {
+  const NodeRecord& node = *event.node;
+  if (event.change != Change::left) return write(json, node);
+  json.begin_object().member("id", node.node.text()).member("name", node.name).member("hub_id", node.hub_id);
+  json.end_object();
+}
+
+void write_service(JsonWriter& json, const WatchEvent& event) {
+  const ServiceRecord& service = *event.service;
+  if (event.change != Change::withdrawn) return write(json, service);
+  json.begin_object().member("name", service.name).member("node", service.node.text());
+  json.member("group", service.group_id).end_object();
+}
+
 }  // namespace
 
 bool is_tool(const NodeRecord& node) { return node.name.empty() && node.description == kToolDescription; }
@@ -71,11 +86,11 @@ std::string json_line(const WatchEvent& event, std::int64_t now_ns) {
   std::ranges::replace(change, ' ', '_');
   JsonWriter json;
   json.begin_object().member("time_ns", now_ns).member("change", change);
-  json.member("hub_id", event.hub_id).member("version", event.version);
+  json.member("hub_id", event.hub_id).member("epoch", event.epoch).member("version", event.version);
   if (!event.former_name.empty()) json.member("former_name", event.former_name);
   if (!event.why.empty()) json.member("why", event.why);
-  if (event.node) write(json.key("node"), *event.node);
-  if (event.service) write(json.key("service"), *event.service);
+  if (event.node) write_node(json.key("node"), event);
+  if (event.service) write_service(json.key("service"), event);
   return json.end_object().str() + "\n";
 }
 

@@ -165,6 +165,26 @@ TEST(CommandLine, RefusesValuesOutOfRange) {
   }
 }
 
+TEST(CommandLine, ANumberIsNoNumberIfItSaysSo) {
+  for (const char* nan : {"nan", "NaN", "-nan"}) {
+    EXPECT_NE(refusal({"echo", "a/b", "--seconds", nan}).find("is no value for --seconds"), std::string::npos) << nan;
+    EXPECT_NE(refusal({"echo", "a/b", "--rate", nan}).find("is no value for --rate"), std::string::npos) << nan;
+    EXPECT_NE(refusal({"ping", "B", "-i", nan}).find("is no value for -i"), std::string::npos) << nan;
+    EXPECT_NE(refusal({"hz", "a/b", "--window", nan}).find("is no value for --window"), std::string::npos) << nan;
+  }
+}
+
+TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
+  EXPECT_EQ(options({"echo", "a/b", "--window", "1000000", "--depth", "4096"}).pace.depth, 4096u);
+  EXPECT_NE(refusal({"echo", "a/b", "--window", "0"}).find("is no value for --window"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--window", "1000001"}).find("is no value for --window"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--depth", "0"}).find("is no value for --depth"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--depth", "4097"}).find("is no value for --depth"), std::string::npos);
+  EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync:1000000"}).window, 1'000'000u);
+  EXPECT_NE(refusal({"pub", "a/b", "--delivery", "sync:1000001"}).find("1 to 1000000"), std::string::npos);
+  EXPECT_TRUE(options({"pub", "a/b", "--retain", "--stay"}).stay);
+}
+
 TEST(CommandLine, HelpEndsWell) {
   const auto parsed = parse({"send", "--help"});
   const auto* ending = std::get_if<CommandLineEnding>(&parsed);

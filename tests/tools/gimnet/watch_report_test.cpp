@@ -16,6 +16,7 @@ WatchEvent node_event(Change change, std::uint32_t index, const std::string& nam
   WatchEvent event;
   event.change = change;
   event.hub_id = 7;
+  event.epoch = 3;
   event.version = 9;
   NodeRecord node;
   node.node = Peer{(7u << 20) | index};
@@ -48,11 +49,27 @@ TEST(WatchReport, ALineForPeople) {
 
 TEST(WatchReport, AnObjectForPrograms) {
   EXPECT_EQ(json_line(node_event(Change::left, 17, "robot", ""), 5),
-            R"({"time_ns":5,"change":"left","hub_id":7,"version":9,"node":{"id":"7.17","name":"robot","hub":"lab",)"
-            R"("hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+            R"({"time_ns":5,"change":"left","hub_id":7,"epoch":3,"version":9,)"
+            R"("node":{"id":"7.17","name":"robot","hub_id":7}})"
             "\n");
-  EXPECT_EQ(json_line(WatchEvent{}, 5), R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"version":0})"
+  EXPECT_EQ(json_line(node_event(Change::joined, 17, "robot", ""), 5),
+            R"({"time_ns":5,"change":"joined","hub_id":7,"epoch":3,"version":9,"node":{"id":"7.17","name":"robot",)"
+            R"("hub":"lab","hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+            "\n");
+  EXPECT_EQ(json_line(WatchEvent{}, 5), R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"epoch":0,"version":0})"
                                         "\n");
+}
+
+TEST(WatchReport, OfAWithdrawnServiceOnlyWhoItWas) {
+  WatchEvent event;
+  event.change = Change::withdrawn;
+  event.service.emplace();
+  event.service->name = "robot/odom";
+  event.service->node = Peer{(7u << 20) | 17};
+  event.service->group_id = 12;
+  EXPECT_EQ(json_line(event, 5), R"({"time_ns":5,"change":"withdrawn","hub_id":0,"epoch":0,"version":0,)"
+                                 R"("service":{"name":"robot/odom","node":"7.17","group":12}})"
+                                 "\n");
 }
 
 TEST(WatchReport, KnowsWhatWasThereBefore) {
