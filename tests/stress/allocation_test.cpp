@@ -91,10 +91,13 @@ class Traffic {
 
  private:
   static std::vector<std::string> arguments() {
-    return {"--shards", "3", "--placement", "hint",
-            // On a slow machine a round has pauses: what the hub takes for idle gives memory back, and needs it anew.
-            "--limit", "keep_alive_ms=300000", "--limit", "silent_ms=600000", "--limit", "slow_consumer_ms=600000",
-            "--limit", "block_ms=600000"};
+    // On a slow machine a round has pauses: what the hub takes for idle gives memory back, and needs it anew.
+    return {"--shards",    "3",
+            "--placement", "hint",
+            "--limit",     "keep_alive_ms=3000000",
+            "--limit",     "silent_ms=3600000",
+            "--limit",     "slow_consumer_ms=3600000",
+            "--limit",     "block_ms=3600000"};
   }
   static JoinOptions at_shard(std::size_t shard, const char* name = "") {
     JoinOptions options;

@@ -2,6 +2,8 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -52,11 +54,11 @@ bool RawNode::read_some(std::size_t bytes_max) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(taken_));
     taken_ = 0;
   }
-  const std::size_t before = buffer_.size();
-  buffer_.resize(before + bytes_max);
-  const ssize_t size = ::recv(socket_.get(), buffer_.data() + before, bytes_max, 0);
+  // Shared, and never cleared: mostly nothing or little comes, and a node keeps no more than that.
+  static thread_local std::array<std::byte, kReadBytesMax> arrived;
+  const ssize_t size = ::recv(socket_.get(), arrived.data(), std::min(bytes_max, arrived.size()), 0);
   const std::size_t came = size > 0 ? static_cast<std::size_t>(size) : 0;
-  buffer_.resize(before + came);
+  buffer_.insert(buffer_.end(), arrived.data(), arrived.data() + came);
   bytes_read_ += came;
   if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) is_closed_ = true;
   return came > 0;

@@ -19,6 +19,9 @@
 
 namespace gimnet::stress {
 
+/// What one call reads at most.
+inline constexpr std::size_t kReadBytesMax = 256 * 1024;
+
 /// One frame as the hub sent it. Valid until: the next read_some().
 struct Frame {
   proto::FrameHeader header;
@@ -54,7 +57,7 @@ class RawNode {
   [[nodiscard]] const std::optional<proto::Goodbye>& goodbye() const { return goodbye_; }
 
   /// One recv(). True: something came.
-  bool read_some(std::size_t bytes_max = 256 * 1024);
+  bool read_some(std::size_t bytes_max = kReadBytesMax);
   /// The next whole frame that was read. PINGs are answered, PAUSE and RESUME noted, GOODBYE kept, and not returned.
   [[nodiscard]] std::optional<Frame> next();
   /// Reads until there is a frame, or throws when the time is over or the connection ended.
