@@ -16,7 +16,6 @@ namespace {
 using proto::Goodbye;
 using proto::GoodbyeCode;
 using std::chrono::milliseconds;
-namespace ns = proto::ns;
 
 std::string title(NodeId node, const Session& session) {
   return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
