@@ -63,7 +63,7 @@ struct Ground {
   explicit Ground(const HubOptions& options)
       : quiescence(options.shards), budget(options.limits.budget_bytes), inbox(options.shards) {
     // As many as a reload may allow: what is not used costs nothing.
-    const std::uint64_t nodes_most = find_limit("nodes")->most;
+    const std::uint64_t nodes_most = find_limit("nodes")->most + find_limit("administrators")->most;
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
       mailboxes.push_back(std::make_unique<Mailbox>(

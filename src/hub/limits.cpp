@@ -34,6 +34,8 @@ constexpr std::array kTable{
     LimitInfo{"handshakes", "connections", &Limits::handshakes, 1, 1'000'000,
               "connections without HELLO at a time; one more ends the oldest", true},
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000, "sessions, those within their grace time included", true},
+    LimitInfo{"administrators", "nodes", &Limits::administrators, 0, 1'024,
+              "places beyond nodes, and descriptors, that are kept for administrators", true},
     LimitInfo{"grace_ms", "ms", &Limits::grace_ms, 0, 24 * kHour,
               "time within which a node that lost its connection gets its id and name back"},
     LimitInfo{"token_ms", "ms", &Limits::token_ms, 1'000, 10 * kYear,

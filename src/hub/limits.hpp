@@ -24,6 +24,7 @@ struct Limits {
   std::uint64_t handshake_ms = 5'000;
   std::uint64_t handshakes = 4'096;
   std::uint64_t nodes = 100'000;
+  std::uint64_t administrators = 8;
   std::uint64_t grace_ms = 30'000;
   std::uint64_t token_ms = 31'536'000'000;
   std::uint64_t kicked_tokens = 4'096;

@@ -163,7 +163,8 @@ void Checks::counts(const std::vector<DueEvent>& told, const Model::Renumbered& 
 
 void Checks::sessions() const {
   const auto& all = conductor_->membership().sessions().all();
-  require(all.size() <= subject_.limits.nodes, Checker::limits, "the hub has more nodes than its limit");
+  require(all.size() <= subject_.limits.nodes + subject_.limits.administrators, Checker::limits,
+          "the hub has more nodes than its limit");
   auto actual = all.begin();
   for (const auto& [index, expected] : model_.sessions()) {
     if (actual != all.end() && actual->first < index) break;

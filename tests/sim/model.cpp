@@ -86,8 +86,9 @@ Model::Verdict Model::judge(const Hello& hello) const {
   if (!hello.hello.name.empty()) verdict.refusal = judge_name(hello.hello.name, verdict.session);
   if (verdict.refusal || verdict.session != 0) return verdict;
   const auto holder = names_.find(hello.hello.name);
-  const bool somebody_goes = holder != names_.end() || longest_away_nameless();
-  if (sessions_.size() >= limits_.nodes && !somebody_goes) verdict.refusal = GoodbyeCode::hub_full;
+  // With an administrator beyond the limit more would have to go than make way.
+  const std::size_t going = (holder != names_.end() ? 1u : 0u) + (longest_away_nameless() ? 1u : 0u);
+  if (sessions_.size() - going >= places_for(hello.hello.role)) verdict.refusal = GoodbyeCode::hub_full;
   return verdict;
 }
 
@@ -179,12 +180,17 @@ void Model::make_way(const Hello& hello, const Verdict& verdict, milliseconds no
     census_.add(Happening::name_taken_over);
     end(holder->second, now);
   }
-  if (verdict.session == 0) make_room(now);
+  if (verdict.session == 0) make_room(hello.hello.role, now);
 }
 
-void Model::make_room(milliseconds now) {
+std::uint64_t Model::places_for(Role role) const {
+  return limits_.nodes + (role == Role::admin ? limits_.administrators : 0);
+}
+
+void Model::make_room(Role role, milliseconds now) {
   if (sessions_.size() < limits_.nodes) return;
   const std::optional<std::uint32_t> away = longest_away_nameless();
+  if (!away && sessions_.size() < places_for(role)) return;
   require(away.has_value(), Checker::limits, "somebody is let in beyond the limit on nodes");
   census_.add(Happening::room_made);
   end(*away, now);

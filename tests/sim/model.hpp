@@ -180,7 +180,9 @@ class Model final : public Witness {
   void take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now);
   [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name, std::uint32_t claimant) const;
   void make_way(const Hello& hello, const Verdict& verdict, milliseconds now);
-  void make_room(milliseconds now);
+  /// How many sessions there may be once somebody of that role was let in.
+  [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
+  void make_room(proto::Role role, milliseconds now);
   [[nodiscard]] std::optional<std::uint32_t> longest_away_nameless() const;
   void take_new_index(std::uint32_t index, milliseconds now);
   void take_name(std::uint32_t index, const std::string& name, milliseconds now);

@@ -46,6 +46,7 @@ void draw_limits(Random& random, Plan& plan) {
   const bool crowded = random.chance(500);
   const std::uint64_t room = random.between(60, 95);
   limits.nodes = crowded ? std::max<std::uint64_t>(2, plan.nodes * room / 100) : 4 * plan.nodes;
+  limits.administrators = 1;
 }
 
 }  // namespace

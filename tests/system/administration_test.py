@@ -4,12 +4,14 @@
 import json
 import os
 import pathlib
+import resource
 import signal
 import tempfile
 import unittest
 
 from support.processes import GIMNET, TCPHUB, Hub, Process, run_gimnet, start_recv
 from support.waiting import wait_until
+from support.wire import OPENING, Client, hello
 
 
 class Case(unittest.TestCase):
@@ -26,6 +28,55 @@ class Case(unittest.TestCase):
 
     def id_of(self, hub, name):
         return next((node["id"] for node in hub.nodes() if node["name"] == name), None)
+
+
+class Full(Case):
+    """A hub that takes nobody any more: who administers it gets in all the same."""
+
+    def sees_and_kicks(self, node):
+        for words in (["status"], ["nodes"], ["services"], ["ctl", "connections"], ["ctl", "routes"]):
+            look = run_gimnet(self.admin, *words)
+            self.assertEqual(look.code, 0, (words, look.err))
+        kicked = self.ctl("kick", f"{node.id >> 20}.{node.id & 0xFFFFF}")
+        self.assertEqual(kicked.code, 0, kicked.err)
+        self.assertEqual(node.goodbye(), "kicked")
+        node.socket.close()
+
+    def test_at_the_limit_on_nodes(self):
+        hub = self.hub("--limit", "nodes=2", "--limit", "silent_ms=600000")
+        nodes = [Client(self, hub).join(name) for name in ("A", "B")]
+        refused = run_gimnet(hub, "status")
+        self.assertEqual(refused.code, 3, refused.err)
+        self.assertIn("takes 2 nodes", refused.err)
+        self.sees_and_kicks(nodes[0])
+        Client(self, hub).join("C")
+
+    def test_without_descriptors(self):
+        hub = self.hub("--limit", "silent_ms=600000", "--limit", "handshake_ms=600000", "--limit", "administrators=2")
+        silent = Client(self, hub)
+        pid = hub.process.popen.pid
+        wait_until(lambda: run_gimnet(hub, "status").code == 0, "a hub that serves")
+        hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)[1]
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (len(os.listdir(f"/proc/{pid}/fd")) + 4, hard))
+        nodes = []
+
+        def come():
+            client = Client(self, hub)
+            client.send(OPENING + hello())
+            answer = client.first_answer()
+            if answer.goodbye is None:
+                client.id = answer.dst
+                nodes.append(client)
+            return answer.goodbye
+        wait_until(lambda: come() == "no_memory", "no descriptor left")
+        self.assertEqual(silent.first_answer().goodbye, "no_memory", "who says no HELLO makes way first")
+        refused = run_gimnet(hub, "status")
+        self.assertEqual(refused.code, 3, refused.err)
+        self.assertIn("out of descriptors", refused.err)
+        self.sees_and_kicks(nodes.pop(0))
+        wait_until(lambda: come() is None, "room for another")
+        self.assertGreaterEqual(json.loads(run_gimnet(self.admin, "status", "--json").out)["counters"]
+                                ["refused.no_descriptor"], 2)
 
 
 class Ctl(Case):

@@ -1,7 +1,6 @@
 #include "hub/control/acceptor.hpp"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,8 +19,6 @@ namespace {
 constexpr int kBatch = 64;
 
 int accept_one(int listener) { return ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK); }
-
-int open_spare() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
 std::string tcp_peer(int descriptor) {
   sockaddr_storage storage{};
@@ -42,14 +39,21 @@ bool is_shortage(int error) { return error == EMFILE || error == ENFILE || error
 
 }  // namespace
 
-Acceptor::Acceptor(std::unique_ptr<Listener> listener, const Limits& limits, RefusalCounters& refusals)
-    : listener_(std::move(listener)), limits_(limits), refusals_(refusals), spare_(open_spare()) {}
+Acceptor::Acceptor(std::unique_ptr<Listener> listener, const Limits& limits, RefusalCounters& refusals,
+                   DescriptorReserve& reserve, MakeRoom make_room)
+    : listener_(std::move(listener)),
+      limits_(limits),
+      refusals_(refusals),
+      reserve_(reserve),
+      make_room_(std::move(make_room)),
+      spare_(open_spare_descriptor()) {}
 
 Acceptor::~Acceptor() {
   if (spare_ >= 0) ::close(spare_);
 }
 
 Acceptor::After Acceptor::accept_some(const std::function<void(Stranger)>& take) {
+  reserve_.fill();
   for (int i = 0; i < kBatch; ++i) {
     const int descriptor = accept_one(listener_->descriptor());
     if (descriptor >= 0) {
@@ -58,8 +62,8 @@ Acceptor::After Acceptor::accept_some(const std::function<void(Stranger)>& take)
       return After::wait;
     } else if (is_shortage(errno)) {
       // The kernel says so before it looks whether anybody waits.
-      const Shortage outcome = turn_away();
-      if (outcome != Shortage::told_one) return outcome == Shortage::nobody_waits ? After::wait : After::pause;
+      const Shortage outcome = accept_with_spare(take);
+      if (outcome != Shortage::served_one) return outcome == Shortage::nobody_waits ? After::wait : After::pause;
     }
     // Anything else is one peer's trouble (it reset before it was accepted): the next one may be well.
   }
@@ -87,24 +91,42 @@ Stranger Acceptor::stranger(int descriptor) const {
   return result;
 }
 
-Acceptor::Shortage Acceptor::turn_away() {
-  if (spare_ < 0) spare_ = open_spare();
+Acceptor::Shortage Acceptor::accept_with_spare(const std::function<void(Stranger)>& take) {
+  if (spare_ < 0) spare_ = open_spare_descriptor();
   if (spare_ < 0) return Shortage::nothing_helps;
   ::close(spare_);
   const int descriptor = accept_one(listener_->descriptor());
   const int error = errno;
-  if (descriptor >= 0) {
-    refusals_.no_descriptor.add(1);
-    Stranger unlucky = stranger(descriptor);
-    log_line(LogLevel::error, {"no_descriptor", log_peer(unlucky.peer.transport, unlucky.peer.address)},
-             "out of descriptors: turned " + unlucky.peer.transport + " " + unlucky.peer.address +
-                 " away; raise the limit (ulimit -n) or lower --limit nodes");
-    static_cast<void>(send_goodbye(*unlucky.transport, proto::GoodbyeCode::no_memory,
-                                   "the hub is out of descriptors; try again later"));
+  if (descriptor < 0) {
+    spare_ = open_spare_descriptor();
+    return error == EAGAIN || error == EWOULDBLOCK ? Shortage::nobody_waits : Shortage::nothing_helps;
   }
-  spare_ = open_spare();
-  if (descriptor >= 0) return Shortage::told_one;
-  return error == EAGAIN || error == EWOULDBLOCK ? Shortage::nobody_waits : Shortage::nothing_helps;
+  Stranger peer = stranger(descriptor);
+  if (find_room(peer)) {
+    spare_ = open_spare_descriptor();
+    take(std::move(peer));
+  } else {
+    turn_away(peer);
+    peer.transport.reset();
+    spare_ = open_spare_descriptor();
+  }
+  return Shortage::served_one;
+}
+
+bool Acceptor::find_room(Stranger& peer) {
+  Room room = make_room_(peer);
+  if (room == Room::none && peer.may_administer && reserve_.give_up_one()) room = Room::reserved;
+  peer.on_reserve = room == Room::reserved;
+  return room != Room::none;
+}
+
+void Acceptor::turn_away(const Stranger& peer) {
+  refusals_.no_descriptor.add(1);
+  log_line(LogLevel::error, {"no_descriptor", log_peer(peer.peer.transport, peer.peer.address)},
+           "out of descriptors: turned " + peer.peer.transport + " " + peer.peer.address +
+               " away; raise the limit (ulimit -n) or lower --limit nodes");
+  static_cast<void>(
+      send_goodbye(*peer.transport, proto::GoodbyeCode::no_memory, "the hub is out of descriptors; try again later"));
 }
 
 }  // namespace gimnet::hub

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "hub/control/descriptor_reserve.hpp"
 #include "hub/control/listener.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
@@ -18,15 +19,26 @@ struct Stranger {
   PeerInfo peer;
   std::string identity;  ///< who it is, as far as the system tells: "uid 1000" over a Unix socket, "open" over TCP
   bool may_administer = false;  ///< root or the hub's own user, over a Unix socket
+  bool on_reserve = false;      ///< has a descriptor that is kept for administrators: nobody else may stay
 };
 
-/// Takes connections from a listener. Out of descriptors it gives up a spare one to accept, tell `no_memory` and close,
-/// so that peers learn at once what is wrong, and asks for a pause.
+/// Takes connections from a listener. Out of descriptors it has a spare one to accept with. The peer stays if others
+/// make room, or if it may administer the hub and there is a descriptor in reserve for it; else it is told `no_memory`
+/// and closed, so that it learns at once what is wrong.
 /// Thread safety: none. Ownership: of the listener and one spare descriptor.
 class Acceptor {
  public:
-  /// REQUIRES: limits and refusals outlive it.
-  Acceptor(std::unique_ptr<Listener> listener, const Limits& limits, RefusalCounters& refusals);
+  enum class Room : std::uint8_t {
+    none,
+    ordinary,  ///< a descriptor is free
+    reserved,  ///< the same, and it is one of those that are kept for administrators
+  };
+  /// Ends somebody who has a descriptor and no right to it before this peer, if there is anybody.
+  using MakeRoom = std::function<Room(const Stranger&)>;
+
+  /// REQUIRES: limits, refusals and reserve outlive it.
+  Acceptor(std::unique_ptr<Listener> listener, const Limits& limits, RefusalCounters& refusals,
+           DescriptorReserve& reserve, MakeRoom make_room);
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
@@ -40,13 +52,18 @@ class Acceptor {
 
  private:
   [[nodiscard]] Stranger stranger(int descriptor) const;
-  enum class Shortage : std::uint8_t { told_one, nobody_waits, nothing_helps };
-  /// Descriptors are short: tells one peer with the spare one's help.
-  Shortage turn_away();
+  enum class Shortage : std::uint8_t { served_one, nobody_waits, nothing_helps };
+  /// Descriptors are short: takes one peer, or turns it away, with the spare one's help.
+  Shortage accept_with_spare(const std::function<void(Stranger)>& take);
+  /// Finds a descriptor for a peer that has the spare one. False: there is none for it.
+  [[nodiscard]] bool find_room(Stranger& peer);
+  void turn_away(const Stranger& peer);
 
   const std::unique_ptr<Listener> listener_;
   const Limits& limits_;
   RefusalCounters& refusals_;
+  DescriptorReserve& reserve_;
+  const MakeRoom make_room_;
   int spare_;
 };
 

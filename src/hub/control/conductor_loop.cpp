@@ -51,8 +51,9 @@ class Watch {
 struct ConductorLoop::Impl {
   /// A listener, and what wakes it.
   struct Door {
-    Door(asio::io_context& context, std::unique_ptr<Listener> listener, const Wiring& wiring)
-        : acceptor(std::move(listener), wiring.limits, wiring.refusals),
+    Door(asio::io_context& context, std::unique_ptr<Listener> listener, const Wiring& wiring,
+         DescriptorReserve& reserve, Acceptor::MakeRoom make_room)
+        : acceptor(std::move(listener), wiring.limits, wiring.refusals, reserve, std::move(make_room)),
           watch(context, acceptor.listener().descriptor()),
           pause(context) {}
     Acceptor acceptor;
@@ -62,6 +63,7 @@ struct ConductorLoop::Impl {
 
   Impl(const Wiring& parts, std::vector<std::unique_ptr<Listener>> listeners)
       : wiring(parts),
+        reserve(parts.limits),
         strangers(
             parts.limits, [this](Stranger& stranger, const proto::Hello& hello) { return admit(stranger, hello); },
             parts.refusals),
@@ -71,7 +73,8 @@ struct ConductorLoop::Impl {
         signals(context, SIGTERM, SIGINT),
         reloads(context, SIGHUP) {
     for (auto& listener : listeners) {
-      doors.push_back(std::make_unique<Door>(context, std::move(listener), parts));
+      doors.push_back(std::make_unique<Door>(context, std::move(listener), parts, reserve,
+                                             [this](const Stranger& newcomer) { return make_room(newcomer); }));
     }
   }
 
@@ -105,11 +108,21 @@ struct ConductorLoop::Impl {
     return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
   }
 
+  /// Who has said HELLO is not one of those who make way.
+  Acceptor::Room make_room(const Stranger& newcomer) {
+    serve_strangers();
+    return strangers.give_way_to(newcomer);
+  }
+
+  void serve_strangers() {
+    while (strangers.serve(now())) {
+    }
+    for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
+  }
+
   void watch_strangers() {
     strangers_watch.wait([this] {
-      while (strangers.serve(now())) {
-      }
-      for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
+      serve_strangers();
       serve_watches();
       arm_timer();
       end_if_all_left();
@@ -224,6 +237,7 @@ struct ConductorLoop::Impl {
 
   const Wiring wiring;
   asio::io_context context{1};
+  DescriptorReserve reserve;
   WaitingRoom strangers;
   std::vector<std::unique_ptr<Transport>> leaving;  ///< to be seen off by `strangers`
   Watch strangers_watch;

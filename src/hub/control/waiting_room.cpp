@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <system_error>
@@ -24,6 +25,12 @@ constexpr int kBatch = 64;
 /// Closing at once would reset the connection where the peer sent more than was read, and the reset could overtake
 /// GOODBYE. So the peer has limits.farewell_ms to read it and close, and may send this much that nobody looks at.
 constexpr std::size_t kDiscardedMax = 64 * 1'024;
+
+void log_refusal(const PeerInfo& who, const Goodbye& goodbye) {
+  log_line(LogLevel::info, {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
+           "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
+               proto::goodbye_name(goodbye.code) + ")");
+}
 
 }  // namespace
 
@@ -116,7 +123,7 @@ void WaitingRoom::read(Peer& peer, milliseconds now) {
 void WaitingRoom::judge(Peer& peer, milliseconds now) {
   // The shard will wait for the descriptor from here on.
   ::epoll_ctl(poll_, EPOLL_CTL_DEL, peer.stranger.transport->descriptor(), nullptr);
-  const std::optional<Goodbye> refusal = judge_(peer.stranger, peer.handshake->hello());
+  const std::optional<Goodbye> refusal = this->refusal(peer);
   if (!refusal) {
     waiting_.erase(peer.self);
     return;
@@ -128,6 +135,35 @@ void WaitingRoom::judge(Peer& peer, milliseconds now) {
   turn_away(peer, *refusal, now);
 }
 
+std::optional<Goodbye> WaitingRoom::refusal(Peer& peer) const {
+  const proto::Hello& hello = peer.handshake->hello();
+  if (peer.stranger.on_reserve && hello.role != proto::Role::admin) {
+    return Goodbye{GoodbyeCode::no_memory,
+                   "the hub is out of descriptors, and keeps its last ones for administrators; try again later"};
+  }
+  return judge_(peer.stranger, hello);
+}
+
+Acceptor::Room WaitingRoom::give_way_to(const Stranger& newcomer) {
+  const bool for_administrator = newcomer.may_administer;
+  auto gone =
+      std::ranges::find_if(leaving_, [&](const Peer& peer) { return for_administrator || !peer.stranger.on_reserve; });
+  const bool told = gone != leaving_.end();
+  if (!told) {
+    gone = std::ranges::find_if(waiting_, [](const Peer& peer) { return !peer.stranger.may_administer; });
+    if (gone == waiting_.end() && for_administrator) gone = waiting_.begin();
+    if (gone == waiting_.end()) return Acceptor::Room::none;
+    const Goodbye goodbye{GoodbyeCode::no_memory,
+                          "the hub is out of descriptors, and others wait; say HELLO at once, or try again later"};
+    refusals_.no_descriptor.add(1);
+    log_refusal(gone->stranger.peer, goodbye);
+    static_cast<void>(send_goodbye(*gone->stranger.transport, goodbye.code, goodbye.sentence));
+  }
+  const bool reserved = gone->stranger.on_reserve;
+  remove(*gone);
+  return reserved ? Acceptor::Room::reserved : Acceptor::Room::ordinary;
+}
+
 void WaitingRoom::discard(Peer& peer) {
   std::array<std::byte, 4'096> nobody_looks{};
   const IoResult result = peer.stranger.transport->receive(nobody_looks);
@@ -137,11 +173,12 @@ void WaitingRoom::discard(Peer& peer) {
 }
 
 void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
-  const PeerInfo& who = peer.stranger.peer;
-  log_line(LogLevel::info, {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
-           "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
-               proto::goodbye_name(goodbye.code) + ")");
-  refusals_.count(goodbye.code);
+  log_refusal(peer.stranger.peer, goodbye);
+  if (peer.stranger.on_reserve && goodbye.code == GoodbyeCode::no_memory) {
+    refusals_.no_descriptor.add(1);
+  } else {
+    refusals_.count(goodbye.code);
+  }
   if (!send_goodbye(*peer.stranger.transport, goodbye.code, goodbye.sentence)) return remove(peer);
   peer.handshake.reset();
   leaving_.splice(leaving_.end(), waiting_, peer.self);

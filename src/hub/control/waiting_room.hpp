@@ -33,6 +33,9 @@ class WaitingRoom {
   void enter(Stranger stranger, std::chrono::milliseconds now);
   /// A peer to which GOODBYE was written elsewhere: it gets the same moment. REQUIRES: a transport with a descriptor.
   void see_off(std::unique_ptr<Transport> transport, std::chrono::milliseconds now);
+  /// There are no descriptors: ends the one who is leaving longest, else the one who waits longest without HELLO. Who
+  /// may administer the hub makes way only for its like.
+  [[nodiscard]] Acceptor::Room give_way_to(const Stranger& newcomer);
   /// Reads what strangers said, one batch. True: there may be more.
   bool serve(std::chrono::milliseconds now);
   /// Ends those whose time is over.
@@ -64,6 +67,7 @@ class WaitingRoom {
   void discard(Peer& peer);
   void begin_leaving(Peer& peer, std::chrono::milliseconds now);
   void judge(Peer& peer, std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<proto::Goodbye> refusal(Peer& peer) const;
   void turn_away(Peer& peer, const proto::Goodbye& goodbye, std::chrono::milliseconds now);
   /// Not while a batch of events is served: one of them may be for a peer that this removes.
   void keep_leaving_few();

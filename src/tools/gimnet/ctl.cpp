@@ -143,7 +143,7 @@ ExitCode run_ctl(Session& session) {
   how.administrator = !only_reads(action);
   // It asks once: coming back by itself would have it wait for a hub that it has just ended.
   how.reconnect = false;
-  if (const auto ending = session.join(how)) {
+  if (const auto ending = only_reads(action) ? session.join_to_look(how) : session.join(how)) {
     if (*ending == ExitCode::denied) say("changing needs the hub's Unix socket: --hub unix:/PATH");
     return *ending;
   }

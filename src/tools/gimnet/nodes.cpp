@@ -27,7 +27,7 @@ std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
 }  // namespace
 
 ExitCode run_nodes(Session& session) {
-  if (const auto ending = session.join({})) return *ending;
+  if (const auto ending = session.join_to_look()) return *ending;
   const Options& options = session.options();
   auto nodes = session.node().nodes(options.target);
   if (!nodes) return session.fail(nodes.failure());

@@ -26,7 +26,7 @@ std::string table_of(const std::vector<ServiceRecord>& services, Paint paint) {
 }  // namespace
 
 ExitCode run_services(Session& session) {
-  if (const auto ending = session.join({})) return *ending;
+  if (const auto ending = session.join_to_look()) return *ending;
   const auto services = session.node().services(session.options().target);
   if (!services) return session.fail(services.failure());
   session.output().write(session.options().json ? json_of(*services) : table_of(*services, session.paint()));

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 #include <vector>
 
 #include "base/suggest.hpp"
@@ -15,11 +16,25 @@ namespace gimnet::tool {
 // What a hub or another node says may have anything in it.
 void say(const std::string& sentence) { std::fprintf(stderr, "gimnet: %s\n", printable(sentence).c_str()); }
 
-std::optional<ExitCode> Session::join(NodeOptions how) {
+NodeOptions Session::options_for(NodeOptions how) const {
   how.hub = options_.hub;
   how.shard = options_.shard;
   if (how.description.empty()) how.description = kToolDescription;
+  return how;
+}
+
+std::optional<ExitCode> Session::join(NodeOptions how) { return settle(Node::join(options_for(std::move(how)))); }
+
+std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
+  how = options_for(std::move(how));
   auto joined = Node::join(how);
+  if (joined || !joined.is(Status::refused)) return settle(std::move(joined));
+  how.administrator = true;
+  auto as_administrator = Node::join(how);
+  return settle(as_administrator ? std::move(as_administrator) : std::move(joined));
+}
+
+std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
     if (failure.status == Status::no_hub) {

@@ -35,6 +35,8 @@ class Session {
 
   /// Joins as the options say. Errors: the code to end with; the words are printed.
   [[nodiscard]] std::optional<ExitCode> join(NodeOptions how);
+  /// Joins to look at the hub: at one that takes no nodes any more, as an administrator, where this user is one.
+  [[nodiscard]] std::optional<ExitCode> join_to_look(NodeOptions how = {});
   /// REQUIRES: joined.
   [[nodiscard]] Node& node() { return *node_; }
 
@@ -56,6 +58,9 @@ class Session {
   [[nodiscard]] bool stopped() { return stop_.signal() != 0; }
 
  private:
+  /// How to join; what the options say is filled in.
+  [[nodiscard]] NodeOptions options_for(NodeOptions how) const;
+  [[nodiscard]] std::optional<ExitCode> settle(Outcome<Node> joined);
   [[nodiscard]] std::string advice(std::string remedy) const;
   [[nodiscard]] bool is_listed(std::string_view name);
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);

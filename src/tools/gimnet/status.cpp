@@ -4,7 +4,7 @@
 namespace gimnet::tool {
 
 ExitCode run_status(Session& session) {
-  if (const auto ending = session.join({})) return *ending;
+  if (const auto ending = session.join_to_look()) return *ending;
   const auto hub = session.node().hub();
   if (!hub) return session.fail(hub.failure());
   const auto connections = session.node().hub_connections();

@@ -1,6 +1,5 @@
 #include "hub/control/acceptor.hpp"
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -10,6 +9,7 @@
 #include <unistd.h>
 
 #include <cstring>
+#include <optional>
 
 #include "proto/control/link.hpp"
 #include "proto/frame/frame_header.hpp"
@@ -28,7 +28,8 @@ class AcceptorTest : public ::testing::Test {
   std::unique_ptr<Acceptor> acceptor(const std::string& url) {
     auto listener = Listener::open(*parse_listen_url(url));
     EXPECT_TRUE(listener);
-    return std::make_unique<Acceptor>(std::move(*listener), limits_, refusals_);
+    return std::make_unique<Acceptor>(std::move(*listener), limits_, refusals_, reserve_,
+                                      [this](const Stranger& newcomer) { return make_room_(newcomer); });
   }
   int socket(int family) {
     open_.push_back(::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -52,8 +53,16 @@ class AcceptorTest : public ::testing::Test {
     return acceptor.accept_some([this](Stranger stranger) { strangers_.push_back(std::move(stranger)); });
   }
 
-  const Limits limits_;
+  static Limits limits() {
+    Limits result;
+    result.administrators = 2;
+    return result;
+  }
+
+  const Limits limits_ = limits();
   RefusalCounters refusals_;
+  DescriptorReserve reserve_{limits_};
+  Acceptor::MakeRoom make_room_ = [](const Stranger&) { return Acceptor::Room::none; };
   TestFolder folder_;
   std::vector<int> open_;
   std::vector<Stranger> strangers_;
@@ -88,36 +97,120 @@ TEST_F(AcceptorTest, TakesABatchAndComesBackForTheRest) {
   EXPECT_EQ(strangers_.size(), 70u);
 }
 
-TEST_F(AcceptorTest, OutOfDescriptorsItTellsThePeerAndTakesTheNextOneLater) {
-  const auto door = acceptor("unix:" + folder_.path("s"));
-  const int client = socket(AF_UNIX);
-  const int later = socket(AF_UNIX);
-  dial(client, door->listener().url());
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
-  const int highest = ::dup(client);
-  open_.push_back(highest);
-  rlimit none = before;
-  none.rlim_cur = static_cast<rlim_t>(highest) + 1;
-  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
-  std::vector<int> fill;  // whatever is free below the limit
-  for (int each = ::dup(client); each >= 0; each = ::dup(client)) fill.push_back(each);
-  EXPECT_EQ(accept(*door), Acceptor::After::wait);
-  EXPECT_TRUE(strangers_.empty());
-  EXPECT_EQ(refusals_.no_descriptor.value(), 1u);
-  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
-  for (const int each : fill) ::close(each);
+/// While it lives this process has no free descriptor.
+class NoDescriptors {
+ public:
+  NoDescriptors() {
+    EXPECT_EQ(::getrlimit(RLIMIT_NOFILE, &before_), 0);
+    const int highest = ::dup(0);
+    fill_.push_back(highest);
+    rlimit none = before_;
+    none.rlim_cur = static_cast<rlim_t>(highest) + 1;
+    EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+    for (int each = ::dup(0); each >= 0; each = ::dup(0)) fill_.push_back(each);
+  }
+  ~NoDescriptors() {
+    EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &before_), 0);
+    while (!fill_.empty()) free_one();
+  }
+  NoDescriptors(const NoDescriptors&) = delete;
+  NoDescriptors& operator=(const NoDescriptors&) = delete;
+
+  void free_one() {
+    ::close(fill_.back());
+    fill_.pop_back();
+  }
+
+ private:
+  rlimit before_{};
+  std::vector<int> fill_;
+};
+
+/// The GOODBYE that came, and then the end.
+std::optional<proto::Goodbye> goodbye_and_end(int client) {
   std::byte answer[512];
   const ssize_t size = ::recv(client, answer, sizeof answer, 0);
-  ASSERT_GT(size, static_cast<ssize_t>(proto::kOpeningSize + proto::kHeaderSize));
-  const auto goodbye = proto::decode<proto::Goodbye>(
-      std::span{answer, static_cast<std::size_t>(size)}.subspan(proto::kOpeningSize + proto::kHeaderSize));
+  constexpr std::size_t kBefore = proto::kOpeningSize + proto::kHeaderSize;
+  std::byte nothing{};
+  if (size < static_cast<ssize_t>(kBefore) || ::recv(client, &nothing, 1, 0) != 0) return std::nullopt;
+  const auto goodbye =
+      proto::decode<proto::Goodbye>(std::span{answer, static_cast<std::size_t>(size)}.subspan(kBefore));
+  return goodbye ? std::optional{*goodbye} : std::nullopt;
+}
+
+TEST_F(AcceptorTest, OutOfDescriptorsItTellsThePeerAndTakesTheNextOneLater) {
+  const auto door = acceptor("tcp://127.0.0.1:0");
+  const int client = socket(AF_INET);
+  const int later = socket(AF_INET);
+  dial(client, door->listener().url());
+  {
+    const NoDescriptors none;
+    EXPECT_EQ(accept(*door), Acceptor::After::wait);
+  }
+  EXPECT_TRUE(strangers_.empty());
+  EXPECT_EQ(refusals_.no_descriptor.value(), 1u);
+  const auto goodbye = goodbye_and_end(client);
   ASSERT_TRUE(goodbye);
   EXPECT_EQ(goodbye->code, proto::GoodbyeCode::no_memory);
-  EXPECT_EQ(::recv(client, answer, sizeof answer, 0), 0);
   dial(later, door->listener().url());
   accept(*door);
   EXPECT_EQ(strangers_.size(), 1u);
+}
+
+TEST_F(AcceptorTest, OutOfDescriptorsAdministratorsAreTakenOnTheReserveUntilItIsEmpty) {
+  const auto door = acceptor("unix:" + folder_.path("s"));
+  const int clients[] = {socket(AF_UNIX), socket(AF_UNIX), socket(AF_UNIX)};
+  for (const int client : clients) dial(client, door->listener().url());
+  {
+    const NoDescriptors none;
+    accept(*door);
+  }
+  ASSERT_EQ(strangers_.size(), 2u);
+  for (const Stranger& each : strangers_) EXPECT_TRUE(each.on_reserve);
+  EXPECT_EQ(reserve_.kept(), 0u);
+  EXPECT_EQ(refusals_.no_descriptor.value(), 1u);
+  EXPECT_TRUE(goodbye_and_end(clients[2]));
+  accept(*door);
+  EXPECT_EQ(reserve_.kept(), 2u) << "taken back";
+  strangers_.clear();
+  dial(socket(AF_UNIX), door->listener().url());
+  accept(*door);
+  ASSERT_EQ(strangers_.size(), 1u);
+  EXPECT_FALSE(strangers_[0].on_reserve);
+}
+
+TEST_F(AcceptorTest, OutOfDescriptorsOthersMakeRoom) {
+  const auto door = acceptor("tcp://127.0.0.1:0");
+  dial(socket(AF_INET), door->listener().url());
+  {
+    NoDescriptors none;
+    make_room_ = [&](const Stranger&) {
+      none.free_one();
+      return Acceptor::Room::ordinary;
+    };
+    accept(*door);
+    ASSERT_EQ(strangers_.size(), 1u);
+    EXPECT_FALSE(strangers_[0].on_reserve);
+    make_room_ = [](const Stranger&) { return Acceptor::Room::none; };
+  }
+  EXPECT_EQ(refusals_.no_descriptor.value(), 0u);
+  EXPECT_EQ(reserve_.kept(), 2u);
+}
+
+TEST_F(AcceptorTest, WhoGetsAnAdministratorsDescriptorIsOnTheReserve) {
+  const auto door = acceptor("unix:" + folder_.path("s"));
+  dial(socket(AF_UNIX), door->listener().url());
+  {
+    NoDescriptors none;
+    make_room_ = [&](const Stranger& newcomer) {
+      EXPECT_TRUE(newcomer.may_administer);
+      none.free_one();
+      return Acceptor::Room::reserved;
+    };
+    accept(*door);
+  }
+  ASSERT_EQ(strangers_.size(), 1u);
+  EXPECT_TRUE(strangers_[0].on_reserve);
 }
 
 }  // namespace

@@ -31,6 +31,18 @@ class WaitingRoomTest : public ::testing::Test {
     room_.enter(peers_.back()->take_stranger(), now);
     return *peers_.back();
   }
+  struct Rights {
+    bool may_administer = false;
+    bool on_reserve = false;
+  };
+  Peer& enter_as(const Rights& rights) {
+    peers_.push_back(std::make_unique<Peer>(limits_));
+    Stranger stranger = peers_.back()->take_stranger();
+    stranger.may_administer = rights.may_administer;
+    stranger.on_reserve = rights.on_reserve;
+    room_.enter(std::move(stranger), 0ms);
+    return *peers_.back();
+  }
   void serve(std::chrono::milliseconds now = 0ms) {
     while (room_.serve(now)) {
     }
@@ -232,6 +244,58 @@ TEST_F(WaitingRoomTest, WhoIsSeenOffIsReadUntilItLeavesOrItsTimeIsOver) {
   EXPECT_TRUE(patient.closed()) << "the hub's side is shut from the beginning";
   room_.tick(1h);
   EXPECT_EQ(room_.leaving(), 0u);
+}
+
+TEST_F(WaitingRoomTest, WithoutDescriptorsWhoLeavesMakesWayAndThenTheOldest) {
+  Peer& oldest = enter();
+  Peer& younger = enter();
+  Peer& told = enter();
+  told.send(opening_and(hello("unwelcome")));
+  serve();
+  const Stranger newcomer;
+  EXPECT_EQ(room_.give_way_to(newcomer), Acceptor::Room::ordinary);
+  EXPECT_EQ(room_.leaving(), 0u);
+  EXPECT_EQ(room_.waiting(), 2u);
+  EXPECT_EQ(room_.give_way_to(newcomer), Acceptor::Room::ordinary);
+  EXPECT_EQ(room_.waiting(), 1u);
+  const auto goodbye = oldest.receive_goodbye();
+  EXPECT_EQ(goodbye ? goodbye->code : GoodbyeCode::done, GoodbyeCode::no_memory);
+  EXPECT_TRUE(oldest.closed());
+  EXPECT_EQ(refusals_.no_descriptor.value(), 1u);
+  younger.send(opening_and(hello("robot")));
+  serve();
+  EXPECT_EQ(admitted_.size(), 1u);
+  EXPECT_EQ(room_.give_way_to(newcomer), Acceptor::Room::none);
+}
+
+TEST_F(WaitingRoomTest, WithoutDescriptorsAdministratorsMakeWayForTheirLikeOnly) {
+  enter_as({.may_administer = true, .on_reserve = true});
+  Peer& told = enter_as({.may_administer = true, .on_reserve = true});
+  told.send(opening_and(hello("a node")));
+  serve();
+  EXPECT_THAT(hellos_, IsEmpty()) << "who is no administrator has no place there";
+  const auto goodbye = told.receive_goodbye();
+  EXPECT_EQ(goodbye ? goodbye->code : GoodbyeCode::done, GoodbyeCode::no_memory);
+  EXPECT_EQ(refusals_.no_descriptor.value(), 1u);
+  EXPECT_EQ(refusals_.of(GoodbyeCode::no_memory), 0u);
+  const Stranger newcomer;
+  EXPECT_EQ(room_.give_way_to(newcomer), Acceptor::Room::none);
+  Stranger administrator;
+  administrator.may_administer = true;
+  EXPECT_EQ(room_.give_way_to(administrator), Acceptor::Room::reserved);
+  EXPECT_EQ(room_.leaving(), 0u);
+  enter();
+  EXPECT_EQ(room_.give_way_to(administrator), Acceptor::Room::ordinary) << "others before its like";
+  EXPECT_EQ(room_.give_way_to(administrator), Acceptor::Room::reserved);
+  EXPECT_EQ(room_.give_way_to(administrator), Acceptor::Room::none);
+}
+
+TEST_F(WaitingRoomTest, AnAdministratorOnTheReserveIsJudged) {
+  proto::Hello wanted = hello("");
+  wanted.role = proto::Role::admin;
+  enter_as({.may_administer = true, .on_reserve = true}).send(opening_and(wanted));
+  serve();
+  EXPECT_EQ(admitted_.size(), 1u);
 }
 
 TEST_F(WaitingRoomTest, AtTheEndEverybodyIsDismissed) {

@@ -19,6 +19,11 @@ bool is_misconduct(const Membership::Ending& ending) {
          ending.code == GoodbyeCode::oddities;
 }
 
+/// check() has seen that who asks as an administrator is one.
+Places places_for(const JoinRequest& request) {
+  return request.role == proto::Role::admin ? Places::all : Places::ordinary;
+}
+
 }  // namespace
 
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
@@ -33,7 +38,7 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
     }
   }
   if (claim.session == nullptr) {
-    if (std::optional<Refusal> refusal = room_refusal(request.name)) return std::move(*refusal);
+    if (std::optional<Refusal> refusal = room_refusal(request)) return std::move(*refusal);
   }
   if (!request.name.empty()) end_absent_holder(request.name, claim.session, now, effects);
   const Result<Joined, Refusal> found = session_for(request, claim, now, effects);
@@ -62,8 +67,9 @@ Result<Membership::Joined, Refusal> Membership::session_for(const JoinRequest& r
     return Joined{claim.session, false};
   }
   make_room(now, effects);
-  const Result<Session*, Refusal> created = claim.token ? sessions_.restore(*claim.token, request.shard_hint, now)
-                                                        : sessions_.create(request.shard_hint, now);
+  const Result<Session*, Refusal> created =
+      claim.token ? sessions_.restore(*claim.token, request.shard_hint, now, places_for(request))
+                  : sessions_.create(request.shard_hint, now, places_for(request));
   if (!created) return created.error();
   (*created)->came_back = claim.token.has_value();
   if (sessions_.indices().runs_short()) effects.emplace_back(StateDue{});
@@ -220,10 +226,10 @@ void Membership::end_absent_holder(const std::string& name, const Session* claim
   end(*sessions_.find(*holder), now, effects);
 }
 
-std::optional<Refusal> Membership::room_refusal(const std::string& name) {
+std::optional<Refusal> Membership::room_refusal(const JoinRequest& request) {
   // The limit may have been lowered, so that more would have to go than make way.
-  const std::size_t ending = (directory_.find(name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
-  return sessions_.full_refusal(ending);
+  const std::size_t ending = (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
+  return sessions_.full_refusal(places_for(request), ending);
 }
 
 void Membership::make_room(milliseconds now, Effects& effects) {

@@ -109,8 +109,8 @@ class Membership {
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
   void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
                          Effects& effects);
-  /// Why there is no room for a newcomer of that name even when all made way who have to: before any of them does.
-  [[nodiscard]] std::optional<Refusal> room_refusal(const std::string& name);
+  /// Why there is no room for that newcomer even when all made way who have to: before any of them does.
+  [[nodiscard]] std::optional<Refusal> room_refusal(const JoinRequest& request);
   /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
   void make_room(std::chrono::milliseconds now, Effects& effects);
   void take_name(Session& session, const std::string& name, std::chrono::milliseconds now, Effects& effects);

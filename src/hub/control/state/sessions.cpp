@@ -61,8 +61,8 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
   return {nullptr, token};
 }
 
-Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now) {
-  if (std::optional<Refusal> refusal = full_refusal()) return std::move(*refusal);
+Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now, Places places) {
+  if (std::optional<Refusal> refusal = full_refusal(places)) return std::move(*refusal);
   const std::optional<std::uint32_t> index = indices_.take(now);
   if (!index) {
     return Refusal{
@@ -74,15 +74,16 @@ Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hi
 }
 
 Result<Session*, Refusal> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
-                                            milliseconds now) {
-  if (std::optional<Refusal> refusal = full_refusal()) return std::move(*refusal);
+                                            milliseconds now, Places places) {
+  if (std::optional<Refusal> refusal = full_refusal(places)) return std::move(*refusal);
   const bool taken = indices_.take_back(token.index);
   GIMNET_CHECK(taken);
   return &put(token.index, token.number, shard_hint, now);
 }
 
-std::optional<Refusal> Sessions::full_refusal(std::size_t ending) const {
-  if (sessions_.size() - ending < limits_.nodes) return std::nullopt;
+std::optional<Refusal> Sessions::full_refusal(Places places, std::size_t ending) const {
+  const std::uint64_t most = limits_.nodes + (places == Places::all ? limits_.administrators : 0);
+  if (sessions_.size() - ending < most) return std::nullopt;
   return Refusal{proto::GoodbyeCode::hub_full, "this hub takes " + std::to_string(limits_.nodes) +
                                                    " nodes and has them; connect to another one, or start it with a "
                                                    "larger --limit nodes"};

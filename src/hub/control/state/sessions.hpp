@@ -69,8 +69,12 @@ using Refusal = proto::Goodbye;
 
 enum class Placement : std::uint8_t { spread, hint };
 
+/// Which places a newcomer may have: also those that are kept for administrators, or not.
+enum class Places : std::uint8_t { ordinary, all };
+
 /// All sessions of a hub: ids, places, tokens, grace times. Time and randomness are arguments.
-/// Thread safety: none. Ownership: a Session& is good until end(). Limits: limits.nodes.
+/// Thread safety: none. Ownership: a Session& is good until end(). Limits: limits.nodes, and
+/// limits.administrators beyond them.
 class Sessions {
  public:
   struct Options {
@@ -108,11 +112,11 @@ class Sessions {
   [[nodiscard]] Claim claim(const Presented& presented);
 
   /// A new session without a connection or a name. Errors: hub_full.
-  [[nodiscard]] Result<Session*, Refusal> create(std::optional<std::uint16_t> shard_hint,
-                                                 std::chrono::milliseconds now);
+  [[nodiscard]] Result<Session*, Refusal> create(std::optional<std::uint16_t> shard_hint, std::chrono::milliseconds now,
+                                                 Places places = Places::ordinary);
   /// The session of a token whose index is free, under its former id. Errors: hub_full.
   [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
-                                                  std::chrono::milliseconds now);
+                                                  std::chrono::milliseconds now, Places places = Places::ordinary);
   /// A connection was admitted for the session. What it says, or that the node was heard(), tells that it read WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
@@ -141,7 +145,7 @@ class Sessions {
   /// Is there a session for longest_away_nameless()?
   [[nodiscard]] bool nameless_away();
   /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
-  [[nodiscard]] std::optional<Refusal> full_refusal(std::size_t ending = 0) const;
+  [[nodiscard]] std::optional<Refusal> full_refusal(Places places, std::size_t ending = 0) const;
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.

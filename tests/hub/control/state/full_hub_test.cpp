@@ -18,6 +18,13 @@ class FullHub : public ::testing::Test {
     const auto joined = membership_.join(request(name), now, effects_);
     return joined ? joined->session : nullptr;
   }
+  Session* join_as_administrator(std::chrono::milliseconds now = 1s) {
+    JoinRequest wanted = request("");
+    wanted.role = proto::Role::admin;
+    wanted.may_administer = true;
+    const auto joined = membership_.join(wanted, now, effects_);
+    return joined ? joined->session : nullptr;
+  }
   GoodbyeCode refused(const std::string& name, std::chrono::milliseconds now) {
     const auto joined = membership_.join(request(name), now, effects_);
     return joined ? GoodbyeCode::done : joined.error().code;
@@ -69,6 +76,31 @@ TEST_F(FullHub, AsManyMakeWayAsHaveTo) {
   EXPECT_EQ(refused("c", 2s), GoodbyeCode::done);
   EXPECT_EQ(membership_.sessions().find(index), nullptr);
   EXPECT_EQ(membership_.sessions().all().size(), 3u);
+}
+
+TEST_F(FullHub, AdministratorsHavePlacesBeyondTheLimit) {
+  limits_.administrators = 2;
+  for (const char* name : {"a", "b", "c", "d"}) join(name);
+  EXPECT_EQ(refused("e", 0ms), GoodbyeCode::hub_full);
+  EXPECT_NE(join_as_administrator(), nullptr);
+  Session* second = join_as_administrator();
+  ASSERT_NE(second, nullptr);
+  EXPECT_EQ(join_as_administrator(), nullptr) << "one beyond";
+  membership_.connection_ended(*second, {true, GoodbyeCode::done, ""}, 1s, effects_);
+  EXPECT_NE(join_as_administrator(), nullptr);
+  // Their places are no room for others.
+  Session* node = membership_.sessions().find(*membership_.directory().find("a"));
+  membership_.connection_ended(*node, {true, GoodbyeCode::done, ""}, 1s, effects_);
+  EXPECT_EQ(refused("e", 1s), GoodbyeCode::hub_full);
+}
+
+TEST_F(FullHub, AnAdministratorTakesThePlaceOfANamelessOneThatIsAwayFirst) {
+  limits_.administrators = 1;
+  for (const char* name : {"a", "b", "c"}) join(name);
+  Session* nameless = join("");
+  lose(*nameless, 1s);
+  EXPECT_NE(join_as_administrator(2s), nullptr);
+  EXPECT_EQ(membership_.sessions().all().size(), 4u);
 }
 
 }  // namespace
