@@ -11,8 +11,6 @@ namespace {
 
 using namespace gimnet;
 
-constexpr std::size_t kStepsMax = 150;
-
 void step(fuzz::ControlRun& run, fuzz::Choices& input) {
   switch (input.below(11)) {
     case 0:
@@ -42,9 +40,6 @@ void step(fuzz::ControlRun& run, fuzz::Choices& input) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  fuzz::Choices input(fuzz::input(data, size));
-  fuzz::ControlRun run(input);
-  for (std::size_t steps = 0; input.left() && steps < kStepsMax; ++steps) step(run, input);
-  run.finish();
+  fuzz::ControlRun::of_input(data, size, step);
   return 0;
 }

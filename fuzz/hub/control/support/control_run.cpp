@@ -13,6 +13,8 @@ namespace ns = proto::ns;
 
 namespace {
 
+/// Each step is compared whole, so that longer runs find no more, but later.
+constexpr std::size_t kStepsMax = 150;
 constexpr std::size_t kLinesMax = 12;
 constexpr std::size_t kTokensMax = 32;
 constexpr std::size_t kRoundsMax = 10'000;
@@ -54,6 +56,13 @@ std::string some_pattern(Choices& input) {
 
 ControlRun::ControlRun(Choices& input) : hub_(limits_for(input.byte())), reference_(hub_.limits) {
   set_log_level(LogLevel::off);
+}
+
+void ControlRun::of_input(const std::uint8_t* data, std::size_t size, Step step) {
+  Choices choices(input(data, size));
+  ControlRun run(choices);
+  for (std::size_t steps = 0; choices.left() && steps < kStepsMax; ++steps) step(run, choices);
+  run.finish();
 }
 
 void ControlRun::compare() { reference_.compare(hub_); }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "fuzz/hub/control/support/control_hub.hpp"
@@ -14,6 +16,11 @@ class ControlRun {
  public:
   /// The first byte chooses the limits.
   explicit ControlRun(Choices& input);
+
+  /// One operation, chosen and filled in from the input.
+  using Step = void (*)(ControlRun&, Choices&);
+  /// What a fuzz target does with its input: a run of such steps until nothing is left of it, then finish().
+  static void of_input(const std::uint8_t* data, std::size_t size, Step step);
 
   // Operations; what they are about is read from the input.
   void join(Choices& input);
