@@ -14,6 +14,7 @@
 #include "hub/shard/commands.hpp"
 #include "proto/control/link.hpp"
 #include "proto/control/ns.hpp"
+#include "tests/hub/control/support/allowance.hpp"
 #include "tests/sim/census.hpp"
 #include "tests/sim/checker.hpp"
 #include "tests/sim/shards.hpp"
@@ -60,15 +61,6 @@ struct Past {
   std::uint64_t token_numbers = 0;  ///< given so far
 };
 
-/// So much at once, and so much a second.
-struct Allowance {
-  bool used = false;
-  std::uint64_t left = 0;  ///< thousandths
-  milliseconds last{};
-  /// False: nothing is left.
-  bool spend(std::uint64_t per_s, std::uint64_t burst, milliseconds now);
-};
-
 /// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was told and what it
 /// answered. It shares no code with the hub but the messages, names and patterns (src/proto). Where the hub may choose
 /// (a new id) the model takes the choice over and checks that it was allowed.
@@ -80,8 +72,8 @@ class Model final : public Witness {
   struct Session {
     std::uint64_t number = 0;        ///< of all sessions, never given twice
     std::uint64_t token_number = 0;  ///< which tokens are its own; another one with each id
-    Allowance declarations;
-    Allowance oddities;
+    hub::Allowance declarations;
+    hub::Allowance oddities;
     proto::Role role{};
     bool connected = false;
     bool renumbered = false;  ///< and not heard of since it was welcomed

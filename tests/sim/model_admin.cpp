@@ -12,18 +12,6 @@ using proto::Status;
 namespace ctrl = proto::ctrl;
 namespace ns = proto::ns;
 
-bool Allowance::spend(std::uint64_t per_s, std::uint64_t burst, milliseconds now) {
-  constexpr std::uint64_t kOne = 1'000;
-  if (!used) left = burst * kOne;
-  used = true;
-  left += static_cast<std::uint64_t>(std::max<std::int64_t>(0, (now - last).count())) * per_s;
-  left = std::min(left, burst * kOne);
-  last = now;
-  if (left < kOne) return false;
-  left -= kOne;
-  return true;
-}
-
 bool Model::may_declare(const Asked& asked) {
   const std::uint64_t quotas = limits_.services_per_node + limits_.subscriptions_per_node;
   const std::uint64_t burst = std::max(limits_.declarations_burst, quotas);

@@ -194,11 +194,21 @@ void ControlRun::administer(Choices& input) {
 }
 
 hub::Reloading ControlRun::some_configuration(Choices& input) const {
-  constexpr std::uint64_t hub::Limits::* kLimits[] = {
-      &hub::Limits::nodes,       &hub::Limits::services_per_node, &hub::Limits::subscriptions_per_node,
-      &hub::Limits::watches,     &hub::Limits::watches_per_node,  &hub::Limits::page_records,
-      &hub::Limits::sync_window, &hub::Limits::token_ms,          &hub::Limits::subscription_depth,
-      &hub::Limits::requests,    &hub::Limits::handshakes};
+  constexpr std::uint64_t hub::Limits::* kLimits[] = {&hub::Limits::nodes,
+                                                      &hub::Limits::services_per_node,
+                                                      &hub::Limits::subscriptions_per_node,
+                                                      &hub::Limits::watches,
+                                                      &hub::Limits::watches_per_node,
+                                                      &hub::Limits::page_records,
+                                                      &hub::Limits::sync_window,
+                                                      &hub::Limits::token_ms,
+                                                      &hub::Limits::subscription_depth,
+                                                      &hub::Limits::requests,
+                                                      &hub::Limits::handshakes,
+                                                      &hub::Limits::declarations_per_s,
+                                                      &hub::Limits::declarations_burst,
+                                                      &hub::Limits::oddities_per_s,
+                                                      &hub::Limits::oddities_burst};
   hub::Reloading found;
   found.limits = reference_.limits();
   // Without a word of its own in the log: reading anew says something at `info`.

@@ -35,6 +35,11 @@ hub::Limits limits_for(std::uint8_t choice) {
   limits.watch_changes = (choice & 64) != 0 ? 6 : 65'536;
   limits.sync_window = 8;
   limits.subscription_depth = 4;
+  if ((choice & 128) != 0) {
+    limits.declarations_burst = limits.oddities_burst = 3;
+    limits.declarations_per_s = 2;
+    limits.oddities_per_s = 1;
+  }
   return limits;
 }
 

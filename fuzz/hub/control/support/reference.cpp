@@ -178,7 +178,8 @@ void Reference::ended(const Line& line, bool said_by_peer, GoodbyeCode code, con
   if (!is_current(line) || !sessions_.at(line.session).connected) return;
   Session& session = sessions_.at(line.session);
   const bool misconduct = !said_by_peer && (code == GoodbyeCode::malformed || code == GoodbyeCode::wrong_source ||
-                                            code == GoodbyeCode::not_allowed || code == GoodbyeCode::too_many_requests);
+                                            code == GoodbyeCode::not_allowed ||
+                                            code == GoodbyeCode::too_many_requests || code == GoodbyeCode::oddities);
   if ((said_by_peer && code == GoodbyeCode::done) || (misconduct && session.name.empty())) {
     spend_tokens(session);
     return end(line.session, hub.now);

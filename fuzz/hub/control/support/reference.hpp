@@ -10,6 +10,7 @@
 
 #include "fuzz/hub/control/support/control_hub.hpp"
 #include "fuzz/hub/control/support/watch_view.hpp"
+#include "tests/hub/control/support/allowance.hpp"
 
 namespace gimnet::fuzz {
 
@@ -50,6 +51,9 @@ class Reference {
     std::map<std::string, std::uint64_t> subscribes;  ///< the same
     std::map<std::uint32_t, WatchView> watches;
     std::uint16_t last_goodbye = 0;
+    // Of the session, so that a new connection is no way to get more
+    hub::Allowance declarations;
+    hub::Allowance oddities;
   };
   struct Service {
     std::uint32_t group = 0;
@@ -151,6 +155,10 @@ class Reference {
   void tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined, std::size_t count);
 
   // Requests
+  /// One more name, service or subscription that is begun or changed. False: the answer must be `rate`.
+  [[nodiscard]] bool may_declare(const Asked& asked);
+  /// After an answer of no use to anybody: the connection is closed if there were too many.
+  void count_oddity(const Asked& asked);
   void dispatch_names(const Asked& asked, std::uint16_t operation);
   void dispatch_services(const Asked& asked, std::uint16_t operation);
   void dispatch_control(const Asked& asked, std::uint16_t operation);
@@ -162,7 +170,9 @@ class Reference {
   void on_list(const Asked& asked) const;
   void on_services(const Asked& asked) const;
   void on_advertise(const Asked& asked);
-  [[nodiscard]] proto::Status judge_offer(const Asked& asked, const proto::ns::Advertise& offer) const;
+  /// Is there anything wrong with it by itself?
+  [[nodiscard]] proto::Status judge_terms(const Asked& asked, const proto::ns::Advertise& offer) const;
+  [[nodiscard]] proto::Status judge_offer(const Asked& asked, const proto::ns::Advertise& offer);
   void on_withdraw(const Asked& asked);
   void on_subscribe(const Asked& asked);
   void on_unsubscribe(const Asked& asked);

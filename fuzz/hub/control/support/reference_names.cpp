@@ -43,8 +43,28 @@ void Reference::asked(const Line& line, Kind kind, std::span<const std::byte> pa
   if (kind == Kind::ns) ++asked_[view->header.operation];
   if (dst != NodeId{} && dst != id_of(kHubIndex)) return require_status(*answer, Status::not_found);
   const Asked request{line.session, session, payload, *answer, hub};
-  if (kind == Kind::ctrl) return dispatch_control(request, view->header.operation);
-  dispatch_names(request, view->header.operation);
+  if (kind == Kind::ctrl) {
+    dispatch_control(request, view->header.operation);
+  } else {
+    dispatch_names(request, view->header.operation);
+  }
+  count_oddity(request);
+}
+
+// ---- rates
+
+bool Reference::may_declare(const Asked& asked) {
+  // Whatever a node may have it may also declare at once.
+  const std::uint64_t quotas = limits_.services_per_node + limits_.subscriptions_per_node;
+  const std::uint64_t burst = std::max(limits_.declarations_burst, quotas);
+  return asked.session.declarations.spend(limits_.declarations_per_s, burst, asked.hub.now);
+}
+
+void Reference::count_oddity(const Asked& asked) {
+  const Status said = proto::read_status(proto::split_control(asked.answer)->body).status;
+  if (said != Status::bad_request && said != Status::not_supported && said != Status::denied) return;
+  if (asked.session.oddities.spend(limits_.oddities_per_s, limits_.oddities_burst, asked.hub.now)) return;
+  closed_[asked.session.seat] = GoodbyeCode::oddities;
 }
 
 void Reference::dispatch_names(const Asked& asked, std::uint16_t operation) {
@@ -93,6 +113,7 @@ void Reference::on_register(const Asked& asked) {
   const auto wanted = proto::decode<ns::RegisterName>(asked.payload);
   if (!wanted || wanted->name.empty()) return require_status(asked.answer, Status::bad_request);
   if (wanted->name != asked.session.name) {
+    if (!may_declare(asked)) return require_status(asked.answer, Status::rate);
     const std::optional<GoodbyeCode> refusal = judge_name(wanted->name, asked.id);
     if (refusal) {
       return require_status(asked.answer, refusal == GoodbyeCode::name_taken ? Status::taken : Status::bad_request);
@@ -107,6 +128,7 @@ void Reference::on_register(const Asked& asked) {
 void Reference::on_unregister(const Asked& asked) {
   if (!proto::decode<ns::UnregisterName>(asked.payload)) return require_status(asked.answer, Status::bad_request);
   if (asked.session.name.empty()) return require_status(asked.answer, Status::not_found);
+  if (!may_declare(asked)) return require_status(asked.answer, Status::rate);
   require_status(asked.answer, Status::done);
   const auto answer = proto::decode_answer<ns::UnregisterNameAnswer>(asked.answer);
   FUZZ_MUST(answer.has_value());

@@ -25,6 +25,11 @@ bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
          a.delivery == b.delivery && window_of(a) == window_of(b) && a.retain == b.retain;
 }
 
+/// Does the one say exactly what the other says?
+bool same_terms(const ns::Advertise& a, const ns::Advertise& b) {
+  return same_stream(a, b) && a.metadata == b.metadata;
+}
+
 /// An index of this hub, as a request names it; 0: of another one.
 template <class Id>
 std::uint32_t own_index(Id id) {
@@ -107,20 +112,26 @@ void Reference::withdraw(const std::string& full_name, milliseconds now) {
   forget_if_unused(full_name);
 }
 
-Status Reference::judge_offer(const Asked& asked, const ns::Advertise& offer) const {
-  const Session& session = asked.session;
-  if (session.name.empty() || !proto::valid_service_name(offer.service)) return Status::bad_request;
+Status Reference::judge_terms(const Asked& asked, const ns::Advertise& offer) const {
+  if (asked.session.name.empty() || !proto::valid_service_name(offer.service)) return Status::bad_request;
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
   if (counted && offer.window > limits_.sync_window) return Status::limit;
-  const std::string full_name = proto::join_service_name(session.name, offer.service);
-  if (!proto::valid_name(full_name)) return Status::bad_request;
+  return Status::done;
+}
+
+Status Reference::judge_offer(const Asked& asked, const ns::Advertise& offer) {
+  if (const Status status = judge_terms(asked, offer); status != Status::done) return status;
+  const std::string full_name = proto::join_service_name(asked.session.name, offer.service);
   const auto topic = topics_.find(full_name);
   const bool provided = topic != topics_.end() && topic->second.service.has_value();
   // Names of nodes are unique, so that nobody else can provide it.
   if (provided) FUZZ_MUST(topic->second.service->provider == asked.id);
-  if (!provided && session.provides.size() >= limits_.services_per_node) return Status::limit;
+  const bool said_before = provided && same_terms(topic->second.service->terms, offer);
+  if (!said_before && !may_declare(asked)) return Status::rate;
+  if (!proto::valid_name(full_name)) return Status::bad_request;
+  if (!provided && asked.session.provides.size() >= limits_.services_per_node) return Status::limit;
   return Status::done;
 }
 
@@ -185,9 +196,12 @@ void Reference::on_subscribe(const Asked& asked) {
   const bool fits = wanted->window <= limits_.sync_window && wanted->depth >= 1 &&
                     wanted->depth <= limits_.subscription_depth && rate_fits;
   if (!fits) return require_status(asked.answer, Status::limit);
-  if (!proto::valid_name(wanted->name)) return require_status(asked.answer, Status::bad_request);
   Session& session = asked.session;
+  const Terms wants{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
   const bool fresh = !session.subscribes.contains(wanted->name);
+  const bool said_before = !fresh && topics_.at(wanted->name).subscribers.at(asked.id) == wants;
+  if (!said_before && !may_declare(asked)) return require_status(asked.answer, Status::rate);
+  if (!proto::valid_name(wanted->name)) return require_status(asked.answer, Status::bad_request);
   if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
     return require_status(asked.answer, Status::limit);
   }
@@ -195,8 +209,7 @@ void Reference::on_subscribe(const Asked& asked) {
   session.subscribes[wanted->name] = session.life;
   Topic& topic = topics_[wanted->name];
   const bool was_paced = !fresh && pace_of(topic, asked.id);
-  Terms& terms = topic.subscribers[asked.id];
-  terms = {wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
+  topic.subscribers[asked.id] = wants;
   if (was_paced && !pace_of(topic, asked.id)) topic.once_paced.insert(asked.id);
   if (!fresh && topic.service && !was_paced && pace_of(topic, asked.id)) topic.once_plain.insert(asked.id);
   if (fresh) tell_provider(wanted->name, session.index, true, topic.subscribers.size());
