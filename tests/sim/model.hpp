@@ -74,6 +74,7 @@ class Model final : public Witness {
     std::uint64_t token_number = 0;  ///< which tokens are its own; another one with each id
     hub::Allowance declarations;
     hub::Allowance oddities;
+    bool held_back = false;  ///< by the rate of declarations, the last time
     proto::Role role{};
     bool connected = false;
     bool renumbered = false;  ///< and not heard of since it was welcomed
@@ -213,8 +214,8 @@ class Model final : public Witness {
   /// The index under which a node goes on that had this one.
   [[nodiscard]] std::uint32_t present(std::uint32_t index) const;
   [[nodiscard]] std::vector<std::uint32_t> former(std::uint32_t index) const;
-  /// One more declaration. False: the answer must be `rate`.
-  [[nodiscard]] bool may_declare(const Asked& asked);
+  /// One more declaration. False: the answer must be `rate`, and that is counted as `refused`.
+  [[nodiscard]] bool may_declare(const Asked& asked, Happening refused);
   void judge_register(const Asked& asked);
   void judge_unregister(const Asked& asked);
   void judge_watch(const Asked& asked);

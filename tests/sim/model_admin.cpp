@@ -12,12 +12,14 @@ using proto::Status;
 namespace ctrl = proto::ctrl;
 namespace ns = proto::ns;
 
-bool Model::may_declare(const Asked& asked) {
+bool Model::may_declare(const Asked& asked, Happening refused) {
   const std::uint64_t quotas = limits_.services_per_node + limits_.subscriptions_per_node;
   const std::uint64_t burst = std::max(limits_.declarations_burst, quotas);
-  if (asked.session.declarations.spend(limits_.declarations_per_s, burst, asked.now)) return true;
-  census_.add(Happening::declared_too_often);
-  return false;
+  const bool may = asked.session.declarations.spend(limits_.declarations_per_s, burst, asked.now);
+  if (!may) census_.add(refused);
+  if (may && asked.session.held_back) census_.add(Happening::rate_over);
+  asked.session.held_back = !may;
+  return may;
 }
 
 void Model::judge_admin(const Asked& asked, std::uint16_t operation) {

@@ -16,7 +16,7 @@ void Model::judge_register(const Asked& asked) {
   if (!wanted || wanted->name.empty()) return require_status(asked, Status::bad_request, Checker::answers);
   const std::string& name = wanted->name;
   if (name != asked.session.name) {
-    if (!may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
+    if (!may_declare(asked, Happening::names_rate)) return require_status(asked, Status::rate, Checker::limits);
     const std::optional<GoodbyeCode> refusal = judge_name(name, asked.index);
     if (refusal == GoodbyeCode::bad_name) return require_status(asked, Status::bad_request, Checker::names);
     if (refusal) return require_status(asked, Status::taken, Checker::names);
@@ -34,7 +34,7 @@ void Model::judge_unregister(const Asked& asked) {
     return require_status(asked, Status::bad_request, Checker::answers);
   }
   if (asked.session.name.empty()) return require_status(asked, Status::not_found, Checker::names);
-  if (!may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
+  if (!may_declare(asked, Happening::names_rate)) return require_status(asked, Status::rate, Checker::limits);
   require_status(asked, Status::done, Checker::names);
   const auto answer = proto::decode_answer<ns::UnregisterNameAnswer>(asked.answer);
   require(answer.has_value(), Checker::answers, "the answer to UNREGISTER cannot be read");

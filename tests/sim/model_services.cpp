@@ -109,7 +109,8 @@ void Model::judge_advertise(const Asked& asked) {
   }
   const Service* known = service(full_name);
   const bool said_before = known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
-  if (!said_before && !may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
+  if (!said_before && !may_declare(asked, Happening::services_rate))
+    return require_status(asked, Status::rate, Checker::limits);
   if (known != nullptr && known->provider != asked.index) return require_status(asked, Status::taken, Checker::names);
   if (known == nullptr && session.provides.size() >= limits_.services_per_node) {
     census_.add(Happening::services_limit);
@@ -178,7 +179,8 @@ void Model::judge_subscribe(const Asked& asked) {
   if (!wanted || !proto::valid_name(wanted->name)) return require_status(asked, Status::bad_request, Checker::answers);
   Session& session = asked.session;
   const bool fresh = !session.subscribes.contains(wanted->name);
-  if (fresh && !may_declare(asked)) return require_status(asked, Status::rate, Checker::limits);
+  if (fresh && !may_declare(asked, Happening::subscriptions_rate))
+    return require_status(asked, Status::rate, Checker::limits);
   if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
     census_.add(Happening::subscriptions_limit);
     return require_status(asked, Status::limit, Checker::limits);

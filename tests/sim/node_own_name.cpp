@@ -1,3 +1,4 @@
+#include "proto/control/ctrl.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
 #include "tests/sim/node.hpp"
@@ -26,12 +27,23 @@ void SimNode::watch_or_rename(std::uint64_t choice) {
   if (!wants_watch_ && number_ % kWatchers == 0) watch();
 }
 
-/// One name after the other, as many at once as it may ask for.
+/// One thing after the other, as many at once as it may ask for: names, services, subscriptions, or what nobody grants.
 void SimNode::flood() {
-  around_.setting.trace.note("node {a} floods the hub with names", number_);
+  Random& random = around_.setting.random;
+  const std::uint64_t with = random.below(4);
+  around_.setting.trace.note("node {a} floods the hub, in way {b}", number_, with);
   while (link().open.size() < around_.setting.plan.limits.requests) {
     const std::string name = some_name();
-    ask(ns::RegisterName{name}, about(name));
+    const std::string service = "s" + std::to_string(random.below(8));
+    if (with == 1) {
+      advertise(service, true);
+    } else if (with == 2) {
+      ask(ns::Subscribe{name + "/" + service}, about(name + "/" + service));
+    } else if (with == 3) {
+      ask(proto::ctrl::Kick{id_, "it asks in vain"}, {}, proto::Kind::ctrl);
+    } else {
+      ask(ns::RegisterName{name}, about(name));
+    }
   }
 }
 

@@ -18,12 +18,22 @@ std::optional<proto::Refusal> count_declaration(HandlerContext& context, const S
 #ifdef GIMNET_BUG_DECLARATIONS_NOT_COUNTED
   return std::nullopt;
 #endif
-  Session& counted = *context.membership.sessions().find(session.index);
+#ifdef GIMNET_BUG_DECLARATIONS_COUNT_FOR_ANOTHER
+  const std::uint32_t account = std::min(session.index, context.membership.sessions().all().begin()->first);
+#else
+  const std::uint32_t account = session.index;
+#endif
+  Session& counted = *context.membership.sessions().find(account);
   if (counted.declarations.take({limits.declarations_per_s, burst}, context.now)) return std::nullopt;
-  return proto::Refusal{proto::Status::rate,
-                        "this node began or changed more names, services and subscriptions than it may: " +
-                            std::to_string(burst) + " at once and " + std::to_string(limits.declarations_per_s) +
-                            " a second; go slower, or start the hub with a larger --limit declarations_per_s"};
+#ifdef GIMNET_BUG_RATE_SAYS_LIMIT
+  constexpr proto::Status kStatus = proto::Status::limit;
+#else
+  constexpr proto::Status kStatus = proto::Status::rate;
+#endif
+  return proto::Refusal{kStatus, "this node began or changed more names, services and subscriptions than it may: " +
+                                     std::to_string(burst) + " at once and " +
+                                     std::to_string(limits.declarations_per_s) +
+                                     " a second; go slower, or start the hub with a larger --limit declarations_per_s"};
 }
 
 PageBudget::PageBudget(const Limits& limits, std::uint32_t records_wanted)
