@@ -89,6 +89,11 @@ constexpr std::array<std::string_view, kHappenings> kNames = {"joined",
                                                               "conductor paused",
                                                               "slow reader",
                                                               "hub killed",
+                                                              "drain asked for",
+                                                              "drain by signal",
+                                                              "refused draining",
+                                                              "told draining",
+                                                              "drained in life",
                                                               "drained",
                                                               "garbage freed"};
 

@@ -94,6 +94,11 @@ enum class Happening : std::uint8_t {
   conductor_paused,
   slow_reader,
   hub_killed,
+  drain_asked_for,
+  drain_by_signal,
+  refused_draining,
+  told_draining,
+  drained_in_life,
   drained,
   garbage_freed,
   count

@@ -22,11 +22,12 @@ enum class Checker : std::uint8_t {
   limits,         ///< the limits hold, and nothing is refused below them
   grace,          ///< a session lasts while it is connected and through its grace time, and no longer
   seam,           ///< the commands to a shard make sense to it
+  drain,          ///< a hub that drains lets nobody in, has everybody told to go, and ends when they have gone
   convergence,    ///< when the faults stop everybody is served
 };
-inline constexpr std::array<std::string_view, 13> kCheckerNames = {
+inline constexpr std::array<std::string_view, 14> kCheckerNames = {
     "names",   "ids",    "tokens", "right_session", "node_table", "group_table", "order",
-    "answers", "events", "limits", "grace",         "seam",       "convergence"};
+    "answers", "events", "limits", "grace",         "seam",       "drain",       "convergence"};
 [[nodiscard]] inline std::string_view name_of(Checker checker) {
   return kCheckerNames[static_cast<std::size_t>(checker)];
 }

@@ -89,6 +89,15 @@ std::string Checks::stale() const {
   return {};
 }
 
+void Checks::after_drain() const {
+  std::vector<std::size_t> told(subject_.shards.shards());
+  for (const SimShards::Sent& sent : subject_.shards.sent()) {
+    if (std::holds_alternative<hub::DrainCommand>(*sent.command)) ++told[sent.shard.value()];
+  }
+  const bool once = std::all_of(told.begin(), told.end(), [](std::size_t times) { return times == 1; });
+  require(once, Checker::drain, "the hub drains, and a shard is not told to have its nodes leave");
+}
+
 void Checks::after_step(milliseconds now) {
   sessions();
   names();
@@ -98,6 +107,8 @@ void Checks::after_step(milliseconds now) {
   events();
   commands();
   deadline(now);
+  require(conductor_->drain_wanted() == model_.drain_wanted(), Checker::drain,
+          "the hub is to drain, and no administrator asked for it, or the reverse");
 }
 
 void Checks::events() {

@@ -25,6 +25,8 @@ class Checks {
 
   void before_it_leaves(ShardIndex shard, const hub::ShardCommand& command);
   void after_step(milliseconds now);
+  /// The conductor was told to drain: so is each shard, once.
+  void after_drain() const;
 
  private:
   void events();

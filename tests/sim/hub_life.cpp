@@ -198,9 +198,12 @@ bool HubLife::serve_watches() {
 }
 
 void HubLife::drain() {
+  drains_ = true;
+  model_.draining();
   shards_.forget_sent();
   conductor_.drain();
   trace_sent();
+  checks_.after_drain();
   checks_.after_step(setting_.agenda.now_ms());
 }
 

@@ -34,7 +34,9 @@ class HubLife {
   [[nodiscard]] std::optional<proto::Goodbye> admit(const Newcomer& newcomer, std::uint64_t number);
   void take_event(std::size_t shard);
   void tick();
+  /// The hub is to end: nobody is let in any more, and everybody is told to go.
   void drain();
+  [[nodiscard]] bool drains() const { return drains_; }
   /// A piece of what those who watch are to be told. True: there is more.
   bool serve_watches();
   [[nodiscard]] bool is_watched() const { return conductor_.watches().size() > 0; }
@@ -64,6 +66,7 @@ class HubLife {
   Checks checks_;
   hub::Limits limits_;
   hub::Conductor conductor_;
+  bool drains_ = false;
 };
 
 }  // namespace gimnet::sim

@@ -13,6 +13,12 @@ namespace {
 
 std::string quoted(const std::string& name) { return "'" + name + "'"; }
 
+/// Which one minds that a HELLO was refused with another code than is due, or let in.
+Checker checker_of(GoodbyeCode said, std::optional<GoodbyeCode> due) {
+  if (said == GoodbyeCode::draining || due == GoodbyeCode::draining) return Checker::drain;
+  return said == GoodbyeCode::hub_full || due == GoodbyeCode::hub_full ? Checker::limits : Checker::names;
+}
+
 }  // namespace
 
 Model::Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
@@ -77,6 +83,10 @@ Past Model::past() const {
 
 Model::Verdict Model::judge(const Hello& hello) const {
   Verdict verdict;
+  if (draining_) {
+    verdict.refusal = GoodbyeCode::draining;
+    return verdict;
+  }
   const bool known_role = hello.hello.role == Role::node || (hello.hello.role == Role::admin && hello.may_administer);
   if (!known_role) {
     verdict.refusal = GoodbyeCode::not_allowed;
@@ -99,10 +109,10 @@ void Model::refused(const Hello& hello, const proto::Goodbye& goodbye, milliseco
     if (goodbye.code == GoodbyeCode::bad_name) census_.add(Happening::bad_name);
     if (goodbye.code == GoodbyeCode::not_allowed) census_.add(Happening::wrong_role);
     if (goodbye.code == GoodbyeCode::hub_full) census_.add(Happening::hub_full);
+    if (goodbye.code == GoodbyeCode::draining) census_.add(Happening::refused_draining);
     return;
   }
-  const bool about_room = goodbye.code == GoodbyeCode::hub_full || verdict.refusal == GoodbyeCode::hub_full;
-  broken(about_room ? Checker::limits : Checker::names,
+  broken(checker_of(goodbye.code, verdict.refusal),
          std::string{"a HELLO for the name "} + quoted(hello.hello.name) + " is refused with " +
              proto::goodbye_name(goodbye.code) + " (" + goodbye.sentence + "), where " +
              (verdict.refusal ? std::string{proto::goodbye_name(*verdict.refusal)} + " is due" : "it is to be let in"));
@@ -112,7 +122,7 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   const Verdict verdict = judge(hello);
   const std::uint32_t index = index_of(attach.node);
   if (verdict.refusal) {
-    broken(*verdict.refusal == GoodbyeCode::hub_full ? Checker::limits : Checker::names,
+    broken(checker_of(*verdict.refusal, verdict.refusal),
            "a HELLO for the name " + quoted(hello.hello.name) + " is let in as node " + std::to_string(index) +
                ", where " + proto::goodbye_name(*verdict.refusal) + " is due");
   }

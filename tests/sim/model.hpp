@@ -126,6 +126,10 @@ class Model final : public Witness {
   void ticked(milliseconds now);
   /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.
   void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
+  /// The hub drains from now on: nobody is let in.
+  void draining() { draining_ = true; }
+  /// An administrator asked for it.
+  [[nodiscard]] bool drain_wanted() const { return drain_wanted_; }
   /// What a RELOAD would read now; nothing: something is wrong with it.
   void configuration(const std::optional<hub::Limits>& limits) { configuration_ = limits; }
   [[nodiscard]] const hub::Limits& limits() const { return limits_; }
@@ -207,6 +211,7 @@ class Model final : public Witness {
   void judge_kick(const Asked& asked);
   void judge_reassign(const Asked& asked);
   void judge_reload(const Asked& asked);
+  void judge_drain(const Asked& asked);
   /// The index of a node that is there, also by one that it had before; 0: none.
   [[nodiscard]] std::uint32_t find_node(NodeId node);
   void kick(std::uint32_t index, milliseconds now);
@@ -261,6 +266,8 @@ class Model final : public Witness {
   std::optional<hub::Limits> configuration_;
   std::vector<DueEvent> due_;
   std::uint64_t orders_ = 0;
+  bool drain_wanted_ = false;
+  bool draining_ = false;
 };
 
 }  // namespace gimnet::sim

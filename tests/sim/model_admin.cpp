@@ -29,6 +29,7 @@ void Model::judge_admin(const Asked& asked, std::uint16_t operation) {
   }
   if (operation == ctrl::Kick::kOperation) return judge_kick(asked);
   if (operation == ctrl::Reassign::kOperation) return judge_reassign(asked);
+  if (operation == ctrl::Drain::kOperation) return judge_drain(asked);
   judge_reload(asked);
 }
 
@@ -123,6 +124,13 @@ std::vector<std::uint32_t> Model::former(std::uint32_t index) const {
     if (moved.index == index) found.push_back(each);
   }
   return found;
+}
+
+void Model::judge_drain(const Asked& asked) {
+  if (!proto::decode<ctrl::Drain>(asked.payload)) return require_status(asked, Status::bad_request, Checker::answers);
+  require_status(asked, Status::done, Checker::drain);
+  census_.add(Happening::drain_asked_for);
+  drain_wanted_ = true;
 }
 
 void Model::judge_reload(const Asked& asked) {

@@ -131,6 +131,7 @@ void Model::judge_control(const Asked& asked, std::uint16_t operation) {
       return judge_connections(asked);
     case ctrl::Kick::kOperation:
     case ctrl::Reassign::kOperation:
+    case ctrl::Drain::kOperation:
     case ctrl::Reload::kOperation:
       return judge_admin(asked, operation);
     default:

@@ -281,13 +281,15 @@ void SimNode::sees_the_end(const WirePointer& wire) {
   if (wire_ == wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
+    // Without a word the hub is not there; it may be soon.
+    const bool hub_ends = refused && link().told.value_or(GoodbyeCode::draining) == GoodbyeCode::draining;
     lose_connection();
     // Half of those who were kicked show their token all the same.
     if (std::exchange(was_kicked_, false) && around_.setting.random.chance(500)) forget_life();
     if (refused) give_up_others();
     const std::uint64_t soon_us = around_.setting.random.between(20'000, 600'000);
     not_before_ = around_.setting.agenda.now() + Time{refused ? 3 * soon_us : soon_us};
-    if (!refused) around_.setting.agenda.at(not_before_, [this] { act(); });
+    if (!refused || hub_ends) around_.setting.agenda.at(not_before_, [this] { act(); });
   } else {
     links_.erase(wire->number);
   }
@@ -303,6 +305,9 @@ void SimNode::on_link(const WirePointer& wire, std::span<const std::byte> payloa
   require(goodbye.has_value(), Checker::answers, "GOODBYE cannot be read");
   around_.setting.trace.note("node {a} is told GOODBYE {b} on wire {c}", number_,
                              static_cast<std::uint64_t>(goodbye->code), wire->number);
+  Link& from = links_.at(wire->number);
+  from.told = goodbye->code;
+  if (goodbye->code == GoodbyeCode::draining && from.welcomed) around_.setting.census.add(Happening::told_draining);
   if (wire != wire_) return;
   refusal_ = goodbye->code;
   was_kicked_ = goodbye->code == GoodbyeCode::kicked;

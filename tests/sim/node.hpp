@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -31,6 +32,8 @@ class SimNode {
 
   /// Begins to act, now or soon.
   void start();
+  /// Has the hub drained, if it is an administrator and can ask.
+  [[nodiscard]] bool order_drain();
   void hears(const WirePointer& wire, const Bytes& frame);
   void sees_the_end(const WirePointer& wire);
 
@@ -66,6 +69,7 @@ class SimNode {
   struct Link {
     WirePointer wire;
     bool welcomed = false;
+    std::optional<proto::GoodbyeCode> told;  ///< how the hub ended it
     NodeId id;
     std::map<std::uint16_t, Open> open;  ///< by request number
     std::uint16_t last_request = 0;

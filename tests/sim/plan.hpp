@@ -39,8 +39,9 @@ struct Plan {
   std::uint64_t bad_configuration = 0;  ///< of reloads
   std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
-  std::uint64_t disk_full = 0;  ///< of times that the hub keeps its state
-  std::uint32_t hub_kills = 0;  ///< in all
+  std::uint64_t disk_full = 0;   ///< of times that the hub keeps its state
+  std::uint32_t hub_kills = 0;   ///< in all
+  std::uint32_t hub_drains = 0;  ///< in all, the one at the end apart
 
   [[nodiscard]] static Plan draw(Random& random, std::size_t nodes);
 };

@@ -191,7 +191,14 @@ void SimShards::release(std::size_t index, hub::SessionRef session) {
   shards_[index].seats[session.slot.value()].reset();
 }
 
+/// What waits is written first, which takes a while; until then nodes go on asking.
 void SimShards::drain(std::size_t index) {
+  setting_.agenda.after(Time{setting_.random.between(1, 20'000)}, [this, index] {
+    if (!dead_) finish_drain(index);
+  });
+}
+
+void SimShards::finish_drain(std::size_t index) {
   for (const std::unique_ptr<Seat>& seat : shards_[index].seats) {
     if (seat == nullptr || !seat->wire) continue;
     flush(index, *seat);

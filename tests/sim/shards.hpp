@@ -119,6 +119,7 @@ class SimShards final : public hub::ShardProxy {
   void say(std::size_t shard, const hub::SendControlCommand& command);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
+  void finish_drain(std::size_t shard);
   void post_fence(std::size_t shard, std::uint32_t ticket);
   void read(std::size_t shard, Seat& seat);
   /// False: the connection has ended.

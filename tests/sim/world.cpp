@@ -24,7 +24,7 @@ World::World(const Options& options)
     nodes_.push_back(std::make_unique<SimNode>(around, i));
     nodes_.back()->start();
   }
-  plan_kills();
+  plan_endings();
 }
 
 void World::make_disk() {
@@ -65,22 +65,36 @@ void World::begin_life(Past past) {
                                     *start, std::move(past));
 }
 
-void World::plan_kills() {
+void World::plan_endings() {
+  const auto until = static_cast<std::uint64_t>(setting_.plan.faults_until.count());
   for (std::uint32_t i = 0; i < setting_.plan.hub_kills; ++i) {
-    const auto until = static_cast<std::uint64_t>(setting_.plan.faults_until.count());
     setting_.agenda.at(Time{setting_.random.between(until / 8, until)}, [this] { kill_hub(); });
+  }
+  for (std::uint32_t i = 0; i < setting_.plan.hub_drains; ++i) {
+    setting_.agenda.at(Time{setting_.random.between(until / 8, until)}, [this] { want_drain(); });
   }
 }
 
 void World::kill_hub() {
+  if (down_) return;
   setting_.trace.note("the hub is killed and starts again");
   setting_.census.add(Happening::hub_killed);
+  stop_hub();
+  start_hub();
+}
+
+void World::stop_hub() {
+  down_ = true;
   life_->shards().die();
   for (const HubLife::Newcomer& newcomer : newcomers_) network_.close_by_hub(newcomer.wire);
   newcomers_.clear();
   clock_.reset();
   clock_due_ = false;
   watches_due_ = false;
+}
+
+void World::start_hub() {
+  down_ = false;
   // What is still on its way to the old life finds its wires closed; the old shards stay until then.
   dead_.push_back(std::move(life_));
   Past past = dead_.back()->model().past();
@@ -93,9 +107,51 @@ void World::kill_hub() {
   begin_life(std::move(past));
 }
 
+void World::want_drain() {
+  if (down_ || life_->drains()) return;
+  const std::uint64_t first = setting_.random.below(nodes_.size());
+  const bool by_signal = setting_.random.chance(400);
+  for (std::size_t i = 0; i < nodes_.size() && !by_signal; ++i) {
+    if (nodes_[(first + i) % nodes_.size()]->order_drain()) return;
+  }
+  setting_.census.add(Happening::drain_by_signal);
+  begin_drain();
+}
+
+void World::begin_drain() {
+  setting_.trace.note("the hub drains");
+  life_->drain();
+  want_conductor(Time{0});
+}
+
+void World::look_at_drain() {
+  if (life_->conductor().drain_wanted() && !life_->drains()) {
+    // The other events of its batch come first.
+    for (auto shards = life_->shards().with_events(); !shards.empty() && setting_.random.chance(500);
+         shards = life_->shards().with_events()) {
+      ++steps_;
+      life_->take_event(setting_.random.pick(shards));
+    }
+    begin_drain();
+  }
+  if (!life_->conductor().drained()) return;
+  const auto& sessions = life_->model().sessions();
+  const bool all_gone =
+      std::none_of(sessions.begin(), sessions.end(), [](const auto& entry) { return entry.second.connected; });
+  require(all_gone, Checker::drain, "the hub ends before everybody has gone");
+  if (last_life_) return;
+  setting_.trace.note("the hub has drained and ends");
+  setting_.census.add(Happening::drained_in_life);
+  stop_hub();
+  setting_.agenda.after(Time{setting_.random.between(1'000, 500'000)}, [this] {
+    setting_.trace.note("the hub starts again");
+    start_hub();
+  });
+}
+
 void World::say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
   setting_.agenda.at(network_.arrival(wire->next_at_hub), [this, wire, hello, identity, life = lives_] {
-    if (life != lives_) return network_.close_by_hub(wire);
+    if (life != lives_ || down_) return network_.close_by_hub(wire);
     newcomers_.push_back({wire, hello, identity});
     want_conductor(Time{0});
   });
@@ -117,6 +173,7 @@ void World::want_conductor(Time delay) {
 }
 
 void World::conductor_turn() {
+  if (down_) return;
   enum class Choice { clock, newcomer, event, watches };
   std::vector<Choice> choices;
   const std::vector<std::size_t> shards = life_->shards().with_events();
@@ -138,6 +195,8 @@ void World::conductor_turn() {
       break;
     case Choice::event:
       life_->take_event(setting_.random.pick(shards));
+      look_at_drain();
+      if (down_) return;
       more_watching = life_->is_watched();
       break;
     case Choice::watches:
@@ -171,7 +230,7 @@ void World::arm_clock() {
   if (clock_ && *clock_ <= time) return;
   clock_ = time;
   setting_.agenda.at(time, [this, time, life = lives_] {
-    if (life != lives_ || clock_ != time) return;
+    if (life != lives_ || down_ || clock_ != time) return;
     clock_due_ = true;
     want_conductor(Time{0});
   });
@@ -183,7 +242,7 @@ Report World::run() {
   try {
     live();
     converge();
-    drain();
+    drain_for_good();
   } catch (const Broken& broken) {
     report.broken = broken;
     report.last = setting_.trace.last();
@@ -255,9 +314,9 @@ void World::require_agreed(const SimNode& node) const {
   }
 }
 
-void World::drain() {
-  setting_.trace.note("the hub drains");
-  life_->drain();
+void World::drain_for_good() {
+  last_life_ = true;
+  begin_drain();
   const Time latest = setting_.agenda.now() + 2s;
   while (!life_->conductor().drained() && setting_.agenda.step(latest)) {
   }

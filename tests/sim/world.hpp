@@ -43,7 +43,15 @@ class World {
   void make_disk();
   [[nodiscard]] std::string keep(const hub::HubState& state);
   void kill_hub();
-  void plan_kills();
+  void plan_endings();
+  /// Its process is gone.
+  void stop_hub();
+  void start_hub();
+  /// An administrator or a signal has the hub drain.
+  void want_drain();
+  void begin_drain();
+  /// What the conductor's loop does after events: begins to drain, or ends (hub/control/conductor_loop.cpp).
+  void look_at_drain();
   void say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity);
   void want_conductor(Time delay);
   /// One thing that the conductor does, out of those that wait for it.
@@ -54,7 +62,7 @@ class World {
   void converge();
   void require_served(const SimNode& node) const;
   void require_agreed(const SimNode& node) const;
-  void drain();
+  void drain_for_good();
 
   const Options options_;
   Setting setting_;
@@ -68,6 +76,8 @@ class World {
   bool clock_due_ = false;
   bool watches_due_ = false;
   std::optional<Time> clock_;  ///< when the conductor wants to look at it
+  bool down_ = false;          ///< no hub is there
+  bool last_life_ = false;     ///< it drains, and is not started again
   std::uint64_t lives_ = 0;
   std::uint64_t sessions_ = 0;
   std::uint64_t steps_ = 0;

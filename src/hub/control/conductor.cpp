@@ -75,7 +75,9 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
+#ifndef GIMNET_BUG_DRAINING_LETS_IN
   if (draining_) return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
+#endif
   JoinRequest request;
   request.role = hello.role;
   request.name = hello.name;
@@ -260,7 +262,10 @@ void Conductor::drain() {
   if (draining_) return;
   draining_ = true;
   shards_to_drain_ = facts_.shards;
-  for (std::size_t i = 0; i < facts_.shards; ++i) {
+#ifdef GIMNET_BUG_DRAIN_FORGETS_A_SHARD
+  --shards_to_drain_;
+#endif
+  for (std::size_t i = 0; i < shards_to_drain_; ++i) {
     wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, DrainCommand{limits_.drain_ms});
   }
 }
