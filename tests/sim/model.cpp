@@ -329,8 +329,9 @@ std::optional<milliseconds> Model::next_deadline() const {
   return next;
 }
 
+// A shard that has not heard yet that a node has another id says the former one.
 std::uint64_t Model::session_of(std::uint32_t index) const {
-  const auto found = sessions_.find(index);
+  const auto found = sessions_.find(present(index));
   return found == sessions_.end() ? 0 : found->second.number;
 }
 
@@ -341,7 +342,7 @@ bool Model::provides(std::uint32_t index, std::uint32_t group) const {
 
 bool Model::subscribes(std::uint32_t index, std::uint32_t group) const {
   const auto found = groups_.find(group);
-  return found != groups_.end() && found->second->second.subscribers.contains(index);
+  return found != groups_.end() && found->second->second.subscribers.contains(present(index));
 }
 
 std::vector<DueEvent> Model::take_due() {
