@@ -22,12 +22,15 @@ enum class Checker : std::uint8_t {
   limits,         ///< the limits hold, and nothing is refused below them
   grace,          ///< a session lasts while it is connected and through its grace time, and no longer
   seam,           ///< the commands to a shard make sense to it
+  pace,           ///< each subscriber gets no more than its terms allow, in order, and the shards know these
+  credit,         ///< a window is never exceeded, and nothing that is lost narrows it for good
+  retained,       ///< a new subscriber begins with the last message of a retained service
   drain,          ///< a hub that drains lets nobody in, has everybody told to go, and ends when they have gone
   convergence,    ///< when the faults stop everybody is served
 };
-inline constexpr std::array<std::string_view, 14> kCheckerNames = {
-    "names",   "ids",    "tokens", "right_session", "node_table", "group_table", "order",
-    "answers", "events", "limits", "grace",         "seam",       "drain",       "convergence"};
+inline constexpr std::array<std::string_view, 17> kCheckerNames = {
+    "names",  "ids",   "tokens", "right_session", "node_table", "group_table", "order", "answers",    "events",
+    "limits", "grace", "seam",   "pace",          "credit",     "retained",    "drain", "convergence"};
 [[nodiscard]] inline std::string_view name_of(Checker checker) {
   return kCheckerNames[static_cast<std::size_t>(checker)];
 }

@@ -36,6 +36,9 @@ DueEvent told_moved(const proto::Payload& payload, std::uint32_t to) {
   told.old_group = index_of(event->old_group);
   told.new_group = index_of(event->new_group);
   told.message_type = event->message_type;
+  told.delivery = event->delivery;
+  told.window = event->window;
+  told.retain = event->retain;
   return told;
 }
 
@@ -81,6 +84,7 @@ std::string Checks::stale() const {
     std::size_t count = 0;
     for (std::size_t i = 0; members != nullptr && i < members->by_shard.size(); ++i) {
       count += members->by_shard[i].size();
+      if (!members->paced_by_shard.empty()) count += members->paced_by_shard[i].size();
     }
     if (members == nullptr || count != topic->subscribers.size()) {
       return "an answer leaves before the table of groups is right";
@@ -99,6 +103,8 @@ void Checks::after_drain() const {
 }
 
 void Checks::after_step(milliseconds now) {
+  ++steps_;
+  touched_ = model_.take_touched();
   sessions();
   names();
   node_table();
@@ -106,6 +112,7 @@ void Checks::after_step(milliseconds now) {
   if (!out_of_order_.empty()) broken(Checker::order, out_of_order_);
   events();
   commands();
+  paces();
   deadline(now);
   require(conductor_->drain_wanted() == model_.drain_wanted(), Checker::drain,
           "the hub is to drain, and no administrator asked for it, or the reverse");
@@ -234,27 +241,44 @@ bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topi
   if (members->accepts != (topic->service->terms.direction == proto::ns::Direction::accepts)) return false;
   std::size_t count = 0;
   for (const auto& list : members->by_shard) count += list.size();
+  for (const auto& list : members->paced_by_shard) count += list.size();
   if (count != topic->subscribers.size()) return false;
-  return std::all_of(topic->subscribers.begin(), topic->subscribers.end(), [&](std::uint32_t index) {
-    const NodePlace place = subject_.nodes.find(index);
-    const hub::GroupMember* member = members->by_shard[place.shard.value()].find(place.slot);
-    return member != nullptr && member->generation == place.generation;
+  return std::all_of(topic->subscribers.begin(), topic->subscribers.end(), [&](const auto& subscriber) {
+    const NodePlace place = subject_.nodes.find(subscriber.first);
+    if (!Model::pace_of(*topic, subscriber.first)) {
+      const hub::GroupMember* member = members->by_shard[place.shard.value()].find(place.slot);
+      return member != nullptr && member->generation == place.generation;
+    }
+    if (members->paced_by_shard.empty()) return false;
+    const hub::PacedMember* member = members->paced_by_shard[place.shard.value()].find(place.slot);
+    return member != nullptr && member->generation == place.generation &&
+           member->was_plain == subscriber.second.once_plain;
   });
 }
 
-void Checks::group_table() const {
+void Checks::group_table() {
+  // All of them now and then, in case that something changes with nobody asking for it.
+  constexpr std::uint64_t kWhole = 32;
+  const bool whole = steps_ % kWhole == 0;
   for (const auto& [group, topic] : model_.groups()) {
-    if (!is_right(subject_.groups.find(group), &topic->second)) {
+    const hub::GroupMembers* members = subject_.groups.find(group);
+    const hub::GroupMembers*& seen = seen_[group];
+    if (!whole && seen == members && !touched_.contains(group)) continue;
+    seen = members;
+    if (!is_right(members, &topic->second)) {
       broken(Checker::group_table,
              "the table is wrong about group " + std::to_string(group) + ", '" + topic->first + "'");
     }
   }
-  for (const std::uint32_t group : model_.groups_given()) {
+  const auto gone = [this](std::uint32_t group) {
     const hub::GroupMembers* members = subject_.groups.find(group);
     if (members != nullptr && !members->ends() && !model_.groups().contains(group)) {
       broken(Checker::group_table, "the table has group " + std::to_string(group) + ", which nobody provides");
     }
-  }
+  };
+  for (const std::uint32_t group : touched_) gone(group);
+  if (!whole) return;
+  for (const std::uint32_t group : model_.groups_given()) gone(group);
 }
 
 void Checks::commands() {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <compare>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -35,8 +37,10 @@ class Checks {
   void sessions() const;
   void names() const;
   void node_table() const;
-  void group_table() const;
+  void group_table();
   void commands();
+  void paces();
+  void pace_of(std::uint32_t group, const Model::Topic& topic) const;
   void deadline(milliseconds now) const;
   /// "" or what a table says that the hub's own state does not.
   [[nodiscard]] std::string stale() const;
@@ -47,6 +51,23 @@ class Checks {
   const hub::Conductor* conductor_ = nullptr;
   std::string out_of_order_;
   std::map<std::uint32_t, hub::Place> places_;  ///< of the sessions that shards were given
+  std::set<std::uint32_t> touched_;             ///< groups that this step may have changed
+  /// Groups as they were published when they were right. What is published is never changed.
+  std::map<std::uint32_t, const hub::GroupMembers*> seen_;
+  std::uint64_t steps_ = 0;
+  /// A session, as commands name it.
+  struct Seat {
+    std::uint8_t shard = 0;
+    std::uint32_t slot = 0;
+    std::uint32_t generation = 0;
+    friend auto operator<=>(const Seat&, const Seat&) = default;
+  };
+  struct Pace {
+    hub::PaceTerms terms;
+    bool retained = false;
+    friend bool operator==(const Pace&, const Pace&) = default;
+  };
+  std::map<std::uint32_t, std::map<Seat, Pace>> paces_;  ///< by group, as the shards were told
 };
 
 }  // namespace gimnet::sim

@@ -340,6 +340,13 @@ bool Model::provides(std::uint32_t index, std::uint32_t group) const {
   return found != groups_.end() && found->second->second.service->provider == index;
 }
 
+std::uint64_t Model::retained_stream(std::uint32_t group) const {
+  const auto found = groups_.find(group);
+  if (found == groups_.end()) return 0;
+  const Service& service = *found->second->second.service;
+  return service.terms.retain ? service.stream : 0;
+}
+
 bool Model::subscribes(std::uint32_t index, std::uint32_t group) const {
   const auto found = groups_.find(group);
   return found != groups_.end() && found->second->second.subscribers.contains(present(index));

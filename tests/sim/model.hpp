@@ -31,6 +31,9 @@ struct DueEvent {
   std::uint32_t old_group = 0;  ///< or the group of SUBSCRIBER_...
   std::uint32_t new_group = 0;
   std::uint32_t message_type = 0;
+  proto::ns::Delivery delivery{};
+  std::uint32_t window = 0;  ///< in force
+  bool retain = false;
   std::uint32_t node = 0;         ///< SUBSCRIBER_...: who
   std::uint32_t subscribers = 0;  ///< SUBSCRIBER_...: now
   friend auto operator<=>(const DueEvent&, const DueEvent&) = default;
@@ -102,12 +105,30 @@ class Model final : public Witness {
     std::uint32_t group = 0;
     std::uint32_t provider = 0;
     proto::ns::Advertise terms;
+    std::uint64_t stream = 0;  ///< of all, never given twice: groups are
+  };
+  /// What a subscriber wants of a service at most; 0: without a bound.
+  struct Terms {
+    std::uint32_t window = 0;
+    std::uint32_t depth = 1;
+    std::uint32_t interval_us = 0;
+    friend bool operator==(const Terms&, const Terms&) = default;
+  };
+  struct Subscriber {
+    Terms terms;
+    // In the present group:
+    bool once_plain = false;  ///< it got everything, and is paced now
+    bool once_paced = false;  ///< it was paced and wants no bound any more: it stays so, without one
   };
   /// A full name that somebody provides or waits for.
   struct Topic {
     std::optional<Service> service;
-    std::set<std::uint32_t> subscribers;
+    std::map<std::uint32_t, Subscriber> subscribers;
   };
+  /// n of sync(n); 0: a service without.
+  [[nodiscard]] static std::uint32_t window_of(const proto::ns::Advertise& terms);
+  /// What the hub owes that subscriber; nothing: all that comes.
+  [[nodiscard]] static std::optional<Terms> pace_of(const Topic& topic, std::uint32_t subscriber);
   using Topics = std::map<std::string, Topic>;
 
   // What the conductor was told, and what it made of it
@@ -151,6 +172,8 @@ class Model final : public Witness {
   /// Group and node indices that were ever given out, in this order.
   [[nodiscard]] const std::vector<std::uint32_t>& groups_given() const { return groups_given_; }
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_given() const { return nodes_given_; }
+  /// Groups of which anything changed since this was last asked.
+  [[nodiscard]] std::set<std::uint32_t> take_touched() { return std::exchange(touched_, {}); }
   /// Whose session ended since this was last asked.
   [[nodiscard]] std::vector<std::uint32_t> take_ended() { return std::exchange(ended_, {}); }
   /// When something runs out next.
@@ -163,6 +186,7 @@ class Model final : public Witness {
   [[nodiscard]] std::uint64_t session_of(std::uint32_t index) const override;
   [[nodiscard]] bool provides(std::uint32_t index, std::uint32_t group) const override;
   [[nodiscard]] bool subscribes(std::uint32_t index, std::uint32_t group) const override;
+  [[nodiscard]] std::uint64_t retained_stream(std::uint32_t group) const override;
 
  private:
   /// What must become of a HELLO.
@@ -230,6 +254,11 @@ class Model final : public Witness {
   void judge_service_list(const Asked& asked);
   void judge_connections(const Asked& asked);
   void judge_advertise(const Asked& asked);
+  /// What is wrong with how a service is to be delivered.
+  [[nodiscard]] proto::Status judge_delivery(const proto::ns::Advertise& offer) const;
+  [[nodiscard]] bool terms_fit(const proto::ns::Subscribe& wanted) const;
+  void change_terms(Topic& topic, std::uint32_t subscriber, const Terms& terms);
+  void judge_subscribe_answer(const Asked& asked, const Topic& topic);
   void open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                   const proto::ns::Advertise& terms);
   void judge_withdraw(const Asked& asked);
@@ -256,6 +285,7 @@ class Model final : public Witness {
   std::vector<std::uint32_t> groups_given_;
   std::vector<std::uint32_t> nodes_given_;
   std::vector<std::uint32_t> ended_;
+  std::set<std::uint32_t> touched_;
   Past past_;                                          ///< of earlier lives, and the tokens of this one
   std::map<std::uint32_t, std::uint64_t> least_;       ///< index: sessions below that number are over for good
   std::map<std::uint32_t, milliseconds> resting_ids_;  ///< index: until when
@@ -266,6 +296,7 @@ class Model final : public Witness {
   std::optional<hub::Limits> configuration_;
   std::vector<DueEvent> due_;
   std::uint64_t orders_ = 0;
+  std::uint64_t streams_ = 0;
   bool drain_wanted_ = false;
   bool draining_ = false;
 };

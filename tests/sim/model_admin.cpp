@@ -98,11 +98,14 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
   least_[to] = std::max(least_[to], session.token_number);
   session.watches.clear();
   if (!session.name.empty()) names_[session.name] = to;
-  for (const auto& [full_name, life] : session.provides) topics_.at(full_name).service->provider = to;
+  for (const auto& [full_name, life] : session.provides) {
+    topics_.at(full_name).service->provider = to;
+    touched_.insert(topics_.at(full_name).service->group);
+  }
   for (const auto& [full_name, life] : session.subscribes) {
-    std::set<std::uint32_t>& subscribers = topics_.at(full_name).subscribers;
-    subscribers.erase(index);
-    subscribers.insert(to);
+    auto subscriber = topics_.at(full_name).subscribers.extract(index);
+    subscriber.key() = to;
+    topics_.at(full_name).subscribers.insert(std::move(subscriber));
     if (const Service* provided = service(full_name); provided != nullptr && provided->provider == to) continue;
     tell_provider(full_name, to, true);
     tell_provider(full_name, index, false);

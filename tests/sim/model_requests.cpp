@@ -202,7 +202,8 @@ void Model::judge_service_list(const Asked& asked) {
     require(record->group == group_id(entry->first) && record->name == full_name &&
                 record->node == id(service.provider) && record->message_type == service.terms.message_type &&
                 record->instance == service.terms.instance && record->delivery == service.terms.delivery &&
-                record->metadata == service.terms.metadata && record->subscribers == topic.subscribers.size(),
+                record->metadata == service.terms.metadata && record->subscribers == topic.subscribers.size() &&
+                record->window == window_of(service.terms) && record->retain == service.terms.retain,
             Checker::answers, "SERVICES says of a service what is not so");
     ++record;
   }

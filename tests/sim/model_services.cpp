@@ -1,7 +1,7 @@
 #include "proto/control/names.hpp"
 #include "tests/sim/model.hpp"
 
-// Services and subscriptions of the reference model.
+// Services of the reference model, and who hears of them.
 
 namespace gimnet::sim {
 
@@ -10,9 +10,15 @@ namespace ns = proto::ns;
 
 namespace {
 
+void count_delivery(const ns::Advertise& terms, Census& census) {
+  if (terms.delivery == ns::Delivery::latest) census.add(Happening::service_latest);
+  if (terms.delivery == ns::Delivery::sync) census.add(Happening::service_sync);
+  if (terms.retain) census.add(Happening::service_retained);
+}
+
 bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
   return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
-         a.delivery == b.delivery;
+         a.delivery == b.delivery && Model::window_of(a) == Model::window_of(b) && a.retain == b.retain;
 }
 
 bool same_terms(const ns::Advertise& a, const ns::Advertise& b) {
@@ -43,7 +49,8 @@ void Model::forget_if_unused(const std::string& full_name) {
 
 void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
                        const ns::Advertise& terms) {
-  for (const std::uint32_t subscriber : topics_.at(full_name).subscribers) {
+  const Topic& topic = topics_.at(full_name);
+  for (const auto& [subscriber, asked] : topic.subscribers) {
     DueEvent event;
     event.to = subscriber;
     event.operation = ns::ServiceMoved::kOperation;
@@ -51,6 +58,9 @@ void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, st
     event.old_group = old_group;
     event.new_group = new_group;
     event.message_type = terms.message_type;
+    event.delivery = terms.delivery;
+    event.retain = terms.retain;
+    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt) event.window = pace->window;
     due_.push_back(std::move(event));
   }
 }
@@ -71,6 +81,7 @@ void Model::withdraw(const std::string& full_name, milliseconds now) {
   const Service old = *entry.service;
   entry.service.reset();
   groups_.erase(old.group);
+  touched_.insert(old.group);
   rest(resting_groups_, old.group, now);
   sessions_.at(old.provider).provides.erase(full_name);
   if (!entry.subscribers.empty()) census_.add(Happening::service_withdrawn);
@@ -79,7 +90,9 @@ void Model::withdraw(const std::string& full_name, milliseconds now) {
 }
 
 void Model::unsubscribe(std::uint32_t index, const std::string& full_name) {
-  topics_.at(full_name).subscribers.erase(index);
+  Topic& topic = topics_.at(full_name);
+  topic.subscribers.erase(index);
+  if (topic.service) touched_.insert(topic.service->group);
   sessions_.at(index).subscribes.erase(full_name);
   tell_provider(full_name, index, false);
   forget_if_unused(full_name);
@@ -106,6 +119,10 @@ void Model::judge_advertise(const Asked& asked) {
   const std::string full_name = proto::join_service_name(session.name, offer->service);
   if (session.name.empty() || !proto::valid_service_name(offer->service) || !proto::valid_name(full_name)) {
     return require_status(asked, Status::bad_request, Checker::answers);
+  }
+  if (const Status status = judge_delivery(*offer); status != Status::done) {
+    census_.add(Happening::delivery_refused);
+    return require_status(asked, status, Checker::limits);
   }
   const Service* known = service(full_name);
   const bool said_before = known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
@@ -151,12 +168,16 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
   const std::uint32_t old_group = entry->second.service ? entry->second.service->group : 0;
   if (old_group != 0) {
     groups_.erase(old_group);
+    touched_.insert(old_group);
     rest(resting_groups_, old_group, asked.now);
   }
   if (!entry->second.subscribers.empty()) {
     census_.add(old_group != 0 ? Happening::service_moved : Happening::subscribed_before_service);
   }
-  entry->second.service = Service{group, asked.index, terms};
+  entry->second.service = Service{group, asked.index, terms, ++streams_};
+  for (auto& [index, subscriber] : entry->second.subscribers) subscriber.once_plain = subscriber.once_paced = false;
+  count_delivery(terms, census_);
+  touched_.insert(group);
   groups_[group] = &*entry;
   groups_given_.push_back(group);
   tell_moved(full_name, old_group, group, terms);
@@ -172,45 +193,6 @@ void Model::judge_withdraw(const Asked& asked) {
   if (entry.service->provider != asked.index) return require_status(asked, Status::denied, Checker::answers);
   require_status(asked, Status::done, Checker::answers);
   withdraw(std::string{full_name}, asked.now);
-}
-
-void Model::judge_subscribe(const Asked& asked) {
-  const auto wanted = proto::decode<ns::Subscribe>(asked.payload);
-  if (!wanted || !proto::valid_name(wanted->name)) return require_status(asked, Status::bad_request, Checker::answers);
-  Session& session = asked.session;
-  const bool fresh = !session.subscribes.contains(wanted->name);
-  if (fresh && !may_declare(asked, Happening::subscriptions_rate))
-    return require_status(asked, Status::rate, Checker::limits);
-  if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
-    census_.add(Happening::subscriptions_limit);
-    return require_status(asked, Status::limit, Checker::limits);
-  }
-  require_status(asked, Status::done, Checker::limits);
-  session.subscribes[wanted->name] = session.life;
-  if (fresh) {
-    topics_[wanted->name].subscribers.insert(asked.index);
-    tell_provider(wanted->name, asked.index, true);
-  }
-  const auto answer = proto::decode_answer<ns::SubscribeAnswer>(asked.answer);
-  const Service* provided = service(wanted->name);
-  require(answer.has_value() && index_of(answer->group) == (provided == nullptr ? 0 : provided->group),
-          Checker::answers, "SUBSCRIBE is answered with a wrong group");
-  if (provided != nullptr) {
-    const ns::Advertise& terms = provided->terms;
-    require(answer->message_type == terms.message_type && answer->instance == terms.instance &&
-                answer->delivery == terms.delivery,
-            Checker::answers, "SUBSCRIBE is answered with other terms than the provider's");
-  }
-}
-
-void Model::judge_unsubscribe(const Asked& asked) {
-  const auto wanted = proto::decode<ns::Unsubscribe>(asked.payload);
-  if (!wanted) return require_status(asked, Status::bad_request, Checker::answers);
-  if (!asked.session.subscribes.contains(wanted->name)) {
-    return require_status(asked, Status::not_found, Checker::answers);
-  }
-  require_status(asked, Status::done, Checker::answers);
-  unsubscribe(asked.index, wanted->name);
 }
 
 }  // namespace gimnet::sim

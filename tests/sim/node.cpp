@@ -202,6 +202,7 @@ void SimNode::forget_life() {
   if (!token_.empty()) old_token_ = std::exchange(token_, {});
   provides_.clear();
   subscribes_.clear();
+  windows_asked_.clear();
   known_.clear();
   view_ = {};
   wants_watch_ = false;
@@ -269,7 +270,7 @@ void SimNode::hears(const WirePointer& wire, const Bytes& frame) {
     require(header.dst == from.id.value(), Checker::right_session, "a node gets a control frame for another one");
     return on_control(from, payload);
   }
-  on_data(from, header);
+  on_data(from, header, frame);
 }
 
 void SimNode::sees_the_end(const WirePointer& wire) {
@@ -338,7 +339,7 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
 
 void SimNode::declare_again() {
   const std::map<std::string, Provided> provided = std::exchange(provides_, {});
-  const std::map<std::string, GroupId> subscribed = std::exchange(subscribes_, {});
+  const std::map<std::string, Subscribed> subscribed = std::exchange(subscribes_, {});
   for (const auto& [service, what] : provided) {
     if (faulty() && around_.setting.random.chance(100)) continue;
     if (registered_.empty()) continue;
@@ -346,12 +347,12 @@ void SimNode::declare_again() {
     offer.former_group = what.group;
     ask(offer, about(service, offer));
   }
-  for (const auto& [full_name, group] : subscribed) {
+  for (const auto& [full_name, before] : subscribed) {
     if (faulty() && around_.setting.random.chance(100)) {
       forgot_ = true;
       continue;
     }
-    ask(ns::Subscribe{full_name}, about(full_name));
+    subscribe(before.wanted);
   }
   if (wants_watch_) watch();
 }

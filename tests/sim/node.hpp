@@ -50,7 +50,11 @@ class SimNode {
     GroupId group;
   };
   [[nodiscard]] const std::map<std::string, Provided>& provides() const { return provides_; }  ///< by service
-  [[nodiscard]] const std::map<std::string, GroupId>& subscribes() const { return subscribes_; }
+  struct Subscribed {
+    proto::ns::Subscribe wanted;
+    GroupId group;  ///< 0 while nobody provides it
+  };
+  [[nodiscard]] const std::map<std::string, Subscribed>& subscribes() const { return subscribes_; }  ///< by full name
   /// What it knows by watching; nullptr if it does not watch.
   [[nodiscard]] const WatchView* view() const { return watches_ ? &view_ : nullptr; }
 
@@ -61,17 +65,30 @@ class SimNode {
     std::uint16_t operation = 0;
     std::string subject;
     proto::ns::Advertise offer;
+    proto::ns::Subscribe wanted;
   };
   [[nodiscard]] static Open about(std::string subject, proto::ns::Advertise offer = {}) {
-    return {{}, 0, std::move(subject), std::move(offer)};
+    return {{}, 0, std::move(subject), std::move(offer), {}};
   }
+  /// What came of a group by one connection.
+  struct Taken {
+    std::uint64_t messages = 0;
+    std::uint64_t credited = 0;
+    std::uint64_t last = 0;         ///< number of the last message
+    std::uint32_t window = 0;       ///< in force; 0: none, or not known yet
+    std::uint32_t window_most = 0;  ///< that may have been in force; 0: not known
+    bool retained = false;
+    bool credit_due = false;
+  };
   /// What belongs to one connection.
   struct Link {
     WirePointer wire;
     bool welcomed = false;
     std::optional<proto::GoodbyeCode> told;  ///< how the hub ended it
     NodeId id;
-    std::map<std::uint16_t, Open> open;  ///< by request number
+    std::map<std::uint16_t, Open> open;    ///< by request number
+    std::map<std::uint32_t, Taken> taken;  ///< by group
+    std::set<std::uint32_t> gone;          ///< groups that ended: what still comes of them counts no more
     std::uint16_t last_request = 0;
   };
   [[nodiscard]] Link& link() { return links_.at(wire_->number); }
@@ -97,7 +114,14 @@ class SimNode {
   void ask_about_names(std::uint64_t choice);
   void change_services(std::uint64_t choice);
   void advertise(const std::string& service, bool anew);
+  void draw_delivery(proto::ns::Advertise& offer);
+  [[nodiscard]] proto::ns::Subscribe some_subscription(const std::string& full_name);
+  void subscribe(const proto::ns::Subscribe& wanted);
   void send_something();
+  void send_message(proto::Kind kind, std::uint32_t dst, proto::Policy policy = proto::Policy::kind_default);
+  void publish(const Provided& service);
+  void tell_others(const std::string& full_name);
+  [[nodiscard]] std::string some_service(std::uint64_t number);
   void declare_again();
   void watch_or_rename(std::uint64_t choice);
   void watch();
@@ -119,8 +143,13 @@ class SimNode {
   void on_welcome(const WirePointer& wire, const proto::Welcome& welcome);
   void on_control(Link& from, std::span<const std::byte> payload);
   void on_answer(const Open& asked, std::span<const std::byte> payload);
-  void on_event(std::uint16_t operation, std::span<const std::byte> payload);
-  void on_data(const Link& from, const proto::FrameHeader& header);
+  void on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload);
+  void on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame);
+  void on_subscribed(const Open& asked, const proto::ns::SubscribeAnswer& answer);
+  void know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window, bool retained);
+  void take_message(Link& from, GroupId group, std::uint64_t message);
+  void credit(Link& from, GroupId group);
+  void credit_later(Link& from, GroupId group);
   void learn(NodeId node);
   [[nodiscard]] std::string some_name();
   [[nodiscard]] std::string some_pattern(bool of_services);
@@ -140,7 +169,8 @@ class SimNode {
   bool was_kicked_ = false;
   std::string registered_;  ///< the name that it has
   std::map<std::string, Provided> provides_;
-  std::map<std::string, GroupId> subscribes_;  ///< by full name; the group is 0 while nobody provides it
+  std::map<std::string, Subscribed> subscribes_;
+  std::map<std::string, std::set<std::uint32_t>> windows_asked_;  ///< ever, by full name
   // Of its connection
   WirePointer wire_;
   std::map<std::uint64_t, Link> links_;  ///< by wire; those that it replaced itself, too

@@ -38,7 +38,7 @@ void SimNode::flood() {
     if (with == 1) {
       advertise(service, true);
     } else if (with == 2) {
-      ask(ns::Subscribe{name + "/" + service}, about(name + "/" + service));
+      subscribe(ns::Subscribe{name + "/" + service});
     } else if (with == 3) {
       ask(proto::ctrl::Kick{id_, "it asks in vain"}, {}, proto::Kind::ctrl);
     } else {

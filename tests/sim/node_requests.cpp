@@ -83,10 +83,12 @@ void SimNode::change_services(std::uint64_t choice) {
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(provides_.size())));
     return ask(ns::Withdraw{entry->second.group}, about(entry->first));
   }
-  if (choice < 58) {
-    const std::string full_name = some_name() + "/s" + std::to_string(which % 4);
-    return ask(ns::Subscribe{full_name}, about(full_name));
+  if (choice < 48 && !subscribes_.empty()) {
+    auto entry = subscribes_.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.below(subscribes_.size())));
+    return subscribe(some_subscription(entry->first));
   }
+  if (choice < 58) return subscribe(some_subscription(some_service(which % 4)));
   if (choice < 63 && !subscribes_.empty()) {
     auto entry = subscribes_.begin();
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(subscribes_.size())));
@@ -103,46 +105,30 @@ void SimNode::change_services(std::uint64_t choice) {
   ask(wrong, about(wrong.service, wrong));
 }
 
-void SimNode::advertise(const std::string& service, bool anew) {
-  ns::Advertise offer;
-  offer.service = service;
-  // Two of eight take data, one of them among those that others subscribe to.
-  if (service == "s3" || service == "s7") offer.direction = ns::Direction::accepts;
-  const auto known = provides_.find(service);
-  if (known != provides_.end()) offer = known->second.offer;
-  offer.former_group = GroupId{};
-  if (anew) offer.message_type = static_cast<std::uint32_t>(around_.setting.random.below(4));
-  offer.metadata = around_.setting.random.chance(500) ? "about it" : "";
-  ask(offer, about(service, offer));
-}
-
 void SimNode::send_something() {
   Random& random = around_.setting.random;
-  const std::uint64_t content = random.next();
-  const auto payload = std::as_bytes(std::span{&content, 1});
   const std::uint64_t choice = random.below(10);
-  if (choice < 6) {
-    if (!known_.empty()) send(Kind::unicast, random.pick(known_).value(), payload);
+  if (choice < 5) {
+    if (!known_.empty()) send_message(Kind::unicast, random.pick(known_).value());
     return;
   }
   if (choice < 9 && !provides_.empty()) {
     auto entry = provides_.begin();
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(provides_.size())));
-    if (entry->second.group != GroupId{}) send(Kind::group, entry->second.group.value(), payload);
-    return;
+    return publish(entry->second);
   }
-  for (const auto& [full_name, group] : subscribes_) {
-    if (group == GroupId{}) continue;
+  for (const auto& [full_name, subscribed] : subscribes_) {
+    if (subscribed.group == GroupId{}) continue;
     // Only the provider may send to its subscribers; everybody may send to the provider, if its service takes data.
     const bool legal = random.chance(700);
-    return send(legal ? Kind::service : Kind::group, group.value(), payload);
+    return send_message(legal ? Kind::service : Kind::group, subscribed.group.value());
   }
 }
 
 void SimNode::on_control(Link& from, std::span<const std::byte> payload) {
   const auto view = proto::split_control(payload);
   require(view.has_value(), Checker::answers, "a control frame cannot be read");
-  if (!view->header.is_answer()) return on_event(view->header.operation, payload);
+  if (!view->header.is_answer()) return on_event(from, view->header.operation, payload);
   const auto asked = from.open.find(view->header.request);
   require(asked != from.open.end(), Checker::answers, "a node gets an answer to what it did not ask here");
   const Open open = asked->second;
@@ -179,11 +165,7 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
       }
       break;
     case ns::Subscribe::kOperation:
-      if (done) {
-        const GroupId group = proto::decode_answer<ns::SubscribeAnswer>(payload)->group;
-        subscribes_[asked.subject] = group;
-        known_groups_.insert(group.value());
-      }
+      if (done) on_subscribed(asked, *proto::decode_answer<ns::SubscribeAnswer>(payload));
       break;
     case ns::Unsubscribe::kOperation:
       if (done) subscribes_.erase(asked.subject);
@@ -194,7 +176,7 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
   }
 }
 
-void SimNode::on_event(std::uint16_t operation, std::span<const std::byte> payload) {
+void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload) {
   if (operation == ns::WatchEvents::kOperation) {
     on_watch_events(payload);
   } else if (operation == ns::ServiceMoved::kOperation) {
@@ -202,7 +184,10 @@ void SimNode::on_event(std::uint16_t operation, std::span<const std::byte> paylo
     require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
     known_groups_.insert(event->new_group.value());
     const auto subscribed = subscribes_.find(event->name);
-    if (subscribed != subscribes_.end()) subscribed->second = event->new_group;
+    if (subscribed != subscribes_.end()) subscribed->second.group = event->new_group;
+    from.taken.erase(event->old_group.value());
+    from.gone.insert(event->old_group.value());
+    if (event->new_group != GroupId{}) know_window(from, event->name, event->new_group, event->window, event->retain);
   } else if (operation == ns::SubscriberJoined::kOperation) {
     const auto event = proto::decode<ns::SubscriberJoined>(payload);
     require(event.has_value(), Checker::events, "SUBSCRIBER_JOINED cannot be read");
@@ -210,7 +195,7 @@ void SimNode::on_event(std::uint16_t operation, std::span<const std::byte> paylo
   }
 }
 
-void SimNode::on_data(const Link& from, const proto::FrameHeader& header) {
+void SimNode::on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame) {
   Census& census = around_.setting.census;
   if (header.kind == Kind::unicast) {
     require(header.dst == from.id.value() || former_ids_.contains(NodeId{header.dst}), Checker::right_session,
@@ -227,6 +212,7 @@ void SimNode::on_data(const Link& from, const proto::FrameHeader& header) {
                                   std::to_string(index_of(GroupId{header.dst})) + ", of which it was not told");
     }
     census.add(Happening::group_delivered);
+    take_message(from, GroupId{header.dst}, message_of(frame));
   } else if (header.kind == Kind::service) {
     census.add(Happening::service_frame_delivered);
   }

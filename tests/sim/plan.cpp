@@ -36,6 +36,9 @@ void draw_limits(Random& random, Plan& plan) {
   const std::uint64_t oddities = random.between(2, 6);
   if (strict) limits.oddities_burst = oddities;
   if (strict) limits.oddities_per_s = 1;
+  limits.sync_window = random.between(1, 5);
+  limits.subscription_depth = random.between(1, 4);
+  limits.subscription_rate_hz = 200;
   limits.watches = random.between(1, 3);
   limits.watches_per_node = random.between(1, 2);
   const bool forgetful = random.chance(500);
@@ -76,6 +79,12 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.rename = sometimes(random, 150);
   plan.slow_reader = sometimes(random, 400);
   plan.bad_configuration = sometimes(random, 500);
+  plan.latest = sometimes(random, 300);
+  plan.sync = sometimes(random, 600);
+  plan.retain = sometimes(random, 500);
+  plan.terms = sometimes(random, 500);
+  plan.late_credit = sometimes(random, 900);
+  plan.queue_messages = random.between(2, 64);
   plan.shard_pause = sometimes(random, 5);
   plan.conductor_pause = sometimes(random, 5);
   plan.disk_full = sometimes(random, 500);

@@ -37,6 +37,12 @@ struct Plan {
   std::uint64_t rename = 0;             ///< of HELLOs
   std::uint64_t slow_reader = 0;        ///< of nodes
   std::uint64_t bad_configuration = 0;  ///< of reloads
+  std::uint64_t latest = 0;             ///< of services
+  std::uint64_t sync = 0;               ///< of services
+  std::uint64_t retain = 0;             ///< of services
+  std::uint64_t terms = 0;              ///< of subscriptions: they want less than all
+  std::uint64_t late_credit = 0;        ///< of messages of sync services
+  std::uint64_t queue_messages = 0;     ///< of services, that wait for a node at most
   std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
   std::uint64_t disk_full = 0;   ///< of times that the hub keeps its state

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "tests/sim/agenda.hpp"
 #include "tests/sim/census.hpp"
 #include "tests/sim/plan.hpp"
@@ -18,6 +21,8 @@ struct Setting {
   Agenda agenda;
   Trace trace;
   Census census;
+  std::vector<std::string> offered;  ///< full names of services that nodes advertised, of which others hear
+  std::uint64_t messages = 0;        ///< that nodes sent: each says its number, so that their order can be checked
 };
 
 }  // namespace gimnet::sim

@@ -67,6 +67,10 @@ bool SimShards::handle(std::size_t index, Seat& seat, Bytes frame) {
     tell(index, seat, true, goodbye->code, goodbye->sentence);
     return false;
   }
+  if (header.kind == Kind::flow) {
+    on_credit(index, seat, frame);
+    return true;
+  }
   if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
     return handle_control(index, seat, std::move(frame));
   route(index, frame, false);
@@ -90,10 +94,21 @@ void SimShards::take_mail(std::size_t index) {
   for (std::size_t count = shard.mail.size(); count > 0; --count) {
     const Mail mail = std::move(shard.mail.front());
     shard.mail.pop_front();
-    if (mail.fence) {
-      push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::FencePassedEvent{*mail.fence}});
-    } else {
-      route(index, mail.frame, true);
+    switch (mail.kind) {
+      case hub::MailKind::fence:
+        push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::FencePassedEvent{mail.fence}});
+        break;
+      case hub::MailKind::start_wanted:
+        on_start_wanted(index, mail.start);
+        break;
+      case hub::MailKind::start:
+        on_start(mail.start);
+        break;
+      case hub::MailKind::retained:
+        on_handed(mail.start, mail.frame);
+        break;
+      default:
+        route(index, mail.frame, true);
     }
   }
 }
@@ -102,9 +117,13 @@ void SimShards::post_fence(std::size_t index, std::uint32_t ticket) {
   const hub::Fence fence{ShardIndex{static_cast<std::uint8_t>(index)}, ticket};
   for (std::size_t other = 0; other < shards_.size(); ++other) {
     if (other == index) continue;
-    shards_[other].mail.push_back({{}, fence});
-    want_turn(other);
+    post(other, {.kind = hub::MailKind::fence, .frame = {}, .fence = fence});
   }
+}
+
+void SimShards::post(std::size_t index, Mail mail) {
+  shards_[index].mail.push_back(std::move(mail));
+  want_turn(index);
 }
 
 void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
@@ -129,8 +148,7 @@ void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t nod
   if (place.shard.value() != index) {
     if (handed_over) return;
     setting_.census.add(Happening::unicast_across_shards);
-    shards_[place.shard.value()].mail.push_back({frame});
-    return want_turn(place.shard.value());
+    return post(place.shard.value(), {.frame = frame});
   }
   Seat* seat = find(index, place.slot, place.generation);
   if (seat != nullptr) deliver(index, *seat, frame, meant);
@@ -150,17 +168,39 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   members->by_shard[index].for_each([&](const GroupMember& member) {
     Seat* seat = find(index, member.slot, member.generation);
     if (seat == nullptr) return;
-    const std::uint32_t node = index_of(seat->node);
-    require(witness_->subscribes(node, group), Checker::right_session,
-            "a frame of a service goes to a node that has not subscribed to it");
-    deliver(index, *seat, frame, witness_->session_of(node));
+    require_subscribed(*seat, group);
+    deliver(index, *seat, frame, witness_->session_of(index_of(seat->node)));
   });
+  const bool paced = !members->paced_by_shard.empty();
+  if (paced) to_paced(index, frame, members->paced_by_shard[index]);
   if (handed_over) return;
   for (std::size_t other = 0; other < shards_.size(); ++other) {
-    if (other == index || members->by_shard[other].empty()) continue;
-    shards_[other].mail.push_back({frame});
-    want_turn(other);
+    const bool any = !members->by_shard[other].empty() || (paced && !members->paced_by_shard[other].empty());
+    if (other != index && any) post(other, {.frame = frame});
   }
+  if (members->retain) keep_last(index, frame);
+  if (const std::uint64_t stream = witness_->retained_stream(group)) last_[group] = {stream, message_of(frame)};
+}
+
+void SimShards::to_paced(std::size_t index, const Bytes& frame, const hub::MemberList<hub::PacedMember>& members) {
+  const GroupId group{proto::load_header(frame.data()).dst};
+  members.for_each([&](const hub::PacedMember& member) {
+    Seat* seat = find(index, member.slot, member.generation);
+    if (seat == nullptr) return;
+    require_subscribed(*seat, index_of(group));
+    const std::uint64_t session = witness_->session_of(index_of(seat->node));
+    Pace* pace = find_pace(*seat, group);
+    if (pace != nullptr && pace->counts.active) {
+      static_cast<void>(offer(index, *seat, *pace, {frame, session}));
+    } else if (member.was_plain) {
+      deliver(index, *seat, frame, session);
+    }
+  });
+}
+
+void SimShards::require_subscribed(const Seat& seat, std::uint32_t group) const {
+  require(witness_->subscribes(index_of(seat.node), group), Checker::right_session,
+          "a frame of a service goes to a node that has not subscribed to it");
 }
 
 void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
@@ -171,15 +211,58 @@ void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_o
 }
 
 void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {
-  if (for_session == 0) broken(Checker::right_session, "a frame for a node that is not there waits for another one");
-  if (seat.number != for_session)
-    broken(Checker::right_session, "a frame waits for another session than the one it is for");
+  require_for(seat, for_session);
   if (!seat.wire && !seat.waits_when_away) {
     setting_.census.add(Happening::unicast_dropped_away);
     return;
   }
-  seat.data.push_back({frame, for_session});
+  push(index, seat, {frame, for_session});
+}
+
+void SimShards::require_for(const Seat& seat, std::uint64_t session) {
+  require(session != 0, Checker::right_session, "a frame for a node that is not there waits for another one");
+  require(seat.number == session, Checker::right_session, "a frame waits for another session than the one it is for");
+}
+
+void SimShards::push(std::size_t index, Seat& seat, Data data) {
+  const std::vector<GroupId> lost = make_room(seat, proto::load_header(data.frame.data()));
+  seat.data.push_back(std::move(data));
   want_flush(index, seat);
+  for (const GroupId group : lost) {
+    Pace* pace = find_pace(seat, group);
+    if (pace == nullptr) continue;
+    pace->counts.on_lost(1);
+    setting_.census.add(Happening::paced_message_lost);
+    release_held(index, seat, *pace);
+  }
+}
+
+/// What goes for what comes: an older LATEST message of the same stream, full or not, or the oldest of a service at a
+/// full queue. Returns their groups.
+std::vector<GroupId> SimShards::make_room(Seat& seat, const proto::FrameHeader& header) {
+  std::vector<GroupId> lost;
+  if (header.kind != Kind::group) return lost;
+  std::size_t groups = 0;
+  for (auto entry = seat.data.begin(); entry != seat.data.end();) {
+    const proto::FrameHeader waiting = proto::load_header(entry->frame.data());
+    const bool same = waiting.kind == header.kind && waiting.dst == header.dst && waiting.src == header.src;
+    if (same && header.policy() == proto::Policy::latest && waiting.policy() == proto::Policy::latest) {
+      setting_.census.add(Happening::latest_replaced);
+      lost.push_back(GroupId{waiting.dst});
+      entry = seat.data.erase(entry);
+      continue;
+    }
+    groups += waiting.kind == Kind::group ? 1 : 0;
+    ++entry;
+  }
+  if (groups < setting_.plan.queue_messages) return lost;
+  const auto oldest = std::find_if(seat.data.begin(), seat.data.end(), [](const Data& each) {
+    return proto::load_header(each.frame.data()).kind == Kind::group;
+  });
+  setting_.census.add(Happening::oldest_dropped);
+  lost.push_back(GroupId{proto::load_header(oldest->frame.data()).dst});
+  seat.data.erase(oldest);
+  return lost;
 }
 
 void SimShards::want_flush(std::size_t index, Seat& seat) {

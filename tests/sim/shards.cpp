@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/endian.hpp"
+
 namespace gimnet::sim {
 
 using hub::AttachCommand;
@@ -24,6 +26,8 @@ Bytes link_frame(NodeId to, HubId hub, const proto::Payload& payload) {
   header.src = make_id<NodeId>(hub, kHubIndex).value();
   return frame_of(header, payload);
 }
+
+std::uint64_t message_of(const Bytes& frame) { return load_le<std::uint64_t>(frame.data() + proto::kHeaderSize); }
 
 SimShards::SimShards(Setting& setting, Parts parts)
     : setting_(setting), parts_(std::move(parts)), shards_(parts_.shards) {}
@@ -111,10 +115,19 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
   } else if (const auto* renumbered = std::get_if<hub::RenumberCommand>(&command)) {
     Seat* seat = find(index, renumbered->session.slot, renumbered->session.generation);
     require(seat != nullptr, Checker::seam, "a session gets another id that the shard does not know");
+    for (auto& [group, kept] : shards_[index].kept) {
+      if (kept.provider == seat->node) kept.provider = renumbered->node;
+    }
     seat->node = renumbered->node;
     if (seat->wire) close(index, *seat, GoodbyeCode::renumbered, renumbered->sentence.c_str());
   } else if (const auto* released = std::get_if<hub::ReleaseCommand>(&command)) {
     release(index, released->session);
+  } else if (const auto* pace = std::get_if<hub::PaceCommand>(&command)) {
+    begin_pace(index, *pace);
+  } else if (const auto* ended = std::get_if<hub::EndPaceCommand>(&command)) {
+    end_pace(index, *ended);
+  } else if (const auto* forget = std::get_if<hub::ForgetRetainedCommand>(&command)) {
+    shards_[index].kept.erase(forget->group.value());
   } else if (const auto* fence = std::get_if<hub::FenceCommand>(&command)) {
     post_fence(index, fence->ticket);
   } else if (std::holds_alternative<hub::DrainCommand>(command)) {
@@ -167,6 +180,7 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   wire->shard = index;
   wire->slot = command.session.slot.value();
   parts_.network.to_node(wire, link_frame(command.node, parts_.hub, proto::encode(command.welcome)));
+  count_anew(index, seat);
   if (!wire->at_hub.empty() || wire->end_arrived) has_something(*wire);
   if (!wire->node_open) setting_.census.add(Happening::hello_of_the_dead);
   if (!wire->node_open && !wire->end_arrived) set_mute(wire, true);
@@ -188,6 +202,7 @@ void SimShards::release(std::size_t index, hub::SessionRef session) {
   require(seat != nullptr, Checker::seam, "a session is released that the shard does not know");
   setting_.trace.note("shard {a} releases slot {b}", index, session.slot.value());
   if (seat->wire) detach(*seat, proto::Goodbye{GoodbyeCode::kicked, "the session is over"});
+  std::erase_if(shards_[index].kept, [seat](const auto& entry) { return entry.second.provider == seat->node; });
   shards_[index].seats[session.slot.value()].reset();
 }
 
@@ -224,6 +239,7 @@ void SimShards::detach(Seat& seat, std::optional<proto::Goodbye> told) {
   seat.control.clear();
   if (seat.waits_when_away) return;
   if (!seat.data.empty()) setting_.census.add(Happening::frames_lost_with_connection);
+  for (auto& [group, pace] : seat.paces) pace->held.clear();
   seat.data.clear();
 }
 

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -9,6 +10,8 @@
 
 #include "hub/concurrent/quiescence.hpp"
 #include "hub/control/shard_proxy.hpp"
+#include "hub/data/fanout/mailbox.hpp"
+#include "hub/data/fanout/recipient.hpp"
 #include "hub/data/route/group_table.hpp"
 #include "hub/data/route/node_table.hpp"
 #include "proto/frame/frame_header.hpp"
@@ -26,6 +29,8 @@ class Witness {
   /// Does the group exist, and does that node send to it?
   [[nodiscard]] virtual bool provides(std::uint32_t index, std::uint32_t group) const = 0;
   [[nodiscard]] virtual bool subscribes(std::uint32_t index, std::uint32_t group) const = 0;
+  /// Which stream of messages that group carries now, if its last message is to be kept; 0: none.
+  [[nodiscard]] virtual std::uint64_t retained_stream(std::uint32_t group) const = 0;
 };
 
 /// The shards of a hub as the conductor sees them: commands are carried out in order, at any time later; events come
@@ -73,11 +78,22 @@ class SimShards final : public hub::ShardProxy {
   /// Nothing waits to be done.
   [[nodiscard]] bool idle() const;
   [[nodiscard]] std::size_t connected() const;
+  /// All that was sent was taken and credited, nothing is held, and nothing is kept of services that are gone.
+  void require_at_rest() const;
 
  private:
   struct Data {
     Bytes frame;
     std::uint64_t for_session = 0;
+  };
+  /// A paced subscription. What may go when is decided by the hub's own counts; the frames wait here.
+  struct Pace {
+    Pace(hub::Recipient& nobody, GroupId group, const hub::PaceTerms& terms) : counts(nobody, group, terms) {}
+    hub::PacedSubscription counts;
+    std::deque<Data> held;
+    // For the checker of rates, since its terms changed
+    std::uint64_t begun = 0;
+    Time first{};
   };
   /// A session on its shard, and its connection while it has one.
   struct Seat {
@@ -91,12 +107,20 @@ class SimShards final : public hub::ShardProxy {
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
     std::deque<Data> data;
+    std::map<std::uint32_t, std::unique_ptr<Pace>> paces;  ///< by group
     bool ready = false;
     bool flush_due = false;
   };
   struct Mail {
+    hub::MailKind kind = hub::MailKind::frames;
     Bytes frame;
-    std::optional<hub::Fence> fence = std::nullopt;  ///< instead of a frame
+    hub::Fence fence{};
+    hub::GroupStart start{};
+  };
+  /// The last message of a retained group, on its provider's shard.
+  struct Kept {
+    NodeId provider;
+    Bytes frame;
   };
   struct Shard {
     std::deque<hub::ShardCommand> commands;
@@ -105,6 +129,7 @@ class SimShards final : public hub::ShardProxy {
     std::vector<std::unique_ptr<Seat>> seats;  ///< by slot
     std::vector<bool> used;                    ///< by slot: somebody had it before
     std::vector<std::uint32_t> ready;          ///< slots to be read
+    std::map<std::uint32_t, Kept> kept;        ///< by group
     bool turn_due = false;
   };
 
@@ -134,7 +159,35 @@ class SimShards final : public hub::ShardProxy {
   void to_node(std::size_t shard, const Bytes& frame, std::uint32_t index, bool handed_over);
   void to_group(std::size_t shard, const Bytes& frame, bool handed_over);
   void to_provider(std::size_t shard, const Bytes& frame, bool handed_over);
+  void to_paced(std::size_t shard, const Bytes& frame, const hub::MemberList<hub::PacedMember>& members);
+  void require_subscribed(const Seat& seat, std::uint32_t group) const;
   void deliver(std::size_t shard, Seat& seat, const Bytes& frame, std::uint64_t for_session);
+  static void require_for(const Seat& seat, std::uint64_t session);
+  void push(std::size_t shard, Seat& seat, Data data);
+  [[nodiscard]] std::vector<GroupId> make_room(Seat& seat, const proto::FrameHeader& header);
+  void post(std::size_t shard, Mail mail);
+
+  // Pace: as hub/data/fanout/pacer.hpp and retained_messages.hpp do it, for messages of one frame
+  void begin_pace(std::size_t shard, const hub::PaceCommand& command);
+  void end_pace(std::size_t shard, const hub::EndPaceCommand& command);
+  [[nodiscard]] static Pace* find_pace(const Seat& seat, GroupId group);
+  /// False: it is not for this subscriber.
+  bool offer(std::size_t shard, Seat& seat, Pace& pace, Data data);
+  void hold(Pace& pace, Data data);
+  void pass(std::size_t shard, Seat& seat, Pace& pace, Data data);
+  void release_held(std::size_t shard, Seat& seat, Pace& pace);
+  void wait_until_due(std::size_t shard, Seat& seat, Pace& pace);
+  void on_credit(std::size_t shard, Seat& seat, const Bytes& frame);
+  /// The counts of its connection begin at 0.
+  void count_anew(std::size_t shard, Seat& seat);
+  void keep_last(std::size_t shard, const Bytes& frame);
+  void ask_start(std::size_t shard, const Seat& seat, Pace& pace);
+  void on_start_wanted(std::size_t shard, const hub::GroupStart& start);
+  void require_last(const hub::GroupStart& start, const Kept* kept) const;
+  [[nodiscard]] Pace* pace_of(const hub::GroupStart& start);
+  void on_start(const hub::GroupStart& start);
+  void on_handed(const hub::GroupStart& start, const Bytes& frame);
+
   void want_flush(std::size_t shard, Seat& seat);
   void flush(std::size_t shard, Seat& seat);
   [[nodiscard]] Seat* find(std::size_t shard, ConnectionSlot slot, std::uint32_t generation);
@@ -144,11 +197,21 @@ class SimShards final : public hub::ShardProxy {
   const Witness* witness_ = nullptr;
   std::vector<Shard> shards_;
   std::vector<Sent> sent_;
+  /// The last message of each retained group that was routed, and of which stream: what a new subscriber is owed.
+  struct Last {
+    std::uint64_t stream = 0;
+    std::uint64_t message = 0;
+  };
+  std::map<std::uint32_t, Last> last_;  ///< by group index
+  std::uint32_t starts_ = 0;            ///< asked for
+  hub::Recipient nobody_;               ///< for the counts, which do not deliver
   bool dead_ = false;
 };
 
 /// A whole frame; the header's length is filled in.
 [[nodiscard]] Bytes frame_of(proto::FrameHeader header, std::span<const std::byte> payload);
+/// The number that a message between nodes says: a later one has a larger one.
+[[nodiscard]] std::uint64_t message_of(const Bytes& frame);
 /// A whole LINK frame from the hub.
 [[nodiscard]] Bytes link_frame(NodeId to, HubId hub, const proto::Payload& payload);
 

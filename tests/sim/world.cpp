@@ -262,6 +262,7 @@ void World::live() {
 /// The faults stopped long ago: everybody who can be served is.
 void World::converge() {
   require(newcomers_.empty() && life_->shards().idle(), Checker::convergence, "something waits to be done for ever");
+  life_->shards().require_at_rest();
   require(!life_->conductor().has_garbage(), Checker::convergence, "lists that nobody reads any more are not freed");
   std::set<std::uint32_t> up;
   for (const auto& node : nodes_) {
@@ -304,11 +305,11 @@ void World::require_agreed(const SimNode& node) const {
                       topic->service->group == index_of(provided.group);
     if (!same) broken(Checker::convergence, "node " + std::to_string(index) + " is wrong about its service " + service);
   }
-  for (const auto& [full_name, group] : node.subscribes()) {
+  for (const auto& [full_name, subscribed_to] : node.subscribes()) {
     const Model::Topic* topic = model.topic(full_name);
     const bool subscribed = topic != nullptr && topic->subscribers.contains(index);
     const std::uint32_t right = subscribed && topic->service ? topic->service->group : 0;
-    if (!subscribed || index_of(group) != right) {
+    if (!subscribed || index_of(subscribed_to.group) != right) {
       broken(Checker::convergence, "node " + std::to_string(index) + " is wrong about the service " + full_name);
     }
   }

@@ -275,7 +275,7 @@ def planted_bugs_are_listed(tree):
     simulated = set()
     for number, line in _list_entries(tree, SIMULATED_LIST):
         words = line.split()
-        source = tree.file(f"src/hub/control/{words[1]}") if len(words) >= 3 else None
+        source = tree.file(f"src/hub/{words[1]}") if len(words) >= 3 else None
         if source is None or words[0] not in _PLANTED.findall(source.text):
             yield f"{SIMULATED_LIST}:{number}: a line is BUG SOURCE CHECKER, and SOURCE mentions GIMNET_BUG_<BUG>"
         simulated.add(words[0])

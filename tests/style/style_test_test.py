@@ -196,10 +196,10 @@ CASES = {
     rules.planted_bugs_are_listed: (
         [{"src/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.PLANTED_LIST: "# list\nA a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(b/a_fuzz.cpp DEPENDS c)\n"},
          {"src/a.cpp": "#ifdef GIMNET_BUG_SLOW_A\n", rules.PLANTED_SLOW_LIST: "SLOW_A parser\n"},
-         {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A a.cpp names\n"}],
+         {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A control/a.cpp names\n"}],
         [
-            {"src/hub/control/a.cpp": "", rules.SIMULATED_LIST: "A a.cpp names\n"},
-            {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A b.cpp names\nA a.cpp names\n"},
+            {"src/hub/control/a.cpp": "", rules.SIMULATED_LIST: "A control/a.cpp names\n"},
+            {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A control/b.cpp names\nA control/a.cpp names\n"},
             {"src/a.cpp": "#ifdef GIMNET_BUG_SLOW_A\n", rules.PLANTED_SLOW_LIST: "SLOW_B parser\n"},
             {"src/a.cpp": "#ifdef GIMNET_BUG_A\n"},
             {rules.PLANTED_LIST: "A a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},

@@ -100,7 +100,11 @@ void EffectRunner::run(const ServiceMovedDue& effect) {
 void EffectRunner::run(const PaceDue& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;
+#ifdef GIMNET_BUG_WINDOW_NOT_TOLD
+  const PaceTerms terms{0, effect.terms.depth, effect.terms.interval_us};
+#else
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
+#endif
   parts_.shards.send(session->place.shard, PaceCommand{ref_of(session->place), group_id(effect.group), terms,
                                                        effect.retained, effect.was_plain});
 }
@@ -118,6 +122,9 @@ void EffectRunner::run(const PaceEnded& effect) {
 void EffectRunner::run(const RetainedDropped& effect) {
   const Session* session = find(effect.provider);
   if (session == nullptr) return;  // what its shard keeps of it ends with it
+#ifdef GIMNET_BUG_LAST_MESSAGE_STAYS
+  return;
+#endif
   parts_.shards.send(session->place.shard, ForgetRetainedCommand{group_id(effect.group)});
 }
 

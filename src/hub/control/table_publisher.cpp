@@ -34,7 +34,9 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     members->provider = make_id<NodeId>(hub_, topic->service->provider);
     members->provider_shard = provider->place.shard;
     members->by_shard.resize(shards_);
+#ifndef GIMNET_BUG_RETAIN_NOT_PUBLISHED
     members->retain = topic->service->terms.retain;
+#endif
     members->accepts =
         static_cast<proto::ns::Direction>(topic->service->terms.direction) == proto::ns::Direction::accepts;
     for (const std::uint32_t subscriber : topic->subscribers) {
