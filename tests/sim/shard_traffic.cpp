@@ -30,7 +30,7 @@ void SimShards::serve_one(std::size_t index) {
   Seat* seat = shard.seats[slot].get();
   if (seat == nullptr) return;
   seat->ready = false;
-  if (seat->wire) read(index, *seat);
+  if (seat->wire && !shard.draining) read(index, *seat);
 }
 
 void SimShards::read(std::size_t index, Seat& seat) {
@@ -97,6 +97,10 @@ void SimShards::take_mail(std::size_t index) {
     switch (mail.kind) {
       case hub::MailKind::fence:
         push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::FencePassedEvent{mail.fence}});
+        break;
+      case hub::MailKind::last:
+        ++shards_[index].lasts;
+        end_drain_if_all(index);
         break;
       case hub::MailKind::start_wanted:
         on_start_wanted(index, mail.start);

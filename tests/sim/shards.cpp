@@ -206,8 +206,18 @@ void SimShards::release(std::size_t index, hub::SessionRef session) {
   shards_[index].seats[session.slot.value()].reset();
 }
 
-/// What waits is written first, which takes a while; until then nodes go on asking.
+/// Nothing more is read, but what other shards still hand over is written.
 void SimShards::drain(std::size_t index) {
+  shards_[index].draining = true;
+  for (std::size_t other = 0; other < shards_.size(); ++other) {
+    if (other != index) post(other, {.kind = hub::MailKind::last, .frame = {}});
+  }
+  end_drain_if_all(index);
+}
+
+void SimShards::end_drain_if_all(std::size_t index) {
+  const Shard& shard = shards_[index];
+  if (!shard.draining || shard.lasts + 1 < shards_.size()) return;
   setting_.agenda.after(Time{setting_.random.between(1, 20'000)}, [this, index] {
     if (!dead_) finish_drain(index);
   });

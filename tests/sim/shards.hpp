@@ -131,6 +131,8 @@ class SimShards final : public hub::ShardProxy {
     std::vector<std::uint32_t> ready;          ///< slots to be read
     std::map<std::uint32_t, Kept> kept;        ///< by group
     bool turn_due = false;
+    bool draining = false;
+    std::size_t lasts = 0;  ///< other shards that drain, too, and of which everything came
   };
 
   void want_turn(std::size_t shard);
@@ -144,6 +146,8 @@ class SimShards final : public hub::ShardProxy {
   void say(std::size_t shard, const hub::SendControlCommand& command);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
+  /// When each other shard has handed over its last.
+  void end_drain_if_all(std::size_t shard);
   void finish_drain(std::size_t shard);
   void post_fence(std::size_t shard, std::uint32_t ticket);
   void read(std::size_t shard, Seat& seat);
