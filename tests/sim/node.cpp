@@ -282,15 +282,16 @@ void SimNode::sees_the_end(const WirePointer& wire) {
   if (wire_ == wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
-    // Without a word the hub is not there; it may be soon.
-    const bool hub_ends = refused && link().told.value_or(GoodbyeCode::draining) == GoodbyeCode::draining;
+    // Without a word the hub is not there; it may be soon. A bad name it says in error only.
+    const GoodbyeCode told = link().told.value_or(GoodbyeCode::draining);
+    const bool soon_again = refused && (told == GoodbyeCode::draining || told == GoodbyeCode::bad_name);
     lose_connection();
     // Half of those who were kicked show their token all the same.
     if (std::exchange(was_kicked_, false) && around_.setting.random.chance(500)) forget_life();
     if (refused) give_up_others();
     const std::uint64_t soon_us = around_.setting.random.between(20'000, 600'000);
     not_before_ = around_.setting.agenda.now() + Time{refused ? 3 * soon_us : soon_us};
-    if (!refused || hub_ends) around_.setting.agenda.at(not_before_, [this] { act(); });
+    if (!refused || soon_again) around_.setting.agenda.at(not_before_, [this] { act(); });
   } else {
     links_.erase(wire->number);
   }
@@ -331,6 +332,8 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
     // With a token it may be the same session under another id, with all that it had subscribed to.
     if (token_.empty()) forgot_ = false;
   }
+  // What waited for it may be of a group that began and ended while it was away.
+  forgot_ = forgot_ || (resumes_ && !token_.empty());
   token_ = welcome.token;
   id_ = welcome.node;
   registered_ = welcome.name;

@@ -183,6 +183,8 @@ void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std:
     const auto event = proto::decode<ns::ServiceMoved>(payload);
     require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
     known_groups_.insert(event->new_group.value());
+    // It may not have heard of the former one: what told it was lost with a connection, and what came of it waits.
+    known_groups_.insert(event->old_group.value());
     const auto subscribed = subscribes_.find(event->name);
     if (subscribed != subscribes_.end()) subscribed->second.group = event->new_group;
     from.taken.erase(event->old_group.value());
