@@ -103,7 +103,7 @@ Inbound::Verdict feed(Inbound& inbound, std::span<const std::byte> bytes, std::s
     const std::size_t size = std::min({step, space.size(), bytes.size()});
     std::memcpy(space.data(), bytes.data(), size);
     bytes = bytes.subspan(size);
-    verdict = inbound.take(size, 1);
+    verdict = inbound.take(size, {1, 1});
   }
   return verdict;
 }

@@ -1,13 +1,20 @@
 #!/usr/bin/env python3
 """Receivers that are slow, stopped, or that flood each other: nobody else notices."""
 
+import json
+import pathlib
 import signal
 import struct
 import subprocess
+import sys
+import tempfile
 import threading
 import time
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+
+from rate_proxy import RateProxy
 from support.pacing import ByteReader, SlowReader
 from support.processes import GIMNET, Hub, run_gimnet, start_gimnet, start_recv
 from support.waiting import PATIENCE_S, wait_until
@@ -194,6 +201,31 @@ class Latest(unittest.TestCase):
         self.assertEqual(pub.wait(), 0, pub.err)
         self.assertEqual(numbers, sorted(set(numbers)))
         self.assertGreater(hub.counter("dropped.replaced"), 0)
+
+
+class LargeMessage(unittest.TestCase):
+    LANE_BYTES = 1536 * 1024  # lane1_bytes: beyond it senders are told to pause
+
+    def test_waits_with_its_sender_and_not_in_the_hub(self):
+        """16 MiB on a way of 16 Mbit/s: the receiver lets the sender no further ahead than that carries."""
+        hub = Hub(self)
+        proxy = RateProxy(hub.port, down_bits_per_s=16e6)
+        self.addCleanup(proxy.close)
+        receiver = start_gimnet(self, proxy, "recv", "--name", "B", "--raw", "-n", "1")
+        hub.wait_for_node("B")
+        queued = []
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(bytes(16 << 20))
+            file.flush()
+            sender = start_gimnet(self, hub, "send", "B", "--file", file.name)
+            while sender.popen.poll() is None:
+                connections = json.loads(run_gimnet(hub, "ctl", "connections", "--json").out)
+                queued.append(max(connection["queued_bytes"] for connection in connections))
+            self.assertEqual(sender.wait(), 0, sender.err)
+        self.assertEqual(receiver.wait(), 0, receiver.err)
+        self.assertEqual(receiver.out_size, (16 << 20) + 1, "the payload and a newline")
+        self.assertLessEqual(max(queued), self.LANE_BYTES)
+        self.assertLessEqual(hub.counter("pauses"), 2)
 
 
 class Floods(unittest.TestCase):

@@ -72,9 +72,9 @@ std::span<std::byte> Inbound::space() {
   return {slab_->bytes() + filled_, Slab::kBytes - filled_};
 }
 
-Inbound::Verdict Inbound::take(std::size_t bytes, std::int64_t arrival_ns) {
+Inbound::Verdict Inbound::take(std::size_t bytes, const Arrival& arrival) {
   filled_ += bytes;
-  arrival_ns_ = arrival_ns;
+  arrival_ = arrival;
   Verdict verdict = Verdict::going;
   while (verdict == Verdict::going) {
     const auto next = proto::next_run(slab_->bytes() + parsed_, slab_->bytes() + filled_, proto::kFrameLengthDefault);
@@ -165,7 +165,7 @@ Inbound::Verdict Inbound::take_message(const proto::FrameView& view, const std::
 }
 
 Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std::byte* frame) {
-  MessageAssembler::Step step = assembler_.take(view);
+  MessageAssembler::Step step = assembler_.take(view, arrival_.steady_ns);
   proto::Reassembled& reassembled = step.reassembled;
   if (step.notice) host_.send_taken(step.notice->to, step.notice->taken);
   if (reassembled.lost_messages > 0) {
@@ -183,7 +183,7 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     return Verdict::going;
   }
   auto record = std::make_unique<Record>();
-  record->incoming = incoming_of({nullptr, frame, arrival_ns_, 0, 0});
+  record->incoming = incoming_of({nullptr, frame, arrival_.wall_ns, 0, 0});
   record->payload = std::move(reassembled.storage);
   record->extensions.assign(view.extensions.begin(), view.extensions.end());
   record->incoming.epoch = epoch_of(view.header);
@@ -195,7 +195,7 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
 }
 
 void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
-  batch_.push_back({slab_, frame, arrival_ns_, view.header.frame_size(), epoch_of(view.header)});
+  batch_.push_back({slab_, frame, arrival_.wall_ns, view.header.frame_size(), epoch_of(view.header)});
   slab_->add_reference();
   ++counts_.messages;
 }
@@ -205,7 +205,7 @@ std::uint32_t Inbound::epoch_of(const proto::FrameHeader& header) {
 }
 
 void Inbound::add_record(Record* record, std::size_t bytes) {
-  record->incoming.arrival_ns = arrival_ns_;
+  record->incoming.arrival_ns = arrival_.wall_ns;
   batch_.push_back(item_of(record, bytes));
 }
 

@@ -69,8 +69,13 @@ class Inbound {
 
   /// Where the next bytes go, at least one frame's worth. Empty: no memory. Valid until: take().
   [[nodiscard]] std::span<std::byte> space();
+  /// When bytes were read from the socket.
+  struct Arrival {
+    std::int64_t wall_ns = 0;    ///< wall_now_ns(), for the program
+    std::int64_t steady_ns = 0;  ///< steady_now_ns(), for intervals
+  };
   /// `bytes` were written to space().
-  [[nodiscard]] Verdict take(std::size_t bytes, std::int64_t arrival_ns);
+  [[nodiscard]] Verdict take(std::size_t bytes, const Arrival& arrival);
 
   /// Data frames of this epoch taken so far.
   [[nodiscard]] std::uint64_t taken() const { return taken_; }
@@ -129,7 +134,7 @@ class Inbound {
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;
   std::uint64_t confirm_bytes_ = UINT64_MAX;
-  std::int64_t arrival_ns_ = 0;
+  Arrival arrival_;
   std::vector<Item> batch_;
   proto::Goodbye goodbye_;
   std::string fault_;

@@ -1,12 +1,7 @@
 #include "client/nif/message_assembler.hpp"
 
-#include <algorithm>
-
 namespace gimnet::nif {
 namespace {
-
-/// A window grows to this while its message comes without a gap: several round trips' worth at a gigabit.
-constexpr std::uint32_t kWindowMax = 8 * 1024 * 1024;
 
 std::uint64_t window_key(const proto::FrameHeader& header, std::uint32_t message) {
   return (static_cast<std::uint64_t>(header.src) << 32) | message;
@@ -19,32 +14,36 @@ bool has_window(const proto::FrameView& view) {
 
 }  // namespace
 
-std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view, std::uint32_t taken) {
+std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view, std::uint32_t taken,
+                                                       std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
   const std::uint64_t key = window_key(view.header, fragment.message);
   auto found = windows_.find(key);
   if (found == windows_.end()) {
     // Messages that ended without a word to this end leave their windows behind; those that go on get theirs again.
     if (windows_.size() >= limits_.streams_max) windows_.clear();
-    found = windows_.emplace(key, OpenMessage{.progress = {fragment.message, fragment.total}}).first;
+    found = windows_.emplace(key, OpenMessage{.progress = {fragment.message, fragment.total}, .tuning = {}}).first;
   }
   OpenMessage& open = found->second;
-  auto notice = open.progress.on_received(taken);
-  if (notice) {
-    open.window = std::min(open.window * 2, kWindowMax);
-    open.progress.set_window(open.window);
+  std::optional<proto::Taken> notice;
+  open.tuning.on_received(taken, now_ns);
+  if (open.progress.due(taken)) {
+    open.tuning.on_taken(taken, now_ns);
+    open.progress.set_window(open.tuning.window());
+    notice = open.progress.tell(taken);
   }
   if (taken == fragment.total) windows_.erase(found);
   return notice;
 }
 
-MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view) {
+MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
   Step step{reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload), std::nullopt};
   using State = proto::Reassembled::State;
   if (!has_window(view)) return step;
   if (step.reassembled.state == State::part || step.reassembled.state == State::whole) {
-    if (const auto taken = progress(view, step.reassembled.taken)) step.notice = Notice{view.header.src, *taken};
+    if (const auto taken = progress(view, step.reassembled.taken, now_ns))
+      step.notice = Notice{view.header.src, *taken};
     return step;
   }
   windows_.erase(window_key(view.header, fragment.message));

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "client/nif/window_tuning.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "proto/frame/reassembler.hpp"
 #include "proto/frame/taken.hpp"
@@ -28,8 +29,8 @@ class MessageAssembler {
     proto::Reassembled reassembled;
     std::optional<Notice> notice;
   };
-  /// REQUIRES: view.fragment.
-  [[nodiscard]] Step take(const proto::FrameView& view);
+  /// `now_ns`: steady_now_ns() when it was read. REQUIRES: view.fragment.
+  [[nodiscard]] Step take(const proto::FrameView& view, std::int64_t now_ns);
 
   /// A frame without fragment header came in that stream. Returns messages lost by it.
   [[nodiscard]] std::uint32_t interrupt(const proto::FrameHeader& header) {
@@ -46,10 +47,11 @@ class MessageAssembler {
 
  private:
   struct OpenMessage {
-    std::uint32_t window = proto::kWindowDefault;
     proto::ReceiveWindow progress;
+    WindowTuning tuning;
   };
-  [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view, std::uint32_t taken);
+  [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view, std::uint32_t taken,
+                                                     std::int64_t now_ns);
 
   const proto::ReassemblyLimits limits_;
   proto::Reassembler reassembler_;

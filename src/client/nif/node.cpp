@@ -140,7 +140,7 @@ bool Node::take_over(Admitted admitted, bool first) {
     declarations_.declare_again();
     watches_.declare_again();
   }
-  const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), wall_now_ns());
+  const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), {wall_now_ns(), steady_now_ns()});
   return verdict == Inbound::Verdict::going;
 }
 

@@ -89,7 +89,7 @@ void Node::read_some(std::int64_t now) {
     return;
   }
   last_heard_ns_ = now;
-  const Inbound::Verdict verdict = inbound_.take(result.bytes, wall_now_ns());
+  const Inbound::Verdict verdict = inbound_.take(result.bytes, {wall_now_ns(), now});
   {
     const MutexLock lock(mutex_);
     bytes_received_ += result.bytes;

@@ -69,12 +69,21 @@ class ReceiveWindow {
 
   /// `taken` is what was received of the message in total, as Reassembled says.
   [[nodiscard]] std::optional<Taken> on_received(std::uint32_t taken) {
-    if (taken < total_ && taken - told_ < std::max(window_ / 4, 1u)) return std::nullopt;
+    if (!due(taken)) return std::nullopt;
+    return tell(taken);
+  }
+  /// Should the sender be told that so many were received?
+  [[nodiscard]] bool due(std::uint32_t taken) const {
+    return taken >= total_ || taken - told_ >= std::max(window_ / 4, 1u);
+  }
+  /// What to tell it.
+  [[nodiscard]] Taken tell(std::uint32_t taken) {
     told_ = taken;
     return current(taken);
   }
 
-  /// Opens or narrows the window from the next TAKEN on; what was allowed once stays allowed.
+  /// Opens or narrows the window; what was allowed once stays allowed. Only between due() and tell(): with a window
+  /// that nobody was told of, none might be due again.
   void set_window(std::uint32_t window) { window_ = std::max(window, 1u); }
 
   /// The answer to a message that is too large to take.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 namespace gimnet::nif::test {
 namespace {
@@ -21,33 +22,66 @@ proto::FrameView piece(std::uint32_t message, std::uint32_t offset, std::uint32_
   return view;
 }
 
-TEST(MessageAssembler, TheWindowGrowsWhileAMessageComesWhole) {
-  MessageAssembler assembler({});
+/// Takes a large message of which a piece comes each so many ns. Returns what was told of it.
+std::vector<proto::Taken> take_paced(MessageAssembler& assembler, std::int64_t piece_ns) {
   const std::string payload(kPiece, 'x');
-  std::uint32_t notices = 0;
-  std::uint32_t window = 0;
+  std::vector<proto::Taken> told;
+  std::int64_t now_ns = 0;
   for (std::uint32_t offset = 0; offset < kLarge; offset += kPiece) {
-    const auto step = assembler.take(piece(1, offset, kLarge, payload));
+    const auto step = assembler.take(piece(1, offset, kLarge, payload), now_ns += piece_ns);
     if (!step.notice) continue;
-    ++notices;
     EXPECT_EQ(step.notice->to, kSender);
-    window = std::max(window, step.notice->taken.allowed - step.notice->taken.taken);
+    told.push_back(step.notice->taken);
   }
-  EXPECT_GT(window, proto::kWindowDefault);
-  EXPECT_LT(notices, 16u) << "fewer as the window grows";
+  return told;
+}
+
+TEST(MessageAssembler, TheWindowGrowsWhereMessagesComeFast) {
+  MessageAssembler assembler({});
+  const auto told = take_paced(assembler, 30'000);
+  std::uint32_t window = 0;
+  for (const proto::Taken& taken : told) window = std::max(window, taken.allowed - taken.taken);
+  EXPECT_GE(window, 4 * proto::kWindowDefault);
+  EXPECT_LT(told.size(), 16u) << "fewer as the window grows";
+}
+
+TEST(MessageAssembler, TheWindowIsNarrowWhereMessagesComeSlowly) {
+  MessageAssembler assembler({});
+  const auto told = take_paced(assembler, 32'000'000);  // 8 Mbit/s
+  for (const proto::Taken& taken : told) {
+    EXPECT_LE(taken.allowed - taken.taken, proto::kWindowDefault);
+    if (taken.taken < kLarge / 2) continue;
+    EXPECT_LE(taken.allowed - taken.taken, 400u * 1024) << taken.taken;
+    EXPECT_TRUE(taken.allowed == kLarge || taken.allowed - taken.taken >= kPiece) << "the next piece may come";
+  }
+  EXPECT_EQ(told.back().taken, kLarge);
+}
+
+TEST(MessageAssembler, TheSenderOfAMessageIsNeverLeftWaiting) {
+  for (const std::int64_t piece_ns : {0, 1'000, 1'000'000, 100'000'000, 2'000'000'000}) {
+    MessageAssembler assembler({});
+    const std::string payload(kPiece, 'x');
+    std::uint32_t allowed = proto::kWindowDefault;
+    std::int64_t now_ns = 0;
+    for (std::uint32_t offset = 0; offset < kLarge; offset += kPiece) {
+      ASSERT_GE(allowed, offset + kPiece) << piece_ns;
+      const auto step = assembler.take(piece(1, offset, kLarge, payload), now_ns += piece_ns);
+      if (step.notice) allowed = std::max(allowed, step.notice->taken.allowed);
+    }
+  }
 }
 
 TEST(MessageAssembler, SmallMessagesAndOtherKindsNeedNoWindow) {
   MessageAssembler assembler({});
-  EXPECT_FALSE(assembler.take(piece(1, 0, 6, "abcdef")).notice);
-  EXPECT_FALSE(assembler.take(piece(2, 0, proto::kWindowDefault, "abc")).notice);
-  EXPECT_FALSE(assembler.take(piece(3, 0, kLarge, "abc", proto::Kind::group)).notice);
+  EXPECT_FALSE(assembler.take(piece(1, 0, 6, "abcdef"), 1).notice);
+  EXPECT_FALSE(assembler.take(piece(2, 0, proto::kWindowDefault, "abc"), 1).notice);
+  EXPECT_FALSE(assembler.take(piece(3, 0, kLarge, "abc", proto::Kind::group), 1).notice);
 }
 
 TEST(MessageAssembler, TellsTheSenderThatAMessageIsLost) {
   MessageAssembler assembler({});
-  static_cast<void>(assembler.take(piece(1, 0, kLarge, "abc")));
-  const auto step = assembler.take(piece(1, 5, kLarge, "gap"));
+  static_cast<void>(assembler.take(piece(1, 0, kLarge, "abc"), 1));
+  const auto step = assembler.take(piece(1, 5, kLarge, "gap"), 1);
   EXPECT_EQ(step.reassembled.lost_messages, 1u);
   ASSERT_TRUE(step.notice);
   EXPECT_TRUE(step.notice->taken.refuses());
@@ -55,8 +89,8 @@ TEST(MessageAssembler, TellsTheSenderThatAMessageIsLost) {
 
 TEST(MessageAssembler, ClearingTellsTheSendersOfLargeMessages) {
   MessageAssembler assembler({});
-  static_cast<void>(assembler.take(piece(4, 0, kLarge, "abc")));
-  static_cast<void>(assembler.take(piece(5, 0, 10, "abc", proto::Kind::service)));
+  static_cast<void>(assembler.take(piece(4, 0, kLarge, "abc"), 1));
+  static_cast<void>(assembler.take(piece(5, 0, 10, "abc", proto::Kind::service), 1));
   const auto lost = assembler.clear();
   EXPECT_EQ(lost.messages, 2u);
   ASSERT_EQ(lost.notices.size(), 1u);
@@ -67,7 +101,7 @@ TEST(MessageAssembler, ClearingTellsTheSendersOfLargeMessages) {
 TEST(MessageAssembler, WindowsOfHostileSendersAreBounded) {
   MessageAssembler assembler({.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20, .streams_max = 8});
   for (std::uint32_t message = 1; message < 1000; ++message) {
-    static_cast<void>(assembler.take(piece(message, 0, kLarge, "x")));
+    static_cast<void>(assembler.take(piece(message, 0, kLarge, "x"), 1));
   }
   EXPECT_LE(assembler.clear().notices.size(), 8u);
 }

@@ -76,6 +76,16 @@ TEST(ReceiveWindow, NeverTakesBackWhatItAllowed) {
   EXPECT_EQ(window.on_received(5000), (Taken{9, 5000, 5100}));
 }
 
+TEST(ReceiveWindow, MayChangeBetweenDueAndTell) {
+  ReceiveWindow window(9, 10'000, 400);
+  EXPECT_FALSE(window.due(99));
+  ASSERT_TRUE(window.due(100));
+  window.set_window(4000);
+  EXPECT_EQ(window.tell(100), (Taken{9, 100, 4100})) << "although a quarter of the new one did not come";
+  EXPECT_FALSE(window.due(1099));
+  EXPECT_TRUE(window.due(1100));
+}
+
 TEST(Windows, BringAGibibyteThrough) {
   SendWindow sender(9, kMessageBytesMax);
   ReceiveWindow receiver(9, kMessageBytesMax);

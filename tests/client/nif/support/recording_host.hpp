@@ -83,7 +83,7 @@ struct Receiving {
       const std::size_t size = std::min({step, space.size(), bytes.size()});
       std::memcpy(space.data(), bytes.data(), size);
       bytes = bytes.subspan(size);
-      verdict = inbound.take(size, 1);
+      verdict = inbound.take(size, {1, 1});
     }
     return verdict;
   }

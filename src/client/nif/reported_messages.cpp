@@ -1,0 +1,37 @@
+#include "client/nif/reported_messages.hpp"
+
+#include "base/endian.hpp"
+#include "proto/frame/fragment_header.hpp"
+
+namespace gimnet::nif {
+
+void ReportedMessages::remember(std::uint32_t number, Outgoing& message) {
+  if (messages_.empty()) messages_.resize(kMessagesMax);
+  Message& place = messages_[number % kMessagesMax];
+  const proto::FrameHeader& header = message.parts().header;
+  place.number = number;
+  place.dst = header.dst;
+  place.kind = header.kind;
+  message.write_start(place.start);
+}
+
+std::optional<std::uint32_t> ReportedMessages::number_of(const proto::Report& report) {
+  const proto::FrameHeader& header = report.header;
+  if (!header.has(proto::kFlagFragment) || header.has(proto::kFlagExt) || header.kind == proto::Kind::list) {
+    return std::nullopt;
+  }
+  if (report.following.size() < proto::kFragmentHeaderSize) return std::nullopt;
+  return load_le<std::uint32_t>(report.following.data());
+}
+
+std::optional<ReportedMessages::Start> ReportedMessages::find(const proto::Report& report) const {
+  const auto number = number_of(report);
+  if (!number || *number == 0 || messages_.empty()) return std::nullopt;
+  const Message& found = messages_[*number % kMessagesMax];
+  if (found.number != *number || found.dst != report.header.dst || found.kind != report.header.kind) {
+    return std::nullopt;
+  }
+  return found.start;
+}
+
+}  // namespace gimnet::nif
