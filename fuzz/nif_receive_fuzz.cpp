@@ -54,7 +54,10 @@ class Witness final : public InboundHost {
     note("taken " + std::to_string(taken.message));
     outbound_.on_taken(from, taken);
   }
-  bool on_report(const proto::Report& report) override { return outbound_.on_report(report.header, report.reason); }
+  bool on_report(const proto::Report& report) override { return outbound_.on_report(report); }
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) override {
+    return outbound_.message_of(report);
+  }
   void send_taken(std::uint32_t to, const proto::Taken& taken) override {
     note("tell " + std::to_string(to) + " " + std::to_string(taken.message) + " " + std::to_string(taken.taken) + " " +
          std::to_string(taken.allowed));

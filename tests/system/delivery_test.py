@@ -2,6 +2,7 @@
 """A robot's log by `gimnet send` arrives in `gimnet recv` in order, byte for byte, and the ledger is exact."""
 
 import json
+import signal
 import subprocess
 import tempfile
 import threading
@@ -177,6 +178,22 @@ class Losses(unittest.TestCase):
         self.assertEqual(sent.code, 1)
         self.assertIn("not acknowledged", sent.err)
         self.assertIn("the hub reports", sent.err)
+
+    def test_send_gives_the_hubs_reason_for_messages_of_every_size(self):
+        """The receiver stands still until the hub has given up what waited for it."""
+        hub = Hub(self, "--limit", "block_ms=300", "--limit", "slow_consumer_ms=600000", "--limit", "silent_ms=600000",
+                  "--limit", "socket_send_bytes=16384")
+        for size in (4000, 6000, 60000):
+            with self.subTest(size=size):
+                before = hub.counter("dropped.timed_out")
+                receiver = start_recv(self, hub, f"B{size}")
+                receiver.signal(signal.SIGSTOP)
+                sender = start_gimnet(self, hub, "send", f"B{size}", stdin=subprocess.PIPE)
+                sender.feed((b"x" * size + b"\n") * 200)
+                wait_until(lambda: hub.counter("dropped.timed_out") > before, "the hub to give up")
+                receiver.signal(signal.SIGCONT)
+                self.assertEqual(sender.wait(), 1, sender.err)
+                self.assertIn("the hub reports timed_out", sender.err)
 
     def test_send_stops_at_a_loss_although_its_input_goes_on(self):
         hub = Hub(self)

@@ -74,8 +74,8 @@ class AckReceipt final : public Receipt {
   const std::uint32_t sequence_;
 };
 
-/// The GIMI header in the 16 bytes that a report repeats: behind the key, where no extension or fragment header stands
-/// before it.
+/// The GIMI header in the 16 bytes that a report repeats: behind the key, where nothing stands before it. NIF takes the
+/// fragment header away of what it remembers.
 std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
   constexpr std::size_t kKeySize = 8;
   const auto bytes = payload_of(in);
@@ -332,7 +332,8 @@ void Core::on_report(const nif_incoming& in) {
   const auto header = reported_header(in);
   const bool to_service = in.kind == NIF_SERVICE;
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
-  StreamTable::Report report{name, in.reason, in.count, 0, in.text};
+  const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;
+  StreamTable::Report report{name, keyed, in.reason, in.count, 0, in.text};
   if (header && header->operation == proto::gimi::Operation::data) report.sequence = header->sequence;
   if (header && header->operation == proto::gimi::Operation::ping) {
     pings_.on_lost(header->sequence, report_words(report.text));

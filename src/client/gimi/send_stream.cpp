@@ -163,8 +163,9 @@ void SendStream::settle_freed(const SendWindow::Freed& freed, const std::string&
 
 bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const MutexLock lock(mutex_);
-  settle_freed(window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns()),
-               "the receiver answered a later question, but did not get them");
+  const SendWindow::Freed freed = window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
+  settle_freed(freed, doubt_.empty() ? "the receiver answered a later question, but did not get them" : doubt_);
+  if (freed.lost != 0 || window_.empty()) doubt_.clear();
   return held_ && window_.has_room();
 }
 
@@ -173,8 +174,10 @@ void SendStream::on_lost(std::uint32_t sequence, const std::string& why) {
   settle_freed(window_.lose(sequence), why);
 }
 
-void SendStream::on_doubt() {
+void SendStream::on_doubt(const std::string& why) {
   const MutexLock lock(mutex_);
+  // The first reason counts: what is reported after it may be its consequence.
+  if (doubt_.empty() && !window_.empty()) doubt_ = why;
   window_.hurry();
 }
 

@@ -65,8 +65,8 @@ class SendStream {
   [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
   /// One message is known to be lost.
   void on_lost(std::uint32_t sequence, const std::string& why) GIMNET_EXCLUDES(mutex_);
-  /// Messages may be lost: ask.
-  void on_doubt() GIMNET_EXCLUDES(mutex_);
+  /// Messages may be lost, and that is why: ask.
+  void on_doubt(const std::string& why) GIMNET_EXCLUDES(mutex_);
   /// What waits is lost, or nobody will ever tell.
   void on_broken(const std::string& why) GIMNET_EXCLUDES(mutex_);
   /// The service is somewhere else now: what waits for an ACK from its former place gets none any more.
@@ -113,6 +113,8 @@ class SendStream {
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;    ///< one thread is between a sequence and NIF
   bool unflushed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< NIF holds messages back because of More::yes
   bool watched_ GIMNET_GUARDED_BY(mutex_) = false;
+  /// What the hub reported since it was asked last; "": nothing.
+  std::string doubt_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

@@ -113,11 +113,17 @@ void StreamTable::on_report(const Report& report) {
     }
     return;
   }
+  if (!report.has_key && report.name.group == 0) {
+    for (SendStream* stream : all()) {
+      if (stream->to() == report.name.peer) stream->on_doubt(why);
+    }
+    return attend_(true);
+  }
   SendStream* stream = find(report.name);
   if (stream == nullptr) return;
   if (report.sequence != 0) stream->on_lost(report.sequence, why);
   if (report.sequence != 0 && report.count == 1) return;
-  stream->on_doubt();
+  stream->on_doubt(why);
   attend_(true);
 }
 

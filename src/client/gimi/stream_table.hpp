@@ -39,6 +39,7 @@ class StreamTable final : public StreamKeeper {
   /// What the hub says of a frame of this node that it could not deliver.
   struct Report {
     StreamName name;
+    bool has_key = true;  ///< false: it may be any stream to that peer; of a group there is one
     std::uint32_t reason = 0;
     std::uint64_t count = 1;
     std::uint32_t sequence = 0;  ///< of the DATA; 0: not known

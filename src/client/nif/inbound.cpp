@@ -1,5 +1,6 @@
 #include "client/nif/inbound.hpp"
 
+#include <array>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -327,9 +328,15 @@ Inbound::Verdict Inbound::take_name_event(proto::ns::Operation operation, std::s
 }
 
 Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
-  const auto report = proto::decode_report(view.payload);
+  auto report = proto::decode_report(view.payload);
   if (!report) return malformed("REPORT is too short");
   if (host_.on_report(*report)) return Verdict::going;
+  // As if the message had come in one frame: programs know of no fragments.
+  const auto start = host_.message_of(*report);
+  if (start) {
+    report->header.flags &= static_cast<std::uint8_t>(~proto::kFlagFragment);
+    report->following = *start;
+  }
   Record* record = make_event(NIF_REPORT, proto::drop_reason_name(report->reason));
   nif_incoming& in = record->incoming;
   in.from = view.header.src;
@@ -344,8 +351,9 @@ Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
     in.key = load_le<std::uint64_t>(report->following.data());
     in.flags = NIF_FLAG_KEYED;
   }
-  const std::size_t size = std::min(view.payload.size(), proto::kReportSizeMax);
-  if (record->payload.append(view.payload.subspan(8).first(size - 8))) record->finish();
+  std::array<std::byte, proto::kReportSizeMax> whole;
+  const std::size_t size = proto::encode_report(*report, whole);
+  if (record->payload.append(std::span(whole).first(size).subspan(8))) record->finish();
   add_record(record, size);
   return Verdict::going;
 }

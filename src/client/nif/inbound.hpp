@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/nif/message_assembler.hpp"
+#include "client/nif/reported_messages.hpp"
 #include "client/nif/session.hpp"
 #include "client/nif/storage.hpp"
 #include "proto/control/control_message.hpp"
@@ -36,6 +37,8 @@ class InboundHost {
   virtual void on_taken(std::uint32_t from, const proto::Taken& taken) = 0;
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
+  /// How the message with a fragment header began that the report is about, if that is known.
+  [[nodiscard]] virtual std::optional<ReportedMessages::Start> message_of(const proto::Report& report) = 0;
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
   /// What a message of that group is tagged with; 0: it does not count in a window.
   [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;

@@ -231,7 +231,11 @@ bool Node::on_report(const proto::Report& report) {
   if (report.reason == proto::DropReason::no_such_node || report.reason == proto::DropReason::renumbered) {
     names_.forget(report.header.dst);
   }
-  return outbound_.on_report(report.header, report.reason);
+  return outbound_.on_report(report);
+}
+
+std::optional<ReportedMessages::Start> Node::message_of(const proto::Report& report) {
+  return outbound_.message_of(report);
 }
 
 void Node::send_taken(std::uint32_t to, const proto::Taken& taken) {

@@ -77,6 +77,7 @@ class Node final : private InboundHost {
   void on_name_decided(const std::string& name, bool lost) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) override;
   void send_taken(std::uint32_t to, const proto::Taken& taken) override;
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return credits_.epoch_for(group); }
   void on_message_lost(std::uint32_t group) override { credits_.take(group, credits_.epoch_for(group), 1, false); }

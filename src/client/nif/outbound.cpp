@@ -224,21 +224,31 @@ void Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
   }
 }
 
-bool Outbound::on_report(const proto::FrameHeader& header, proto::DropReason reason) {
+bool Outbound::on_report(const proto::Report& report) {
   const MutexLock lock(mutex_);
+  const proto::FrameHeader& header = report.header;
   if (header.kind == proto::Kind::taken) {
     // Our own TAKENs ask for no reports, so this answers probe().
     for (auto& [stream, progress] : in_progress_) {
-      if (progress->windowed && progress->dst == header.dst) progress->undelivered = reason;
+      if (progress->windowed && progress->dst == header.dst) progress->undelivered = report.reason;
     }
     notify_waiting();
     return true;
   }
   const auto found = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
   if (found == in_progress_.end() || !found->second->windowed || !header.has(proto::kFlagFragment)) return false;
-  found->second->undelivered = reason;
+  InProgress& progress = *found->second;
+  if (const auto number = ReportedMessages::number_of(report); number && *number != progress.number) return false;
+  // Why the rest of a message goes is what became of its beginning.
+  const bool rest = report.reason == proto::DropReason::cut_message;
+  if (!rest || progress.undelivered == proto::DropReason::none) progress.undelivered = report.reason;
   notify_waiting();
-  return !found->second->reported;
+  return !progress.reported;
+}
+
+std::optional<ReportedMessages::Start> Outbound::message_of(const proto::Report& report) {
+  const MutexLock lock(mutex_);
+  return reported_.find(report);
 }
 
 void Outbound::add_counters(nif_counters& counters) {

@@ -13,6 +13,7 @@
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
 #include "client/nif/platform.hpp"
+#include "client/nif/reported_messages.hpp"
 #include "client/nif/send_queue.hpp"
 #include "client/nif/session.hpp"
 #include "gimnet/nif.h"
@@ -79,9 +80,10 @@ class Outbound {
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
   void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
-  /// A REPORT about a frame with this header. True: it belongs to a message that is being sent and did not ask for
-  /// reports.
-  bool on_report(const proto::FrameHeader& header, proto::DropReason reason) GIMNET_EXCLUDES(mutex_);
+  /// True: it belongs to a message that is being sent and did not ask for reports.
+  bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
+  /// How the message with a fragment header began that the report is about, if that is known.
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
 
  private:
   /// A send that follows the last write, or the send before, within this time is part of a burst.
@@ -110,6 +112,7 @@ class Outbound {
                                          Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::uint32_t number_of(Outgoing& message) GIMNET_REQUIRES(mutex_);
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
@@ -143,6 +146,7 @@ class Outbound {
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
   std::unordered_map<std::uint64_t, InProgress*> in_progress_ GIMNET_GUARDED_BY(mutex_);  ///< by stream
   std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
+  ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
 

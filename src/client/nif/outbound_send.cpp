@@ -180,12 +180,19 @@ nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader>
   return NIF_OK;
 }
 
+/// For a message that has a fragment header.
+std::uint32_t Outbound::number_of(Outgoing& message) {
+  const std::uint32_t number = next_message_++;
+  if (message.reported()) reported_.remember(number, message);
+  return number;
+}
+
 nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   const bool with_header = proto::needs_fragment_header(message.size());
   const nif_status turn = wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
   if (turn != NIF_OK) return turn;
   std::optional<proto::FragmentHeader> fragment;
-  if (with_header) fragment = proto::FragmentHeader{next_message_++, 0, message.size()};
+  if (with_header) fragment = proto::FragmentHeader{number_of(message), 0, message.size()};
   return put(message, fragment, 0, message.size(), false);
 }
 
@@ -198,7 +205,7 @@ nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadli
     const nif_status turn = wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
     if (turn != NIF_OK) return turn;
     if (progress.number == 0) {
-      progress.number = next_message_++;
+      progress.number = number_of(message);
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "base/endian.hpp"
 #include "client/nif/pause_table.hpp"
 #include "proto/frame/fragmenter.hpp"
 
@@ -129,6 +130,14 @@ void Outgoing::write_frame(std::span<std::byte> frame, std::uint32_t src, std::o
   if (report) parts.header.flags |= proto::kFlagReport;
   const std::size_t prefix = proto::write_prefix(parts, frame);
   copy_payload(frame.data() + prefix, offset, piece_size);
+}
+
+void Outgoing::write_start(std::span<std::byte> start) {
+  if (parts_.key) {
+    store_le(start.data(), *parts_.key);
+    start = start.subspan(sizeof *parts_.key);
+  }
+  copy_payload(start.data(), 0, static_cast<std::uint32_t>(start.size()));
 }
 
 }  // namespace gimnet::nif

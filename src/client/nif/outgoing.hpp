@@ -35,6 +35,8 @@ class Outgoing {
   /// Writes one frame with the payload bytes from `offset` on; `frame` has exactly its size.
   void write_frame(std::span<std::byte> frame, std::uint32_t src, std::optional<proto::FragmentHeader> fragment,
                    std::uint32_t offset, std::uint32_t piece_size, bool report);
+  /// Writes the key, if there is one, and the first bytes of the payload behind it. REQUIRES: it has as many.
+  void write_start(std::span<std::byte> start);
 
  private:
   [[nodiscard]] std::optional<Failure> read_address(const nif_outgoing& message);

@@ -1,6 +1,5 @@
 #include "client/nif/reported_messages.hpp"
 
-#include "base/endian.hpp"
 #include "proto/frame/fragment_header.hpp"
 
 namespace gimnet::nif {
@@ -21,7 +20,7 @@ std::optional<std::uint32_t> ReportedMessages::number_of(const proto::Report& re
     return std::nullopt;
   }
   if (report.following.size() < proto::kFragmentHeaderSize) return std::nullopt;
-  return load_le<std::uint32_t>(report.following.data());
+  return proto::load_fragment_header(report.following.data()).message;
 }
 
 std::optional<ReportedMessages::Start> ReportedMessages::find(const proto::Report& report) const {

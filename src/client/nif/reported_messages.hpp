@@ -11,9 +11,9 @@
 
 namespace gimnet::nif {
 
-/// How the last messages with a fragment header began. A REPORT repeats 16 bytes of a frame, and of a fragment those are
-/// hardly more than its header: they tell the number of the message, and nothing of what it is.
-/// Thread safety: one thread at a time. Memory: 48 KiB, from the first message on.
+/// How the last messages with a fragment header began. A REPORT repeats 16 bytes of a frame, and of a fragment those
+/// are hardly more than its header: they tell the number of the message, and nothing of what it is. Thread safety: one
+/// thread at a time. Memory: 48 KiB, from the first message on.
 class ReportedMessages {
  public:
   /// REPORTs come a round trip and a report_interval_ms of the hub after their messages.

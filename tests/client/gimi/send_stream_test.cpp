@@ -120,6 +120,38 @@ TEST_F(SendStreamTest, AReportOfOneMessageFreesIt) {
   EXPECT_NE(stream.counts().loss.find("queue_full"), std::string::npos);
 }
 
+TEST_F(SendStreamTest, AReportOfAFragmentFreesItsMessage) {
+  const Sender stream = sender(3);
+  for (const std::size_t size : {4'090u, 20'000u}) {  // whole with a fragment header, and in pieces
+    stream.send(std::string(size, 'x')).or_throw();
+    const auto lost = hub_.next_message();
+    ASSERT_TRUE(lost);
+    ASSERT_TRUE(lost->header.has(proto::kFlagFragment));
+    report(proto::DropReason::timed_out, 1, *lost);
+    EXPECT_TRUE(stream.settle(Timeout{20'000}).is(Status::not_delivered)) << "and nobody asks for it";
+    EXPECT_EQ(stream.counts().loss, "the hub reports timed_out: it took nothing for as long as the hub waits");
+  }
+  EXPECT_EQ(stream.counts().lost, 2u);
+}
+
+TEST_F(SendStreamTest, AReportThatNamesNoMessageIsTheReasonOfWhatTheReceiverMisses) {
+  SendOptions options;
+  options.key = kKey;
+  options.window = 3;
+  options.age_max_ms = 60'000;  // stands before the fragment header in the bytes that a report repeats
+  const Sender stream = node_->sender(Peer{kPeerId}, options).or_throw();
+  stream.send(std::string(5'000, 'x')).or_throw();
+  const auto lost = hub_.next_message();
+  ASSERT_TRUE(lost);
+  report(proto::DropReason::too_old, 1, *lost);
+  report(proto::DropReason::cut_message, 1, *lost);
+  const Taken ping = next();
+  EXPECT_EQ(ping.header.operation, Operation::ping);
+  acknowledge(0, 0, ping.header.sequence);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream.counts().loss, "the hub reports too_old");
+}
+
 TEST_F(SendStreamTest, AReportOfAGoneRouteFreesEverythingThere) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
@@ -185,6 +217,7 @@ TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   acknowledge(0, 0, ping.header.sequence);
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().lost, 2u);
+  EXPECT_EQ(stream.counts().loss, "the hub reports shard_full");
 }
 
 TEST_F(SendStreamTest, ABrokenConnectionFreesEverything) {

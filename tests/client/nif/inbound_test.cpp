@@ -237,6 +237,36 @@ TEST(Inbound, ReportsSayWhatBecameOfWhichFrame) {
   EXPECT_EQ(receiving.inbound.taken(), 0u) << "reports are not counted for resume";
 }
 
+TEST(Inbound, AReportOfAFragmentSaysWhichMessageItWas) {
+  Receiving receiving;
+  proto::Report report;
+  report.reason = proto::DropReason::queue_full;
+  report.count = 1;
+  report.header.dst = kPeerId;
+  report.header.flags = proto::kFlagKeyed | proto::kFlagFragment;
+  const std::string following("\1\0\0\0\0\0\0\0\0\0\0\1fore", 16);
+  report.following = std::as_bytes(std::span(following));
+  std::array<std::byte, proto::kReportSizeMax> payload;
+  const std::size_t size = proto::encode_report(report, payload);
+  std::vector<std::byte> bytes;
+  add_frame(bytes, from_peer(proto::Kind::report), {reinterpret_cast<const char*>(payload.data()), size});
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  ReportedMessages::Start start{};
+  start[0] = std::byte{9};
+  start[8] = std::byte{'x'};
+  receiving.host.start = start;
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  ASSERT_EQ(receiving.host.items.size(), 2u);
+  EXPECT_EQ(receiving.host.items[0].flags, 0u) << "it is not known any more";
+  const nif_incoming& known = receiving.host.items[1];
+  EXPECT_EQ(known.flags, NIF_FLAG_KEYED);
+  EXPECT_EQ(known.key, 9u);
+  ASSERT_EQ(known.size, 32u);
+  const std::string_view whole = payload_of(known);
+  EXPECT_EQ(whole[13], static_cast<char>(proto::kFlagKeyed)) << "as if it had come in one frame";
+  EXPECT_EQ(whole[24], 'x');
+}
+
 TEST(Inbound, ANewConnectionLosesUnfinishedMessages) {
   Receiving receiving;
   std::vector<std::byte> bytes;

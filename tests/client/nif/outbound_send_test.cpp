@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "base/endian.hpp"
 #include "client/nif/outbound.hpp"
 #include "proto/frame/report.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
@@ -201,6 +204,38 @@ TEST(OutboundSend, AsksAfterAReceiverThatIsSilentAndBelievesTheReport) {
   sending.join();
   nif_incoming in;
   EXPECT_EQ(nif_receive(connected.node.get(), &in, 0), NIF_TIMEOUT) << "nobody asked for this report";
+}
+
+/// What the hub says of that frame, or of the same piece of another message.
+void report(FakeConnection& hub, proto::DropReason reason, const Frame& frame, std::uint32_t number_offset = 0) {
+  std::vector<std::byte> following(frame.bytes.begin() + proto::kHeaderSize, frame.bytes.end());
+  store_le(following.data(), load_le<std::uint32_t>(following.data()) + number_offset);
+  std::array<std::byte, proto::kReportSizeMax> payload;
+  const std::size_t size = proto::encode_report({reason, 1, frame.header, following}, payload);
+  proto::FrameParts parts;
+  parts.header.kind = proto::Kind::report;
+  parts.header.src = kHubNode;
+  parts.header.dst = kOwnId;
+  hub.send(parts, {reinterpret_cast<const char*>(payload.data()), size});
+}
+
+TEST(OutboundSend, AReportEndsTheLargeMessageThatItIsAbout) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  const std::string payload = pattern(3u << 20);
+  std::thread sending([&] {
+    EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED);
+    EXPECT_NE(std::string(nif_error_text()).find("queue_full"), std::string::npos) << nif_error_text();
+  });
+  std::optional<Frame> frame;
+  for (std::size_t size = 0; size < proto::kWindowDefault; size += frame->payload().size()) {
+    frame = connected.hub.next_message();
+    ASSERT_TRUE(frame);
+  }
+  report(connected.hub, proto::DropReason::timed_out, *frame, 1);  // one that was sent before, say
+  report(connected.hub, proto::DropReason::queue_full, *frame);
+  report(connected.hub, proto::DropReason::cut_message, *frame);
+  sending.join();
 }
 
 TEST(OutboundSend, AHubThatDoesNotReadFillsTheQueueAndTimesOut) {

@@ -35,6 +35,7 @@ class RecordingHost final : public InboundHost {
   void on_name_decided(const std::string& name, bool lost) override { decided = (lost ? "lost " : "kept ") + name; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override { taken_received.push_back(taken); }
   bool on_report(const proto::Report&) override { return false; }
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report&) override { return start; }
   void send_taken(std::uint32_t, const proto::Taken& taken) override { taken_sent.push_back(taken); }
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group == counted_group ? 1 : 0; }
   void on_message_lost(std::uint32_t group) override { lost_groups.push_back(group); }
@@ -61,6 +62,7 @@ class RecordingHost final : public InboundHost {
   std::vector<std::uint32_t> lost_groups;
   std::uint32_t counted_group = 0;  ///< its messages count in a window
   std::string decided;
+  std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about
   std::vector<proto::Taken> taken_sent;
   std::vector<proto::Taken> taken_received;
 };
