@@ -177,6 +177,14 @@ struct NodeState {
   std::string trouble;                   ///< why the connection broke last; "" if it never did
 };
 
+/// Messages on their way to a node that it cannot give out.
+struct LostCounts {
+  std::uint64_t incomplete = 0;  ///< a part of them did not come, or did not fit what came before
+  std::uint64_t too_large = 0;   ///< larger than NodeOptions::message_bytes_max
+  std::uint64_t broken_off = 0;  ///< lost with a connection; at least so many
+  [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + broken_off; }
+};
+
 /// A member of the network. Leaves for good when it is destroyed.
 class Node {
  public:
@@ -230,6 +238,9 @@ class Node {
   Outcome<Message> receive(Timeout timeout = kForever) const;
   /// Messages dropped because of too many keys, or because they were no GIMI messages.
   [[nodiscard]] std::uint64_t dropped() const;
+  /// Messages to this node, or of its subscriptions, that were lost on their way, as far as it knows. What a service
+  /// left out because this node was too slow is not among them: Subscription::missed().
+  [[nodiscard]] LostCounts lost() const;
 
   // ---- services
 

@@ -3,6 +3,7 @@
 
 import json
 import signal
+import struct
 import subprocess
 import tempfile
 import threading
@@ -11,7 +12,7 @@ import unittest
 from support.logs import robot_logs
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.waiting import wait_until
-from support.wire import Client, random_bytes
+from support.wire import FLAG_FRAGMENT, FLAG_KEYED, GROUP, NS, UNICAST, Client, random_bytes, text
 
 
 class Chatter:
@@ -194,6 +195,25 @@ class Losses(unittest.TestCase):
                 receiver.signal(signal.SIGCONT)
                 self.assertEqual(sender.wait(), 1, sender.err)
                 self.assertIn("the hub reports timed_out", sender.err)
+
+    def test_recv_and_echo_say_what_did_not_become_whole(self):
+        hub = Hub(self)
+        provider = Client(self, hub).join("A")
+        group = provider.ask(NS, 7, text(3, "B"))[3]
+        recv = start_gimnet(self, hub, "recv", "--name", "R", "--json", "-n", "1")
+        echo = start_gimnet(self, hub, "echo", "A/B", "--json", "-n", "1")
+        to = hub.wait_for_node("R")["id"].split(".")
+        wait_until(lambda: json.loads(run_gimnet(hub, "services", "A/B", "--json").out)[0]["subscribers"] == 1,
+                   "the subscriber")
+        data = bytes(8) + struct.pack("<IBBH", 1, 0, 0, 0) + b"whole"
+        for dst, kind in ((int(to[0]) << 20 | int(to[1]), UNICAST), (group, GROUP)):
+            piece = struct.pack("<III", kind + 1, 0, 20000) + bytes(8) + bytes(1000)
+            provider.send(provider.frame(dst, piece, kind=kind, flags=FLAG_FRAGMENT | FLAG_KEYED))
+            provider.send(provider.frame(dst, data, kind=kind, flags=FLAG_KEYED))
+        for process in (recv, echo):
+            self.assertEqual(process.wait(), 0, process.err)
+            self.assertEqual((json.loads(process.out)["text"], json.loads(process.out)["lost"]), ("whole", 1))
+            self.assertIn("gimnet: 1 message was lost: a part did not come, or did not fit the others\n", process.err)
 
     def test_send_stops_at_a_loss_although_its_input_goes_on(self):
         hub = Hub(self)

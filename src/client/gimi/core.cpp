@@ -209,6 +209,9 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_REPORT:
       on_report(in);
       return NIF_DONE;
+    case NIF_GAP:
+      on_gap(in);
+      return NIF_DONE;
     case NIF_CONNECTED:
       on_connected(in);
       return NIF_DONE;
@@ -290,6 +293,7 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
 
 nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {
   inbox_.count_dropped();
+  losses_.add(proto::DropReason::too_large, 1);
   if (in.kind != NIF_UNICAST || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
   const std::string sentence = "it takes messages of at most " + std::to_string(message_bytes_max_) +
                                " bytes, and this one has " + std::to_string(view.data.size());
@@ -339,6 +343,12 @@ void Core::on_report(const nif_incoming& in) {
     pings_.on_lost(header->sequence, report_words(report.text));
   }
   streams_.on_report(report);
+}
+
+void Core::on_gap(const nif_incoming& in) {
+  // From itself: what this node sent. Its streams learn of the break by themselves.
+  if (in.from == nif_id(node())) return;
+  losses_.add(static_cast<proto::DropReason>(in.reason), in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
 }
 
 void Core::on_connected(const nif_incoming& in) {

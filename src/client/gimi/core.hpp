@@ -8,6 +8,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/clerk.hpp"
 #include "client/gimi/inbox.hpp"
+#include "client/gimi/loss_tally.hpp"
 #include "client/gimi/ping_table.hpp"
 #include "client/gimi/service_table.hpp"
 #include "client/gimi/stream_table.hpp"
@@ -35,6 +36,7 @@ class Core {
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
   [[nodiscard]] WatchTable& watches() { return watches_; }
+  [[nodiscard]] LostCounts lost() const { return losses_.counts(); }
   [[nodiscard]] Outcome<std::int64_t> ping(Peer to, Timeout timeout, Lane lane, BytesView echo);
 
  private:
@@ -52,6 +54,7 @@ class Core {
   [[nodiscard]] nif_verdict refuse(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_report(const nif_incoming& in);
+  void on_gap(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
   void end(const Ending& ending);
@@ -63,6 +66,7 @@ class Core {
   ServiceTable services_;
   WatchTable watches_;
   PingTable pings_;
+  LossTally losses_;
   Clerk clerk_;
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};

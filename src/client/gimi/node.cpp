@@ -106,6 +106,7 @@ Outcome<Message> Node::receive(MessageKey key, Timeout timeout) const {
 
 Outcome<Message> Node::receive(Timeout timeout) const { return core_->inbox().receive_any(timeout); }
 std::uint64_t Node::dropped() const { return core_->inbox().dropped(); }
+LostCounts Node::lost() const { return core_->lost(); }
 
 Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options, Timeout timeout) const {
   auto service = core_->services().advertise(core_->state().name, std::string(name), options, timeout);

@@ -169,11 +169,12 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
   MessageAssembler::Step step = assembler_.take(view, arrival_.steady_ns);
   proto::Reassembled& reassembled = step.reassembled;
   if (step.notice) host_.send_taken(step.notice->to, step.notice->taken);
-  if (reassembled.lost_messages > 0) {
-    counts_.messages_lost += reassembled.lost_messages;
+  if (std::uint32_t cut = reassembled.lost_messages; cut > 0) {
+    counts_.messages_lost += cut;
     const bool too_large = reassembled.state == proto::Reassembled::State::too_large;
-    add_gap(view.header.src, reassembled.lost_messages,
-            too_large ? proto::DropReason::too_large : proto::DropReason::cut_message);
+    if (too_large) --cut;  // this one; others ended before it
+    if (cut > 0) add_gap(view.header.src, cut, proto::DropReason::cut_message);
+    if (too_large) add_gap(view.header.src, 1, proto::DropReason::too_large);
   }
   if (reassembled.state != proto::Reassembled::State::whole) {
     if (view.header.kind == proto::Kind::group && view.ends_message()) host_.on_message_lost(view.header.dst);

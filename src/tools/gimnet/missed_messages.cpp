@@ -17,8 +17,7 @@ std::uint64_t MissedMessages::take(const Message& message) {
 }
 
 std::vector<std::string> MissedMessages::news(std::int64_t now_ns) {
-  if (!untold_ || now_ns < next_ns_) return {};
-  next_ns_ = now_ns + kPeriodNs;
+  if (!untold_ || !pace_.due(now_ns)) return {};
   return rest();
 }
 

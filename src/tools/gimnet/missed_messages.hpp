@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gimnet/gimi.hpp"
+#include "tools/gimnet/news_pace.hpp"
 
 namespace gimnet::tool {
 
@@ -13,12 +14,9 @@ namespace gimnet::tool {
 /// steady_now_ns(). Thread safety: one thread.
 class MissedMessages {
  public:
-  /// How often it is said at most.
-  static constexpr std::int64_t kPeriodNs = 1'000'000'000;
-
   /// Returns how many of its service did not come up to this one. REQUIRES: it is of a service.
   std::uint64_t take(const Message& message);
-  /// Sentences about what was not told yet, one a service; none within kPeriodNs of the last ones.
+  /// Sentences about what was not told yet, one a service; none within NewsPace::kPeriodNs of the last ones.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns);
   /// As news(), at the end: whatever the time is.
   [[nodiscard]] std::vector<std::string> rest();
@@ -31,7 +29,7 @@ class MissedMessages {
     std::uint64_t told = 0;
   };
   std::map<std::string, Service, std::less<>> services_;
-  std::int64_t next_ns_ = 0;
+  NewsPace pace_;
   bool untold_ = false;
 };
 

@@ -6,19 +6,20 @@
 #include "tools/gimnet/bounds.hpp"
 #include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/json_writer.hpp"
+#include "tools/gimnet/lost_messages.hpp"
 
 namespace gimnet::tool {
 namespace {
 
 constexpr Timeout kLookAtConnection{500};
 
-void print(Session& session, const Message& message, std::optional<std::uint64_t> missed) {
+void print(Session& session, const Message& message, const Absent& absent) {
   Output& output = session.output();
   if (session.options().raw) {
     output.write(message.data());
     output.write("\n");
   } else {
-    output.write(session.options().json ? json_line(message, missed) : text_line(message));
+    output.write(session.options().json ? json_line(message, absent) : text_line(message));
   }
 }
 
@@ -36,7 +37,7 @@ std::string text_line(const Message& message) {
   return line + "#" + std::to_string(message.sequence()) + ": " + printable(message.text()) + "\n";
 }
 
-std::string json_line(const Message& message, std::optional<std::uint64_t> missed) {
+std::string json_line(const Message& message, const Absent& absent) {
   JsonWriter json;
   json.begin_object().member("from", message.from().text());
   if (!message.service().empty()) json.member("service", message.service());
@@ -46,7 +47,8 @@ std::string json_line(const Message& message, std::optional<std::uint64_t> misse
     json.member("sent_ns", *sent);
     json.member("age_us", static_cast<double>(message.arrival_ns() - *sent) / 1000.0);
   }
-  if (missed) json.member("missed", *missed);
+  json.member("lost", absent.lost);
+  if (absent.missed) json.member("missed", *absent.missed);
   json.member("size", message.size()).bytes_member("text", message.data()).end_object();
   return json.str() + "\n";
 }
@@ -54,6 +56,7 @@ std::string json_line(const Message& message, std::optional<std::uint64_t> misse
 ExitCode print_messages(Session& session, const Receive& receive, MissedMessages* missed) {
   const Bounds bounds(session.options());
   ConnectionWatch watch(session.node());
+  LostMessages lost;
   std::uint64_t printed = 0;
   Failure failure;
   while (!bounds.enough(printed) && !bounds.late() && !session.stopped()) {
@@ -63,7 +66,10 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
       if (!session.output().ok()) break;
       message = receive(bounds.wait(kLookAtConnection));
     }
-    if (missed != nullptr) say_all(missed->news(steady_now_ns()));
+    lost.take(session.node().lost());
+    const std::int64_t now_ns = steady_now_ns();
+    say_all(lost.news(now_ns));
+    if (missed != nullptr) say_all(missed->news(now_ns));
     if (!message && message.is(Status::timeout)) {
       watch.look();
       continue;
@@ -72,10 +78,14 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
       failure = message.failure();
       break;
     }
-    print(session, *message, missed != nullptr ? std::optional(missed->take(*message)) : std::nullopt);
+    Absent absent{.lost = lost.all(), .missed = std::nullopt};
+    if (missed != nullptr) absent.missed = missed->take(*message);
+    print(session, *message, absent);
     ++printed;
     if (!session.output().ok()) break;
   }
+  lost.take(session.node().lost());
+  say_all(lost.rest());
   if (missed != nullptr) say_all(missed->rest());
   if (!failure.sentence.empty()) return session.fail(failure);
   watch.look();  // it may have broken and be back since the last look

@@ -12,17 +12,22 @@
 
 namespace gimnet::tool {
 
+/// What did not come until a message did.
+struct Absent {
+  std::uint64_t lost = 0;               ///< to this node, on the way
+  std::optional<std::uint64_t> missed;  ///< of the message's service, where somebody counted
+};
+
 /// A message as a line, for people and as an object.
 [[nodiscard]] std::string text_line(const Message& message);
-/// `missed`: how many of its service did not come, where somebody counted.
-[[nodiscard]] std::string json_line(const Message& message, std::optional<std::uint64_t> missed = std::nullopt);
+[[nodiscard]] std::string json_line(const Message& message, const Absent& absent = {});
 
 /// Takes the next message; waits for it at most so long.
 using Receive = std::function<Outcome<Message>(Timeout)>;
 
 /// Prints what comes, until as many have come or as much time has passed as the options say. Writes at the latest when
-/// nothing more is there at once. Says so when the connection breaks and when it is back, and what did not come where
-/// `missed` is given.
+/// nothing more is there at once. Says so when the connection breaks and when it is back, what was lost on its way, and
+/// what did not come where `missed` is given.
 [[nodiscard]] ExitCode print_messages(Session& session, const Receive& receive, MissedMessages* missed = nullptr);
 
 }  // namespace gimnet::tool

@@ -29,6 +29,19 @@ class Dismissed : public Conversation, public testing::WithParamInterface<Goodby
 
 class WithoutReconnecting : public Conversation {};
 
+class Lost : public Conversation {
+ protected:
+  /// The first piece of a large message to this node.
+  void begin_message(std::uint32_t number, std::uint32_t total) {
+    proto::FrameParts parts;
+    parts.header.dst = nif::test::kOwnId;
+    parts.header.src = kPeerId;
+    parts.key = 0;
+    parts.fragment = proto::FragmentHeader{number, 0, total};
+    hub_.send(parts, std::string(100, 'x'));
+  }
+};
+
 TEST_P(Dismissed, EverybodyWhoWaitsLeavesWithTheReason) {
   const Sender stream = sender(1);
   stream.send("never acknowledged").or_throw();
@@ -98,6 +111,28 @@ TEST_F(WithoutReconnecting, ClosingAfterwardsAnswersClosed) {
   EXPECT_TRUE(node_->receive().is(Status::not_connected));
   node_->close();
   EXPECT_TRUE(node_->receive().is(Status::closed));
+}
+
+TEST_F(Lost, MessagesAreCountedByWhy) {
+  EXPECT_EQ(node_->lost().all(), 0u);
+  begin_message(1, 20'000);
+  begin_message(2, 20'000);
+  begin_message(3, 200u << 20);
+  const std::string text = "x";
+  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  ASSERT_TRUE(node_->receive());
+  EXPECT_EQ(node_->lost().incomplete, 2u) << "each was followed by something else";
+  EXPECT_EQ(node_->lost().too_large, 1u);
+  EXPECT_EQ(node_->lost().broken_off, 0u);
+}
+
+TEST_F(Lost, MessagesThatTheHubWillNotSendAgainAreCounted) {
+  hub_.send(proto::flow::Skip{proto::DropReason::link_lost, 3});
+  hub_.send(proto::flow::Skip{proto::DropReason::link_lost, proto::flow::kSkipUnknown});
+  const std::string text = "x";
+  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  ASSERT_TRUE(node_->receive());
+  EXPECT_EQ(node_->lost().broken_off, 4u) << "at least one, where nobody knows";
 }
 
 }  // namespace

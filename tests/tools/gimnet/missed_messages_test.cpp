@@ -49,8 +49,8 @@ TEST_F(MissedMessagesTest, NewsComeAtMostOnceASecond) {
   take(3);
   EXPECT_EQ(missed_.news(100).size(), 1u);
   take(5);
-  EXPECT_EQ(missed_.news(100 + MissedMessages::kPeriodNs - 1), Sentences{});
-  EXPECT_EQ(missed_.news(100 + MissedMessages::kPeriodNs),
+  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs - 1), Sentences{});
+  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs),
             Sentences{"2 messages of r/s did not come (this reader was too slow)"});
 }
 

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "gimnet/gimi.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::gimi {
+
+/// Messages that were on their way to this node and were lost, by why. Thread safety: add() from the library's thread,
+/// counts() from any.
+class LossTally {
+ public:
+  void add(proto::DropReason reason, std::uint64_t messages) {
+    std::atomic<std::uint64_t>& count = place(reason);
+    // One thread writes; who reads wants a recent value, and nothing that goes with it.
+    count.store(count.load(std::memory_order_relaxed) + messages, std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] LostCounts counts() const {
+    return {incomplete_.load(std::memory_order_relaxed), too_large_.load(std::memory_order_relaxed),  // see add()
+            broken_off_.load(std::memory_order_relaxed)};
+  }
+
+ private:
+  [[nodiscard]] std::atomic<std::uint64_t>& place(proto::DropReason reason) {
+    if (reason == proto::DropReason::cut_message) return incomplete_;
+    return reason == proto::DropReason::too_large ? too_large_ : broken_off_;
+  }
+
+  std::atomic<std::uint64_t> incomplete_{0};
+  std::atomic<std::uint64_t> too_large_{0};
+  std::atomic<std::uint64_t> broken_off_{0};
+};
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,23 @@
+#include "client/gimi/loss_tally.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::gimi {
+namespace {
+
+TEST(LossTally, CountsByWhy) {
+  LossTally tally;
+  EXPECT_EQ(tally.counts().all(), 0u);
+  tally.add(proto::DropReason::cut_message, 1);
+  tally.add(proto::DropReason::too_large, 2);
+  tally.add(proto::DropReason::link_lost, 3);
+  tally.add(proto::DropReason::none, 4);  // what a later version calls by another name
+  tally.add(proto::DropReason::cut_message, 10);
+  EXPECT_EQ(tally.counts().incomplete, 11u);
+  EXPECT_EQ(tally.counts().too_large, 2u);
+  EXPECT_EQ(tally.counts().broken_off, 7u);
+  EXPECT_EQ(tally.counts().all(), 20u);
+}
+
+}  // namespace
+}  // namespace gimnet::gimi

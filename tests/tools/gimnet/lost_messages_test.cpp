@@ -1,0 +1,40 @@
+#include "tools/gimnet/lost_messages.hpp"
+
+#include <gtest/gtest.h>
+
+namespace gimnet::tool {
+namespace {
+
+using Sentences = std::vector<std::string>;
+
+TEST(LostMessages, NothingIsSaidOfNothing) {
+  LostMessages lost;
+  lost.take({});
+  EXPECT_EQ(lost.news(1), Sentences{});
+  EXPECT_EQ(lost.rest(), Sentences{});
+  EXPECT_EQ(lost.all(), 0u);
+}
+
+TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
+  LostMessages lost;
+  lost.take({.incomplete = 1, .too_large = 2, .broken_off = 3});
+  EXPECT_EQ(lost.all(), 6u);
+  EXPECT_EQ(lost.rest(), (Sentences{"1 message was lost: a part did not come, or did not fit the others",
+                                    "2 messages were lost: larger than this end takes",
+                                    "3 messages were lost: on their way when the connection broke"}));
+  EXPECT_EQ(lost.rest(), Sentences{});
+  lost.take({.incomplete = 4, .too_large = 2, .broken_off = 3});
+  EXPECT_EQ(lost.rest(), Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
+}
+
+TEST(LostMessages, NewsComeAtMostOnceASecond) {
+  LostMessages lost;
+  lost.take({.incomplete = 1, .too_large = 0, .broken_off = 0});
+  EXPECT_EQ(lost.news(100).size(), 1u);
+  lost.take({.incomplete = 2, .too_large = 0, .broken_off = 0});
+  EXPECT_EQ(lost.news(100 + NewsPace::kPeriodNs - 1), Sentences{});
+  EXPECT_EQ(lost.news(100 + NewsPace::kPeriodNs).size(), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::tool
