@@ -12,6 +12,9 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
   Entry* message = lane.find_message(NodeId{header.src}, entry.message_number);
   if (message == nullptr) return false;
+  // Of a message that is begun nothing is dropped or replaced any more: its frames wait in the order in which they
+  // came, or a large one to a slow reader would hold up everybody else in its lane until it ends.
+  if (message->touched && message != &lane.entries().back()) return false;
   if (backlog_ && context.budget.exhausted()) {
     lose(entry, proto::DropReason::over_budget, context);
     return true;
@@ -56,7 +59,10 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
   }
   if (context.budget.exhausted()) {
     lose(entry, proto::DropReason::over_budget, context);
-  } else if (entry.touched || fits(header.lane & proto::kLaneMask, entry.size, context.limits)) {
+  } else if (fits(header.lane & proto::kLaneMask, entry.size, context.limits)) {
+    lane.push(std::move(entry));
+  } else if (entry.touched) {
+    if (entry.block) ask_to_pause(entry, header, context);
     lane.push(std::move(entry));
   } else if (entry.block) {
     admit_block(std::move(entry), header, context);

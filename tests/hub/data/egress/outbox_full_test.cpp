@@ -118,6 +118,48 @@ TEST(FullOutbox, OldestNeverDropsBlock) {
   for (const std::string& text : connection.take()) EXPECT_NE(text[0], 'g');
 }
 
+// Frames of a message under way wait in the order in which they came: others are not held up until it ends.
+TEST(FullOutbox, WhatCameBeforeTheRestOfAMessageUnderWayGoesBeforeIt) {
+  EgressRig rig;
+  TestConnection connection(rig);
+  const auto fragment = [&](std::uint32_t offset) {
+    rig.push_fragment(connection.outbox, 1, offset, 100'000, std::string(10, 'a'));
+  };
+  block(connection);
+  fragment(0);
+  rig.push(connection.outbox, "behind a message that was not begun", {.src = 2});
+  fragment(10);
+  fragment(20);
+  connection.peer.set_room(proto::kHeaderSize);
+  connection.flush();
+  rig.push(connection.outbox, "one", {.src = 2});
+  fragment(30);
+  fragment(40);
+  rig.push(connection.outbox, "two", {.src = 2});
+  fragment(50);
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  const std::string ten(10, 'a');
+  EXPECT_THAT(connection.take(),
+              ElementsAre("1:0:" + ten, "1:10:" + ten, "1:20:" + ten, "behind a message that was not begun", "one",
+                          "1:30:" + ten, "1:40:" + ten, "two", "1:50:" + ten, "first"));
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, TheRestOfAMessageUnderWayPausesItsSenderBeyondTheLimit) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    rig.push_fragment(connection.outbox, 1, 8'000 * (i + 1), 100'000, std::string(8'000, 'a'));
+    rig.push(connection.outbox, "between", {.src = 2});
+    if (i == 0) {
+      EXPECT_THAT(rig.signals.take(), IsEmpty());
+    }
+  }
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1", "pause 2", "hold 1", "hold 2"));
+}
+
 TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
