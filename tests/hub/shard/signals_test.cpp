@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -84,6 +86,29 @@ TEST_P(SignalsAcross, ASenderThatIgnoresPauseIsNotReadUntilThereIsRoom) {
   EXPECT_THAT(b.frames, SizeIs(1'000));
   EXPECT_THAT(c.texts(), ElementsAre("behind it"));
   EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
+TEST_P(SignalsAcross, ManySendersToOneThatDoesNotReadLoseNothing) {
+  HubRig rig(2, small_limits());
+  std::vector<FakeNode*> senders;
+  for (int i = 0; i < 30; ++i) senders.push_back(&rig.join(GetParam()));
+  FakeNode& b = rig.join(0);
+  b.pipe.set_room(0);
+  constexpr int kFrames = 200;
+  const std::string payload(1024 - proto::kHeaderSize, 'x');
+  for (FakeNode* sender : senders) {
+    for (int i = 0; i < kFrames; ++i) rig.send(*sender, b.id.value(), std::to_string(i) + ' ' + payload);
+  }
+  rig.settle_without_reading();
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+  EXPECT_GT(rig.ledger().queued, 64u + 8 * 32) << "more than the lane and eight reserves";
+  b.pipe.set_room(MemoryPeer::kAll);
+  rig.settle();
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+  EXPECT_THAT(b.frames, SizeIs(30 * kFrames));
+  std::map<std::uint32_t, int> next;
+  for (const testing::GotFrame& frame : b.frames) EXPECT_EQ(std::stoi(frame.text()), next[frame.header.src]++);
+  for (const FakeNode* sender : senders) EXPECT_EQ(rig.connection(*sender)->holds, 0u);
 }
 
 TEST_P(SignalsAcross, AHeldSenderGoesOnWhenTheRecipientLeaves) {

@@ -21,7 +21,8 @@ class SenderSignals {
   virtual ~SenderSignals() = default;
   virtual void pause(NodeId sender, const proto::flow::Target& target) = 0;
   virtual void resume(NodeId sender, const proto::flow::Target& target) = 0;
-  /// The sender ignored its PAUSE past the reserve: stop reading it until release() was called as often as hold().
+  /// The sender ignored its PAUSE past the reserve, or had no time to heed it: stop reading it until release() was
+  /// called as often as hold().
   virtual void hold(NodeId sender) = 0;
   virtual void release(NodeId sender) = 0;
 };

@@ -118,8 +118,8 @@ class Outbox {
   /// Messages of which the rest is still refused; beyond it the rest of the oldest is let through, and the recipient
   /// finds the gap.
   static constexpr std::size_t kCutMessagesMax = 64;
-  /// A sender that can't be held (its own CONFIRM is waited for) and does not pause: beyond so many reserves its
-  /// messages are dropped, BLOCK or not.
+  /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not pause: beyond so many
+  /// reserves its messages are dropped, BLOCK or not.
   static constexpr std::uint64_t kReservesMax = 8;
   /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
   static constexpr std::uint32_t kSettleBytesMax = kSharedChunkBytes;
@@ -142,8 +142,9 @@ class Outbox {
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context);
-  void admit_block(Entry entry, const proto::FrameHeader& header, EgressContext& context);
-  void ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns false if it came all
+  /// the same, although it was held: the message is not to be taken.
+  [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   void forget_cut(NodeId src, std::uint32_t number);

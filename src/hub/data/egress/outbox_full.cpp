@@ -20,8 +20,9 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
     return true;
   }
   const bool over = !fits(header.lane & proto::kLaneMask, entry.size, context.limits);
-  if (over && entry.block) {
-    ask_to_pause(entry, header, context);
+  if (over && entry.block && !ask_to_pause(entry, header, context)) {
+    lose(entry, proto::DropReason::queue_full, context);
+    return true;
   }
   // The message may have been settled already, and is not looked at again.
   if (backlog_) settle_run(entry.run, entry.shared, context);
@@ -61,33 +62,32 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
     lose(entry, proto::DropReason::over_budget, context);
   } else if (fits(header.lane & proto::kLaneMask, entry.size, context.limits)) {
     lane.push(std::move(entry));
-  } else if (entry.touched) {
-    if (entry.block) ask_to_pause(entry, header, context);
-    lane.push(std::move(entry));
   } else if (entry.block) {
-    admit_block(std::move(entry), header, context);
+    if (ask_to_pause(entry, header, context)) {
+      lane.push(std::move(entry));
+    } else {
+      lose(entry, proto::DropReason::queue_full, context);
+    }
+  } else if (entry.touched) {
+    lane.push(std::move(entry));
   } else {
     admit_full(std::move(entry), header, context);
   }
 }
 
-void Outbox::admit_block(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
-  ask_to_pause(entry, header, context);
+bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
   const std::size_t lane = header.lane & proto::kLaneMask;
-  const std::uint64_t most = lane_limit(lane, context.limits) + kReservesMax * context.limits.reserve_bytes;
-  if (lanes_->queues[lane].bytes() + entry.size > most) {
-    lose(entry, proto::DropReason::queue_full, context);
-  } else {
-    lanes_->queues[lane].push(std::move(entry));
-  }
-}
-
-void Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
-  const std::size_t lane = header.lane & proto::kLaneMask;
-  const bool past_reserve =
-      lanes_->queues[lane].bytes() + entry.size > lane_limit(lane, context.limits) + context.limits.reserve_bytes;
-  lanes_->pauses.on_full(NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
-                         past_reserve, context.signals);
+  const Limits& limits = context.limits;
+  const std::uint64_t bytes = lanes_->queues[lane].bytes() + entry.size;
+  const std::uint64_t limit = lane_limit(lane, limits);
+  const std::uint64_t since_held =
+      lanes_->pauses.on_full(NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
+                             bytes > limit + limits.reserve_bytes, context.signals);
+  // Many senders may come at once: each is held, and loses nothing. What one of them had under way by then was in its
+  // shard's mailbox to this one, or came with the reads before its shard heard of the hold.
+  const std::uint64_t reserves = kReservesMax * limits.reserve_bytes;
+  const bool comes_though_held = since_held > limits.mailbox_bytes + limits.turn_bytes + reserves;
+  return !comes_though_held || bytes <= limit + reserves;
 }
 
 /// Policies count messages: the first ones of a run may still fit.

@@ -4,8 +4,8 @@
 
 namespace gimnet::hub {
 
-void PauseBook::on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes, bool past_reserve,
-                        SenderSignals& signals) {
+std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes,
+                                 bool past_reserve, SenderSignals& signals) {
   auto note = std::find_if(notes_.begin(), notes_.end(),
                            [&](const Note& each) { return each.sender == sender && each.target == target; });
   if (note == notes_.end()) {
@@ -19,6 +19,8 @@ void PauseBook::on_full(NodeId sender, const proto::flow::Target& target, std::u
     note->held = true;
     signals.hold(sender);
   }
+  if (!note->held) return 0;
+  return note->held_bytes += bytes;
 }
 
 void PauseBook::on_room(proto::Lane lane, SenderSignals& signals) {

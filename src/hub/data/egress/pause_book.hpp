@@ -13,9 +13,10 @@ class PauseBook {
  public:
   [[nodiscard]] bool empty() const { return notes_.empty(); }
 
-  /// A frame with BLOCK of `bytes` came although its lane is full.
-  void on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes, bool past_reserve,
-               SenderSignals& signals);
+  /// A frame with BLOCK of `bytes` came although its lane is full. Returns the bytes that came from its sender for that
+  /// target since it was held, this frame included; 0: it is not held.
+  std::uint64_t on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes, bool past_reserve,
+                        SenderSignals& signals);
   /// The lane has room again.
   void on_room(proto::Lane lane, SenderSignals& signals);
   /// The outbox is given up.
@@ -25,7 +26,8 @@ class PauseBook {
   struct Note {
     NodeId sender;
     proto::flow::Target target;
-    std::uint32_t bytes_since = 0;
+    std::uint32_t bytes_since = 0;  ///< it was told last
+    std::uint64_t held_bytes = 0;   ///< that came since it was held
     bool held = false;
   };
   /// A sender that still sends after so many bytes has not seen PAUSE, or lost it with a connection: told again.

@@ -160,6 +160,41 @@ TEST(FullOutbox, TheRestOfAMessageUnderWayPausesItsSenderBeyondTheLimit) {
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1", "pause 2", "hold 1", "hold 2"));
 }
 
+// Each of many senders is held in time, but all of them together had more under way than any reserve.
+TEST(FullOutbox, BlockOfManySendersIsKept) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (std::uint32_t sender = 1; sender <= 100; ++sender) {
+    for (int i = 0; i < 20; ++i) rig.push(connection.outbox, sized(kKiB), {.src = sender});
+  }
+  EXPECT_FALSE(rig.tally.any_dropped);
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, BlockOfASenderThatComesThoughHeldIsDroppedBeyondWhatWasUnderWay) {
+  Limits limits = small_limits();
+  limits.mailbox_bytes = 512 * kKiB;
+  limits.turn_bytes = 64 * kKiB;
+  EgressRig rig(limits);
+  TestConnection connection(rig);
+  block(connection);
+  const auto push = [&](std::uint32_t sender) { rig.push(connection.outbox, sized(kKiB), {.src = sender}); };
+  for (int i = 0; i < 16 + 16; ++i) push(1);
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1")) << "within the reserve";
+  for (int i = 0; i < 512 + 64 + 8 * 16; ++i) push(1);
+  EXPECT_EQ(rig.signals.take()[0], "hold 1");
+  EXPECT_FALSE(rig.tally.any_dropped);
+  push(1);
+  rig.push_fragment(connection.outbox, 1, 0, 100, "dropped with its rest");
+  rig.push_fragment(connection.outbox, 1, 21, 100, "the rest");
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u);
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u);
+  push(2);
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "another sender loses nothing by it";
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
 TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);

@@ -47,6 +47,17 @@ TEST(PauseBook, HoldsOnceAndReleasesAsOften) {
   EXPECT_THAT(signals.take(), IsEmpty());
 }
 
+TEST(PauseBook, CountsWhatComesFromAHeldSender) {
+  FakeSignals signals;
+  PauseBook book;
+  EXPECT_EQ(book.on_full(kOne, kNormal, 100, false, signals), 0u);
+  EXPECT_EQ(book.on_full(kOne, kNormal, 100, true, signals), 100u);
+  EXPECT_EQ(book.on_full(kOne, kNormal, 20, true, signals), 120u);
+  EXPECT_EQ(book.on_full(kTwo, kNormal, 3, true, signals), 3u) << "of another one";
+  book.on_room(proto::Lane::normal, signals);
+  EXPECT_EQ(book.on_full(kOne, kNormal, 5, true, signals), 5u) << "held anew";
+}
+
 TEST(PauseBook, RemindsAt256KiBAndNotBefore) {
   FakeSignals signals;
   PauseBook book;
