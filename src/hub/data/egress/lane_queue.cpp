@@ -132,8 +132,7 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   // Streams that left are forgotten when there are more of them than of others.
   if (streams() > 2 * entries_.size() + kForgottenMin) forget_streams();
   if (!indexed_) {
-    if (!streams_) streams_ = std::make_unique<StreamIndex>();
-    indexed_ = true;
+    begin_streams();
     for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
       const Entry& each = entries_.at(number);
       if (each.frames != 0 && each.latest && !each.touched) (*streams_)[stream_of(each)] = number;
@@ -196,6 +195,13 @@ void LaneQueue::skip_dead() {
   if (!entries_.empty()) return;
   forget_streams();
   forget_messages();
+}
+
+/// From here on LATEST entries that are pushed are remembered by their stream.
+void LaneQueue::begin_streams() {
+  forget_streams();
+  if (!streams_) streams_ = std::make_unique<StreamIndex>();
+  indexed_ = true;
 }
 
 /// Keeps the memory: the next burst fills it again.

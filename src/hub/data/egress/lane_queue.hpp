@@ -52,6 +52,11 @@ class LaneQueue {
   /// Returns whether there was one. From the first call on, LATEST entries are looked up by stream.
   [[nodiscard]] bool replace_latest(Entry& entry, Entry& older);
 
+  /// Does the same for all that came while nobody asked for it: of each stream only the newest LATEST message stays, in
+  /// the place of the oldest. Calls lose(Entry& older) for each that goes. The entries get other numbers.
+  template <class Lose>
+  void replace_all_latest(Lose&& lose);
+
   /// Takes out the oldest entry (or first frame of a run) that may be dropped for room. Returns false if there is none.
   [[nodiscard]] bool drop_oldest(Entry& dropped);
 
@@ -81,6 +86,7 @@ class LaneQueue {
   void discount(const Entry& entry);
   void skip_dead();
   void forget_streams();
+  void begin_streams();
   [[nodiscard]] Entry* search_message(NodeId src, std::uint32_t message_number);
   void index_messages();
   void note_message(const Entry& entry, std::uint64_t number);
@@ -96,5 +102,22 @@ class LaneQueue {
   bool messages_indexed_ = false;  ///< messages_ names every message that waits for more
   std::unique_ptr<MessageIndex> messages_;
 };
+
+template <class Lose>
+void LaneQueue::replace_all_latest(Lose&& lose) {
+  begin_streams();
+  for (std::size_t left = entries_.size(); left != 0; --left) {
+    Entry entry = std::move(entries_.front());
+    entries_.pop_front();  // before another is pushed, so that the ring does not grow
+    if (entry.frames == 0) continue;
+    discount(entry);
+    Entry older;
+    if (entry.latest && !entry.touched && replace_latest(entry, older)) {
+      lose(older);
+    } else {
+      push(std::move(entry));
+    }
+  }
+}
 
 }  // namespace gimnet::hub

@@ -137,12 +137,21 @@ bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& conte
 }
 
 void Outbox::settle(EgressContext& context) {
-  backlog_ = true;
+  const bool begins = !std::exchange(backlog_, true);
   if (!lanes_) return;
   lanes_->open.close();
+  if (begins) replace_latest(context);
   charge_entries(context);
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
     settle_lane(lanes_->queues[lane], lanes_->settled[lane], context);
+  }
+}
+
+/// While nothing waited, nobody asked whether an older message of the stream does.
+void Outbox::replace_latest(EgressContext& context) {
+  for (LaneQueue& lane : lanes_->queues) {
+    if (lane.latest_bytes() == 0) continue;
+    lane.replace_all_latest([&](Entry& older) { lose(older, proto::DropReason::replaced, context); });
   }
 }
 

@@ -149,6 +149,7 @@ class Outbox {
   [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   void forget_cut(NodeId src, std::uint32_t number);
   void tell_lost(const Entry& entry) const;
+  void replace_latest(EgressContext& context);
   /// Many small messages that cannot form runs take more memory for their entries than for their bytes.
   void charge_entries(EgressContext& context);
   void settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context);

@@ -135,6 +135,46 @@ TEST_F(LaneQueueTest, ReplacesTheLatestOfAStream) {
   EXPECT_FALSE(lane.replace_latest(third, older)) << "it left";
 }
 
+TEST_F(LaneQueueTest, ReplacesAllThatCameBefore) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
+  constexpr std::size_t kStreams = 100;
+  for (std::size_t i = 0; i < 10 * kStreams; ++i) {
+    lane.push(entry("stream" + std::to_string(10 + i % kStreams).substr(0, 2) + std::to_string(i), latest));
+    lane.push(entry("plain", {.src = static_cast<std::uint32_t>(2 + i % 2)}));
+  }
+  Entry part = entry("part", {.src = 9});
+  part.fragmented = true;
+  part.complete = false;
+  part.message_number = 77;
+  lane.push(std::move(part));
+  ASSERT_NE(lane.find_message(NodeId{7u << 20 | 9}, 77), nullptr);
+  const std::size_t before = lane.entries().size();
+  std::size_t lost = 0;
+  lane.replace_all_latest([&](Entry& older) {
+    EXPECT_TRUE(older.latest);
+    ++lost;
+  });
+  EXPECT_EQ(lost, before - lane.entries().size());
+  EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 9}, 77), &lane.entries().back());
+  std::uint64_t bytes = 0;
+  std::uint64_t latest_bytes = 0;
+  for (std::uint64_t number = lane.entries().first_number(); number != lane.entries().end_number(); ++number) {
+    const Entry& each = lane.entries().at(number);
+    bytes += each.size;
+    if (!each.latest) continue;
+    latest_bytes += each.size;
+    const std::string text(reinterpret_cast<const char*>(each.run.bytes + proto::kHeaderSize + 8),
+                           each.run.size - proto::kHeaderSize - 8);
+    EXPECT_GE(std::stoul(text), 9 * kStreams) << "the newest stay";
+  }
+  EXPECT_EQ(lane.bytes(), bytes);
+  EXPECT_EQ(lane.latest_bytes(), latest_bytes);
+  EXPECT_EQ(lane.block_bytes(), 0u);
+  Entry next = entry("stream50next", latest);
+  Entry older;
+  EXPECT_TRUE(lane.replace_latest(next, older)) << "and are found";
+}
+
 // A lane that never runs empty, and a sender with an ever new key: what left is not remembered.
 TEST_F(LaneQueueTest, ForgetsStreamsThatLeft) {
   const TestFrame latest{.flags = 3 | proto::kFlagKeyed};

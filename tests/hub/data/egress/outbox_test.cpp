@@ -115,6 +115,56 @@ TEST(Outbox, LatestReplacesInPlace) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
+// While the connection takes all that comes nobody looks for older ones; once it does not, the newest are what waits.
+TEST(Outbox, LatestOfOneBurstIsReplacedWhenItHasToWait) {
+  EgressRig rig;
+  TestConnection connection(rig);
+  rig.push(connection.outbox, "key____1 begun", {.flags = kLatest});
+  rig.push(connection.outbox, "key____1 old", {.flags = kLatest});
+  rig.push(connection.outbox, "key____2 old", {.flags = kLatest});
+  rig.push(connection.outbox, "key____1 other lane", {.flags = kLatest, .lane = 2});
+  rig.push(connection.outbox, "plain");
+  rig.push(connection.outbox, "key____2 new", {.flags = kLatest});
+  rig.push(connection.outbox, "key____1 newer", {.flags = kLatest});
+  rig.push(connection.outbox, "plain again", {.src = 2});
+  connection.peer.set_room(20);
+  connection.flush();
+  EXPECT_EQ(rig.dropped(DropReason::replaced), 2u);
+  EXPECT_TRUE(rig.ledger_exact());
+  rig.push(connection.outbox, "key____1 newest", {.flags = kLatest});
+  EXPECT_EQ(rig.dropped(DropReason::replaced), 3u);
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  EXPECT_THAT(connection.take(), ElementsAre("key____1 begun", "key____1 newest", "key____2 new", "plain",
+                                             "plain again", "key____1 other lane"));
+  EXPECT_TRUE(rig.ledger_exact());
+  EXPECT_EQ(rig.tally.queued, 0);
+}
+
+TEST(Outbox, ALatestMessageOfABurstThatIsReplacedGoesWithItsRest) {
+  EgressRig rig;
+  TestConnection connection(rig);
+  const auto fragment = [&](std::uint32_t number, std::uint32_t offset) {
+    rig.push_fragment(connection.outbox, number, offset, 24,
+                      "key____1" + std::string(8, static_cast<char>('0' + number)),
+                      {.kind = Kind::group, .flags = kLatest});
+  };
+  connection.peer.set_room(0);
+  fragment(1, 0);
+  fragment(1, 8);
+  fragment(2, 0);
+  connection.flush();
+  EXPECT_EQ(rig.dropped(DropReason::replaced), 2u);
+  fragment(1, 16);
+  fragment(2, 8);
+  fragment(2, 16);
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u);
+  connection.peer.set_room(MemoryPeer::kAll);
+  connection.flush();
+  EXPECT_THAT(connection.take(), SizeIs(3));
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
 TEST(Outbox, LatestOfAMessageUnderWayIsNotReplaced) {
   EgressRig rig;
   TestConnection connection(rig);
