@@ -19,6 +19,7 @@ struct Tally {
   bool any_dropped = false;
   std::uint64_t received_bytes = 0;
   std::uint64_t sent_bytes = 0;
+  std::uint64_t sent_control_bytes = 0;  ///< of them, of FLOW, LINK, NS and CTRL frames; not published
   std::uint64_t receive_calls = 0;
   std::uint64_t send_calls = 0;
   std::uint64_t copied_bytes = 0;

@@ -37,6 +37,7 @@ struct Progress {
   std::uint64_t taken_bytes = 0;  ///< that left the send queue, when last looked at
   std::uint64_t since_ms = 0;     ///< it has taken less than the least since then
   std::uint64_t owed_bytes = 0;   ///< had been sent when messages were dropped because it took nothing
+  std::uint64_t data_end = 0;     ///< of all bytes sent, where those end that came from lanes
   std::uint64_t block_taken_bytes = 0;
   std::uint64_t block_since_ms = 0;
   std::uint64_t rate_bytes = 0;  ///< taken when the rate was last measured

@@ -39,14 +39,17 @@ bool Flusher::flush_dirty() {
 void Flusher::flush(Connection& connection) {
   if (!connection.connected || connection.blocked) return let_wait(connection);
   const std::uint64_t sent_before = state_.tally.sent_bytes;
+  const std::uint64_t control_before = state_.tally.sent_control_bytes;
   const Flush result = connection.writer.flush(
       connection.outbox, connection.resume ? &connection.resume->kept : nullptr, *connection.transport, state_.egress);
   const std::uint64_t sent = state_.tally.sent_bytes - sent_before;
+  const bool sent_data = sent != state_.tally.sent_control_bytes - control_before;
   if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
     connection.must_confirm = must_confirm;
     state_.signals.arm(connection);
   }
   connection.sent_bytes += sent;
+  if (sent_data && connection.progress) connection.progress->data_end = connection.sent_bytes;
   if (sent != 0) connection.last_sent_ms = state_.now_ms;
   switch (result) {
     case Flush::emptied:
@@ -106,6 +109,7 @@ void Flusher::watch(Connection& connection) {
   Progress& progress = *connection.progress;
   progress.since_ms = progress.block_since_ms = progress.rate_since_ms = state_.now_ms;
   progress.taken_bytes = progress.block_taken_bytes = progress.rate_bytes = taken_bytes(connection);
+  progress.data_end = connection.sent_bytes;
 }
 
 void Flusher::on_writable(Connection& connection) {
@@ -129,8 +133,10 @@ void Flusher::look_after(Connection& connection) {
   // What the kernel calls unsent counts its own bookkeeping on some transports: never less than before.
   const std::uint64_t taken = std::max(taken_bytes(connection), progress.rate_bytes);
   adapt_unsent_limit(connection, taken);
-  if (taken != progress.block_taken_bytes || !connection.outbox.has_block()) {
-    progress.block_taken_bytes = taken;
+  // The hub's own words (PING, PONG, CONFIRM) may pass while data does not.
+  const std::uint64_t data_taken = std::min(taken, progress.data_end);
+  if (data_taken != progress.block_taken_bytes || !connection.outbox.has_block()) {
+    progress.block_taken_bytes = data_taken;
     progress.block_since_ms = state_.now_ms;
   } else if (state_.now_ms - progress.block_since_ms >= state_.limits.block_ms) {
     connection.outbox.time_out_block(state_.egress);

@@ -237,6 +237,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
   const std::uint64_t confirmed = connection.resume->kept.confirm(confirm.count);
   state_.tally.delivered += confirmed;
   state_.tally.queued -= static_cast<std::int64_t>(confirmed);
+  if (confirmed != 0 && connection.progress) connection.progress->block_since_ms = state_.now_ms;
   state_.recipients.mark_dirty(connection);
 }
 

@@ -163,6 +163,48 @@ TEST(Flusher, TimesOutANodeThatNeverConfirms) {
   EXPECT_EQ(rig.dropped(DropReason::timed_out), 16u);
 }
 
+// What the hub answers it is taken, but nothing of what waits.
+TEST(Flusher, TimesOutANodeThatNeverConfirmsButAsks) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  rig.settle();
+  for (int i = 0; i < 54; ++i) {
+    rig.send_flow(b, proto::flow::Ping{});
+    rig.pass_ms(100);
+    b.read();
+  }
+  rig.settle();
+  EXPECT_GE(b.flow_of<proto::flow::Pong>().size(), 54u);
+  EXPECT_EQ(rig.dropped(DropReason::timed_out), 16u);
+  EXPECT_FALSE(b.pipe.transport_gone());
+}
+
+TEST(Flusher, AConfirmIsProgressThoughItMakesNoRoomYet) {
+  Limits limits;
+  limits.resume_bytes = 4'096;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0, {.resume = true});
+  for (int i = 0; i < 4; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  rig.send(a, b.id.value(), std::string(4'000, 'y'));
+  rig.settle();
+  ASSERT_THAT(b.frames, SizeIs(4)) << "the last one has no room in the resume buffer before all are confirmed";
+  for (std::uint64_t confirmed = 1; confirmed <= 3; ++confirmed) {
+    rig.pass_ms(3'000);
+    rig.send_flow(b, proto::flow::Confirm{confirmed});
+    rig.settle();
+    EXPECT_THAT(b.frames, SizeIs(4));
+  }
+  rig.send_flow(b, proto::flow::Confirm{4});
+  rig.settle();
+  EXPECT_THAT(b.frames, SizeIs(5));
+  EXPECT_EQ(rig.ledger().dropped, 0u);
+}
+
 TEST(Flusher, GoesOnAfterAConfirm) {
   Limits limits;
   limits.resume_bytes = 4'096;

@@ -195,9 +195,11 @@ void GatherWriter::consume(const Batch& batch, std::size_t bytes, Job& job) {
     bytes -= taken;
     switch (pick.source) {
       case Source::partial:
+        if (partial_.control) job.context.tally.sent_control_bytes += taken;
         static_cast<void>(consume_partial(taken, job));
         break;
       case Source::control:
+        job.context.tally.sent_control_bytes += taken;
         consume_queue(job.outbox.control(), taken, true, job);
         break;
       case Source::replay:
