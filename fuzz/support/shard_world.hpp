@@ -106,7 +106,7 @@ class ShardWorld {
     turn();
     FUZZ_MUST(counters_.queued.value() == 0);
     // The slab that is read into may have been kept by a frame that is gone; the next read finds out.
-    FUZZ_MUST(shard_->state().pool.pinned_bytes() <= kSlabReadBytes + 16 + limits_.frame_bytes);
+    FUZZ_MUST(shard_->state().pool.pinned_bytes() <= kBufferRoom + kSlabReadBytes + 16 + limits_.frame_bytes);
   }
 
  protected:
