@@ -134,6 +134,7 @@ TEST(Hub, EndsWhenThoseWhomItToldGoodbyeHaveLeft) {
     ::close(descriptor);
   });
   (*hub)->run();
+  *hub = nullptr;  // closes what it still has
   node.join();
   EXPECT_FALSE(ended_early);
   EXPECT_TRUE(dismissed);
