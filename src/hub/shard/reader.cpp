@@ -76,11 +76,12 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   const std::byte* next = received.begin;
   state_.router.begin_bytes();
-  while (true) {
+  while (next != received.end) {
     const proto::RunView repeats = state_.router.append_repeats(next, received.end);
     if (repeats.frames != 0) {
       count(connection, repeats);
       next += repeats.size;
+      if (next == received.end) break;
     }
     proto::NextRun found = proto::next_run(next, received.end, length_max);
     if (found.found == proto::Found::run) {
@@ -95,12 +96,13 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
                     "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
     }
     if (connection.tail_since_ms == 0 || next != received.begin) connection.tail_since_ms = state_.now_ms;
-    if (next == received.end) connection.tail_since_ms = 0;
     if (keep(connection, {next, received.end}, found.needed)) return true;
     closer_.close(connection, proto::GoodbyeCode::no_memory,
                   "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
     return false;
   }
+  connection.tail_since_ms = 0;
+  return true;
 }
 
 /// Closed itself, a newcomer would pay for those who begin frames and never end them.
