@@ -62,12 +62,13 @@ SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.gene
 /// The asker's own paces, for when it has its answer: messages that count in a window must not come before it knows of
 /// that window, or it would never credit them.
 Effects take_paces_of(std::uint32_t asker, Effects& effects) {
-  const auto paces = std::ranges::stable_partition(effects, [asker](const Effect& effect) {
+  const auto is_own_pace = [asker](const Effect& effect) {
     const auto* pace = std::get_if<PaceDue>(&effect);
-    return pace == nullptr || pace->subscriber != asker;
-  });
-  Effects taken(std::make_move_iterator(paces.begin()), std::make_move_iterator(paces.end()));
-  effects.erase(paces.begin(), paces.end());
+    return pace != nullptr && pace->subscriber == asker;
+  };
+  Effects taken;
+  std::ranges::copy_if(effects, std::back_inserter(taken), is_own_pace);
+  if (!taken.empty()) std::erase_if(effects, is_own_pace);
   return taken;
 }
 
