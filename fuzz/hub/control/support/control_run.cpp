@@ -27,6 +27,7 @@ hub::Limits limits_for(std::uint8_t choice) {
   limits.slow_consumer_ms = 500;
   limits.token_ms = (choice & 1) != 0 ? 2'500 : 60'000;
   limits.nodes = (choice & 2) != 0 ? 4 : 8;
+  limits.administrators = 1;
   limits.services_per_node = limits.subscriptions_per_node = (choice & 4) != 0 ? 2 : 5;
   limits.watches = (choice & 8) != 0 ? 3 : 10;
   limits.watches_per_node = (choice & 8) != 0 ? 2 : 10;

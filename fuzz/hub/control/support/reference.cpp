@@ -65,10 +65,14 @@ Reference::Verdict Reference::judge(const Stranger& who, milliseconds wall) cons
   // Whoever is away under that name makes way, then a nameless one.
   const auto holder = names_.find(who.hello.name);
   const std::size_t stay = sessions_.size() - (holder != names_.end() ? 1 : 0);
-  const std::size_t room = limits_.nodes > stay ? limits_.nodes - stay : 0;
   const std::uint64_t goes = longest_away_nameless(holder != names_.end() ? holder->second : 0);
-  if (room == 0 && (goes == 0 || stay > limits_.nodes)) verdict.refusal = GoodbyeCode::hub_full;
+  const std::size_t away = stay >= limits_.nodes && goes != 0 ? 1 : 0;
+  if (stay - away >= places_for(role)) verdict.refusal = GoodbyeCode::hub_full;
   return verdict;
+}
+
+std::uint64_t Reference::places_for(Role role) const {
+  return limits_.nodes + (role == Role::admin ? limits_.administrators : 0);
 }
 
 std::uint64_t Reference::longest_away_nameless(std::uint64_t but) const {
@@ -139,7 +143,9 @@ std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachComman
     session.declare_until = hub.now + milliseconds{limits_.grace_ms};
     return verdict.session;
   }
-  if (sessions_.size() >= limits_.nodes) end(longest_away_nameless(0), hub.now);
+  if (sessions_.size() >= limits_.nodes) {
+    if (const std::uint64_t away = longest_away_nameless(0); away != 0) end(away, hub.now);
+  }
   FUZZ_MUST(index != kHubIndex && index < kEveryIndex && !by_index_.contains(index));
   if (!verdict.former) FUZZ_MUST(is_free(resting_nodes_, index, hub.now));
   resting_nodes_.erase(index);

@@ -129,6 +129,7 @@ class Reference {
   void judge_token(const Stranger& who, milliseconds wall, Verdict& verdict) const;
   [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name, std::uint64_t claimant) const;
   [[nodiscard]] std::uint64_t longest_away_nameless(std::uint64_t but) const;
+  [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
   std::uint64_t take_in(const Verdict& verdict, const hub::AttachCommand& attach, const ControlHub& hub);
   void take_name(std::uint64_t id, const std::string& name, milliseconds now);
   void end(std::uint64_t id, milliseconds now);
