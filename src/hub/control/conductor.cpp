@@ -1,8 +1,5 @@
 #include "hub/control/conductor.hpp"
 
-#include <algorithm>
-#include <iterator>
-
 #include "base/check.hpp"
 #include "base/endian.hpp"
 #include "base/id_text.hpp"
@@ -58,19 +55,6 @@ std::uint64_t epoch_of(const HubStart& start) {
 }
 
 SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
-
-/// The asker's own paces, for when it has its answer: messages that count in a window must not come before it knows of
-/// that window, or it would never credit them.
-Effects take_paces_of(std::uint32_t asker, Effects& effects) {
-  const auto is_own_pace = [asker](const Effect& effect) {
-    const auto* pace = std::get_if<PaceDue>(&effect);
-    return pace != nullptr && pace->subscriber == asker;
-  };
-  Effects taken;
-  std::ranges::copy_if(effects, std::back_inserter(taken), is_own_pace);
-  if (!taken.empty()) std::erase_if(effects, is_own_pace);
-  return taken;
-}
 
 }  // namespace
 
@@ -196,7 +180,6 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const proto::Payload answer = handle(context, request);
   const proto::Status status = proto::peek_status(answer);
   if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, status);
-  const Effects after_answer = take_paces_of(index_of(event.node), effects);
 #ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
 #endif
@@ -214,7 +197,6 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
 #ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
 #endif
-  runner_.carry_out(after_answer, now);
   if (is_odd(status)) on_oddity(event, now);
 }
 

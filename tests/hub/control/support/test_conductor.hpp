@@ -92,11 +92,12 @@ class TestConductor {
                        now);
   }
 
-  /// Asks for something and returns the answer, which is the last thing that a node is told.
+  /// Asks for something and returns the answer, which is the last thing that the node's shard is told.
   template <class Answer, class Message>
   Result<Answer, proto::Refusal> ask(const Node& node, const Message& message, proto::Kind kind = proto::Kind::ns) {
     send_frame(node, kind, proto::encode(message, ++requests));
-    const SendControlCommand* answer = shards.all<SendControlCommand>().back();
+    const auto* answer = std::get_if<SendControlCommand>(&shards.sent.back().command);
+    EXPECT_NE(answer, nullptr);
     EXPECT_EQ(answer->answers, 1u);
     EXPECT_EQ(answer->attachment, node.attachment);
     EXPECT_EQ(answer->session.slot, node.session.slot);
