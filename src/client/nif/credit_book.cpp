@@ -7,21 +7,29 @@ namespace gimnet::nif {
 void CreditBook::begin_anew() {
   const MutexLock lock(mutex_);
   ++epoch_;
+  std::erase_if(accounts_, [](const auto& entry) { return entry.second.early; });
   for (auto& [group, account] : accounts_) account.taken = account.told = 0;
 }
 
 void CreditBook::tell_all() {
   const MutexLock lock(mutex_);
   for (auto& [group, account] : accounts_) {
-    if (account.taken != 0) tell(group, account);
+    if (account.taken != 0 && !account.early) tell(group, account);
   }
 }
 
 void CreditBook::open(GroupId group, std::uint32_t window) {
   if (group == GroupId{}) return;
   const MutexLock lock(mutex_);
-  if (window == 0 && !accounts_.contains(group.value())) return;
-  accounts_[group.value()].window = window;
+  const auto found = accounts_.find(group.value());
+  if (window == 0 && (found == accounts_.end() || found->second.early)) {
+    if (found != accounts_.end()) accounts_.erase(found);
+    return;
+  }
+  Account& account = accounts_[group.value()];
+  account.window = window;
+  account.early = false;
+  if (account.taken != account.told) tell(group.value(), account);
   any_.store(true, std::memory_order_relaxed);  // a hint for this thread, which sets and reads it
 }
 
@@ -30,10 +38,13 @@ void CreditBook::forget(GroupId group) {
   accounts_.erase(group.value());
 }
 
-std::uint32_t CreditBook::epoch_for(std::uint32_t group) {
-  if (!any_.load(std::memory_order_relaxed)) return 0;  // see open()
+std::uint32_t CreditBook::epoch_for(std::uint32_t group, bool subscribing) {
+  if (!subscribing && !any_.load(std::memory_order_relaxed)) return 0;  // see open()
   const MutexLock lock(mutex_);
-  return accounts_.contains(group) ? epoch_ : 0;
+  if (accounts_.contains(group)) return epoch_;
+  if (!subscribing || accounts_.size() >= kAccountsMax) return 0;
+  accounts_[group].early = true;
+  return epoch_;
 }
 
 void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t messages, bool more) {
@@ -43,6 +54,7 @@ void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t me
   if (found == accounts_.end() || epoch != epoch_) return;
   Account& account = found->second;
   account.taken += messages;
+  if (account.early) return;
   const std::uint64_t enough = more ? std::max(1u, account.window / 2) : 1;
   if (account.taken - account.told >= enough) tell(group, account);
 }

@@ -27,8 +27,10 @@ class CreditBook {
   void open(GroupId group, std::uint32_t window) GIMNET_EXCLUDES(mutex_);
   /// The group is gone.
   void forget(GroupId group) GIMNET_EXCLUDES(mutex_);
-  /// What a message of the group that comes now is tagged with; 0: it is not counted.
-  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  /// What a message of the group that comes now is tagged with; 0: it is not counted. `subscribing`: a SUBSCRIBE waits
+  /// for its answer. The hub may send messages before that, and counts them: so they are counted until open() says
+  /// whether it does.
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group, bool subscribing) GIMNET_EXCLUDES(mutex_);
 
   /// The program took messages. With `more` the hub is told once half of the window was taken, else at once.
   void take(std::uint32_t group, std::uint32_t epoch, std::uint32_t messages, bool more) GIMNET_EXCLUDES(mutex_);
@@ -38,7 +40,10 @@ class CreditBook {
     std::uint32_t window = 0;
     std::uint64_t taken = 0;
     std::uint64_t told = 0;
+    bool early = false;  ///< not open yet: counted, but not told
   };
+  /// Groups of which something came early, at most.
+  static constexpr std::size_t kAccountsMax = 4096;
   void tell(std::uint32_t group, Account& account) GIMNET_REQUIRES(mutex_);
 
   Outbound& outbound_;

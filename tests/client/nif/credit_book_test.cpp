@@ -98,6 +98,44 @@ TEST(CreditBook, GathersWhileMoreWaits) {
   EXPECT_EQ(total, 8u);
 }
 
+/// A message comes before the answer to SUBSCRIBE, which has that window.
+void subscribe_late(Connected& connected, std::uint32_t window) {
+  std::thread asking(
+      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
+  publish(connected.hub);
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{kGroup};
+  answer.window = window;
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  asking.join();
+}
+
+TEST(CreditBook, CountsWhatCameBeforeTheAnswer) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe_late(connected, 1);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u) << "the window would be shut for ever";
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 2u);
+}
+
+TEST(CreditBook, DoesNotCreditWhatCameBeforeAnAnswerWithoutAWindow) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  subscribe_late(connected, 0);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(take(connected.node.get()).epoch, 0u);
+  subscribe(connected, 1);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
 TEST(CreditBook, AGroupWithoutAWindowIsNotCredited) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options(), make_welcome());
