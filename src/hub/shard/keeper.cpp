@@ -1,5 +1,7 @@
 #include "hub/shard/keeper.hpp"
 
+#include <algorithm>
+
 #include <bit>
 
 #include "base/clock.hpp"
@@ -31,6 +33,12 @@ void Keeper::look_at(Connection& connection) {
     return closer_.close(
         connection, proto::GoodbyeCode::too_many_requests,
         "the hub's words wait and are not taken, RESUME among them; read what the hub says, come back");
+  }
+  // What a peer sent before it was gone waits for who holds it, but no longer than its session would wait for the peer:
+  // it may be held by what waits for itself, and would be for ever.
+  if (connection.write_failed &&
+      state_.now_ms - connection.last_heard_ms >= std::max(limits.grace_ms, limits.silent_ms)) {
+    return closer_.on_broken(connection);
   }
   const bool heard = connection.holds == 0 && !connection.waits_for_room && !connection.draining;
   if (heard && state_.now_ms - connection.last_heard_ms >= limits.silent_ms) {

@@ -223,6 +223,24 @@ TEST_P(GonePeer, IsNoSlowConsumerWhileItIsHeld) {
   EXPECT_EQ(rig_.ledger().queued, 1u);
 }
 
+TEST_P(GonePeer, IsNotHeldForEverByWhatWaitsForItself) {
+  FakeNode& other = rig_.join(0);
+  join(true);
+  fill(sender_);
+  vanish();
+  rig_.send(other, sender_.id.value(), "writing to it fails");
+  const std::uint64_t heard_ms = rig_.now_ms;
+  bool ended = false;
+  while (!ended && rig_.now_ms < heard_ms + 2 * limits_.grace_ms) {
+    rig_.now_ms += 500;
+    rig_.send_flow(other, proto::flow::Pong{});
+    turn();
+    ended = end().has_value();
+  }
+  EXPECT_TRUE(ended);
+  EXPECT_GE(rig_.now_ms, heard_ms + limits_.grace_ms);
+}
+
 TEST_P(GonePeer, WhatItSentIsReadAlthoughWritingToItFails) {
   FakeNode& to = rig_.join(0);
   FakeNode& other = rig_.join(0);
