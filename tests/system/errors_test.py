@@ -375,12 +375,13 @@ class TheHubGoes(unittest.TestCase):
     def test_those_that_publish_or_watch_say_so_too(self):
         lines = start_gimnet(self, self.hub, "pub", "P/s", "--rate", "20", stdin=subprocess.PIPE).feed(b"x\n" * 5000)
         stays = start_gimnet(self, self.hub, "pub", "Q/s", "--stay")
+        waits = start_gimnet(self, self.hub, "pub", "W/s", "--wait", "2")
         watch = start_gimnet(self, self.hub, "watch", "**", "--json")
-        for name in ("P", "Q"):
+        for name in ("P", "Q", "W"):
             wait_until(lambda name=name: f'"name":"{name}"'.encode() in watch.out, f"the node {name}")
         wait_until(lambda: "the service stays until Ctrl-C" in stays.err, "the end of its input")
         self.kill()
-        self.all_go_on([lines, stays, watch])
+        self.all_go_on([lines, stays, waits, watch])
 
     def all_go_on(self, tools):
         for tool in tools:

@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -15,17 +16,52 @@ namespace {
 
 /// How long the last lines may take to leave.
 constexpr Timeout kDrain{10'000};
-/// How often somebody who waits for nothing but a signal looks at the connection.
+/// How often the connection is looked at.
 constexpr std::int64_t kLookNs = 200'000'000;
-/// Lines that come without a pause; after so many the connection is looked at.
-constexpr std::uint64_t kLinesPerLook = 1'000;
 
-Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
+/// What goes on only while a hub is there: looks now and then, says what it sees, and waits where nothing stands, since
+/// publishing would wait without a word.
+class Standing {
+ public:
+  explicit Standing(Session& session) : session_(session), watch_(session.node()) {}
+
+  /// False: none will come any more, or a signal came; outcome() says which.
+  [[nodiscard]] bool stands() {
+    while (steady_now_ns() >= next_look_ns_) {
+      next_look_ns_ = steady_now_ns() + kLookNs;
+      if (!goes_on()) return false;
+      if (session_.node().state().connected) return true;
+      if (!session_.stop().wait_until(next_look_ns_)) return false;
+    }
+    return true;
+  }
+  /// False: a signal came before `deadline_ns`, or as stands().
+  [[nodiscard]] bool stands_until(std::int64_t deadline_ns) {
+    while (stands()) {
+      if (steady_now_ns() >= deadline_ns) return true;
+      if (!session_.stop().wait_until(std::min(deadline_ns, next_look_ns_))) return false;
+    }
+    return false;
+  }
+  /// The hub wants this node; looks at once.
+  [[nodiscard]] bool goes_on() { return watch_.goes_on(); }
+  /// Why it did not stand: a signal is no failure.
+  [[nodiscard]] Outcome<void> outcome() const {
+    if (session_.stopped()) return {};
+    return Session::gone();
+  }
+
+ private:
+  Session& session_;
+  ConnectionWatch watch_;
+  std::int64_t next_look_ns_ = 0;
+};
+
+Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
-  ConnectionWatch watch(session.node());
-  LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return watch.goes_on(); });
+  LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return standing.goes_on(); });
   const Progress progress([&] {
     return std::to_string(publisher.published()) + " published to " + std::to_string(publisher.subscribers());
   });
@@ -33,11 +69,7 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
-        // Lines may come while there is no hub: that is said, and they go on when it is back.
-        if ((!input.has_line() || publisher.published() % kLinesPerLook == 0) && !watch.goes_on()) {
-          return Session::gone();
-        }
-        if (period_ns != 0 && !session.stop().wait_until(next_ns)) return {};
+        if (!standing.stands_until(next_ns)) return standing.outcome();
         next_ns += period_ns;
         if (auto sent = publisher.publish(line, period_ns == 0 && input.has_line() ? More::yes : More::no); !sent) {
           return sent;
@@ -54,15 +86,26 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher) {
   }
 }
 
+Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publisher, Standing& standing) {
+  const std::size_t wanted = session.options().subscribers;
+  if (publisher.subscribers() >= wanted) return {};
+  say("waiting for " + std::to_string(wanted) + (wanted == 1 ? " subscriber of " : " subscribers of ") +
+      session.options().target);
+  while (true) {
+    auto waited = publisher.wait_for_subscribers(wanted, Timeout{kLookNs / 1'000'000});
+    if (waited || waited.failure().status != Status::timeout) return waited;
+    if (!standing.goes_on()) return standing.outcome();
+  }
+}
+
 /// The service stands, and with it what is retained, until a signal comes or the hub wants this node no more.
-Outcome<void> stay(Session& session) {
+Outcome<void> stay(Session& session, Standing& standing) {
   session.output().flush();
   say("the input has ended; the service stays until Ctrl-C");
-  ConnectionWatch watch(session.node());
   while (session.stop().wait_until(steady_now_ns() + kLookNs)) {
-    if (!watch.goes_on()) return Session::gone();
+    if (!standing.goes_on()) break;
   }
-  return {};
+  return standing.outcome();
 }
 
 void write_counts(Session& session, const Publisher& publisher) {
@@ -88,17 +131,12 @@ ExitCode run_pub(Session& session) {
   service.key = options.key;
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
   if (!publisher) return session.fail(publisher.failure());
-  if (options.subscribers > publisher->subscribers()) {
-    say("waiting for " + std::to_string(options.subscribers) +
-        (options.subscribers == 1 ? " subscriber of " : " subscribers of ") + options.target);
-    if (auto waited = publisher->wait_for_subscribers(options.subscribers); !waited) {
-      return session.fail(waited.failure());
-    }
-  }
-  auto sent = publish_lines(session, *publisher);
+  Standing standing(session);
+  auto sent = wait_for_subscribers(session, *publisher, standing);
+  if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing);
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
   write_counts(session, *publisher);
-  if (sent && options.stay && !session.stopped()) sent = stay(session);
+  if (sent && options.stay && !session.stopped()) sent = stay(session, standing);
   if (!sent) return session.fail(sent.failure());
   return session.finish();
 }
