@@ -175,10 +175,11 @@ class Reload(Case):
 
     def test_a_bad_file_changes_nothing(self):
         hub = self.configured("[limits]\nservices_per_node = 0\n")
-        self.file.write_text("shrads = 2\n[limits]\nservices_per_node = 5\n")
+        self.file.write_text("shrads = 2\nspni = true\n[limits]\nservices_per_node = 5\n")
         refused = self.ctl("reload")
         self.assertEqual(refused.code, 1)
-        self.assertIn(f"{self.file}:1:1: there is no key 'shrads'", refused.err)
+        self.assertIn(f"\n{self.file}:1:1: there is no key 'shrads'", refused.err)
+        self.assertIn(f"\n{self.file}:2:1: there is no key 'spni'", refused.err)
         self.assertIn("stays in force", refused.err)
         wait_until(lambda: "there is no key 'shrads'" in hub.process.err, "the same words in the log")
         self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)

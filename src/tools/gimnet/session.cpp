@@ -13,8 +13,16 @@
 
 namespace gimnet::tool {
 
-// What a hub or another node says may have anything in it.
-void say(const std::string& sentence) { std::fprintf(stderr, "gimnet: %s\n", printable(sentence).c_str()); }
+void say(const std::string& sentence) {
+  // What a hub or another node says may have anything in it; of that, only ends of lines are for the terminal.
+  std::string shown;
+  for (std::size_t begin = 0; begin <= sentence.size();) {
+    const std::size_t end = std::min(sentence.find('\n', begin), sentence.size());
+    shown += (begin == 0 ? "" : "\n") + printable(std::string_view(sentence).substr(begin, end - begin));
+    begin = end + 1;
+  }
+  std::fprintf(stderr, "gimnet: %s\n", shown.c_str());
+}
 
 NodeOptions Session::options_for(NodeOptions how) const {
   how.hub = options_.hub;
