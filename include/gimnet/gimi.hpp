@@ -181,7 +181,7 @@ struct NodeState {
 struct LostCounts {
   std::uint64_t incomplete = 0;  ///< a part of them did not come, or did not fit what came before
   std::uint64_t too_large = 0;   ///< larger than NodeOptions::message_bytes_max
-  std::uint64_t broken_off = 0;  ///< lost with a connection; at least so many
+  std::uint64_t broken_off = 0;  ///< lost with a connection: frames, of which a large message has many
   [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + broken_off; }
 };
 

@@ -22,7 +22,8 @@ std::vector<std::string> LostMessages::rest() {
   std::vector<std::string> sentences;
   add_sentence(sentences, counts_.incomplete, told_.incomplete, "a part did not come, or did not fit the others");
   add_sentence(sentences, counts_.too_large, told_.too_large, "larger than this end takes");
-  add_sentence(sentences, counts_.broken_off, told_.broken_off, "on their way when the connection broke");
+  add_sentence(sentences, counts_.broken_off, told_.broken_off,
+               "on their way when the connection broke, counted in frames");
   told_ = counts_;
   return sentences;
 }

@@ -49,7 +49,7 @@ std::string service_words(const ServiceRecord& service) {
   return printable(words);
 }
 
-// Of what is gone the hub tells only who it was (docs/protocol.md, section 6): nothing else is said here.
+// Of what is gone the hub tells only who it was (docs/protocol.md, section 8): nothing else is said here.
 void write_node(JsonWriter& json, const WatchEvent& event) {
   const NodeRecord& node = *event.node;
   if (event.change != Change::left) return write(json, node);

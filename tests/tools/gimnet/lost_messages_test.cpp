@@ -19,9 +19,10 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
   LostMessages lost;
   lost.take({.incomplete = 1, .too_large = 2, .broken_off = 3});
   EXPECT_EQ(lost.all(), 6u);
-  EXPECT_EQ(lost.rest(), (Sentences{"1 message was lost: a part did not come, or did not fit the others",
-                                    "2 messages were lost: larger than this end takes",
-                                    "3 messages were lost: on their way when the connection broke"}));
+  EXPECT_EQ(lost.rest(),
+            (Sentences{"1 message was lost: a part did not come, or did not fit the others",
+                       "2 messages were lost: larger than this end takes",
+                       "3 messages were lost: on their way when the connection broke, counted in frames"}));
   EXPECT_EQ(lost.rest(), Sentences{});
   lost.take({.incomplete = 4, .too_large = 2, .broken_off = 3});
   EXPECT_EQ(lost.rest(), Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
