@@ -66,7 +66,7 @@ class Folder(unittest.TestCase):
         for home in ("", "/nonexistent/home"):
             hub = PlainHub(self, "--listen", url, env={"XDG_STATE_HOME": "", "HOME": home}).wait_ready()
             Client(self, hub).join("K")
-            self.assertIn("--state-dir", hub.process.err)
+            wait_until(lambda hub=hub: "--state-dir" in hub.process.err, "the warning in the log")
             hub.kill()
 
     def test_two_hubs_do_not_share_one(self):
@@ -94,7 +94,7 @@ class Folder(unittest.TestCase):
             self.assertIn(part, said)
         os.rename(file, file + ".old")
         anew = PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", state).wait_ready()
-        self.assertIn("begins anew", anew.process.err)
+        wait_until(lambda: "begins anew" in anew.process.err, "the warning in the log")
 
     def test_a_place_that_is_no_folder_is_told(self):
         path = os.path.join(self.path, "file")
