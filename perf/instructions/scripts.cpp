@@ -4,6 +4,7 @@
 //     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames of the counted run
 //     instruction_scripts           prints what compiled it, and the scripts' names
 
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -12,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/endian.hpp"
 #include "bench/hub/data/support/null_transport.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "tests/hub/data/support/route_rig.hpp"
@@ -192,22 +194,47 @@ Work hub_turn_single() {
           }};
 }
 
-Work hub_turn_fan_out() {
+/// A provider with so many services, each with the same members, whose frames come in turns.
+Work hub_turn_fan_out(std::uint32_t services) {
   auto rig = std::make_shared<testing::HubRig>();
   testing::FakeNode& provider = rig->join(0);
   std::vector<testing::FakeNode*> members;
   for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
-  rig->publish_group(1, provider.id, members);
+  for (std::uint32_t service = 1; service <= services; ++service) rig->publish_group(service, provider.id, members);
   rig->settle();
   constexpr std::uint32_t kFrames = 32;
   std::vector<std::byte> bytes;
   for (std::uint32_t i = 0; i < kFrames; ++i) {
-    const auto frame =
-        testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload, {.kind = proto::Kind::group});
+    const auto group = testing::HubRig::group(1 + i % services);
+    const auto frame = testing::HubRig::frame(provider, group, kPayload, {.kind = proto::Kind::group});
     bytes.insert(bytes.end(), frame.begin(), frame.end());
   }
   return {kFrames * kFanOut, [rig, &provider, bytes] {
             rig->write(provider, bytes);
+            rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
+          }};
+}
+
+/// The same to recipients by their ids: each frame brings its own.
+Work hub_turn_list() {
+  auto rig = std::make_shared<testing::HubRig>();
+  testing::FakeNode& sender = rig->join(0);
+  std::string ids_and_payload;
+  for (std::uint32_t i = 0; i < kFanOut; ++i) {
+    std::array<std::byte, 4> id{};
+    store_le(id.data(), rig->join(0).id.value());
+    ids_and_payload.append(reinterpret_cast<const char*>(id.data()), id.size());
+  }
+  ids_and_payload += kPayload;
+  rig->settle();
+  constexpr std::uint32_t kFrames = 32;
+  std::vector<std::byte> bytes;
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    const auto frame = testing::HubRig::frame(sender, kFanOut, ids_and_payload, {.kind = proto::Kind::list});
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  }
+  return {kFrames * kFanOut, [rig, &sender, bytes] {
+            rig->write(sender, bytes);
             rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
           }};
 }
@@ -227,7 +254,9 @@ constexpr Script kScripts[] = {
     {"mailbox", mailbox},
     {"hub_turn_one_to_one", [] { return hub_turn(1); }},
     {"hub_turn_in_turns", [] { return hub_turn(kDestinations); }},
-    {"hub_turn_fan_out_100", hub_turn_fan_out},
+    {"hub_turn_fan_out_100", [] { return hub_turn_fan_out(1); }},
+    {"hub_turn_fan_out_100_in_turns", [] { return hub_turn_fan_out(kDestinations); }},
+    {"hub_turn_list_100", hub_turn_list},
     {"hub_turn_single", hub_turn_single},
 };
 

@@ -13,22 +13,25 @@ from driver import instructions  # noqa: E402
 LIST = ROOT / "perf" / "instructions" / "planted_bugs.txt"
 
 
-def scripts_with_bug() -> list[str]:
+def scripts_with_bug() -> list[tuple[str, str]]:
+    """The programs with a bug, each with the script that finds it."""
     lines = [line.split() for line in LIST.read_text().splitlines() if line.strip() and not line.startswith("#")]
-    return [words[1] for words in lines]
+    return [(f"instruction_scripts_{words[0].lower()}", words[1]) for words in lines]
 
 
 def main() -> int:
     folder = pathlib.Path(sys.argv[1]).resolve() / "bin"
-    scripts = scripts_with_bug()
-    assert scripts, f"{LIST} lists nothing"
+    bugs = scripts_with_bug()
+    assert bugs, f"{LIST} lists nothing"
+    scripts = sorted({script for _, script in bugs})
     try:
         made_by, _ = instructions.describe(folder / "instruction_scripts")
         if made_by["build"] != "release":
             raise instructions.CountingError("a build without optimisation says nothing of a twentieth")
         clean = {script: instructions.count(folder / "instruction_scripts", script)[0] for script in scripts}
         budget = {"instructions_per_frame": clean}
-        planted = instructions.measure(folder / "instruction_scripts_planted", scripts, budget)
+        planted = [verdict for program, script in bugs
+                   for verdict in instructions.measure(folder / program, [script], budget)]
         again = instructions.measure(folder / "instruction_scripts", scripts, budget)
     except instructions.CountingError as error:
         print(f"SKIPPED: {error}")

@@ -105,6 +105,9 @@ bool IoShard::room_came() {
 }
 
 void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
+#if defined(GIMNET_BUG_SLOW_TURN)
+  asm volatile(".rept 130\n\tnop\n\t.endr");
+#endif
   state_.egress.owner.check_here();
   state_.now_ms = state_.egress.now_ms = now_ms;
   state_.egress.now_wall_ns = wall_now_ns();
