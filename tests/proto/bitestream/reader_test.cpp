@@ -207,8 +207,21 @@ TEST(BitestreamReader, ReadsNothingOfNothing) {
   EXPECT_TRUE(is_valid({}));
 }
 
+TEST(BitestreamReader, TakesALengthFieldOfEverySize) {
+  const auto bytes = load_vector("bitestream/length_fields");
+  Reader reader(bytes);
+  for (int i = 0; i < 3; ++i) {
+    const auto value = reader.next();
+    ASSERT_TRUE(value) << i;
+    EXPECT_EQ(value->as<std::uint8_t>(), 7) << i;
+  }
+  EXPECT_FALSE(reader.next());
+  EXPECT_FALSE(reader.failed());
+}
+
 TEST(BitestreamReader, RefusesEveryCutOfEveryVector) {
-  for (const std::string name : {"bitestream/example", "bitestream/every_type", "bitestream/long_text"}) {
+  for (const std::string name :
+       {"bitestream/example", "bitestream/every_type", "bitestream/length_fields", "bitestream/long_text"}) {
     const auto bytes = load_vector(name);
     std::vector<std::size_t> ends{0};
     Reader whole(bytes);
