@@ -27,12 +27,49 @@ class Pace:
         time.sleep(max(0.0, wake_at - now))
 
 
+class Allowance:
+    """A pace without a clock: lets through what it is granted, of one connection; anything until bound() is called. What a
+    grant finds unused is void, as on a line that had nothing to carry. `news` is notified of all that changes."""
+
+    def __init__(self):
+        self.news = threading.Condition()
+        self._left, self._wanted, self._bound = 0.0, None, False
+
+    def bound(self):
+        with self.news:
+            self._bound = True
+
+    def lift(self):
+        with self.news:
+            self._bound = False
+            self.news.notify_all()
+
+    def grant(self, size):
+        with self.news:
+            self._left = size + (self._left if self._wanted is not None else 0.0)
+            self.news.notify_all()
+
+    @property
+    def used_up(self):
+        """More is there than may go. Whoever asks holds `news`."""
+        return self._bound and self._wanted is not None and self._wanted > self._left
+
+    def wait(self, size):
+        with self.news:
+            self._wanted = size
+            self.news.notify_all()
+            self.news.wait_for(lambda: not self._bound or self._left >= size)
+            self._left -= size if self._bound else 0.0
+            self._wanted = None
+
+
 class RateProxy:
     """Forwards connections to a port of this machine. Down is towards who dialed. Close it when done."""
 
-    def __init__(self, port, down_bits_per_s=None, up_bits_per_s=None):
+    def __init__(self, port, down_bits_per_s=None, up_bits_per_s=None, down=None):
+        """`down`: an Allowance in place of a rate."""
         self.target = port
-        self.down = Pace(down_bits_per_s and down_bits_per_s / 8)
+        self.down = down or Pace(down_bits_per_s and down_bits_per_s / 8)
         self.up = Pace(up_bits_per_s and up_bits_per_s / 8)
         self.accepted = self.down_bytes = self.up_bytes = 0
         self._lock = threading.Lock()
@@ -59,6 +96,8 @@ class RateProxy:
 
     def close(self):
         self._closing = True
+        if isinstance(self.down, Allowance):
+            self.down.lift()  # nobody waits for it any more
         self._shut(self._listener)
         self.cut()
 

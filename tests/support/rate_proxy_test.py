@@ -6,7 +6,7 @@ import threading
 import time
 import unittest
 
-from rate_proxy import RateProxy
+from rate_proxy import Allowance, RateProxy
 
 PATIENCE_S = 20
 
@@ -74,6 +74,26 @@ class RateProxyTest(unittest.TestCase):
         client.sendall(bytes(50_000))
         self.take(client, 50_000)
         self.assertGreaterEqual(time.monotonic() - begin, 0.45, "50,000 bytes at 100,000 a second")
+
+    def test_lets_through_what_is_granted_and_saves_nothing_up(self):
+        allowance = Allowance()
+        proxy = self.proxy(down=allowance)
+        client = self.dial(proxy)
+        client.sendall(b"a" * 500)
+        self.assertEqual(self.take(client, 500), b"a" * 500, "anything, before it is bound")
+        allowance.bound()
+        allowance.grant(5000)  # void with the next: nobody wanted it
+        allowance.grant(30)
+        client.sendall(b"b" * 100)
+        with allowance.news:
+            self.assertTrue(allowance.news.wait_for(lambda: allowance.used_up, PATIENCE_S))
+        self.assertEqual(proxy.down_bytes, 500)
+        for _ in range(2):
+            allowance.grant(35)
+        self.assertEqual(self.take(client, 100), b"b" * 100, "30, 35 and 35")
+        allowance.lift()
+        client.sendall(b"c" * 700)
+        self.assertEqual(self.take(client, 700), b"c" * 700)
 
     def test_holds_little(self):
         proxy = self.proxy(down_bits_per_s=8)

@@ -1,140 +1,22 @@
 #!/usr/bin/env python3
-"""Delivery of services to subscribers of very different speed, behind a proxy that bounds it: sync(1), latest, windows
-that must not leak, and the last message for who comes late. Judged by counts and sequence numbers, not by time."""
+"""Windows of subscriptions that must not leak, and the last message for who comes late. Judged by counts and sequence numbers,
+not by time."""
 
 import os
 import pathlib
 import struct
 import sys
-import threading
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
 from rate_proxy import RateProxy
+from support.delivery import STREAM_DELIVERY, SYNC_DELIVERY, Provider, advertise, subscribe
 from support.processes import Hub, run_gimnet, start_gimnet
-from support.waiting import PATIENCE_S, wait_until
-from support.wire import (CREDIT, FLAG_KEYED, FLOW, GROUP, LATEST, NS, Client, Closed, number, text, value)
+from support.waiting import wait_until
+from support.wire import CREDIT, FLOW, GROUP, NS, Client, number, text
 
 FULL = os.environ.get("GIMNET_STRESS") == "full"
-STREAM_DELIVERY, LATEST_DELIVERY, SYNC_DELIVERY = range(3)
-SIZE = 1000
-
-
-def advertise(client, name, delivery, window=None, retain=False):
-    body = text(3, name) + number(7, 2, delivery)
-    if window is not None:
-        body += number(10, 4, window)
-    if retain:
-        body += value(11, 1, b"\1")
-    return client.ask(NS, 7, body)
-
-
-def subscribe(client, name, **pace):
-    body = text(3, name)
-    if "window" in pace:
-        body += number(4, 4, pace["window"])
-    if "depth" in pace:
-        body += number(5, 4, pace["depth"])
-    if "rate_hz" in pace:
-        body += value(6, 11, struct.pack("<d", pace["rate_hz"]))
-    return client.ask(NS, 10, body)
-
-
-def message(sequence, content=b""):
-    """A DATA message of GIMI with key 0."""
-    return bytes(8) + struct.pack("<IBBH", sequence, 0, 0, 0) + content
-
-
-class Provider:
-    """Publishes numbered messages of a service, one when it is told to."""
-
-    def __init__(self, test, hub, delivery, window=None, retain=False):
-        self.client = Client(test, hub).join("A", shard=0)
-        self.group = advertise(self.client, "B", delivery, window, retain)[3]
-        self.flags = FLAG_KEYED | (LATEST if delivery == LATEST_DELIVERY else 0)
-        self.sequence = 0
-
-    def publish(self, size=SIZE):
-        self.sequence += 1
-        content = b"%d" % self.sequence
-        payload = message(self.sequence, content + b"." * (size - len(content)))
-        self.client.send(self.client.frame(self.group, payload, kind=GROUP, flags=self.flags))
-        return self.sequence
-
-
-class Subscriber:
-    """Counts what comes; with `credits` it says that it took each message before it takes the next."""
-
-    def __init__(self, test, proxy, provider, credits, shard=0, **pace):
-        self.client = Client(test, proxy, receive_bytes=4096).join(shard=shard)
-        self.group, self.credits, self.provider = provider.group, credits, provider
-        self.answer = subscribe(self.client, "A/B", **pace)
-        self.got, self.stale = [], []
-        self.news = threading.Condition()
-        self.seen_by_hub = 0  # sequence of a message that the hub has handled
-        self.fresh = 0        # ... when the last CREDIT was sent: what comes next is not older
-        threading.Thread(target=self._run, daemon=True).start()
-
-    def _run(self):
-        try:
-            while True:
-                got = self.client.next_where(lambda frame: frame.kind == GROUP)
-                sequence = struct.unpack_from("<I", got.payload, 8)[0]
-                with self.news:
-                    if self.credits and sequence < self.fresh:
-                        self.stale.append((sequence, self.fresh))
-                    self.got.append(sequence)
-                    self.fresh = self.seen_by_hub
-                    self.news.notify_all()
-                self.client.ping()  # the hub's own may be far behind
-                if self.credits:
-                    total = len(self.got)
-                    self.client.send(self.client.frame(0, struct.pack("<B3xIQ", CREDIT, self.group, total), kind=FLOW))
-        except (Closed, OSError):
-            pass
-
-    def wait_for(self, sequence):
-        with self.news:
-            return self.news.wait_for(lambda: self.got and self.got[-1] >= sequence, PATIENCE_S)
-
-
-class Rates(unittest.TestCase):
-    """A provider, and three subscribers at 10, 1 and 0.1 Mbit/s, on its shard and on another."""
-
-    def run_rates(self, delivery, window, shards):
-        hub = Hub(self, shards=shards)
-        provider = Provider(self, hub, delivery, window)
-        proxies = [RateProxy(hub.port, down_bits_per_s=rate) for rate in (10e6, 1e6, 1e5)]
-        for proxy in proxies:
-            self.addCleanup(proxy.close)
-        subscribers = [Subscriber(self, proxy, provider, window is not None, shard=shards - 1) for proxy in proxies]
-        fast = subscribers[0]
-        count = 1000 if FULL else 200
-        for _ in range(count):
-            sequence = provider.publish()
-            # The next one only when the fast one has this: whether it gets every one does not depend on the machine.
-            self.assertTrue(fast.wait_for(sequence), "the fast one waits in vain")
-            for each in subscribers:
-                each.seen_by_hub = sequence
-        for each in subscribers:
-            self.assertTrue(each.wait_for(count), "the newest has to arrive, however slow the way is")
-            self.assertEqual(each.got, sorted(set(each.got)), "in order, and once")
-        self.assertEqual(fast.got, list(range(1, count + 1)))
-        self.assertLessEqual(len(subscribers[2].got), count)
-        return subscribers
-
-    def test_sync_gives_each_the_newest_at_its_own_rate(self):
-        for shards in (1, 2):
-            with self.subTest(shards=shards):
-                for each in self.run_rates(SYNC_DELIVERY, 1, shards):
-                    self.assertEqual(each.answer[8], 1, "the window in force")
-                    self.assertEqual(each.stale, [], "what it got was older than what its hub had when it credited")
-
-    def test_latest_gives_each_the_newest_at_its_own_rate(self):
-        for shards in (1, 2):
-            with self.subTest(shards=shards):
-                self.run_rates(LATEST_DELIVERY, None, shards)
 
 
 class Windows(unittest.TestCase):
