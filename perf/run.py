@@ -15,13 +15,14 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver import against, catalogue, instructions, suite  # noqa: E402
+from driver import against, catalogue, control, instructions, suite  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.report import write_report  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+DOCUMENT = ROOT / "docs" / "performance.md"
 QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 0.5
 RUNS = 3
@@ -45,6 +46,8 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--instructions", nargs="?", const="", metavar="SCRIPT",
                         help="instructions per frame against the budget; of one script: where they go")
     parser.add_argument("--update", action="store_true", help="with --instructions: make what is counted the budget")
+    parser.add_argument("--control", action="store_true",
+                        help="what the control plane takes, into perf/control.json; with --report into docs/performance.md, too")
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
@@ -74,7 +77,7 @@ def chosen_subjects(arguments: argparse.Namespace) -> tuple[str, ...]:
 def needed_packages(arguments: argparse.Namespace) -> list[str]:
     if arguments.instructions is not None:
         return ["valgrind"]
-    if arguments.against is not None:
+    if arguments.against is not None or arguments.control:
         return []
     packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
     if any(case.spec.roles is not None for case in choose_plan(arguments)):
@@ -163,7 +166,7 @@ def measure(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:
-        write_report(document, ROOT / "docs" / "performance.md")
+        write_report(document, DOCUMENT)
     return judge(outcomes, rows, arguments.smoke)
 
 
@@ -197,6 +200,22 @@ def count_instructions(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def measure_control(arguments: argparse.Namespace) -> int:
+    try:
+        figures = control.measure(arguments.build_dir)
+    except (SubjectError, OSError, subprocess.TimeoutExpired) as error:
+        say(f"error: {error}")
+        return 1
+    figures |= {"date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(), "machine": describe_machine(),
+                "version": program_version()}
+    control.FIGURES.write_text(json.dumps(figures, indent=1) + "\n")
+    section = control.make_section(figures)
+    say(section)
+    if arguments.report:
+        DOCUMENT.write_text(control.put_into(DOCUMENT.read_text(), section))
+    return 0
+
+
 def compare_versions(arguments: argparse.Namespace) -> int:
     settings = make_settings(arguments)
     settings.seconds = arguments.seconds or against.PAIR_SECONDS
@@ -220,6 +239,8 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
+    if arguments.control:
+        return measure_control(arguments)
     if arguments.against is not None:
         return compare_versions(arguments)
     return measure(arguments)

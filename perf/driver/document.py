@@ -2,7 +2,7 @@
 
 import pathlib
 
-from driver import yardstick
+from driver import control, yardstick
 from driver.figures import shown, shown_with_spread
 from driver.floor import floor_text
 from driver.markdown import table
@@ -15,7 +15,7 @@ FINDINGS = pathlib.Path(__file__).resolve().parent.parent / "findings.md"
 INTRODUCTION = """# Performance
 
 What the hub costs, measured against the cheapest relay that there can be and against other hubs. This page is written by `./dev perf --report`;
-nothing here is edited by hand, but for the findings, which are those of `perf/findings.md`.
+nothing here is edited by hand, but for the findings, which are those of `perf/findings.md`; the control plane's figures are kept in `perf/control.json`.
 
 ## The yardstick
 
@@ -120,6 +120,8 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         *floor_text(rows),
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         FINDINGS.read_text(),
+        *control.section_lines(),
+        *control.bystanders_lines(rows),
         "## All figures", "",
         "Medians of the runs, with the smallest and the largest. `x null` is of the CPU cost; of the median round trip for pings, of its 99th",
         "percentile for pings under bulk; of bytes a connection for idle_10000, of context switches for idle_alone, and of seconds for",
