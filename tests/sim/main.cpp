@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "base/log.hpp"
-#include "tests/sim/world.hpp"
+#include "tests/sim/shrink.hpp"
 
 // ./dev sim: the deterministic simulation of the control plane. See README.md.
 
@@ -15,12 +15,13 @@ namespace gimnet::sim {
 namespace {
 
 constexpr const char* kUsage =
-    "usage: gimnet-sim [--seeds N] [--from SEED] [--seed SEED] [--nodes N] [--trace] [--hashes]\n"
-    "                  [--every-fault] [--expect CHECKER] [--checkers]\n"
+    "usage: gimnet-sim [--seeds N] [--from SEED] [--seed SEED] [--nodes N] [--without FAULT,...]\n"
+    "                  [--trace] [--hashes] [--every-fault] [--expect CHECKER] [--checkers]\n"
     "  --seeds N         so many worlds (100), from seed 1 on\n"
     "  --from SEED       from that seed on\n"
     "  --seed SEED       that one world only\n"
     "  --nodes N         nodes in a world (200)\n"
+    "  --without FAULTS  leave these kinds of faults out, though a seed has them: crash,hang\n"
     "  --trace           print every event of the world as it happens\n"
     "  --hashes          print the hash of each world's trace, and nothing else\n"
     "  --every-fault     fail if a fault or collision never came\n"
@@ -51,6 +52,12 @@ std::uint64_t number(std::string_view flag, const char* text) {
   return value;
 }
 
+std::string fault_names() {
+  std::string names;
+  for (const Fault& fault : kFaults) names.append(names.empty() ? "" : ", ").append(fault.name);
+  return names;
+}
+
 void print_checkers() {
   for (const std::string_view name : kCheckerNames) std::printf("%.*s\n", static_cast<int>(name.size()), name.data());
 }
@@ -59,6 +66,12 @@ void read_value(Arguments& arguments, std::string_view flag, const char* value) 
   if (value == nullptr) usage(std::string{flag} + " wants a value");
   if (flag == "--expect") {
     arguments.expect = value;
+    return;
+  }
+  if (flag == "--without") {
+    std::string unknown;
+    arguments.world.without = faults_of(value, unknown);
+    if (!unknown.empty()) usage("there is no fault '" + unknown + "': " + fault_names());
     return;
   }
   const std::uint64_t count = number(flag, value);
@@ -92,7 +105,8 @@ Arguments read(int count, char** values) {
       arguments.hashes = true;
     } else if (flag == "--every-fault") {
       arguments.every_fault = true;
-    } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" || flag == "--expect") {
+    } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" || flag == "--without" ||
+               flag == "--expect") {
       read_value(arguments, flag, i + 1 < count ? values[i + 1] : nullptr);
       ++i;
     } else {
@@ -102,13 +116,22 @@ Arguments read(int count, char** values) {
   return arguments;
 }
 
-void print_failure(const Report& report, std::size_t nodes) {
+void print_failure(const World::Options& world, const Report& report) {
   for (const std::string& line : report.last) std::printf("%s\n", line.c_str());
   const std::string_view checker = name_of(report.broken->checker);
   std::printf("\nseed %" PRIu64 " broke at event %" PRIu64 ", step %" PRIu64 " of the conductor\n", report.seed,
               report.events, report.steps);
   std::printf("checker %.*s: %s\n", static_cast<int>(checker.size()), checker.data(), report.broken->sentence.c_str());
-  std::printf("again: ./dev sim --seed %" PRIu64 " --nodes %zu --trace\n", report.seed, nodes);
+  std::printf("again: ./dev sim %s --trace\n", arguments_of(world).c_str());
+}
+
+/// What breaks is looked for in the smallest world that breaks in the same way.
+void print_smallest(const World::Options& world, const Report& report) {
+  const Shrunk smallest = shrink(world, report);
+  std::printf("smaller, of %" PRIu64 " worlds that were tried, after %" PRIu64 " events instead of %" PRIu64
+              ": ./dev sim %s --trace\n",
+              smallest.tried, smallest.report.events, report.events, arguments_of(smallest.world).c_str());
+  std::printf("its line in tests/sim/regression_seeds.txt says `SEED NODES [--without FAULT,...]` of that\n");
 }
 
 int judge(const Arguments& arguments, const Census& census, std::uint64_t worlds, std::uint64_t steps) {
@@ -136,8 +159,10 @@ int run(const Arguments& arguments) {
     const Report report = World(options).run();
     if (arguments.hashes) std::printf("%" PRIu64 " %016" PRIx64 "\n", seed, report.hash);
     if (report.broken) {
-      print_failure(report, options.nodes);
-      return arguments.expect == name_of(report.broken->checker) ? 0 : 1;
+      print_failure(options, report);
+      if (arguments.expect == name_of(report.broken->checker)) return 0;
+      if (!arguments.hashes && !arguments.world.print) print_smallest(options, report);
+      return 1;
     }
     census.add(report.census);
     steps += report.steps;

@@ -88,8 +88,8 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.shard_pause = sometimes(random, 5);
   plan.conductor_pause = sometimes(random, 5);
   plan.disk_full = sometimes(random, 500);
-  plan.hub_kills = random.chance(300) ? static_cast<std::uint32_t>(random.between(1, 2)) : 0;
-  plan.hub_drains = random.chance(200) ? static_cast<std::uint32_t>(random.between(1, 2)) : 0;
+  plan.hub_kills = random.chance(300) ? random.between(1, 2) : 0;
+  plan.hub_drains = random.chance(200) ? random.between(1, 2) : 0;
   return plan;
 }
 

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
+#include <bitset>
 #include <chrono>
 #include <cstdint>
+#include <string_view>
 
 #include "hub/limits.hpp"
 #include "tests/sim/agenda.hpp"
@@ -46,10 +49,45 @@ struct Plan {
   std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
   std::uint64_t disk_full = 0;   ///< of times that the hub keeps its state
-  std::uint32_t hub_kills = 0;   ///< in all
-  std::uint32_t hub_drains = 0;  ///< in all, the one at the end apart
+  std::uint64_t hub_kills = 0;   ///< in all
+  std::uint64_t hub_drains = 0;  ///< in all, the one at the end apart
 
   [[nodiscard]] static Plan draw(Random& random, std::size_t nodes);
 };
+
+/// What can be taken out of a world, to see whether it breaks without that, too.
+struct Fault {
+  std::string_view name;
+  std::uint64_t Plan::* likelihood;
+};
+inline constexpr std::array<Fault, 25> kFaults = {{
+    {"hub_kills", &Plan::hub_kills},
+    {"hub_drains", &Plan::hub_drains},
+    {"crash", &Plan::crash},
+    {"vanish", &Plan::vanish},
+    {"hang", &Plan::hang},
+    {"goodbye", &Plan::goodbye},
+    {"twin", &Plan::twin},
+    {"misconduct", &Plan::misconduct},
+    {"administers", &Plan::administers},
+    {"flood", &Plan::flood},
+    {"bad_token", &Plan::bad_token},
+    {"lost_token", &Plan::lost_token},
+    {"rename", &Plan::rename},
+    {"slow_reader", &Plan::slow_reader},
+    {"bad_configuration", &Plan::bad_configuration},
+    {"latest", &Plan::latest},
+    {"sync", &Plan::sync},
+    {"retain", &Plan::retain},
+    {"terms", &Plan::terms},
+    {"late_credit", &Plan::late_credit},
+    {"shard_pause", &Plan::shard_pause},
+    {"conductor_pause", &Plan::conductor_pause},
+    {"disk_full", &Plan::disk_full},
+    {"nameless", &Plan::nameless},
+    {"waits_away", &Plan::waits_away},
+}};
+/// A set of faults, by their places in kFaults.
+using Faults = std::bitset<kFaults.size()>;
 
 }  // namespace gimnet::sim

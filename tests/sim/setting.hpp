@@ -13,8 +13,9 @@ namespace gimnet::sim {
 
 /// What all parts of a world share. Thread safety: none. Lifetime: the world's.
 struct Setting {
-  Setting(std::uint64_t seed, std::size_t nodes, bool print)
-      : random(seed), plan(Plan::draw(random, nodes)), trace(agenda, print) {}
+  /// `without`: what is taken out of what the seed drew.
+  Setting(std::uint64_t seed, std::size_t nodes, const Faults& without, bool print)
+      : random(seed), plan(draw(random, nodes, without)), trace(agenda, print) {}
 
   Random random;
   const Plan plan;
@@ -23,6 +24,15 @@ struct Setting {
   Census census;
   std::vector<std::string> offered;  ///< full names of services that nodes advertised, of which others hear
   std::uint64_t messages = 0;        ///< that nodes sent: each says its number, so that their order can be checked
+
+ private:
+  [[nodiscard]] static Plan draw(Random& random, std::size_t nodes, const Faults& without) {
+    Plan plan = Plan::draw(random, nodes);
+    for (std::size_t i = 0; i < kFaults.size(); ++i) {
+      if (without[i]) plan.*kFaults[i].likelihood = 0;
+    }
+    return plan;
+  }
 };
 
 }  // namespace gimnet::sim

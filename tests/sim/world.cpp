@@ -9,7 +9,7 @@ using proto::GoodbyeCode;
 using namespace std::chrono_literals;
 
 World::World(const Options& options)
-    : options_(options), setting_(options.seed, options.nodes, options.print), network_(setting_) {
+    : options_(options), setting_(options.seed, options.nodes, options.without, options.print), network_(setting_) {
   network_.connect({[this](Wire& wire) { life_->shards().has_something(wire); },
                     [this](const WirePointer& wire, const Bytes& frame) { nodes_[wire->node]->hears(wire, frame); },
                     [this](const WirePointer& wire) { nodes_[wire->node]->sees_the_end(wire); }});
@@ -67,10 +67,10 @@ void World::begin_life(Past past) {
 
 void World::plan_endings() {
   const auto until = static_cast<std::uint64_t>(setting_.plan.faults_until.count());
-  for (std::uint32_t i = 0; i < setting_.plan.hub_kills; ++i) {
+  for (std::uint64_t i = 0; i < setting_.plan.hub_kills; ++i) {
     setting_.agenda.at(Time{setting_.random.between(until / 8, until)}, [this] { kill_hub(); });
   }
-  for (std::uint32_t i = 0; i < setting_.plan.hub_drains; ++i) {
+  for (std::uint64_t i = 0; i < setting_.plan.hub_drains; ++i) {
     setting_.agenda.at(Time{setting_.random.between(until / 8, until)}, [this] { want_drain(); });
   }
 }

@@ -29,6 +29,7 @@ class World {
   struct Options {
     std::uint64_t seed = 0;
     std::size_t nodes = 200;
+    Faults without;      ///< faults that are left out, though the seed drew them
     bool print = false;  ///< every event, as it happens
   };
   explicit World(const Options& options);
