@@ -45,8 +45,9 @@ bool IndexPool::take_back(std::uint32_t index) {
 void IndexPool::give_back(std::uint32_t index, std::chrono::milliseconds now) {
   GIMNET_CHECK(held(index) && held_ > 0);
   --held_;
-  resting_.push_back({now + resting_time_, index});
   rests_until_[index] = now + resting_time_;
+  resting_.add({now + resting_time_, index}, rests_until_.size(),
+               [this](const Resting& each) { return !still_rests(each); });
   wake(now);
 }
 
@@ -73,14 +74,18 @@ void IndexPool::mark_taken(std::uint32_t index) {
   if (granted(index)) ++granted_taken_;
 }
 
+/// It was not taken back meanwhile, and perhaps given back anew.
+bool IndexPool::still_rests(const Resting& note) const {
+  const auto found = rests_until_.find(note.index);
+  return found != rests_until_.end() && found->second == note.until;
+}
+
 void IndexPool::wake(std::chrono::milliseconds now) {
   while (!resting_.empty() && resting_.front().until <= now) {
     const Resting rested = resting_.front();
     resting_.pop_front();
-    const auto found = rests_until_.find(rested.index);
-    // Taken back meanwhile, and perhaps resting anew.
-    if (found == rests_until_.end() || found->second != rested.until) continue;
-    rests_until_.erase(found);
+    if (!still_rests(rested)) continue;
+    rests_until_.erase(rested.index);
     taken_[rested.index] = false;
     if (granted(rested.index)) --granted_taken_;
   }

@@ -2,10 +2,11 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <unordered_map>
 #include <vector>
+
+#include "hub/control/state/due_list.hpp"
 
 namespace gimnet::hub {
 
@@ -57,6 +58,7 @@ class IndexPool {
   };
   [[nodiscard]] std::uint32_t index_at(std::uint64_t position) const;
   [[nodiscard]] bool granted(std::uint32_t index) const;
+  [[nodiscard]] bool still_rests(const Resting& note) const;
   [[nodiscard]] bool taken(std::uint32_t index) const { return index < taken_.size() && taken_[index]; }
   void mark_taken(std::uint32_t index);
   void wake(std::chrono::milliseconds now);
@@ -69,7 +71,7 @@ class IndexPool {
   std::uint64_t reached_ = 0;        ///< the furthest position so far
   std::vector<bool> taken_;          ///< held or resting; grows with the highest index so far
   std::uint64_t granted_taken_ = 0;  ///< of those, how many are granted
-  std::deque<Resting> resting_;      ///< some of them may have been taken back
+  DueList<Resting> resting_;         ///< void: those that were taken back
   std::unordered_map<std::uint32_t, std::chrono::milliseconds> rests_until_;
   std::uint32_t held_ = 0;
 };

@@ -55,7 +55,7 @@ class Journal {
   const std::uint64_t epoch_;
   bool keeps_ = false;
   std::uint64_t version_ = 0;
-  std::deque<Note> notes_;
+  std::deque<Note> notes_;  ///< Limit: watch_changes and watch_bytes
   std::size_t bytes_ = 0;
 };
 

@@ -53,8 +53,9 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
   sessions_.attach(session, now);
   effects.emplace_back(NodeNoted{found->new_session ? ChangeKind::joined : ChangeKind::back, session.index, {}, {}});
   if (!found->new_session) {
-    redeclaring_.push_back(
-        {now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment});
+    redeclaring_.add(
+        {now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment},
+        sessions_.all().size(), [this](const Redeclaring& each) { return !still_redeclares(each); });
   }
   return *found;
 }
@@ -189,11 +190,14 @@ void Membership::tick(milliseconds now, Effects& effects) {
   while (!redeclaring_.empty() && redeclaring_.front().until <= now) {
     const Redeclaring due = redeclaring_.front();
     redeclaring_.pop_front();
-    const Session* session = sessions_.find(due.index);
-    const bool same = session != nullptr && session->place.generation == due.generation &&
-                      session->attachment == due.attachment && session->connected;
-    if (same) services_.drop_undeclared(due.index, now, effects);
+    if (still_redeclares(due)) services_.drop_undeclared(due.index, now, effects);
   }
+}
+
+bool Membership::still_redeclares(const Redeclaring& due) const {
+  const Session* session = sessions_.find(due.index);
+  return session != nullptr && session->place.generation == due.generation && session->attachment == due.attachment &&
+         session->connected;
 }
 
 std::optional<milliseconds> Membership::next_deadline() const {

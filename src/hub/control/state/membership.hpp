@@ -2,12 +2,12 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "hub/control/state/directory.hpp"
+#include "hub/control/state/due_list.hpp"
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/sessions.hpp"
@@ -102,6 +102,8 @@ class Membership {
     std::uint32_t generation;
     std::uint32_t attachment;
   };
+  /// Is it still the return that was noted?
+  [[nodiscard]] bool still_redeclares(const Redeclaring& due) const;
   [[nodiscard]] std::optional<Refusal> check(const JoinRequest& request) const;
   /// The session that the request is for: the one whose token it shows, or a new one.
   [[nodiscard]] Result<Joined, Refusal> session_for(const JoinRequest& request, const Sessions::Claim& claim,
@@ -121,7 +123,7 @@ class Membership {
   Directory directory_;
   Services services_;
   NameStanding standing_ = NameStanding::final;
-  std::deque<Redeclaring> redeclaring_;  ///< in the order of `until`
+  DueList<Redeclaring> redeclaring_;
 };
 
 }  // namespace gimnet::hub

@@ -124,8 +124,9 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
   GIMNET_CHECK(session.connected);
   session.connected = false;
   --connected_;
-  std::deque<Away>& away = session.name.empty() ? away_nameless_ : away_named_;
-  away.push_back({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment});
+  DueList<Away>& away = session.name.empty() ? away_nameless_ : away_named_;
+  away.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment},
+           sessions_.size(), [this](const Away& each) { return !still_away(each); });
 }
 
 bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
@@ -136,7 +137,7 @@ bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now)
     if (moved.index == former) moved.index = index;
   }
   renumbered_[former] = {index, session.number};
-  for (std::deque<Away>* list : {&away_named_, &away_nameless_}) {
+  for (DueList<Away>* list : {&away_named_, &away_nameless_}) {
     for (Away& away : *list) {
       if (away.index == former && away.generation == session.place.generation) away.index = index;
     }
@@ -197,7 +198,7 @@ bool Sessions::nameless_away() {
 
 Session* Sessions::longest_away_nameless() { return take_due(away_nameless_, milliseconds::max()); }
 
-Session* Sessions::take_due(std::deque<Away>& away, milliseconds now) {
+Session* Sessions::take_due(DueList<Away>& away, milliseconds now) {
   while (!away.empty() && away.front().until <= now) {
     const Away due = away.front();
     away.pop_front();
@@ -208,7 +209,7 @@ Session* Sessions::take_due(std::deque<Away>& away, milliseconds now) {
 
 std::optional<milliseconds> Sessions::next_expiry() const {
   std::optional<milliseconds> expiry;
-  for (const std::deque<Away>* away : {&away_named_, &away_nameless_}) {
+  for (const DueList<Away>* away : {&away_named_, &away_nameless_}) {
     if (!away->empty() && (!expiry || away->front().until < *expiry)) expiry = away->front().until;
   }
   return expiry;

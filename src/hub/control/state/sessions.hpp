@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "base/ids.hpp"
 #include "base/result.hpp"
 #include "base/token_bucket.hpp"
+#include "hub/control/state/due_list.hpp"
 #include "hub/control/state/durable.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/number_floor.hpp"
@@ -172,7 +172,7 @@ class Sessions {
     std::uint32_t attachment;
   };
   /// The next of `away` that is due at `now`, taken off the list, or nullptr.
-  [[nodiscard]] Session* take_due(std::deque<Away>& away, std::chrono::milliseconds now);
+  [[nodiscard]] Session* take_due(DueList<Away>& away, std::chrono::milliseconds now);
   Session& put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                std::chrono::milliseconds now);
   /// Is it still the absence that was noted?
@@ -189,9 +189,9 @@ class Sessions {
   SlotPool slots_;
   std::map<std::uint32_t, Session> sessions_;
   std::map<std::uint32_t, Moved> renumbered_;  ///< by former index
-  // Both in the order of `until`, since all grace times are equal. Apart, so that a nameless one is found at once.
-  std::deque<Away> away_named_;
-  std::deque<Away> away_nameless_;
+  // All grace times are equal, so the order is that of `until`. Apart, so that a nameless one is found at once.
+  DueList<Away> away_named_;
+  DueList<Away> away_nameless_;
   std::size_t connected_ = 0;
 };
 
