@@ -50,7 +50,7 @@ class LogThrottle {
     TokenBucket bucket;
     std::uint64_t left_out = 0;
   };
-  using Subjects = std::list<Subject>;
+  using Subjects = std::list<Subject>;  ///< Limit: kSubjectsMax
 
   Subject& find(std::string name);
 

@@ -67,6 +67,10 @@ _SLEEP = re.compile(r"\b(sleep_for|sleep_until|usleep|nanosleep)\b|\b(time|async
 _CLOCK = re.compile(r"\b\w*clock::now\b|\b(clock_gettime|gettimeofday|timespec_get)\b|"
                     r"(?<![\w.>])(?:std::|::)?time\(\s*(nullptr|NULL|0|&)")
 _RANDOM = re.compile(r"\brandom_device\b|\b(getrandom|getentropy|s?rand|drand48|arc4random)\s*\(")
+# What grows at one end and shrinks at the other, as a member, a local or an alias; and a vector made to do so.
+_QUEUE = re.compile(r"^\s*(?:using \w+ = |static |mutable )*std::(deque|list|queue|priority_queue)<.*;")
+_FRONT_ERASED = re.compile(r"\b(\w+)\.erase\(\1\.begin\(\)\)")
+_BOUND = re.compile(r"\bk\w*Max\b|\w+_max_?\b|\blimits_?\.\w+")
 _UNFINISHED = re.compile(r"\b(TODO|FIXME|HACK|XXX)\b|\bfor now\b", re.IGNORECASE)
 _MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home)/")
 _PLANTED = re.compile(r"\bGIMNET_BUG_([A-Z0-9_]+)\b")
@@ -178,6 +182,22 @@ def memory_orders_name_their_partner(tree):
             near = file.lines[max(0, number - 3) : number + 1]
             if _MEMORY_ORDER.search(line) and not any("//" in text for text in near):
                 yield f"{file.path}:{number + 1}: a memory order without a comment on its partner operation"
+
+
+def queues_name_their_limit(tree):
+    for file in tree.files(("src",), CPP_SUFFIXES):
+        code = file.code_lines()
+        for number, line in enumerate(code):
+            queue = _QUEUE.match(line)
+            if queue and "(" not in re.sub(r"GIMNET_GUARDED_BY\(\w+\)", "", line):
+                above = number
+                while above > 0 and file.lines[above - 1].lstrip().startswith("//"):
+                    above -= 1
+                if not any("Limit: " in text for text in file.lines[above : number + 1]):
+                    yield f"{file.path}:{number + 1}: a std::{queue[1]} without a comment `Limit: ...` that names its bound"
+            front = _FRONT_ERASED.search(line)
+            if front and not any(_BOUND.search(text) for text in code[max(0, number - 1) : number + 1]):
+                yield f"{file.path}:{number + 1}: {front[1]} is used as a queue, and no bound is near"
 
 
 # Who may ask for the time, and for randomness that no seed gives: everybody else is handed them, and can be simulated.
@@ -328,6 +348,7 @@ RULES = (
     file_length,
     function_length,
     memory_orders_name_their_partner,
+    queues_name_their_limit,
     time_and_chance_are_handed_in,
     no_sleeps_in_tests,
     no_machine_paths,

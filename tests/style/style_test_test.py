@@ -145,6 +145,22 @@ CASES = {
             {"src/a.cpp": "// Too far.\nint x;\nint y;\nint z;\na.load(std::memory_order::acquire);\n"},
         ],
     ),
+    rules.queues_name_their_limit: (
+        [
+            {"src/a.hpp": GUARDED + "std::deque<int> a_;  ///< Limit: nodes\n"},
+            {"src/a.hpp": GUARDED + "/// In order.\n/// Limit: kMost\nstd::list<A<B>> a_ GIMNET_GUARDED_BY(m_);\n"},
+            {"src/a.hpp": GUARDED + "  void f(std::deque<A>& a);\n  std::deque<int> g(int);\n  std::vector<int> a_;\n"},
+            {"src/a.cpp": "if (a.size() == kAMax) a.erase(a.begin());\nwhile (b > limits_.x)\n  b.erase(b.begin());\n"},
+            {"tests/a_test.cpp": "std::deque<int> a;\n"},
+        ],
+        [
+            {"src/a.hpp": GUARDED + "std::deque<int> a_;\n"},
+            {"src/a.hpp": GUARDED + "// Limit: of another\nint b;\nstd::list<int> a_;  ///< in order\n"},
+            {"src/a.hpp": GUARDED + "using As = std::queue<int>;\n"},
+            {"src/a.hpp": GUARDED + "std::deque<A> a_ GIMNET_GUARDED_BY(m_);\n"},
+            {"src/a.cpp": "a.erase(a.begin());\n"},
+        ],
+    ),
     rules.time_and_chance_are_handed_in: (
         [
             {"src/base/clock.hpp": "auto a = std::chrono::steady_clock::now();\n"},

@@ -88,6 +88,7 @@ class Inbox {
 
   Mutex mutex_;
   Condition any_;
+  /// Limit: the queues that the program asked for, and kUnaskedKeysMax
   std::list<MessageQueue> queues_ GIMNET_GUARDED_BY(mutex_);
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
   std::size_t unasked_keys_ GIMNET_GUARDED_BY(mutex_) = 0;

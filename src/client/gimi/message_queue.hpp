@@ -68,7 +68,7 @@ class MessageQueue {
   Inbox& inbox_;
   const std::size_t bytes_max_;
   QueueOptions options_;
-  std::deque<Entry> entries_;
+  std::deque<Entry> entries_;  ///< Limit: bytes_max_ and the options' messages
   std::vector<TakenMessages> taken_;
   std::size_t bytes_ = 0;
   std::uint64_t received_ = 0;

@@ -58,7 +58,8 @@ class SendWindow {
   void drop_front();
 
   std::size_t messages_max_;
-  std::deque<Waiting> waiting_;  ///< ascending; acknowledged ones only behind one that is not
+  /// Ascending; acknowledged ones only behind one that is not. Limit: messages_max_
+  std::deque<Waiting> waiting_;
   std::size_t unacknowledged_ = 0;
   std::uint32_t next_sequence_ = 1;
   std::uint32_t ping_number_ = 0;

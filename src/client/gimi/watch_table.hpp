@@ -38,7 +38,7 @@ class WatchQueue {
   Uplink& uplink_;
   Mutex mutex_;
   Condition changed_;
-  std::deque<Entry> entries_ GIMNET_GUARDED_BY(mutex_);
+  std::deque<Entry> entries_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: what the hub sends unasked
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

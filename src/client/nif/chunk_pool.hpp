@@ -39,7 +39,7 @@ class ChunkPool {
 
  private:
   static constexpr std::size_t kKept = 16;
-  std::deque<std::shared_ptr<Chunk>> chunks_;  ///< the one handed out longest ago is first
+  std::deque<std::shared_ptr<Chunk>> chunks_;  ///< the one handed out longest ago is first. Limit: kKept
 };
 
 }  // namespace gimnet::nif

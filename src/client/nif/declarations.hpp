@@ -63,8 +63,8 @@ class Declarations {
   std::map<std::string, Subscription> subscriptions_ GIMNET_GUARDED_BY(mutex_);
 
   // The library's thread.
-  std::deque<std::string> services_due_;
-  std::deque<std::string> subscriptions_due_;
+  std::deque<std::string> services_due_;       ///< Limit: services_
+  std::deque<std::string> subscriptions_due_;  ///< Limit: subscriptions_
   std::size_t under_way_ = 0;
   bool declaring_ = false;
   std::uint64_t round_ = 0;  ///< answers of an earlier connection do not count

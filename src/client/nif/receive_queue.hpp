@@ -57,7 +57,7 @@ class ReceiveQueue {
 
   Mutex mutex_;
   Condition filled_;
-  std::deque<Item> items_ GIMNET_GUARDED_BY(mutex_);
+  std::deque<Item> items_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: bytes_max_, and what one read brings
   std::size_t bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool stopped_ GIMNET_GUARDED_BY(mutex_) = false;
   bool closed_ GIMNET_GUARDED_BY(mutex_) = false;

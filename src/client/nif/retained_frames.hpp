@@ -38,7 +38,7 @@ class RetainedFrames {
   void drop_front(std::uint64_t count);
 
   const std::size_t bytes_max_;
-  std::deque<FrameRun> runs_;
+  std::deque<FrameRun> runs_;  ///< Limit: bytes_max_
   std::size_t bytes_ = 0;
   std::uint64_t frames_ = 0;  ///< in runs_
   std::uint64_t next_ = 0;    ///< count of the next frame that is written

@@ -96,7 +96,7 @@ class SendQueue {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  using Runs = std::deque<FrameRun>;
+  using Runs = std::deque<FrameRun>;  ///< Limit: has_room()
 
   [[nodiscard]] Place allocate(std::size_t size);
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;

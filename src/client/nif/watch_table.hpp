@@ -56,7 +56,7 @@ class WatchTable {
   std::uint32_t last_number_ GIMNET_GUARDED_BY(mutex_) = 0;
 
   // The library's thread.
-  std::deque<std::uint32_t> due_;
+  std::deque<std::uint32_t> due_;  ///< each once. Limit: the node's watches
   std::vector<Item> events_;
 };
 

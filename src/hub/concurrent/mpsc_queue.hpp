@@ -104,7 +104,7 @@ class MpscQueue {
 #ifdef GIMNET_TSAN_QUEUE
   // ThreadSanitizer does not model the fences inside concurrentqueue and would report races that are none.
   mutable std::mutex mutex_;
-  std::deque<T> items_;
+  std::deque<T> items_;  // Limit: its users', as of the queue in whose place it stands
 #else
   moodycamel::ConcurrentQueue<T> queue_;
   std::vector<moodycamel::ProducerToken> tokens_;

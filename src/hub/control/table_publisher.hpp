@@ -62,7 +62,7 @@ class TablePublisher {
   const std::size_t shards_;
   const Tables tables_;
   std::unordered_map<std::uint32_t, std::unique_ptr<const GroupMembers>> published_;
-  std::deque<Garbage> garbage_;
+  std::deque<Garbage> garbage_;  ///< Limit: what was replaced within one turn of the slowest shard
 };
 
 }  // namespace gimnet::hub

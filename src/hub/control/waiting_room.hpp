@@ -54,7 +54,7 @@ class WaitingRoom {
 
  private:
   struct Peer;
-  using Peers = std::list<Peer>;
+  using Peers = std::list<Peer>;  ///< Limit: handshakes
   struct Peer {
     Stranger stranger;
     std::unique_ptr<Handshake> handshake;  ///< null: leaving

@@ -93,7 +93,7 @@ class Reassembler {
     std::uint32_t total = 0;
     ByteBuffer bytes;
   };
-  using Entries = std::list<Entry>;  ///< the one that waited longest is first
+  using Entries = std::list<Entry>;  ///< the one that waited longest is first. Limit: streams_max
 
   Entry& touch(const FragmentStream& stream);
   void remember_lost(Entry& entry, std::uint32_t message);

@@ -62,7 +62,7 @@ class Meter {
   std::int64_t begin_ns_;
   std::int64_t window_ns_;
   std::int64_t last_ns_ = 0;
-  std::deque<Arrival> arrivals_;
+  std::deque<Arrival> arrivals_;  ///< Limit: kMessagesMax
   Reading whole_;
 };
 
