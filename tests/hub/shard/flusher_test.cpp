@@ -148,14 +148,26 @@ TEST(Flusher, ByteByByteIsProgressForBlock) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
 }
 
-// A node that reads, says PING and never confirms what it asked to be kept: nothing waits for it for ever.
-TEST(Flusher, TimesOutANodeThatNeverConfirms) {
-  Limits limits;
-  limits.resume_bytes = 4'096;
-  HubRig rig(1, limits);
+/// A node that asked for what it did not confirm to be kept, of which there is room for four messages.
+class FlusherOfAResumer : public ::testing::Test {
+ protected:
+  static Limits small() {
+    Limits limits;
+    limits.resume_bytes = 4'096;
+    return limits;
+  }
+  void send(int count) {
+    for (int i = 0; i < count; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+  }
+
+  HubRig rig{1, small()};
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0, {.resume = true});
-  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+};
+
+// A node that reads, says PING and never confirms what it asked to be kept: nothing waits for it for ever.
+TEST_F(FlusherOfAResumer, TimesOutANodeThatNeverConfirms) {
+  send(20);
   rig.settle();
   EXPECT_THAT(b.frames, SizeIs(4)) << "as many as the resume buffer holds";
   rig.pass_ms(5'400);
@@ -164,13 +176,8 @@ TEST(Flusher, TimesOutANodeThatNeverConfirms) {
 }
 
 // What the hub answers it is taken, but nothing of what waits.
-TEST(Flusher, TimesOutANodeThatNeverConfirmsButAsks) {
-  Limits limits;
-  limits.resume_bytes = 4'096;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(0, {.resume = true});
-  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+TEST_F(FlusherOfAResumer, TimesOutANodeThatNeverConfirmsButAsks) {
+  send(20);
   rig.settle();
   for (int i = 0; i < 54; ++i) {
     rig.send_flow(b, proto::flow::Ping{});
@@ -183,13 +190,8 @@ TEST(Flusher, TimesOutANodeThatNeverConfirmsButAsks) {
   EXPECT_FALSE(b.pipe.transport_gone());
 }
 
-TEST(Flusher, AConfirmIsProgressThoughItMakesNoRoomYet) {
-  Limits limits;
-  limits.resume_bytes = 4'096;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(0, {.resume = true});
-  for (int i = 0; i < 4; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+TEST_F(FlusherOfAResumer, AConfirmIsProgressThoughItMakesNoRoomYet) {
+  send(4);
   rig.send(a, b.id.value(), std::string(4'000, 'y'));
   rig.settle();
   ASSERT_THAT(b.frames, SizeIs(4)) << "the last one has no room in the resume buffer before all are confirmed";
@@ -205,13 +207,8 @@ TEST(Flusher, AConfirmIsProgressThoughItMakesNoRoomYet) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
 }
 
-TEST(Flusher, GoesOnAfterAConfirm) {
-  Limits limits;
-  limits.resume_bytes = 4'096;
-  HubRig rig(1, limits);
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(0, {.resume = true});
-  for (int i = 0; i < 20; ++i) rig.send(a, b.id.value(), std::string(1'000, 'x'));
+TEST_F(FlusherOfAResumer, GoesOnAfterAConfirm) {
+  send(20);
   for (int i = 0; i < 5; ++i) {
     rig.settle();
     rig.send_flow(b, proto::flow::Confirm{b.data_frames});

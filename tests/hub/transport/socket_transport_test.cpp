@@ -1,8 +1,6 @@
 #include "hub/transport/socket_transport.hpp"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -12,6 +10,8 @@
 #include <memory>
 #include <utility>
 #include <vector>
+
+#include "tests/hub/transport/support/connected_sockets.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -27,32 +27,15 @@ struct Ends {
   }
 };
 
-std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) {
-  int pair[2] = {-1, -1};
-  EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+std::unique_ptr<Ends> connect(Family family, const Limits& limits) {
+  const ConnectedSockets sockets = connect_by(family);
   auto ends = std::make_unique<Ends>();
-  ends->near = std::make_unique<SocketTransport>(pair[0], Family::unix_socket, limits);
-  ends->far = pair[1];
+  ends->near = std::make_unique<SocketTransport>(sockets.near, family, limits);
+  ends->far = sockets.far;
   return ends;
 }
-
-std::unique_ptr<Ends> tcp_ends(const Limits& limits = {}) {
-  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
-  EXPECT_EQ(::listen(listener, 1), 0);
-  EXPECT_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  auto ends = std::make_unique<Ends>();
-  ends->far = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  EXPECT_EQ(::connect(ends->far, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  ends->near =
-      std::make_unique<SocketTransport>(::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC), Family::tcp, limits);
-  ::close(listener);
-  return ends;
-}
+std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) { return connect(Family::unix_socket, limits); }
+std::unique_ptr<Ends> tcp_ends(const Limits& limits = {}) { return connect(Family::tcp, limits); }
 
 iovec piece(std::string_view text) { return {const_cast<char*>(text.data()), text.size()}; }
 
