@@ -1,6 +1,7 @@
 #pragma once
 
-#include <atomic>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 
@@ -18,36 +19,47 @@ class CreditBook {
  public:
   explicit CreditBook(Outbound& outbound) : outbound_(outbound) {}
 
-  /// A connection that was not resumed is about to stand: counts begin at 0. Before the first post on it, so that no
-  /// total of the earlier one is told there.
-  void begin_anew() GIMNET_EXCLUDES(mutex_);
+  /// A connection is about to stand, before the first post on it: which groups have no window is not known any more,
+  /// since the hub could not tell what changed meanwhile. Unless it was `resumed` counts begin at 0, and no total of
+  /// the earlier connection is told on this one.
+  void begin(bool resumed) GIMNET_EXCLUDES(mutex_);
   /// A connection stands: what was taken is told (again).
   void tell_all() GIMNET_EXCLUDES(mutex_);
-  /// The hub counts this group, with that window; 0: it does not. Counts of an earlier subscription go on.
+  /// The hub counts this group, with that window; 0: it does not, unless it did. Counts of an earlier subscription go
+  /// on.
   void open(GroupId group, std::uint32_t window) GIMNET_EXCLUDES(mutex_);
   /// The group is gone.
   void forget(GroupId group) GIMNET_EXCLUDES(mutex_);
-  /// What a message of the group that comes now is tagged with; 0: it is not counted. `subscribing`: a SUBSCRIBE waits
-  /// for its answer. The hub may send messages before that, and counts them: so they are counted until open() says
-  /// whether it does.
-  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group, bool subscribing) GIMNET_EXCLUDES(mutex_);
+  /// What a message of the group that comes now is tagged with; 0: it is not counted. The hub may send messages before
+  /// its answer to SUBSCRIBE, and counts them; after a reconnect even before the SUBSCRIBE. So messages of a group of
+  /// which nothing is known are counted until open() says whether the hub does.
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
 
   /// The program took messages. With `more` the hub is told once half of the window was taken, else at once.
   void take(std::uint32_t group, std::uint32_t epoch, std::uint32_t messages, bool more) GIMNET_EXCLUDES(mutex_);
 
  private:
+  enum class State : std::uint8_t {
+    early,    ///< not open yet: counted, but not told
+    counted,  ///< by the hub, too
+    plain,    ///< opened without a window: not counted
+  };
   struct Account {
+    State state = State::early;
     std::uint32_t window = 0;
     std::uint64_t taken = 0;
     std::uint64_t told = 0;
-    bool early = false;  ///< not open yet: counted, but not told
   };
-  /// Groups of which something came early, at most.
+  /// Groups, at most: beyond them only those that the hub counts are added, and no message is counted early.
   static constexpr std::size_t kAccountsMax = 4096;
+  /// Plain groups that are known without the lock.
+  static constexpr std::size_t kPlainSlots = 64;
   void tell(std::uint32_t group, Account& account) GIMNET_REQUIRES(mutex_);
 
   Outbound& outbound_;
-  std::atomic<bool> any_{false};
+  // The library's thread: the plain group last seen with that remainder, so that messages of services without a window
+  // take no lock.
+  std::array<std::uint32_t, kPlainSlots> plain_{};
 
   Mutex mutex_;
   std::uint32_t epoch_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -142,6 +142,7 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     }
   }
   if (changed) {
+    credits_.forget(former);  // its SERVICE_MOVED was lost with the connection
     Record* record = make_event(NIF_SERVICE_MOVED, full_name);
     record->incoming.former_group = former.value();
     record->incoming.group = group.value();

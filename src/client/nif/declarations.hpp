@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "client/nif/credit_book.hpp"
 #include "client/nif/outbound.hpp"
 #include "client/nif/request_table.hpp"
 #include "client/nif/storage.hpp"
@@ -20,7 +21,8 @@ namespace gimnet::nif {
 /// Thread safety: add, remove and find from any thread; the rest from the library's.
 class Declarations {
  public:
-  Declarations(RequestTable& requests, Outbound& outbound) : requests_(requests), outbound_(outbound) {}
+  Declarations(RequestTable& requests, Outbound& outbound, CreditBook& credits)
+      : requests_(requests), outbound_(outbound), credits_(credits) {}
 
   void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
@@ -57,6 +59,7 @@ class Declarations {
 
   RequestTable& requests_;
   Outbound& outbound_;
+  CreditBook& credits_;
 
   Mutex mutex_;
   std::map<std::string, Service> services_ GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node

@@ -36,7 +36,7 @@ Node::Node(Options options)
       received_(options_.receive_queue_bytes, wake_),
       requests_(outbound_),
       credits_(outbound_),
-      declarations_(requests_, outbound_),
+      declarations_(requests_, outbound_, credits_),
       watches_(requests_),
       inbound_(options_.reassembly, *this),
       tokens_(options_.name, options_.keep_token),
@@ -97,7 +97,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   session_ = std::move(admitted.session);
   if (!first) outbound_.set_declaring(true);  // until declare_again() below knows better
   // Before anything can be posted: a total of the earlier connection would count as one of this.
-  if (!session_.resumed) credits_.begin_anew();
+  credits_.begin(session_.resumed);
   const auto let_go = outbound_.attach(socket_, session_);
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself

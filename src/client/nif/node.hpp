@@ -79,9 +79,7 @@ class Node final : private InboundHost {
   bool on_report(const proto::Report& report) override;
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) override;
   void send_taken(std::uint32_t to, const proto::Taken& taken) override;
-  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override {
-    return credits_.epoch_for(group, requests_.subscribing());
-  }
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return credits_.epoch_for(group); }
   void on_message_lost(std::uint32_t group) override { credits_.take(group, epoch_for(group), 1, false); }
   void deliver(std::span<const Item> items) override;
 

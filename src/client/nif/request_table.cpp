@@ -6,7 +6,6 @@
 
 #include "base/endian.hpp"
 #include "gimnet/nif.h"
-#include "proto/control/ns.hpp"
 #include "proto/frame/frame_builder.hpp"
 
 namespace gimnet::nif {
@@ -34,17 +33,7 @@ std::optional<std::uint16_t> RequestTable::reserve(proto::Kind kind, std::uint16
     ++last_number_;
   } while (last_number_ == proto::kNoRequest || open_.contains(last_number_));
   open_.emplace(last_number_, Open{kind, operation, State::waiting, {}, std::move(handler)});
-  note_subscribing();
   return last_number_;
-}
-
-void RequestTable::note_subscribing() {
-  const bool any = std::any_of(open_.begin(), open_.end(), [](const auto& entry) {
-    const Open& open = entry.second;
-    return open.kind == proto::Kind::ns && open.operation == proto::ns::Subscribe::kOperation &&
-           (open.state == State::waiting || open.state == State::abandoned);
-  });
-  subscribing_.store(any, std::memory_order_relaxed);  // a flag by itself
 }
 
 nif_status RequestTable::wait_for_number(proto::Kind kind, std::uint16_t operation, Deadline deadline,
@@ -69,7 +58,6 @@ nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& a
       const bool answered = open.state == State::answered;
       if (answered) answer = std::move(open.answer);
       open_.erase(number);
-      note_subscribing();
       changed_.notify_all();
       return answered || again ? NIF_OK : closed();
     }
@@ -94,7 +82,6 @@ nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payloa
   const MutexLock lock(mutex_);
   if (posted) return wait_for_answer(number, answer, deadline, again);
   open_.erase(number);
-  note_subscribing();
   again = true;
   changed_.notify_all();
   return NIF_OK;
@@ -122,7 +109,6 @@ bool RequestTable::ask_later(proto::Kind kind, const proto::Payload& payload, Ha
   if (outbound_.post(request_frame(kind, payload, *number))) return true;
   const MutexLock lock(mutex_);
   open_.erase(*number);
-  note_subscribing();
   return false;
 }
 
@@ -147,13 +133,11 @@ bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer)
     if (open.state == State::waiting && !open.handler) {
       open.state = State::answered;
       open.answer = std::move(payload);
-      note_subscribing();
       changed_.notify_all();
       return true;
     }
     handler = std::move(open.handler);
     open_.erase(found);
-    note_subscribing();
     changed_.notify_all();
   }
   if (handler) handler(payload);
@@ -167,7 +151,6 @@ void RequestTable::fail_all() {
   for (auto& [number, open] : open_) {
     if (open.state == State::waiting) open.state = State::broken;
   }
-  note_subscribing();
   changed_.notify_all();
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -36,9 +35,6 @@ class RequestTable {
 
   /// False: nobody asked for it.
   bool on_answer(proto::Kind kind, const proto::ControlView& answer) GIMNET_EXCLUDES(mutex_);
-  /// Does a SUBSCRIBE wait for its answer? From any thread; on the library's it holds for every message that came
-  /// before the answer.
-  [[nodiscard]] bool subscribing() const { return subscribing_.load(std::memory_order_relaxed); }  // a flag by itself
   /// The connection broke: no answer will come.
   void fail_all() GIMNET_EXCLUDES(mutex_);
   /// The handle closes: everybody who waits leaves.
@@ -63,10 +59,7 @@ class RequestTable {
   [[nodiscard]] nif_status wait_for_answer(std::uint16_t number, proto::Payload& answer, Deadline deadline, bool& again)
       GIMNET_REQUIRES(mutex_);
 
-  void note_subscribing() GIMNET_REQUIRES(mutex_);
-
   Outbound& outbound_;
-  std::atomic<bool> subscribing_{false};
 
   Mutex mutex_;
   Condition changed_;

@@ -201,5 +201,94 @@ TEST(CreditBook, AResumedOneRepeatsItsTotals) {
   EXPECT_EQ(credited(connected.hub), 1u);
 }
 
+/// A service came back under kMovedGroup while the node was away: its first messages come before anything is declared.
+constexpr std::uint32_t kMovedGroup = kGroup + 1;
+
+FakeConnection come_back_resumed(FakeHub& hub) {
+  proto::Welcome welcome = make_welcome(1 << 20);
+  welcome.resumed = true;
+  return hub.admit(welcome);
+}
+
+std::uint64_t credited_of(FakeConnection& hub, std::uint32_t group) {
+  while (const auto credit = hub.next_flow<proto::flow::Credit>()) {
+    if (credit->group == GroupId{group}) return credit->taken;
+  }
+  return 0;
+}
+
+TEST(CreditBook, CountsWhatComesBeforeASubscriptionIsDeclaredAgain) {
+  constexpr int kServices = 40;  // they are declared first, and not all at once
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
+  const auto answer_advertise = [&](std::uint32_t i) {
+    std::uint16_t number = 0;
+    ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
+    proto::ns::AdvertiseAnswer answer;
+    answer.group = GroupId{kGroup + 100 + i};
+    connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  };
+  for (std::uint32_t i = 0; i < kServices; ++i) {
+    std::thread asking([&] {
+      const std::string name = "s" + std::to_string(i);
+      nif_service service{};
+      service.struct_size = sizeof service;
+      service.name = name.c_str();
+      std::uint32_t group = 0;
+      EXPECT_EQ(nif_advertise(connected.node.get(), &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+    });
+    answer_advertise(i);
+    asking.join();
+  }
+  subscribe(connected, 1);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+  connected.hub.close();
+  connected.hub = come_back_resumed(hub);
+  publish(connected.hub, kMovedGroup);
+  EXPECT_NE(take(connected.node.get()).epoch, 0u) << "before any SUBSCRIBE was sent";
+  for (std::uint32_t i = 0; i < kServices; ++i) answer_advertise(i);
+  answer_subscribe(connected.hub, 1, kMovedGroup);
+  EXPECT_EQ(credited_of(connected.hub, kMovedGroup), 1u) << "the window would be shut for ever";
+  // The former group is gone, and nothing is told of it any more.
+  connected.hub.close();
+  connected.hub = come_back_resumed(hub);
+  const auto repeated = connected.hub.next_flow<proto::flow::Credit>();
+  ASSERT_TRUE(repeated);
+  EXPECT_EQ(repeated->group, GroupId{kMovedGroup});
+}
+
+TEST(CreditBook, CountsWhatComesBeforeASubscribeThatBrokeIsAskedAgain) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
+  std::thread asking(
+      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
+  connected.hub.close();  // it has heard the SUBSCRIBE, and nobody its answer
+  connected.hub = come_back_resumed(hub);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  answer_subscribe(connected.hub, 1);
+  EXPECT_EQ(credited(connected.hub), 1u) << "the window would be shut for ever";
+  answer_subscribe(connected.hub, 1);  // a call that was asked on two connections asks once more
+  asking.join();
+}
+
+TEST(CreditBook, AGroupWithoutAWindowMayHaveOneAfterABreak) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
+  subscribe(connected, 0);
+  publish(connected.hub);
+  EXPECT_EQ(take(connected.node.get()).epoch, 0u);
+  connected.hub.close();
+  connected.hub = come_back_resumed(hub);
+  publish(connected.hub);
+  static_cast<void>(take(connected.node.get()));
+  answer_subscribe(connected.hub, 1);
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
 }  // namespace
 }  // namespace gimnet::nif
