@@ -236,14 +236,16 @@ bool Outbound::on_report(const proto::Report& report) {
     return true;
   }
   const auto found = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
-  if (found == in_progress_.end() || !found->second->windowed || !header.has(proto::kFlagFragment)) return false;
-  InProgress& progress = *found->second;
-  if (const auto number = ReportedMessages::number_of(report); number && *number != progress.number) return false;
-  // Why the rest of a message goes is what became of its beginning.
-  const bool rest = report.reason == proto::DropReason::cut_message;
-  if (!rest || progress.undelivered == proto::DropReason::none) progress.undelivered = report.reason;
-  notify_waiting();
-  return !progress.reported;
+  const auto number = ReportedMessages::number_of(report);
+  if (found != in_progress_.end() && found->second->windowed && header.has(proto::kFlagFragment) &&
+      (!number || *number == found->second->number)) {
+    InProgress& progress = *found->second;
+    // Why the rest of a message goes is what became of its beginning.
+    const bool rest = report.reason == proto::DropReason::cut_message;
+    if (!rest || progress.undelivered == proto::DropReason::none) progress.undelivered = report.reason;
+    notify_waiting();
+  }
+  return reported_.is_unwanted(report);
 }
 
 std::optional<ReportedMessages::Start> Outbound::message_of(const proto::Report& report) {

@@ -80,7 +80,8 @@ class Outbound {
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
   void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
-  /// True: it belongs to a message that is being sent and did not ask for reports.
+  /// True: it is about a message of which the program wants no reports. The library asks for those of every message of
+  /// more than a window, and some come when it is sent.
   bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
   /// How the message with a fragment header began that the report is about, if that is known.
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
@@ -98,7 +99,6 @@ class Outbound {
     std::uint64_t epoch = 0;
     std::uint32_t dst = 0;
     bool windowed = false;
-    bool reported = false;  ///< the program wants the reports
     bool refused = false;
     proto::DropReason undelivered = proto::DropReason::none;
     proto::SendWindow window;
@@ -112,7 +112,7 @@ class Outbound {
                                          Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::uint32_t number_of(Outgoing& message) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);

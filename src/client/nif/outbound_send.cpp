@@ -181,9 +181,9 @@ nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader>
 }
 
 /// For a message that has a fragment header.
-std::uint32_t Outbound::number_of(Outgoing& message) {
+std::uint32_t Outbound::number_of(Outgoing& message, bool windowed) {
   const std::uint32_t number = next_message_++;
-  if (message.reported()) reported_.remember(number, message);
+  if (message.reported() || windowed) reported_.remember(number, message);
   return number;
 }
 
@@ -192,7 +192,7 @@ nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   const nif_status turn = wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
   if (turn != NIF_OK) return turn;
   std::optional<proto::FragmentHeader> fragment;
-  if (with_header) fragment = proto::FragmentHeader{number_of(message), 0, message.size()};
+  if (with_header) fragment = proto::FragmentHeader{number_of(message, false), 0, message.size()};
   return put(message, fragment, 0, message.size(), false);
 }
 
@@ -205,7 +205,7 @@ nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadli
     const nif_status turn = wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
     if (turn != NIF_OK) return turn;
     if (progress.number == 0) {
-      progress.number = number_of(message);
+      progress.number = number_of(message, progress.windowed);
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }
@@ -226,7 +226,6 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
       .number = 0,
       .dst = message.parts().header.dst,
       .windowed = message.parts().header.kind == proto::Kind::unicast && message.size() > proto::kWindowDefault,
-      .reported = message.reported(),
       .window = proto::SendWindow(0, message.size())};
   in_progress_.emplace(message.stream(), &progress);
   const nif_status status = send_pieces(message, progress, deadline);

@@ -11,9 +11,10 @@
 
 namespace gimnet::nif {
 
-/// How the last messages with a fragment header began. A REPORT repeats 16 bytes of a frame, and of a fragment those
-/// are hardly more than its header: they tell the number of the message, and nothing of what it is. Thread safety: one
-/// thread at a time. Memory: 48 KiB, from the first message on.
+/// How the last messages with a fragment header began whose frames ask for reports, and for whom they do: the program,
+/// or only this library. A REPORT repeats 16 bytes of a frame, and of a fragment those are hardly more than its header:
+/// they tell the number of the message, and nothing of what it is. Thread safety: one thread at a time. Memory: 48 KiB,
+/// from the first message on.
 class ReportedMessages {
  public:
   /// REPORTs come a round trip and a report_interval_ms of the hub after their messages.
@@ -21,12 +22,16 @@ class ReportedMessages {
   /// Of each: the key, if it has one, and what follows. As much as a REPORT repeats of a frame.
   using Start = std::array<std::byte, proto::kReportFollowingMax>;
 
-  /// REQUIRES: numbers ascend by one from message to message of the node; the message has over 4 KiB.
+  /// REQUIRES: the message has over 4 KiB.
   void remember(std::uint32_t number, Outgoing& message);
 
   /// What stood behind the header of the message that the report is about. Nothing: it has no fragment header, that is
   /// behind other bytes (EXT, LIST ids), or the message is too old.
   [[nodiscard]] std::optional<Start> find(const proto::Report& report) const;
+
+  /// Is the report about a message of which the program wants no reports? It may come when the message is long sent.
+  /// Where the report tells no number, all remembered ones of that kind and destination decide.
+  [[nodiscard]] bool is_unwanted(const proto::Report& report) const;
 
   /// The number of the message that the report is about; nothing: it has none, or does not tell.
   [[nodiscard]] static std::optional<std::uint32_t> number_of(const proto::Report& report);
@@ -36,9 +41,13 @@ class ReportedMessages {
     std::uint32_t number = 0;  ///< 0: none
     std::uint32_t dst = 0;
     proto::Kind kind = proto::Kind::unicast;
+    bool wanted = false;  ///< by the program
     Start start{};
   };
-  std::vector<Message> messages_;  ///< by number modulo kMessagesMax
+  [[nodiscard]] const Message* find_message(const proto::Report& report) const;
+
+  std::vector<Message> messages_;
+  std::size_t next_ = 0;  ///< the oldest, which the next one replaces
 };
 
 }  // namespace gimnet::nif

@@ -238,6 +238,42 @@ TEST(OutboundSend, AReportEndsTheLargeMessageThatItIsAbout) {
   sending.join();
 }
 
+/// The message was refused in the middle, and then comes a REPORT of a fragment of it.
+bool program_gets_late_report(bool wanted, std::uint32_t age_ms_max) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  const std::string payload = pattern(2u << 20);
+  std::thread sending([&] {
+    const nif_bytes part = {payload.data(), payload.size()};
+    nif_outgoing message = NIF_OUTGOING_INIT;
+    message.to = kSlow;
+    message.flags = wanted ? NIF_FLAG_REPORT : 0;
+    message.age_ms_max = age_ms_max;
+    message.parts = &part;
+    message.part_count = 1;
+    EXPECT_EQ(nif_send(connected.node.get(), &message, NIF_FOREVER), NIF_TOO_LARGE);
+  });
+  const auto frame = connected.hub.next_message();
+  EXPECT_TRUE(frame);
+  send_taken(connected, {1, 0, 0});
+  sending.join();
+  report(connected.hub, proto::DropReason::queue_full, *frame);
+  settle(connected);
+  nif_incoming in{};
+  const bool came = nif_receive(connected.node.get(), &in, 0) == NIF_OK;
+  EXPECT_TRUE(!came || in.type == NIF_REPORT);
+  nif_release(&in);
+  return came;
+}
+
+TEST(OutboundSend, ALateReportIsForProgramsThatAskedForReports) {
+  EXPECT_FALSE(program_gets_late_report(false, 0));
+  EXPECT_TRUE(program_gets_late_report(true, 0));
+  // An extension stands where the number of the message would.
+  EXPECT_FALSE(program_gets_late_report(false, 60'000));
+  EXPECT_TRUE(program_gets_late_report(true, 60'000));
+}
+
 TEST(OutboundSend, AHubThatDoesNotReadFillsTheQueueAndTimesOut) {
   FakeHub hub;
   nif_options options = default_options();
