@@ -177,12 +177,14 @@ struct NodeState {
   std::string trouble;                   ///< why the connection broke last; "" if it never did
 };
 
-/// Messages on their way to a node that it cannot give out.
+/// What was on its way to a node and cannot be given out.
 struct LostCounts {
-  std::uint64_t incomplete = 0;  ///< a part of them did not come, or did not fit what came before
-  std::uint64_t too_large = 0;   ///< larger than NodeOptions::message_bytes_max
-  std::uint64_t broken_off = 0;  ///< lost with a connection: frames, of which a large message has many
-  [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + broken_off; }
+  std::uint64_t incomplete = 0;  ///< messages of which a part did not come, or did not fit what came before
+  std::uint64_t too_large = 0;   ///< messages larger than NodeOptions::message_bytes_max
+  /// Frames that the hub could not send again after a break; a small message has one, a large one many.
+  std::uint64_t frames_broken_off = 0;
+  /// How many losses are known: messages, and frames where only those are.
+  [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + frames_broken_off; }
 };
 
 /// A member of the network. Leaves for good when it is destroyed.

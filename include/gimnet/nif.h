@@ -272,8 +272,10 @@ typedef enum nif_incoming_type {
    * so is key where it is KEYED]. Of a message over 4 KiB those bytes are as if it had come in one frame without a
    * fragment header, as long as it is among the last 1,024 such messages that asked for reports or have over 1 MiB. */
   NIF_REPORT = 1,
-  /** Messages were lost [from: the sender; 0: any to this node; own id: frames of this node that had left the resume
-   * buffer unconfirmed when the connection broke; reason, count or NIF_COUNT_UNKNOWN, text]. */
+  /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so many messages].
+   * `cut_message`: a part did not come, or the connection broke before it. `too_large`. With `link_lost` the count is of
+   * frames, of which a large message has many, or NIF_COUNT_UNKNOWN: they had left a resume buffer unconfirmed when the
+   * connection broke, that of the hub or, from the own id, of this node. */
   NIF_GAP = 2,
   /** Connected again after a break [from: own node id; flags: NIF_CONNECTED_*]. The library declares services and
    * subscriptions again by itself. Not delivered for the first connection, which nif_connect() made. */

@@ -8,30 +8,31 @@
 
 namespace gimnet::gimi {
 
-/// Messages that were on their way to this node and were lost, by why. Thread safety: add() from the library's thread,
+/// What was on its way to this node and was lost, by why. Thread safety: add() from the library's thread,
 /// counts() from any.
 class LossTally {
  public:
-  void add(proto::DropReason reason, std::uint64_t messages) {
-    std::atomic<std::uint64_t>& count = place(reason);
+  /// `count` as NIF_GAP has it: messages, or frames that went with a connection.
+  void add(proto::DropReason reason, std::uint64_t count) {
+    std::atomic<std::uint64_t>& sum = place(reason);
     // One thread writes; who reads wants a recent value, and nothing that goes with it.
-    count.store(count.load(std::memory_order_relaxed) + messages, std::memory_order_relaxed);
+    sum.store(sum.load(std::memory_order_relaxed) + count, std::memory_order_relaxed);
   }
 
   [[nodiscard]] LostCounts counts() const {
     return {incomplete_.load(std::memory_order_relaxed), too_large_.load(std::memory_order_relaxed),  // see add()
-            broken_off_.load(std::memory_order_relaxed)};
+            frames_broken_off_.load(std::memory_order_relaxed)};
   }
 
  private:
   [[nodiscard]] std::atomic<std::uint64_t>& place(proto::DropReason reason) {
     if (reason == proto::DropReason::cut_message) return incomplete_;
-    return reason == proto::DropReason::too_large ? too_large_ : broken_off_;
+    return reason == proto::DropReason::too_large ? too_large_ : frames_broken_off_;
   }
 
   std::atomic<std::uint64_t> incomplete_{0};
   std::atomic<std::uint64_t> too_large_{0};
-  std::atomic<std::uint64_t> broken_off_{0};
+  std::atomic<std::uint64_t> frames_broken_off_{0};
 };
 
 }  // namespace gimnet::gimi

@@ -51,7 +51,7 @@ void Inbound::begin(const Session& session) {
   taken_ = 0;
   const MessageAssembler::Lost lost = assembler_.clear();
   counts_.messages_lost += lost.messages;
-  if (lost.messages > 0) add_gap(0, lost.messages, proto::DropReason::link_lost);
+  if (lost.messages > 0) add_gap(0, lost.messages, proto::DropReason::cut_message);
   for (const auto& notice : lost.notices) host_.send_taken(notice.to, notice.taken);
   deliver();
 }

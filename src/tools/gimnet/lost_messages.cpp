@@ -5,10 +5,15 @@
 namespace gimnet::tool {
 namespace {
 
-void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std::uint64_t told, std::string_view why) {
+struct Words {
+  std::string what;
+  std::string_view why;
+};
+
+void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std::uint64_t told, const Words& words) {
   if (count == told) return;
-  sentences.push_back(std::to_string(count) + (count == 1 ? " message was lost: " : " messages were lost: ") +
-                      std::string(why));
+  sentences.push_back(std::to_string(count) + " " + words.what + (count == 1 ? " was lost: " : "s were lost: ") +
+                      std::string(words.why));
 }
 
 }  // namespace
@@ -20,10 +25,11 @@ std::vector<std::string> LostMessages::news(std::int64_t now_ns) {
 
 std::vector<std::string> LostMessages::rest() {
   std::vector<std::string> sentences;
-  add_sentence(sentences, counts_.incomplete, told_.incomplete, "a part did not come, or did not fit the others");
-  add_sentence(sentences, counts_.too_large, told_.too_large, "larger than this end takes");
-  add_sentence(sentences, counts_.broken_off, told_.broken_off,
-               "on their way when the connection broke, counted in frames");
+  add_sentence(sentences, counts_.incomplete, told_.incomplete,
+               {"message", "a part did not come, or did not fit the others"});
+  add_sentence(sentences, counts_.too_large, told_.too_large, {"message", "larger than this end takes"});
+  add_sentence(sentences, counts_.frames_broken_off, told_.frames_broken_off,
+               {"frame", "on the way when the connection broke, and a large message has many frames"});
   told_ = counts_;
   return sentences;
 }

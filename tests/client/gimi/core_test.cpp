@@ -123,7 +123,7 @@ TEST_F(Lost, MessagesAreCountedByWhy) {
   ASSERT_TRUE(node_->receive());
   EXPECT_EQ(node_->lost().incomplete, 2u) << "each was followed by something else";
   EXPECT_EQ(node_->lost().too_large, 1u);
-  EXPECT_EQ(node_->lost().broken_off, 0u);
+  EXPECT_EQ(node_->lost().frames_broken_off, 0u);
 }
 
 TEST_F(Lost, MessagesThatTheHubWillNotSendAgainAreCounted) {
@@ -132,7 +132,7 @@ TEST_F(Lost, MessagesThatTheHubWillNotSendAgainAreCounted) {
   const std::string text = "x";
   answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
   ASSERT_TRUE(node_->receive());
-  EXPECT_EQ(node_->lost().broken_off, 4u) << "at least one, where nobody knows";
+  EXPECT_EQ(node_->lost().frames_broken_off, 4u) << "at least one, where nobody knows";
 }
 
 }  // namespace

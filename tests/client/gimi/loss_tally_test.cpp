@@ -15,7 +15,7 @@ TEST(LossTally, CountsByWhy) {
   tally.add(proto::DropReason::cut_message, 10);
   EXPECT_EQ(tally.counts().incomplete, 11u);
   EXPECT_EQ(tally.counts().too_large, 2u);
-  EXPECT_EQ(tally.counts().broken_off, 7u);
+  EXPECT_EQ(tally.counts().frames_broken_off, 7u);
   EXPECT_EQ(tally.counts().all(), 20u);
 }
 

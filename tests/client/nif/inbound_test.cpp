@@ -130,6 +130,17 @@ TEST(Inbound, PutsFragmentsTogetherAndTellsOfLoss) {
   EXPECT_EQ(receiving.inbound.counts().messages_lost, 2u);
 }
 
+TEST(Inbound, CountsMessagesThatWereUnfinishedWhenTheConnectionBroke) {
+  Receiving receiving;
+  std::vector<std::byte> bytes;
+  add_frame(bytes, fragment(1, 0, 6), "abc");
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  receiving.inbound.begin(Receiving::session());
+  ASSERT_EQ(receiving.host.gaps(), 1u);
+  EXPECT_EQ(receiving.host.items.back().count, 1u);
+  EXPECT_STREQ(receiving.host.items.back().text, "cut_message") << "link_lost counts frames";
+}
+
 TEST(Inbound, OpensTheWindowOfALargeMessage) {
   Receiving receiving;
   const std::uint32_t total = 4u << 20;
