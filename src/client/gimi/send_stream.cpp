@@ -109,6 +109,7 @@ bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
   if (status != NIF_OK) {
     // It may have been given up with all others meanwhile; then it counts as never sent all the same.
     if (window_.synchronized() && !window_.cancel(sequence) && counts_.lost != 0) --counts_.lost;
+    if (window_.empty()) forget_doubts();
     return false;
   }
   ++counts_.sent;
@@ -163,15 +164,24 @@ void SendStream::settle_freed(const SendWindow::Freed& freed, const std::string&
 
 bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const MutexLock lock(mutex_);
+  const bool answers = ack.pong_sequence != 0 && ack.pong_sequence == window_.ping_number();
   const SendWindow::Freed freed = window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
-  settle_freed(freed, doubt_.empty() ? "the receiver answered a later question, but did not get them" : doubt_);
-  if (freed.lost != 0 || window_.empty()) doubt_.clear();
+  const std::string& doubt = asked_.empty() ? doubt_ : asked_;
+  settle_freed(freed, doubt.empty() ? "the receiver answered a later question, but did not get them" : doubt);
+  if (answers) asked_.clear();
+  if (freed.lost != 0 || window_.empty()) forget_doubts();
   return held_ && window_.has_room();
 }
 
 void SendStream::on_lost(std::uint32_t sequence, const std::string& why) {
   const MutexLock lock(mutex_);
   settle_freed(window_.lose(sequence), why);
+  if (window_.empty()) forget_doubts();
+}
+
+void SendStream::forget_doubts() {
+  doubt_.clear();
+  asked_.clear();
 }
 
 void SendStream::on_doubt(const std::string& why) {
@@ -185,6 +195,7 @@ void SendStream::lose_all(const std::string& why) {
   SendWindow::Freed freed = window_.lose_all();
   if (std::exchange(held_, std::nullopt)) ++freed.lost;
   settle_freed(freed, why);
+  forget_doubts();
 }
 
 void SendStream::on_broken(const std::string& why) {
@@ -223,6 +234,8 @@ bool SendStream::tick(std::int64_t now_ns) {
       sequence = window_.open(now_ns);
     } else if (window_.ping_due(now_ns)) {
       ping = window_.ping_number() != 0 ? window_.ping_number() : uplink_.next_ping();
+      if (ping != window_.ping_number()) asked_ = std::exchange(doubt_, "");
+      window_.ping_sent(ping, now_ns);  // before the PONG can be here
     } else {
       return true;
     }
@@ -238,7 +251,7 @@ bool SendStream::tick(std::int64_t now_ns) {
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();
-  if (status == NIF_OK) window_.ping_sent(ping, now_ns);
+  if (status != NIF_OK) window_.ping_not_sent();
   return true;
 }
 

@@ -92,6 +92,7 @@ class SendStream {
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
   void hold_again(std::vector<std::byte> data) GIMNET_EXCLUDES(mutex_);
   void lose_all(const std::string& why) GIMNET_REQUIRES(mutex_);
+  void forget_doubts() GIMNET_REQUIRES(mutex_);
   /// REQUIRES: something was lost.
   [[nodiscard]] Failure loss() const GIMNET_REQUIRES(mutex_);
   void settle_freed(const SendWindow::Freed& freed, const std::string& why) GIMNET_REQUIRES(mutex_);
@@ -113,8 +114,10 @@ class SendStream {
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;    ///< one thread is between a sequence and NIF
   bool unflushed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< NIF holds messages back because of More::yes
   bool watched_ GIMNET_GUARDED_BY(mutex_) = false;
-  /// What the hub reported since it was asked last; "": nothing.
+  /// Why messages may be lost, as the hub reported it since the last PING; "": nothing. A PONG that answers a PING
+  /// behind all of it settles it: `asked_` is what was in doubt when the open PING was sent.
   std::string doubt_ GIMNET_GUARDED_BY(mutex_);
+  std::string asked_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

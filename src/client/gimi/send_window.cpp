@@ -106,6 +106,12 @@ void SendWindow::ping_sent(std::uint32_t number, std::int64_t now_ns) {
   ++pings_;
 }
 
+void SendWindow::ping_not_sent() {
+  if (ping_number_ == 0) return;  // an ACK freed everything meanwhile
+  ping_again_ns_ = 0;
+  --pings_;
+}
+
 std::int64_t SendWindow::patience_ns() const { return std::max(kPatienceRoundTrips * round_trip_ns_, kPatienceMinNs); }
 
 void SendWindow::drop_front() {

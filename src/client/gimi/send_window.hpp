@@ -43,6 +43,8 @@ class SendWindow {
   /// The number of the PING that is open already, to be repeated; 0: none.
   [[nodiscard]] std::uint32_t ping_number() const { return ping_number_; }
   void ping_sent(std::uint32_t number, std::int64_t now_ns);
+  /// That PING could not be sent: it is due again.
+  void ping_not_sent();
   /// Ask at the next occasion: something says that messages were lost.
   void hurry() { hurried_ = true; }
 

@@ -220,6 +220,64 @@ TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   EXPECT_EQ(stream.counts().loss, "the hub reports shard_full");
 }
 
+class SettledDoubt : public Conversation {
+ protected:
+  SettledDoubt() : stream_(sender(3)) {}
+
+  /// Two messages, of which a report says that the second was lost, and something else.
+  void lose_the_second() {
+    stream_.send("1").or_throw();
+    stream_.send("2").or_throw();
+    first_ = next_data_frame();
+    const auto second = next_data_frame();
+    ASSERT_TRUE(first_ && second);
+    report(proto::DropReason::shard_full, 2, *second);
+    ping_ = next_ping();
+  }
+  /// The number of the next PING that is not that one again.
+  std::uint32_t next_ping() {
+    for (;;) {
+      const Taken taken = next();
+      if (HasFailure()) return 0;
+      if (taken.header.operation == Operation::ping && taken.header.sequence != ping_) return taken.header.sequence;
+    }
+  }
+  /// The third one is lost, and nobody says why.
+  void expect_no_reason() {
+    acknowledge(1, 0, next_ping());
+    EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
+    EXPECT_EQ(stream_.counts().loss, "the receiver answered a later question, but did not get them");
+  }
+
+  Sender stream_;
+  std::uint32_t ping_ = 0;
+  std::optional<nif::test::Frame> first_;
+};
+
+TEST_F(SettledDoubt, IsNoReasonAfterThePong) {
+  lose_the_second();
+  stream_.send("3").or_throw();  // the window is never empty
+  acknowledge(1, 0, ping_);
+  expect_no_reason();
+}
+
+TEST_F(SettledDoubt, IsNoReasonWhenNothingWaitsAnyMore) {
+  lose_the_second();
+  acknowledge(1, 0);
+  EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
+  stream_.send("3").or_throw();
+  expect_no_reason();
+}
+
+TEST_F(SettledDoubt, IsNoReasonWhenAReportTookTheLast) {
+  lose_the_second();
+  report(proto::DropReason::queue_full, 1, *first_);
+  EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
+  EXPECT_EQ(stream_.counts().lost, 2u);
+  stream_.send("3").or_throw();
+  expect_no_reason();
+}
+
 TEST_F(SendStreamTest, ABrokenConnectionFreesEverything) {
   const Sender stream = sender(1);
   stream.send("1").or_throw();

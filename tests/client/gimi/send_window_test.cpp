@@ -77,6 +77,20 @@ TEST(SendWindow, AsksWhenAnAckIsLate) {
   EXPECT_TRUE(window.ping_due(800 * kMs));
 }
 
+TEST(SendWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
+  SendWindow window(2);
+  window.open(0);
+  window.ping_sent(9, 200 * kMs);
+  window.ping_not_sent();
+  EXPECT_TRUE(window.ping_due(200 * kMs));
+  EXPECT_EQ(window.ping_number(), 9u);
+  window.ping_sent(9, 201 * kMs);
+  EXPECT_TRUE(window.ping_due(401 * kMs)) << "it counts as the first";
+  static_cast<void>(window.acknowledge(1, 0, 0, 201 * kMs));
+  window.ping_not_sent();
+  EXPECT_FALSE(window.ping_due(3600'000 * kMs)) << "nothing waits any more";
+}
+
 TEST(SendWindow, WaitsLongerWhereTheWayIsLong) {
   SendWindow window(2);
   window.open(0);
