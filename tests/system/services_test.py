@@ -8,6 +8,7 @@ import time
 import unittest
 
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.proxy import Proxy
 from support.waiting import wait_until
 from support.wire import FLAG_KEYED, GROUP, NS, Client, number, text
 
@@ -69,9 +70,35 @@ class Services(unittest.TestCase):
             wait_until(lambda: paced.out, "a message, before the next one could take its place")
         for tool in (lines, objects, paced):
             self.assertEqual(tool.wait(), 0, tool.err)
-        said = "gimnet: 941 messages of r/s did not come (this reader was too slow)\n"
+        said = ("gimnet: 941 messages of r/s did not come: this reader was too slow, or the sender's connection broke "
+                "(`gimnet status` counts what the hub dropped)\n")
         self.assertEqual((lines.err, objects.err, paced.err), (said, said, ""))
         self.assertEqual([json.loads(line)["missed"] for line in objects.out.splitlines()], [0, 941])
+
+    def test_echo_blames_a_broken_connection_for_what_did_not_come_across_it(self):
+        hub = Hub(self)
+        proxy = Proxy(self, hub.port)
+        provider = Client(self, hub).join("r")
+        group = provider.ask(NS, 7, text(3, "s"))[3]
+        echo = start_gimnet(self, proxy, "echo", "r/s", "-n", "2", "--raw")
+        wait_until(lambda: subscribers_of(hub, "r/s") == 1, "the subscriber")
+
+        def publish(sequence):
+            data = struct.pack("<IBBH", sequence, DATA, 0, 0) + b"x"
+            provider.send(provider.frame(group, bytes(KEY) + data, kind=GROUP, flags=FLAG_KEYED))
+        publish(1)
+        wait_until(lambda: echo.out, "the first message")
+        proxy.drop_all()
+        wait_until(lambda: "connected again" in echo.err, "its new connection")
+        sequences = iter(range(943, 1 << 20))
+
+        def is_over():
+            publish(next(sequences))
+            return echo.popen.poll() is not None
+        wait_until(is_over, "a message behind the new subscription")
+        self.assertEqual(echo.wait(), 0, echo.err)
+        self.assertRegex(echo.err, r"[0-9]+ messages of r/s did not come: the connection to the hub was broken\n")
+        self.assertNotIn("too slow", echo.err)
 
     def test_a_subscription_survives_its_provider(self):
         hub = Hub(self)

@@ -90,6 +90,9 @@ class Message {
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
   /// When it was read from the network, by this machine's clock in ns since 1970.
   [[nodiscard]] std::int64_t arrival_ns() const { return arrival_ns_; }
+  /// How often its node had connected anew when it came, as NodeState::reconnects: where it grows from one message to
+  /// the next the connection to the hub was broken between them.
+  [[nodiscard]] std::uint32_t reconnects() const { return reconnects_; }
   /// Full name of the service it was published by; "" for one that was sent to this node.
   [[nodiscard]] std::string_view service() const { return service_ ? std::string_view{*service_} : ""; }
 
@@ -105,6 +108,7 @@ class Message {
   Peer from_;
   MessageKey key_;
   std::uint32_t sequence_ = 0;
+  std::uint32_t reconnects_ = 0;
   Lane lane_ = Lane::normal;
   std::uint32_t group_ = 0;
   std::uint32_t epoch_ = 0;  ///< of a message that counts in a window

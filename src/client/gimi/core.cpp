@@ -269,7 +269,7 @@ nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView
   if (view.data.size() > message_bytes_max_) return refuse(in, view);
   if (in.kind == NIF_GROUP) return on_group_data(in, view);
   const StreamName name = received_stream_of(in);
-  Message message = MessageAccess::make(in, view, nullptr);
+  Message message = MessageAccess::make(in, view, nullptr, reconnects_);
   AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header.sequence);
   const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
   if (inbox_.put(name.key, message, wanted ? &receipt : nullptr)) return NIF_KEEP;
@@ -282,7 +282,7 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
   if (service == nullptr) return verdict_of(place);
   // After a break the hub gives the last message of a retained service again: it does not know who had it.
   if (service->is_repeated(in.from, view.header.sequence)) return NIF_DONE;
-  Message message = MessageAccess::make(in, view, service->shared_name());
+  Message message = MessageAccess::make(in, view, service->shared_name(), reconnects_);
   if (!inbox_.put(service->queue(), message, nullptr)) {
     MessageAccess::disown(message);
     return NIF_NOT_NOW;
@@ -352,6 +352,7 @@ void Core::on_gap(const nif_incoming& in) {
 }
 
 void Core::on_connected(const nif_incoming& in) {
+  ++reconnects_;
   streams_.on_interrupted(0);
   if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
   services_.on_reconnected();

@@ -68,6 +68,7 @@ class Core {
   PingTable pings_;
   LossTally losses_;
   Clerk clerk_;
+  std::uint32_t reconnects_ = 0;  ///< the library's thread: as the messages that come now count them
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};
 };

@@ -29,13 +29,14 @@ void Message::swap(Message& other) noexcept {
   std::swap(from_, other.from_);
   std::swap(key_, other.key_);
   std::swap(sequence_, other.sequence_);
+  std::swap(reconnects_, other.reconnects_);
   std::swap(lane_, other.lane_);
   std::swap(group_, other.group_);
   std::swap(epoch_, other.epoch_);
 }
 
 Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageView& view,
-                            std::shared_ptr<const std::string> service) {
+                            std::shared_ptr<const std::string> service, std::uint32_t reconnects) {
   const auto key = proto::gimi::StreamKey::of(in.key);
   Message message;
   message.data_ = view.data;
@@ -46,6 +47,7 @@ Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageVi
   message.from_ = Peer{in.from};
   message.key_ = {key.type, key.instance};
   message.sequence_ = view.header.sequence;
+  message.reconnects_ = reconnects;
   message.lane_ = static_cast<Lane>(in.lane);
   message.group_ = in.to;
   message.epoch_ = in.epoch;

@@ -1,19 +1,47 @@
 #include "tools/gimnet/missed_messages.hpp"
 
+#include <algorithm>
+
 namespace gimnet::tool {
+
+void MissedMessages::add_sentence(std::vector<std::string>& sentences, Count& count, const std::string& service,
+                                  std::string_view why) {
+  if (count.told == count.missed) return;
+  count.told = count.missed;
+  sentences.push_back(std::to_string(count.missed) + (count.missed == 1 ? " message of " : " messages of ") + service +
+                      " did not come: " + std::string(why));
+}
 
 std::uint64_t MissedMessages::take(const Message& message) {
   const auto found = services_.find(message.service());
   auto& service = found != services_.end() ? found->second : services_[std::string(message.service())];
   const auto step = static_cast<std::int32_t>(message.sequence() - service.sequence);
   // The first of a provider says where it stands; a provider that began again counts from 1.
-  if (message.from().id == service.provider && step > 1) {
-    service.missed += static_cast<std::uint32_t>(step - 1);
-    untold_ = true;
-  }
+  if (message.from().id == service.provider && step > 1) count(service, static_cast<std::uint32_t>(step - 1), message);
   service.provider = message.from().id;
   service.sequence = message.sequence();
+  service.reconnects = message.reconnects();
   return service.missed;
+}
+
+void MissedMessages::count(Service& service, std::uint64_t missed, const Message& message) {
+  service.missed += missed;
+  if (message.reconnects() != service.reconnects) {
+    service.broken.missed += missed;
+    told_as_lost_ = 0;  // what was lost with the connection is among these
+    untold_ = true;
+    return;
+  }
+  const std::uint64_t told = std::min(missed, told_as_lost_);
+  told_as_lost_ -= told;
+  service.unknown.missed += missed - told;
+  untold_ = untold_ || missed != told;
+}
+
+void MissedMessages::take_lost(const LostCounts& counts) {
+  const std::uint64_t lost = counts.incomplete + counts.too_large;
+  told_as_lost_ += lost - lost_;
+  lost_ = lost;
 }
 
 std::vector<std::string> MissedMessages::news(std::int64_t now_ns) {
@@ -24,10 +52,11 @@ std::vector<std::string> MissedMessages::news(std::int64_t now_ns) {
 std::vector<std::string> MissedMessages::rest() {
   std::vector<std::string> sentences;
   for (auto& [name, service] : services_) {
-    if (service.told == service.missed) continue;
-    service.told = service.missed;
-    sentences.push_back(std::to_string(service.missed) + (service.missed == 1 ? " message of " : " messages of ") +
-                        name + " did not come (this reader was too slow)");
+    add_sentence(sentences, service.broken, name, "the connection to the hub was broken");
+    // Nobody tells a reader whether it or the sender was in the way.
+    add_sentence(
+        sentences, service.unknown, name,
+        "this reader was too slow, or the sender's connection broke (`gimnet status` counts what the hub dropped)");
   }
   untold_ = false;
   return sentences;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gimnet/gimi.hpp"
@@ -10,26 +11,41 @@
 
 namespace gimnet::tool {
 
-/// What did not come of services, by the gaps between the numbers of what came, and when to say so. Times are those of
-/// steady_now_ns(). Thread safety: one thread.
+/// What did not come of services, by the gaps between the numbers of what came, why, and when to say so. Times are
+/// those of steady_now_ns(). Thread safety: one thread.
 class MissedMessages {
  public:
   /// Returns how many of its service did not come up to this one. REQUIRES: it is of a service.
   std::uint64_t take(const Message& message);
-  /// Sentences about what was not told yet, one a service; none within NewsPace::kPeriodNs of the last ones.
+  /// As the node counts now what it cannot give out. So many of what did not come since the last time count as missed,
+  /// but are told by LostMessages. REQUIRES: the node receives nothing but these services.
+  void take_lost(const LostCounts& counts);
+  /// Sentences about what was not told yet, one a service and cause; none within NewsPace::kPeriodNs of the last ones.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns);
   /// As news(), at the end: whatever the time is.
   [[nodiscard]] std::vector<std::string> rest();
 
  private:
-  struct Service {
-    std::uint32_t provider = 0;
-    std::uint32_t sequence = 0;
+  struct Count {
     std::uint64_t missed = 0;
     std::uint64_t told = 0;
   };
+  struct Service {
+    std::uint32_t provider = 0;
+    std::uint32_t sequence = 0;
+    std::uint32_t reconnects = 0;
+    std::uint64_t missed = 0;
+    Count broken;   ///< while the connection to the hub was
+    Count unknown;  ///< by all that happens elsewhere
+  };
+  static void add_sentence(std::vector<std::string>& sentences, Count& count, const std::string& service,
+                           std::string_view why);
+  void count(Service& service, std::uint64_t missed, const Message& message);
+
   std::map<std::string, Service, std::less<>> services_;
   NewsPace pace_;
+  std::uint64_t lost_ = 0;          ///< as take_lost() was told last
+  std::uint64_t told_as_lost_ = 0;  ///< of those that did not come yet in numbers
   bool untold_ = false;
 };
 

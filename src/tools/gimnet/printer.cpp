@@ -66,7 +66,9 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
       if (!session.output().ok()) break;
       message = receive(bounds.wait(kLookAtConnection));
     }
-    lost.take(session.node().lost());
+    const LostCounts counts = session.node().lost();
+    lost.take(counts);
+    if (missed != nullptr) missed->take_lost(counts);
     const std::int64_t now_ns = steady_now_ns();
     say_all(lost.news(now_ns));
     if (missed != nullptr) say_all(missed->news(now_ns));

@@ -29,6 +29,11 @@ class Dismissed : public Conversation, public testing::WithParamInterface<Goodby
 
 class WithoutReconnecting : public Conversation {};
 
+class Reconnected : public Conversation {
+ protected:
+  Reconnected() : Conversation(true) {}
+};
+
 class Lost : public Conversation {
  protected:
   /// The first piece of a large message to this node.
@@ -111,6 +116,19 @@ TEST_F(WithoutReconnecting, ClosingAfterwardsAnswersClosed) {
   EXPECT_TRUE(node_->receive().is(Status::not_connected));
   node_->close();
   EXPECT_TRUE(node_->receive().is(Status::closed));
+}
+
+TEST_F(Reconnected, MessagesTellOverWhichConnectionTheyCame) {
+  const std::string text = "x";
+  for (std::uint32_t connection = 0; connection < 3; ++connection) {
+    answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    const auto message = node_->receive();
+    ASSERT_TRUE(message);
+    EXPECT_EQ(message->reconnects(), connection);
+    EXPECT_EQ(node_->state().reconnects, connection);
+    hub_.close();
+    hub_ = fake_.admit(nif::test::make_welcome());
+  }
 }
 
 TEST_F(Lost, MessagesAreCountedByWhy) {

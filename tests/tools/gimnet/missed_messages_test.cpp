@@ -10,9 +10,16 @@ namespace {
 using test::make_message;
 using Sentences = std::vector<std::string>;
 
+const char* const kUnknown =
+    " of r/s did not come: this reader was too slow, or the sender's connection broke (`gimnet status` counts what the "
+    "hub dropped)";
+const char* const kBroken = " of r/s did not come: the connection to the hub was broken";
+
 class MissedMessagesTest : public testing::Test {
  protected:
-  std::uint64_t take(std::uint32_t sequence) { return missed_.take(make_message("x", sequence, {}, "r/s")); }
+  std::uint64_t take(std::uint32_t sequence, std::uint32_t reconnects = 0) {
+    return missed_.take(make_message("x", sequence, {}, "r/s", reconnects));
+  }
 
   MissedMessages missed_;
 };
@@ -26,10 +33,30 @@ TEST_F(MissedMessagesTest, TheFirstMayHaveAnyNumber) {
 TEST_F(MissedMessagesTest, GapsAreCounted) {
   take(1);
   EXPECT_EQ(take(3), 1u);
-  EXPECT_EQ(missed_.rest(), Sentences{"1 message of r/s did not come (this reader was too slow)"});
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
   EXPECT_EQ(take(13), 10u);
-  EXPECT_EQ(missed_.rest(), Sentences{"10 messages of r/s did not come (this reader was too slow)"});
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("10 messages") + kUnknown});
   EXPECT_EQ(missed_.rest(), Sentences{}) << "once";
+}
+
+TEST_F(MissedMessagesTest, ABrokenConnectionIsTheCauseOfTheGapAcrossIt) {
+  take(1);
+  take(3);
+  EXPECT_EQ(take(13, 1), 10u);
+  EXPECT_EQ(take(15, 1), 11u);
+  EXPECT_EQ(missed_.rest(), (Sentences{std::string("9 messages") + kBroken, std::string("2 messages") + kUnknown}));
+  take(17, 1);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("3 messages") + kUnknown});
+}
+
+TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
+  take(1);
+  missed_.take_lost({.incomplete = 1, .too_large = 1, .frames_broken_off = 50});
+  EXPECT_EQ(take(4), 2u);
+  EXPECT_EQ(missed_.rest(), Sentences{});
+  missed_.take_lost({.incomplete = 2, .too_large = 1, .frames_broken_off = 50});
+  EXPECT_EQ(take(7), 4u);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
 }
 
 TEST_F(MissedMessagesTest, NumbersWrapAround) {
@@ -50,8 +77,7 @@ TEST_F(MissedMessagesTest, NewsComeAtMostOnceASecond) {
   EXPECT_EQ(missed_.news(100).size(), 1u);
   take(5);
   EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs - 1), Sentences{});
-  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs),
-            Sentences{"2 messages of r/s did not come (this reader was too slow)"});
+  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs), Sentences{std::string("2 messages") + kUnknown});
 }
 
 }  // namespace

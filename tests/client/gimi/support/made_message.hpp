@@ -16,12 +16,12 @@ inline Message make_counted(std::uint32_t group, std::uint32_t epoch) {
   in.kind = NIF_GROUP;
   in.to = group;
   in.epoch = epoch;
-  return MessageAccess::make(in, {}, nullptr);
+  return MessageAccess::make(in, {}, nullptr, 0);
 }
 
 /// A message that NIF knows nothing of, of a service if one is named. `text` must outlive it.
 inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {},
-                            const std::string& service = "") {
+                            const std::string& service = "", std::uint32_t reconnects = 0) {
   nif_incoming in{};
   in.from = (7u << 20) | 5;
   in.key = key.type | (static_cast<std::uint64_t>(key.instance) << 32);
@@ -30,7 +30,8 @@ inline Message make_message(std::string_view text, std::uint32_t sequence = 1, M
   proto::gimi::MessageView view;
   view.header.sequence = sequence;
   view.data = std::as_bytes(std::span(text.data(), text.size()));
-  return MessageAccess::make(in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service));
+  return MessageAccess::make(in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service),
+                             reconnects);
 }
 
 }  // namespace gimnet::test
