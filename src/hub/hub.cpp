@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "base/log.hpp"
 #include "hub/config/folders.hpp"
 #include "hub/config/reloader.hpp"
 #include "hub/config/start_state.hpp"
@@ -15,14 +16,24 @@
 namespace gimnet::hub {
 namespace {
 
-Result<std::vector<ListenUrl>> addresses_for(const HubOptions& options) {
+/// Nobody asked for the default socket: a place for it that cannot be used, as in the environment of a session that has
+/// ended, costs that socket and not the hub.
+std::vector<ListenUrl> addresses_for(const HubOptions& options) {
   if (!options.listen.empty()) return options.listen;
-  if (const Result<std::string> folder = runtime_folder(); !folder) return folder.error();
+  const Result<std::string> folder = runtime_folder();
+  std::string trouble = folder ? "" : folder.error().sentence;
   std::vector<ListenUrl> urls;
   for (const std::string& text : default_addresses()) {
     const Result<ListenUrl> url = parse_listen_url(text);
-    if (!url) return url.error();
-    urls.push_back(*url);
+    if (!url) {
+      trouble = url.error().sentence;
+    } else if (folder || url->scheme == ListenUrl::Scheme::tcp) {
+      urls.push_back(*url);
+    }
+  }
+  if (!trouble.empty()) {
+    log_warning("listening on TCP only, without the Unix socket over which administrators connect: " + trouble +
+                "; --listen unix:/PATH names another place, beside --listen " + urls.front().text());
   }
   return urls;
 }
@@ -171,17 +182,16 @@ Hub::Hub(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Hub::~Hub() { parts_->shards.stop(); }
 
 Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigSources& sources) {
-  const Result<std::vector<ListenUrl>> urls = addresses_for(options);
-  if (!urls) return urls.error();
+  const std::vector<ListenUrl> urls = addresses_for(options);
   std::vector<std::unique_ptr<Listener>> listeners;
-  for (const ListenUrl& url : *urls) {
+  for (const ListenUrl& url : urls) {
     Result<std::unique_ptr<Listener>> listener = Listener::open(url);
     if (!listener) return listener.error();
     listeners.push_back(std::move(*listener));
   }
   // After the addresses: a second hub by mistake is told that they are in use, which says more.
   const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
-  Result<StartState> state = start_state({options.state_dir, options.id, urls->front(), wall});
+  Result<StartState> state = start_state({options.state_dir, options.id, urls.front(), wall});
   if (!state) return state.error();
   std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();

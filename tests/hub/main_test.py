@@ -85,6 +85,19 @@ class CommandLine(unittest.TestCase):
                     self.skipTest("the default port is in use on this machine: " + hub.process.stderr.read())
                 self.assertEqual(hub.ready, f"ready tcp://127.0.0.1:7450 unix:{folder}/gimnet/tcphub.sock")
 
+    def test_a_runtime_folder_that_is_gone_costs_the_socket_only(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with Hub(XDG_RUNTIME_DIR=f"{folder}/gone") as hub:
+                if not hub.ready:
+                    said = hub.process.stderr.read()
+                    self.assertIn("cannot listen on tcp://127.0.0.1:7450", said)
+                    self.skipTest("the default port is in use on this machine: " + said)
+                self.assertEqual(hub.ready, "ready tcp://127.0.0.1:7450")
+                self.assertEqual(hub.end(signal.SIGTERM), 0)
+                said = hub.process.stderr.read()
+                for part in ("listening on TCP only", f"make {folder}/gone first", "--listen unix:/PATH"):
+                    self.assertIn(part, said)
+
     def test_a_wrong_command_line_is_told_and_ends_with_2(self):
         for arguments, part in ((("--lisen", "x"), "did you mean --listen?"),
                                 (("--limit", "nodes=0"), "nodes"),
