@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <optional>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "base/log.hpp"
@@ -77,10 +78,12 @@ class Lines {
     }
     return first;
   }
-  [[nodiscard]] std::string text() const {
-    std::string all;
-    for (const std::string& line : lines_) all += line + "\n";
-    return all;
+  [[nodiscard]] std::string text() const { return text(1, lines_.size()); }
+  /// The lines first..last, counted from 1.
+  [[nodiscard]] std::string text(std::size_t first, std::size_t last) const {
+    std::string some;
+    for (std::size_t number = first; number <= last; ++number) some += lines_[number - 1] + "\n";
+    return some;
   }
 
  private:
@@ -144,6 +147,23 @@ std::set<std::size_t> mend_text(Lines& lines, const std::string& name, Faults& f
   return mended;
 }
 
+bool is_at_end(const toml::parse_error& error) {
+  return error.description().find("end-of-file") != std::string_view::npos;
+}
+
+/// A list that is not closed takes what follows for its values, so the parser complains of the next key, or of the end.
+/// The lines of such a list before the error; none: that is not what is wrong.
+std::optional<std::pair<std::size_t, std::size_t>> open_list_before(const Lines& lines, std::size_t line, bool at_end) {
+  const std::size_t last = at_end ? lines.size() : line - 1;
+  if (last == 0) return std::nullopt;
+  if (!at_end && !toml::parse(lines.text(line, line))) return std::nullopt;
+  const std::size_t first = lines.beginning(last);
+  const toml::parse_result part = toml::parse(lines.text(first, last));
+  const bool is_open =
+      !part && is_at_end(part.error()) && part.error().description().find("array") != std::string_view::npos;
+  return is_open ? std::optional(std::pair(first, last)) : std::nullopt;
+}
+
 /// Parses as much as can be made sense of. Nothing: too much is wrong.
 std::optional<toml::table> parse(std::string_view text, const std::string& name, Faults& faults) {
   Lines lines(text);
@@ -155,8 +175,12 @@ std::optional<toml::table> parse(std::string_view text, const std::string& name,
     if (parsed) return std::move(parsed).table();
     const toml::parse_error& error = parsed.error();
     const std::size_t line = std::clamp<std::size_t>(error.source().begin.line, 1, lines.size());
-    const bool at_end = error.description().find("end-of-file") != std::string_view::npos;
-    if (left_out_from != 0 && (at_end || line <= left_out_to)) {
+    const bool at_end = is_at_end(error);
+    if (const auto list = open_list_before(lines, line, at_end)) {
+      std::tie(left_out_from, left_out_to) = *list;
+      faults.push_back({place_of(name, left_out_from, lines.first_column(left_out_from)),
+                        "this is not TOML: the list that begins here is not closed; end it with ]"});
+    } else if (left_out_from != 0 && (at_end || line <= left_out_to)) {
       // What was left out was the end of something that began further up.
       if (left_out_from == 1) return std::nullopt;
       left_out_from = lines.beginning(left_out_from - 1);

@@ -95,11 +95,25 @@ TEST(TomlFile, AKeyGivenTwiceIsTold) {
 
 TEST(TomlFile, AnErrorInALongerValueCostsThatValueAlone) {
   const TomlFile file = read_toml("hub_id = 1\nlisten = [\n  'a',\n  'b'\nshards = 2\n", "f");
-  EXPECT_THAT(places(file), ElementsAre("f:5:1"));
-  EXPECT_THAT(keys(file), ElementsAre("hub_id"));
+  EXPECT_THAT(places(file), ElementsAre("f:2:1"));
+  EXPECT_THAT(keys(file), ElementsAre("hub_id", "shards"));
   const TomlFile open = read_toml("hub_id = 1\nname = '''x\n\n", "f");
   EXPECT_THAT(places(open), SizeIs(1));
   EXPECT_THAT(keys(open), ElementsAre("hub_id"));
+}
+
+TEST(TomlFile, AListThatIsNotClosedHidesNothing) {
+  for (const std::string list :
+       {"listen = [", "listen = [ 'a'", "listen = [\n  'a',", "listen = [[", "listen = [\n\n# x\n"}) {
+    const TomlFile file = read_toml(list + "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+    ASSERT_THAT(file.faults, SizeIs(2)) << list;
+    EXPECT_EQ(file.faults[0].line(), "f:1:1: this is not TOML: the list that begins here is not closed; end it with ]");
+    EXPECT_THAT(file.faults[1].place, HasSubstr(":10")) << "the value of nodes";
+    EXPECT_THAT(keys(file), ElementsAre("shards", "limits.grace_ms")) << list;
+  }
+  const TomlFile twice = read_toml("a = [\nb = [\n[limits]\nnodes = 1\nc = [\n", "f");
+  EXPECT_THAT(places(twice), UnorderedElementsAre("f:1:1", "f:2:1", "f:5:1"));
+  EXPECT_THAT(keys(twice), ElementsAre("limits.nodes"));
 }
 
 TEST(TomlFile, WhatStandsBelowABrokenHeaderIsNobodys) {
