@@ -144,7 +144,8 @@ ExitCode run_ctl(Session& session) {
   // It asks once: coming back by itself would have it wait for a hub that it has just ended.
   how.reconnect = false;
   if (const auto ending = only_reads(action) ? session.join_to_look(how) : session.join(how)) {
-    if (*ending == ExitCode::denied) say("changing needs the hub's Unix socket: --hub unix:/PATH");
+    const bool by_socket = session.join_failure().starts_with("the hub at unix:");
+    if (*ending == ExitCode::denied && !by_socket) say("changing needs the hub's Unix socket: --hub unix:/PATH");
     return *ending;
   }
   switch (action) {

@@ -45,6 +45,7 @@ std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
 std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
+    join_failure_ = failure.sentence;
     if (failure.status == Status::no_hub) {
       if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?')) failure.sentence += '.';
       failure.sentence += advice(

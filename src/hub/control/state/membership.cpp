@@ -213,6 +213,11 @@ std::optional<Refusal> Membership::check(const JoinRequest& request) const {
     return Refusal{GoodbyeCode::not_allowed, "this hub takes no links from other hubs; connect as a node"};
   }
   if (request.role == proto::Role::admin && !request.may_administer) {
+    // By another way it would not be told apart from nobody, by this one it is told as whom it came.
+    if (request.identity.starts_with("uid ")) {
+      return Refusal{GoodbyeCode::not_allowed, "only root and the user that runs the hub administer it, and this is " +
+                                                   request.identity + "; run the command as one of them"};
+    }
     return Refusal{GoodbyeCode::not_allowed,
                    "administrators connect over the hub's Unix socket, as root or as the user that runs the hub"};
   }

@@ -249,6 +249,10 @@ TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
   JoinRequest admin = request("");
   admin.role = proto::Role::admin;
   EXPECT_EQ(refused(admin), GoodbyeCode::not_allowed);
+  admin.identity = "uid 1000";
+  const auto by_socket = membership_.join(admin, 0ms, effects_);
+  ASSERT_FALSE(by_socket);
+  EXPECT_THAT(by_socket.error().sentence, ::testing::HasSubstr("this is uid 1000; run the command as one of them"));
   admin.may_administer = true;
   EXPECT_EQ(refused(admin), GoodbyeCode::done);
   JoinRequest unknown = request("");
