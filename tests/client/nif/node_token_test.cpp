@@ -91,12 +91,14 @@ TEST(NodeToken, ItStaysWhereGoodbyeCouldNotBeSaid) {
   const RuntimeFolder runtime;
   FakeHub hub;
   {
+    FakeConnection again{-1};  // outlives the node, which would dial once more
     Connected connected = connect_to(hub, keeping("robot"), make_welcome());
     connected.hub.close();
     nif_incoming in{};
     ASSERT_EQ(nif_receive(connected.node.get(), &in, 20'000), NIF_OK);
     EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_DISCONNECTED));
     nif_release(&in);
+    again = hub.accept();  // nobody welcomes it
   }
   EXPECT_TRUE(has_files(runtime));
   EXPECT_EQ(connect_to(hub, keeping("robot"), make_welcome()).hello.token, make_welcome().token);
