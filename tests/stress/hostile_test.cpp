@@ -81,11 +81,14 @@ TEST(Strangers, AGoodNodeJoinsBesideTenThousandSilentOnes) {
   EXPECT_LE(highest - before, 24 * kMiB);
   wait_all_ended(silent);
   expect_good_nodes_are_served(hub);
+  RawNode observer(hub.unix_url());
+  EXPECT_EQ(Statistics::of(observer).told("refused.hello_timeout"), silent.size());
 }
 
 TEST(Strangers, GarbageIsEndedAndCostsNothing) {
   const HubProcess hub({"--shards", "2"});
   std::mt19937_64 random(5);
+  std::uint64_t sent = 0;
   const std::int64_t before = hub.resident_bytes();
   for (int round = 0; round < (is_full_size() ? 20 : 4); ++round) {
     std::vector<Descriptor> strangers;
@@ -95,13 +98,19 @@ TEST(Strangers, GarbageIsEndedAndCostsNothing) {
       for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
       // Every second one begins well.
       if (i % 2 == 0) std::copy(proto::kOpening.begin(), proto::kOpening.end(), bytes.begin());
-      if (bytes.size() >= proto::kOpeningSize) write(strangers.back(), bytes);
+      if (bytes.size() >= proto::kOpeningSize) {
+        write(strangers.back(), bytes);
+        ++sent;
+      }
       ::shutdown(strangers.back().get(), SHUT_WR);
     }
     expect_good_nodes_are_served(hub);
     wait_all_ended(strangers);
   }
   EXPECT_LE(hub.resident_bytes() - before, 8 * kMiB);
+  RawNode observer(hub.unix_url());
+  const Statistics end = Statistics::of(observer);
+  EXPECT_EQ(end.told("refused.garbage") + end.told("refused.malformed") + end.told("refused.unfinished"), sent);
 }
 
 TEST(Strangers, AHelloThatNeverEndsIsEnded) {
@@ -126,6 +135,8 @@ TEST(Strangers, AHelloThatNeverEndsIsEnded) {
     wait_readable({}, 50);
   }
   expect_good_nodes_are_served(hub);
+  RawNode observer(hub.unix_url());
+  EXPECT_EQ(Statistics::of(observer).told("refused.hello_timeout"), slow.size());
 }
 
 // Each keeps 64 KiB of a frame in the hub that it never ends, all together more than the hub allows.

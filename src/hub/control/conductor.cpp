@@ -170,8 +170,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_,         limits_,          membership_,     watches_, wiring_.counters, now, effects,
-                         wiring_.queues, wiring_.refusals, &name_counters_, this};
+  HandlerContext context{facts_,         limits_,          membership_,        watches_, wiring_.counters, now, effects,
+                         wiring_.queues, wiring_.refusals, &request_counters_, this};
   const Request request{*session, view->header, payload};
   const NodeId dst{proto::load_header(event.frame.data()).dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
@@ -179,7 +179,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const ShardIndex shard = session->place.shard;
   const proto::Payload answer = handle(context, request);
   const proto::Status status = proto::peek_status(answer);
-  if (kind == proto::Kind::ns) name_counters_.count(view->header.operation, status);
+  request_counters_.count(kind, view->header.operation, status);
 #ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
 #endif
@@ -311,7 +311,7 @@ bool Conductor::serve_watches(milliseconds now) {
     const Session* session = membership_.sessions().find(node);
     if (session != nullptr) runner_.send_event(*session, events);
   });
-  name_counters_.resyncs.add(watches_.resyncs() - resyncs);
+  request_counters_.resyncs.add(watches_.resyncs() - resyncs);
   return more;
 }
 

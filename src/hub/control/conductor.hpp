@@ -19,9 +19,9 @@
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/name_counters.hpp"
 #include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 #include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {
@@ -104,7 +104,7 @@ class Conductor final : private Administration {
   Membership membership_;
   Watches watches_;
   TablePublisher publisher_;
-  NameCounters name_counters_;
+  RequestCounters request_counters_;
   StateKeeper keeper_;
   EffectRunner runner_;  ///< on all of these
   /// After a restart: until then nodes that are not back yet count as away.

@@ -35,6 +35,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(silent),
     GIMNET_COUNTER(slow_consumers),
     GIMNET_COUNTER(stalled_frames),
+    GIMNET_COUNTER(unfinished_frames),
     GIMNET_COUNTER(pauses),
     GIMNET_COUNTER(resumes),
     GIMNET_COUNTER(reports),
@@ -59,10 +60,25 @@ constexpr std::size_t kListed = kCounters.size() + proto::kDropReasonCount;
 static_assert(sizeof(ShardCounters) >= kListed * sizeof(Counter) &&
               sizeof(ShardCounters) - kListed * sizeof(Counter) < alignof(ShardCounters));
 
+using Take = std::function<void(const std::string& name, std::uint64_t value)>;
+
+template <class Protocol>
+void take_requests(const std::string& prefix, const Protocol& counters, const char* (*name_of)(std::uint16_t),
+                   const Take& take) {
+  for (std::size_t operation = 0; operation < counters.by_operation.size(); ++operation) {
+    const char* name = name_of(static_cast<std::uint16_t>(operation));
+    if (name != nullptr) take(prefix + name, counters.by_operation[operation].value());
+  }
+  take(prefix + "unknown", counters.unknown.value());
+  for (std::size_t status = 1; status < counters.refused.size(); ++status) {
+    take(prefix + "refused." + proto::status_name(static_cast<proto::Status>(status)),
+         counters.refused[status].value());
+  }
+}
+
 }  // namespace
 
-void for_each_counter(const ShardCounters& counters,
-                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
+void for_each_counter(const ShardCounters& counters, const Take& take) {
   for (const Named& named : kCounters) take(std::string{named.name}, (counters.*named.field).value());
   for (std::size_t reason = 1; reason < proto::kDropReasonCount; ++reason) {
     const auto* name = proto::drop_reason_name(static_cast<proto::DropReason>(reason));
@@ -70,28 +86,20 @@ void for_each_counter(const ShardCounters& counters,
   }
 }
 
-void for_each_counter(const RefusalCounters& counters,
-                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
+void for_each_counter(const RefusalCounters& counters, const Take& take) {
   for (std::size_t code = 0; code < counters.by_code.size(); ++code) {
     const auto* name = proto::goodbye_name(static_cast<proto::GoodbyeCode>(code));
     take(std::string{"refused."} + name, counters.by_code[code].value());
   }
   take("refused.garbage", counters.garbage.value());
+  take("refused.unfinished", counters.unfinished.value());
   take("refused.no_descriptor", counters.no_descriptor.value());
 }
 
-void for_each_counter(const NameCounters& counters,
-                      const std::function<void(const std::string& name, std::uint64_t value)>& take) {
-  for (std::size_t operation = 0; operation < counters.by_operation.size(); ++operation) {
-    const char* name = proto::ns::operation_name(static_cast<std::uint16_t>(operation));
-    if (name != nullptr) take(std::string{"names."} + name, counters.by_operation[operation].value());
-  }
-  take("names.unknown", counters.unknown.value());
+void for_each_counter(const RequestCounters& counters, const Take& take) {
+  take_requests("names.", counters.names, proto::ns::operation_name, take);
   take("names.resyncs", counters.resyncs.value());
-  for (std::size_t status = 1; status < counters.refused.size(); ++status) {
-    const auto* name = proto::status_name(static_cast<proto::Status>(status));
-    take(std::string{"names.refused."} + name, counters.refused[status].value());
-  }
+  take_requests("ctrl.", counters.ctrl, proto::ctrl::operation_name, take);
 }
 
 }  // namespace gimnet::hub

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "hub/observe/counters.hpp"
-#include "hub/observe/name_counters.hpp"
 #include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 
 namespace gimnet::hub {
 
@@ -19,7 +19,7 @@ void for_each_counter(const ShardCounters& counters,
 void for_each_counter(const RefusalCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 /// The same for HubNS requests: "names.resolve" and so on, "names.unknown", "names.refused.not_found" and so on.
-void for_each_counter(const NameCounters& counters,
+void for_each_counter(const RequestCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 
 }  // namespace gimnet::hub

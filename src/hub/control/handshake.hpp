@@ -28,6 +28,8 @@ class Handshake {
   /// `bytes` were put there. REQUIRES: at most room().size().
   [[nodiscard]] Verdict took(std::size_t bytes);
 
+  /// Has it said anything?
+  [[nodiscard]] bool begun() const { return size_ != 0; }
   [[nodiscard]] const proto::Hello& hello() const { return hello_; }
   [[nodiscard]] const proto::Goodbye& refusal() const { return refusal_; }
 

@@ -102,7 +102,10 @@ std::optional<milliseconds> WaitingRoom::next_deadline() const {
 void WaitingRoom::read(Peer& peer, milliseconds now) {
   const IoResult result = peer.stranger.transport->receive(peer.handshake->room());
   if (result.status == IoStatus::would_block) return;
-  if (result.status != IoStatus::ok) return remove(peer);
+  if (result.status != IoStatus::ok) {
+    if (peer.handshake->begun()) refusals_.unfinished.add(1);
+    return remove(peer);
+  }
   switch (peer.handshake->took(result.bytes)) {
     case Handshake::Verdict::more:
       return;

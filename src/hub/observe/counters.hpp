@@ -63,6 +63,7 @@ struct alignas(64) ShardCounters {
   Counter silent;
   Counter slow_consumers;
   Counter stalled_frames;
+  Counter unfinished_frames;  ///< connections that broke in the middle of a frame
   Counter too_many_requests;
   Counter oddities;
   Counter no_memory;

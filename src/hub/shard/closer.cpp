@@ -8,6 +8,7 @@ namespace gimnet::hub {
 
 void Closer::close(Connection& connection, proto::GoodbyeCode code, std::string sentence) {
   if (!connection.connected) return;
+  if (code == proto::GoodbyeCode::malformed) state_.counters.malformed.add(1);
   if (code == proto::GoodbyeCode::too_many_requests) state_.counters.too_many_requests.add(1);
   if (code == proto::GoodbyeCode::oddities) state_.counters.oddities.add(1);
   if (code == proto::GoodbyeCode::no_memory) state_.counters.no_memory.add(1);
@@ -16,6 +17,7 @@ void Closer::close(Connection& connection, proto::GoodbyeCode code, std::string 
 }
 
 void Closer::on_broken(Connection& connection) {
+  if (!connection.tail.empty()) state_.counters.unfinished_frames.add(1);
   detach(connection, false);
   tell(connection, false, proto::GoodbyeCode::done, {});
 }

@@ -167,7 +167,6 @@ bool Reader::refuse(Connection& connection, const proto::RunView& view, proto::D
   // One frame came and ended here; what stands behind it is not looked at and so was never a frame.
   state_.tally.accepted += 1;
   state_.tally.drop(reason, 1);
-  if (reason == proto::DropReason::malformed) state_.counters.malformed.add(1);
   closer_.close(connection, code, sentence);
   return false;
 }

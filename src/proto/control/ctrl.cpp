@@ -23,6 +23,30 @@ std::vector<Counter> read_counters(Fields& counters) {
 
 }  // namespace
 
+const char* operation_name(std::uint16_t operation) {
+  switch (static_cast<Operation>(operation)) {
+    case Operation::hub_info:
+      return "hub_info";
+    case Operation::statistics:
+      return "statistics";
+    case Operation::connections:
+      return "connections";
+    case Operation::kick:
+      return "kick";
+    case Operation::reassign:
+      return "reassign";
+    case Operation::drain:
+      return "drain";
+    case Operation::reload:
+      return "reload";
+    case Operation::log_level:
+      return "log_level";
+    case Operation::routes:
+      return "routes";
+  }
+  return nullptr;
+}
+
 void HubInfoAnswer::write(bitestream::Writer& writer) const {
   writer.put_u16(3, hub.value());
   put_clean_text(writer, 4, hub_name, kNameBytesMax);

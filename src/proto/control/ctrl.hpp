@@ -31,6 +31,11 @@ enum class Operation : std::uint16_t {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
+/// Operations of requests are below this.
+inline constexpr std::size_t kRequestsEnd = 10;
+/// The request as counters and documents name it, for example "kick"; nullptr: there is no such request.
+[[nodiscard]] const char* operation_name(std::uint16_t operation);
+
 /// Records of one page, if the request does not say.
 inline constexpr std::uint32_t kPageRecordsDefault = 256;
 

@@ -40,19 +40,26 @@ TEST(CounterNames, RefusalsAreListedByCode) {
   counters.count(proto::GoodbyeCode::no_memory);
   counters.count(static_cast<proto::GoodbyeCode>(proto::kGoodbyeCount));
   counters.garbage.add(2);
+  counters.unfinished.add(3);
   const auto all = read(counters);
-  EXPECT_EQ(all.size(), proto::kGoodbyeCount + 2);
+  EXPECT_EQ(all.size(), proto::kGoodbyeCount + 3);
   EXPECT_EQ(all.at("refused.no_memory"), 1u);
   EXPECT_EQ(all.at("refused.garbage"), 2u);
+  EXPECT_EQ(all.at("refused.unfinished"), 3u);
   EXPECT_EQ(all.at("refused.no_descriptor"), 0u);
   EXPECT_FALSE(all.contains("refused.unknown"));
 }
 
 TEST(CounterNames, RequestsAreListedByOperationAndRefusalsByStatus) {
-  NameCounters counters;
-  counters.count(proto::ns::Resolve::kOperation, proto::Status::done);
-  counters.count(proto::ns::Resolve::kOperation, proto::Status::not_found);
-  counters.count(0x7fff, proto::Status::not_supported);
+  RequestCounters counters;
+  counters.count(proto::Kind::ns, proto::ns::Resolve::kOperation, proto::Status::done);
+  counters.count(proto::Kind::ns, proto::ns::Resolve::kOperation, proto::Status::not_found);
+  counters.count(proto::Kind::ns, 0x7fff, proto::Status::not_supported);
+  counters.count(proto::Kind::ctrl, proto::ctrl::Statistics::kOperation, proto::Status::done);
+  counters.count(proto::Kind::ctrl, proto::ctrl::Routes::kOperation, proto::Status::done);
+  counters.count(proto::Kind::ctrl, proto::ctrl::Kick::kOperation, proto::Status::denied);
+  counters.count(proto::Kind::ctrl, proto::ctrl::kRequestsEnd, proto::Status::not_supported);
+  counters.count(proto::Kind::ctrl, 0, proto::Status::not_supported);
   const auto all = read(counters);
   EXPECT_EQ(all.at("names.resolve"), 2u);
   EXPECT_EQ(all.at("names.list"), 0u);
@@ -60,6 +67,14 @@ TEST(CounterNames, RequestsAreListedByOperationAndRefusalsByStatus) {
   EXPECT_EQ(all.at("names.refused.not_found"), 1u);
   EXPECT_EQ(all.at("names.refused.not_supported"), 1u);
   EXPECT_FALSE(all.contains("names.refused.done"));
+  EXPECT_EQ(all.at("names.refused.denied"), 0u);
+  EXPECT_EQ(all.at("ctrl.statistics"), 1u);
+  EXPECT_EQ(all.at("ctrl.routes"), 1u);
+  EXPECT_EQ(all.at("ctrl.kick"), 1u);
+  EXPECT_EQ(all.at("ctrl.reload"), 0u);
+  EXPECT_EQ(all.at("ctrl.unknown"), 2u);
+  EXPECT_EQ(all.at("ctrl.refused.denied"), 1u);
+  EXPECT_EQ(all.at("ctrl.refused.not_supported"), 2u);
 }
 
 }  // namespace

@@ -153,6 +153,22 @@ TEST_F(WaitingRoomTest, WhoIsAdmittedOrLeavesByItselfIsNoRefusal) {
   EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
   for (const Counter& counter : refusals_.by_code) EXPECT_EQ(counter.value(), 0u);
   EXPECT_EQ(refusals_.garbage.value(), 0u);
+  EXPECT_EQ(refusals_.unfinished.value(), 0u);
+}
+
+TEST_F(WaitingRoomTest, CountsWhoEndsInTheMiddleOfOpeningOrHello) {
+  const std::vector<std::byte> bytes = opening_and(hello("robot"));
+  std::uint64_t ended = 0;
+  for (const std::size_t size : {std::size_t{1}, proto::kOpeningSize, proto::kOpeningSize + 1, bytes.size() - 1}) {
+    Peer& peer = enter();
+    peer.send(std::span{bytes}.first(size));
+    serve();
+    EXPECT_EQ(refusals_.unfinished.value(), ended) << "it may go on";
+    peer.close();
+    serve();
+    EXPECT_EQ(refusals_.unfinished.value(), ++ended) << size << " bytes";
+  }
+  EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
 }
 
 TEST_F(WaitingRoomTest, CountsWhoDoesNotSayHelloInTime) {

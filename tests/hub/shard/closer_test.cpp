@@ -41,6 +41,44 @@ TEST(Closer, CountsWhoAskedForTooMuchAndWhoFoundNoMemory) {
   EXPECT_EQ(rig.sum(&ShardCounters::no_memory), 1u);
 }
 
+TEST(Closer, CountsWhomTheConductorCannotRead) {
+  HubRig rig;
+  rig.command(0, CloseCommand{rig.join(0).session, GoodbyeCode::malformed, "no request number"});
+  rig.settle();
+  EXPECT_EQ(rig.sum(&ShardCounters::malformed), 1u);
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 0u) << "control frames are none of the ledger's";
+}
+
+TEST(Closer, CountsWhoEndsInTheMiddleOfAFrame) {
+  HubRig rig;
+  std::uint64_t ended = 0;
+  for (const std::size_t size : {std::size_t{1}, proto::kHeaderSize - 1, proto::kHeaderSize, std::size_t{4'000}}) {
+    for (const bool reset : {false, true}) {
+      FakeNode& a = rig.join(0);
+      const auto frame = HubRig::frame(a, a.id.value(), std::string(5'000, 'x'));
+      rig.write(a, std::span(frame).first(size));
+      rig.turn();
+      reset ? a.pipe.reset() : a.pipe.close();
+      rig.settle_without_reading();
+      EXPECT_TRUE(a.pipe.transport_gone());
+      EXPECT_EQ(rig.sum(&ShardCounters::unfinished_frames), ++ended) << size << " bytes";
+    }
+  }
+}
+
+TEST(Closer, WhoEndsBetweenTwoFramesIsNotCounted) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  const auto frame = HubRig::frame(a, a.id.value(), "whole");
+  rig.write(a, std::span(frame).first(5));
+  rig.turn();
+  rig.write(a, std::span(frame).subspan(5));
+  a.pipe.close();
+  rig.settle();
+  EXPECT_TRUE(a.pipe.transport_gone());
+  EXPECT_EQ(rig.sum(&ShardCounters::unfinished_frames), 0u);
+}
+
 TEST(Closer, ClosingTwiceTellsOnce) {
   HubRig rig;
   FakeNode& a = rig.join(0);

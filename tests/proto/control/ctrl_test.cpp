@@ -64,6 +64,15 @@ TEST(CtrlMessages, ThatChangeTheHubAreAsTheVectorsSay) {
   expect_answer("ctrl/log_level_answer", 8, SetLogLevelAnswer{"info"});
 }
 
+TEST(CtrlMessages, EachRequestHasAName) {
+  for (std::uint16_t operation = 1; operation < kRequestsEnd; ++operation)
+    EXPECT_NE(operation_name(operation), nullptr);
+  EXPECT_STREQ(operation_name(Kick::kOperation), "kick");
+  for (const std::uint16_t none : {std::uint16_t{0}, std::uint16_t{kRequestsEnd}, KickAnswer::kOperation}) {
+    EXPECT_EQ(operation_name(none), nullptr) << none;
+  }
+}
+
 TEST(CtrlMessages, SkipCountersThatAreNotNumbers) {
   bitestream::Writer body;
   body.put_u16(1, 0);

@@ -17,6 +17,11 @@ class Statistics {
 
   /// REQUIRES: the hub has a counter of that name.
   [[nodiscard]] std::uint64_t operator[](const std::string& name) const { return counters_.at(name); }
+  /// The same of a counter that the hub only tells where it is not 0: the conductor's.
+  [[nodiscard]] std::uint64_t told(const std::string& name) const {
+    const auto found = counters_.find(name);
+    return found == counters_.end() ? 0 : found->second;
+  }
   /// Of one shard alone. REQUIRES: the hub has that shard and a counter of that name.
   [[nodiscard]] std::uint64_t of_shard(std::size_t shard, const std::string& name) const {
     return by_shard_.at(shard).at(name);

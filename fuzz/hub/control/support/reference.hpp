@@ -223,7 +223,7 @@ class Reference {
   std::uint64_t ids_ = 0;
   std::uint64_t numbers_ = 0;
   std::uint64_t orders_ = 0;
-  std::map<std::uint16_t, std::uint64_t> asked_;  ///< NS requests by operation
+  std::map<std::pair<proto::Kind, std::uint16_t>, std::uint64_t> asked_;
   LogLevel level_ = LogLevel::info;
   bool drain_wanted_ = false;
   bool draining_ = false;

@@ -11,6 +11,7 @@
 
 namespace gimnet::fuzz {
 
+using proto::Kind;
 using proto::Role;
 using proto::Status;
 using proto::ns::ChangeKind;
@@ -85,9 +86,11 @@ void Reference::on_statistics(const Asked& asked) const {
   const auto answer = proto::decode_answer<ctrl::StatisticsAnswer>(asked.answer);
   FUZZ_MUST(answer && answer->shards.size() >= ControlHub::kShards);
   std::map<std::string, std::uint64_t> due;
-  for (const auto& [operation, count] : asked_) {
-    const char* name = ns::operation_name(operation);
-    due[name != nullptr ? "names." + std::string{name} : "names.unknown"] += count;
+  for (const auto& [asked_kind, count] : asked_) {
+    const auto [kind, operation] = asked_kind;
+    const bool about_names = kind == Kind::ns;
+    const char* name = about_names ? ns::operation_name(operation) : ctrl::operation_name(operation);
+    due[(about_names ? "names." : "ctrl.") + std::string{name != nullptr ? name : "unknown"}] += count;
   }
   std::map<std::string, std::uint64_t> said;
   for (const ctrl::ShardRecord& record : answer->shards) {

@@ -40,15 +40,19 @@ void Reference::asked(const Line& line, Kind kind, std::span<const std::byte> pa
     return;
   }
   FUZZ_MUST(answer.has_value());
-  if (kind == Kind::ns) ++asked_[view->header.operation];
-  if (dst != NodeId{} && dst != id_of(kHubIndex)) return require_status(*answer, Status::not_found);
   const Asked request{line.session, session, payload, *answer, hub};
-  if (kind == Kind::ctrl) {
-    dispatch_control(request, view->header.operation);
+  const std::uint16_t operation = view->header.operation;
+  if (dst != NodeId{} && dst != id_of(kHubIndex)) {
+    require_status(*answer, Status::not_found);
+  } else if (kind == Kind::ctrl) {
+    dispatch_control(request, operation);
+    count_oddity(request);
   } else {
-    dispatch_names(request, view->header.operation);
+    dispatch_names(request, operation);
+    count_oddity(request);
   }
-  count_oddity(request);
+  // An answer with counters was written before its own request counts.
+  ++asked_[{kind, operation}];
 }
 
 // ---- rates

@@ -28,7 +28,7 @@ void add_conductor(const HandlerContext& context, ctrl::StatisticsAnswer& answer
     if (value != 0) record.counters.push_back({name, value});
   };
   if (context.refusals != nullptr) for_each_counter(*context.refusals, add);
-  if (context.names != nullptr) for_each_counter(*context.names, add);
+  if (context.requests != nullptr) for_each_counter(*context.requests, add);
   if (!record.counters.empty()) answer.shards.push_back(std::move(record));
 }
 

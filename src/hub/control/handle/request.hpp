@@ -10,9 +10,9 @@
 #include "hub/control/state/watches.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/name_counters.hpp"
 #include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
+#include "hub/observe/request_counters.hpp"
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
@@ -39,7 +39,7 @@ struct HandlerContext {
   Effects& effects;                              ///< carried out before the answer leaves
   std::span<const QueueGauges* const> queues{};  ///< one per shard, or none
   const RefusalCounters* refusals = nullptr;     ///< or none
-  const NameCounters* names = nullptr;           ///< or none
+  const RequestCounters* requests = nullptr;     ///< or none
   Administration* administration = nullptr;      ///< or none
 };
 

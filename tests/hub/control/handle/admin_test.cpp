@@ -72,6 +72,17 @@ TEST_F(AdminTest, TellsWhatWasAskedAboutNames) {
             (ctrl::ShardRecord{ctrl::kConductorRecord, {{"names.resolve", 2}, {"names.refused.not_found", 1}}}));
 }
 
+TEST_F(AdminTest, TellsWhatWasAskedOfTheHub) {
+  const Node robot = join("robot");
+  ask_hub<ctrl::HubInfoAnswer>(robot, ctrl::HubInfo{});
+  ASSERT_FALSE(ask<ctrl::DrainAnswer>(robot, ctrl::Drain{}, proto::Kind::ctrl));
+  const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
+  ASSERT_EQ(statistics.shards.size(), 3u);
+  EXPECT_EQ(statistics.shards[2],
+            (ctrl::ShardRecord{ctrl::kConductorRecord,
+                               {{"ctrl.hub_info", 1}, {"ctrl.drain", 1}, {"ctrl.refused.denied", 1}}}));
+}
+
 TEST_F(AdminTest, StatisticsOfTheMostShardsFitInAFrame) {
   const Node robot = join("robot");
   counters[0].delivered.add(~std::uint64_t{0});

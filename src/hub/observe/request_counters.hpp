@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "hub/observe/counters.hpp"
+#include "proto/control/ctrl.hpp"
+#include "proto/control/ns.hpp"
+
+namespace gimnet::hub {
+
+/// Requests of admitted nodes, HubNS and HubCtrl each: by operation, and those that were not granted, by status.
+/// Thread safety: written by the conductor's thread only, read by anybody.
+struct RequestCounters {
+  template <std::size_t operations>
+  struct Protocol {
+    std::array<Counter, operations> by_operation;      ///< refused ones included
+    Counter unknown;                                   ///< operations that this hub does not have
+    std::array<Counter, proto::kStatusCount> refused;  ///< by status
+
+    void count(std::uint16_t operation, bool known, proto::Status status) {
+      (known ? by_operation[operation] : unknown).add(1);
+      const auto index = static_cast<std::size_t>(status);
+      if (status != proto::Status::done && index < refused.size()) refused[index].add(1);
+    }
+  };
+
+  Protocol<proto::ns::kRequestsEnd> names;
+  Protocol<proto::ctrl::kRequestsEnd> ctrl;
+  Counter resyncs;  ///< watches that were too far behind and began again
+
+  void count(proto::Kind kind, std::uint16_t operation, proto::Status status) {
+    if (kind == proto::Kind::ns) names.count(operation, proto::ns::operation_name(operation) != nullptr, status);
+    if (kind == proto::Kind::ctrl) ctrl.count(operation, proto::ctrl::operation_name(operation) != nullptr, status);
+  }
+};
+
+}  // namespace gimnet::hub
