@@ -40,6 +40,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(resumes),
     GIMNET_COUNTER(reports),
     GIMNET_COUNTER(held_reads),
+    GIMNET_COUNTER(untaken_frames),
     GIMNET_COUNTER(gap_frames),
     GIMNET_COUNTER(resumed),
     GIMNET_COUNTER(lane0_demoted),

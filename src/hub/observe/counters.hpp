@@ -70,8 +70,9 @@ struct alignas(64) ShardCounters {
   Counter pauses;
   Counter resumes;
   Counter reports;
-  Counter held_reads;  ///< times a sender that ignored PAUSE was not read
-  Counter gap_frames;  ///< let go at a resume and announced with SKIP
+  Counter held_reads;      ///< times a sender that ignored PAUSE was not read
+  Counter untaken_frames;  ///< read at the hub's end and left to their senders: not accepted, not confirmed
+  Counter gap_frames;      ///< let go at a resume and announced with SKIP
   Counter resumed;
   Counter lane0_demoted;  ///< frames
   Counter bad_credits;    ///< CREDITs for no subscription of the node, or with a total that cannot be

@@ -135,7 +135,13 @@ bool Reader::handle_run(Connection& connection, proto::RunView& view) {
   auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
   const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
   if (admission == Admission::data) {
-    route(connection, view);
+    if (connection.draining) {
+      // Read for the CONFIRM behind it. All shards were told that nothing follows, and may have closed whom it is for:
+      // it stays its sender's, like what is not read any more.
+      state_.counters.untaken_frames.add(view.frames);
+    } else {
+      route(connection, view);
+    }
     return true;
   }
   return handle_other(connection, view, admission);
@@ -244,6 +250,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
 
 void Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return;
+  if (connection.draining) return;  // what stands before it may not have been taken, nor may it be confirmed with it
   connection.resume->taken += skip.count;
   state_.counters.gap_frames.add(skip.count);
 }

@@ -243,6 +243,42 @@ TEST(Keeper, DrainsANodeThatHasToConfirm) {
   EXPECT_EQ(rig.dropped(DropReason::link_lost), 0u);
 }
 
+// Such a node is read for its CONFIRM while others are closed already: what it sends meanwhile stays its own.
+TEST(Keeper, TakesNoDataOfANodeThatHasToConfirmAtTheEnd) {
+  for (const std::size_t shard : {0u, 1u}) {
+    Limits limits;
+    limits.resume_bytes = 4'096;
+    HubRig rig(2, limits);
+    FakeNode& flooder = rig.join(0);
+    FakeNode& confirmer = rig.join(0, {.resume = true});
+    FakeNode& receiver = rig.join(shard);
+    rig.send(confirmer, receiver.id.value(), "taken");
+    for (int i = 0; i < 6; ++i) rig.send(flooder, confirmer.id.value(), std::string(1'000, 'x'));
+    rig.settle();
+    ASSERT_LT(confirmer.frames.size(), 6u) << "the rest waits for a CONFIRM";
+    for (const std::size_t each : {0u, 1u}) rig.command(each, DrainCommand{60'000});
+    rig.turn();
+    const std::uint64_t accepted = rig.ledger().accepted;
+    for (const char* text : {"behind", "the last word"}) rig.send(confirmer, receiver.id.value(), text);
+    rig.send_flow(confirmer, proto::flow::Skip{DropReason::replaced, 3});
+    rig.send_flow(confirmer, proto::flow::Ping{});
+    rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
+    for (int i = 0; i < 10 && !confirmer.pipe.transport_gone(); ++i) {
+      rig.settle();
+      if (!confirmer.pipe.transport_gone()) rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
+    }
+    EXPECT_THAT(confirmer.frames, SizeIs(6)) << "its CONFIRMs were read";
+    EXPECT_TRUE(confirmer.goodbye);
+    EXPECT_EQ(receiver.texts(), std::vector<std::string>{"taken"});
+    EXPECT_EQ(rig.ledger().accepted, accepted);
+    EXPECT_EQ(rig.ledger().dropped, 0u);
+    EXPECT_EQ(rig.sum(&ShardCounters::untaken_frames), 2u);
+    const auto confirms = confirmer.flow_of<proto::flow::Confirm>();
+    ASSERT_FALSE(confirms.empty());
+    EXPECT_EQ(confirms.back().count, 1u) << "it knows that the others were not taken";
+  }
+}
+
 TEST(Keeper, DoesNotWaitForOtherShardsBeyondItsDeadline) {
   HubRig rig(2);
   FakeNode& a = rig.join(0);
