@@ -33,6 +33,8 @@ constexpr std::array kTable{
     LimitInfo{"handshake_ms", "ms", &Limits::handshake_ms, 10, kHour, "time until HELLO must be there"},
     LimitInfo{"handshakes", "connections", &Limits::handshakes, 1, 1'000'000,
               "connections without HELLO at a time; one more ends the oldest", true},
+    LimitInfo{"handshakes_per_address", "connections", &Limits::handshakes_per_address, 1, 1'000'000,
+              "the same from one address of another machine; this machine's own connections do not count", true},
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000, "sessions, those within their grace time included", true},
     LimitInfo{"administrators", "nodes", &Limits::administrators, 0, 1'024,
               "places beyond nodes, and descriptors, that are kept for administrators", true},

@@ -87,6 +87,7 @@ struct ConductorLoop::Impl {
     const milliseconds moment = now();
     const auto after =
         door.acceptor.accept_some([this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
+    see_off_leaving();
     arm_timer();
     if (after == Acceptor::After::wait) return watch_door(door);
     door.pause.expires_after(milliseconds{Acceptor::kPauseMs});
@@ -117,6 +118,10 @@ struct ConductorLoop::Impl {
   void serve_strangers() {
     while (strangers.serve(now())) {
     }
+    see_off_leaving();
+  }
+
+  void see_off_leaving() {
     for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
   }
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <system_error>
+#include <utility>
 
 #include "base/check.hpp"
 #include "base/log.hpp"
@@ -42,13 +43,15 @@ WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& ref
 WaitingRoom::~WaitingRoom() { ::close(poll_); }
 
 void WaitingRoom::enter(Stranger stranger, milliseconds now) {
+  const std::string address{remote_address(stranger.peer.transport, stranger.peer.address)};
+  if (!address.empty()) make_place_for(address, now);
   if (waiting_.size() >= limits_.handshakes) {
-    turn_away(waiting_.front(), {GoodbyeCode::hello_timeout, "too many connections wait for their HELLO; try again"},
-              now);
+    end_waiting(waiting_.front(), "too many connections wait for their HELLO; try again", now);
   }
   Peer& peer = waiting_.emplace_back();
   peer.self = std::prev(waiting_.end());
   peer.stranger = std::move(stranger);
+  if (!address.empty()) join_crowd(peer, address);
   peer.handshake = std::make_unique<Handshake>(limits_);
   peer.deadline = now + milliseconds{limits_.handshake_ms};
   epoll_event event{};
@@ -60,6 +63,37 @@ void WaitingRoom::enter(Stranger stranger, milliseconds now) {
     turn_away(peer, {GoodbyeCode::no_memory, "the hub is out of memory; try again later"}, now);
   }
   keep_leaving_few();
+}
+
+void WaitingRoom::make_place_for(std::string_view address, milliseconds now) {
+  for (auto crowd = crowds_.find(address); crowd != crowds_.end(); crowd = crowds_.find(address)) {
+    if (crowd->second.size() < limits_.handshakes_per_address) return;
+    end_waiting(
+        *crowd->second.front(),
+        "too many connections from this address wait for their HELLO (the hub's limit handshakes_per_address is " +
+            std::to_string(limits_.handshakes_per_address) + "); say it at once, and try again",
+        now);
+  }
+}
+
+void WaitingRoom::end_waiting(Peer& peer, const std::string& sentence, milliseconds now) {
+  const std::size_t waiting = waiting_.size();
+  read(peer, now);
+  if (waiting_.size() == waiting) turn_away(peer, {GoodbyeCode::hello_timeout, sentence}, now);
+}
+
+void WaitingRoom::join_crowd(Peer& peer, std::string_view address) {
+  const auto crowd = crowds_.try_emplace(std::string{address}).first;
+  crowd->second.push_back(&peer);
+  peer.crowd = crowd;
+  peer.in_crowd = std::prev(crowd->second.end());
+}
+
+void WaitingRoom::leave_crowd(Peer& peer) {
+  if (!peer.crowd) return;
+  const Crowds::iterator crowd = *std::exchange(peer.crowd, std::nullopt);
+  crowd->second.erase(peer.in_crowd);
+  if (crowd->second.empty()) crowds_.erase(crowd);
 }
 
 bool WaitingRoom::serve(milliseconds now) {
@@ -128,6 +162,7 @@ void WaitingRoom::judge(Peer& peer, milliseconds now) {
   ::epoll_ctl(poll_, EPOLL_CTL_DEL, peer.stranger.transport->descriptor(), nullptr);
   const std::optional<Goodbye> refusal = this->refusal(peer);
   if (!refusal) {
+    leave_crowd(peer);
     waiting_.erase(peer.self);
     return;
   }
@@ -183,6 +218,7 @@ void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now
     refusals_.count(goodbye.code);
   }
   if (!send_goodbye(*peer.stranger.transport, goodbye.code, goodbye.sentence)) return remove(peer);
+  leave_crowd(peer);
   peer.handshake.reset();
   leaving_.splice(leaving_.end(), waiting_, peer.self);
   begin_leaving(peer, now);
@@ -214,6 +250,7 @@ void WaitingRoom::begin_leaving(Peer& peer, milliseconds now) {
 
 void WaitingRoom::remove(Peer& peer) {
   Peers& list = peer.handshake != nullptr ? waiting_ : leaving_;
+  leave_crowd(peer);
   list.erase(peer.self);  // closing the descriptor takes it out of the poll set
 }
 

@@ -4,8 +4,11 @@
 #include <cstddef>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "hub/control/acceptor.hpp"
 #include "hub/control/handshake.hpp"
@@ -16,8 +19,9 @@ namespace gimnet::hub {
 
 /// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else. Those who say HELLO are
 /// judged; those who are refused are told why, and given a moment to read it.
-/// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes; one more
-/// ends the oldest, of those who leave, too. Time is an argument.
+/// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes, and
+/// limits.handshakes_per_address of them from one other machine; one more ends the oldest of these, unless its HELLO is
+/// there by now. As many may leave. Time is an argument.
 class WaitingRoom {
  public:
   /// Takes the stranger's transport and returns nothing, or leaves it and says why not.
@@ -55,14 +59,24 @@ class WaitingRoom {
  private:
   struct Peer;
   using Peers = std::list<Peer>;  ///< Limit: handshakes
+  /// Those who wait, the oldest first, by the address of the other machine.
+  using Crowd = std::list<Peer*>;  ///< Limit: handshakes_per_address
+  using Crowds = std::map<std::string, Crowd, std::less<>>;
   struct Peer {
     Stranger stranger;
     std::unique_ptr<Handshake> handshake;  ///< null: leaving
     std::chrono::milliseconds deadline{};
     std::size_t discarded = 0;
     Peers::iterator self;
+    std::optional<Crowds::iterator> crowd;  ///< while it waits; none: not counted by address
+    Crowd::iterator in_crowd;
   };
 
+  /// There is no place for another one: ends this peer's waiting, with a HELLO that came by now or without.
+  void end_waiting(Peer& peer, const std::string& sentence, std::chrono::milliseconds now);
+  void make_place_for(std::string_view address, std::chrono::milliseconds now);
+  void join_crowd(Peer& peer, std::string_view address);
+  void leave_crowd(Peer& peer);
   void read(Peer& peer, std::chrono::milliseconds now);
   void discard(Peer& peer);
   void begin_leaving(Peer& peer, std::chrono::milliseconds now);
@@ -78,6 +92,7 @@ class WaitingRoom {
   RefusalCounters& refusals_;
   int poll_;
   bool closing_ = false;
+  Crowds crowds_;
   Peers waiting_;  ///< both in the order of their deadlines
   Peers leaving_;
 };
