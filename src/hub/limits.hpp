@@ -32,6 +32,7 @@ struct Limits {
   // Keep-alive
   std::uint64_t keep_alive_ms = 1'000;
   std::uint64_t silent_ms = 3'000;
+  std::uint64_t unacknowledged_ms = 15'000;
   // Outboxes
   std::uint64_t lane0_bytes = 512 * 1024;
   std::uint64_t lane1_bytes = 1536 * 1024;

@@ -40,6 +40,7 @@ void Attacher::attach(AttachCommand command) {
   connection.posted_shards = kAllShards;
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
+  if (connection.holds != 0) state_.signals.watch_unread(connection);
   connection.armed = Interest{.read = connection.holds == 0, .write = false};
   const int descriptor = connection.transport->descriptor();
   if (descriptor >= 0 && !state_.poller.add(descriptor, connection.token(), connection.armed)) {

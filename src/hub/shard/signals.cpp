@@ -76,13 +76,19 @@ void Signals::apply_hold(NodeId node, bool hold) {
   Connection* connection = state_.find(node);
   if (connection == nullptr) return;
   if (hold) {
-    ++connection->holds;
+    if (++connection->holds == 1) watch_unread(*connection);
     state_.counters.held_reads.add(1);
   } else if (connection->holds != 0) {
-    --connection->holds;
+    if (--connection->holds == 0) watch_unread(*connection);
     connection->on_read_again(state_.now_ms);
   }
   arm(*connection);
+}
+
+void Signals::watch_unread(Connection& connection) {
+  if (!connection.connected) return;
+  const std::uint64_t ms = connection.holds != 0 ? state_.limits.unacknowledged_ms : 0;
+  connection.transport->limit_unacknowledged(static_cast<std::uint32_t>(ms));
 }
 
 void Signals::send_reports() {

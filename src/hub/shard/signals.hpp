@@ -31,6 +31,9 @@ class Signals final : public SenderSignals {
 
   /// Sets what the connection is waited for, from its state.
   void arm(Connection& connection);
+  /// Nothing is heard of a node that is not read, however long: bounds how long its machine may take nothing (for a
+  /// peer that is read it would end those too that have to take nothing but LATEST messages).
+  void watch_unread(Connection& connection);
 
  private:
   void flow(NodeId sender, const proto::flow::Message& message);

@@ -56,6 +56,7 @@ struct MemoryPipe {
   std::size_t room = ~std::size_t{0};
   std::size_t reset_after = ~std::size_t{0};
   std::uint32_t unsent_limit = 0;
+  std::uint32_t unacknowledged_limit = 0;
   std::uint64_t send_calls = 0;
   bool closed = false;
   bool failed = false;
@@ -105,6 +106,8 @@ std::uint64_t MemoryTransport::unsent_bytes() const { return pipe_->to_peer.size
 
 void MemoryTransport::limit_unsent(std::uint32_t bytes) { pipe_->unsent_limit = bytes; }
 
+void MemoryTransport::limit_unacknowledged(std::uint32_t ms) { pipe_->unacknowledged_limit = ms; }
+
 MemoryPeer::MemoryPeer(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
 
 void MemoryPeer::write(std::span<const std::byte> bytes) { pipe_->to_hub.append(bytes.data(), bytes.size()); }
@@ -140,6 +143,8 @@ bool MemoryPeer::transport_writable() const { return pipe_->failed || pipe_->fre
 bool MemoryPeer::transport_gone() const { return pipe_->gone; }
 
 std::uint32_t MemoryPeer::unsent_limit() const { return pipe_->unsent_limit; }
+
+std::uint32_t MemoryPeer::unacknowledged_limit() const { return pipe_->unacknowledged_limit; }
 
 std::uint64_t MemoryPeer::send_calls() const { return pipe_->send_calls; }
 

@@ -27,6 +27,7 @@ class MemoryTransport final : public Transport {
   /// What the peer has not read yet.
   [[nodiscard]] std::uint64_t unsent_bytes() const override;
   void limit_unsent(std::uint32_t bytes) override;
+  void limit_unacknowledged(std::uint32_t ms) override;
   [[nodiscard]] int descriptor() const override { return -1; }
 
  private:
@@ -69,6 +70,8 @@ class MemoryPeer {
   [[nodiscard]] bool transport_gone() const;
   /// The last bound that limit_unsent() set.
   [[nodiscard]] std::uint32_t unsent_limit() const;
+  /// The last bound that limit_unacknowledged() set.
+  [[nodiscard]] std::uint32_t unacknowledged_limit() const;
   [[nodiscard]] std::uint64_t send_calls() const;
 
  private:

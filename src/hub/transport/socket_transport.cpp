@@ -83,4 +83,8 @@ void SocketTransport::limit_unsent(std::uint32_t bytes) {
   }
 }
 
+void SocketTransport::limit_unacknowledged(std::uint32_t ms) {
+  if (family_ == Family::tcp) set_option(descriptor_, IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(ms));
+}
+
 }  // namespace gimnet::hub

@@ -23,6 +23,7 @@ class SocketTransport final : public Transport {
   [[nodiscard]] IoResult send(std::span<const iovec> pieces) override;
   [[nodiscard]] std::uint64_t unsent_bytes() const override;
   void limit_unsent(std::uint32_t bytes) override;
+  void limit_unacknowledged(std::uint32_t ms) override;
   [[nodiscard]] int descriptor() const override { return descriptor_; }
 
  private:

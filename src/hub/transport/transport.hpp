@@ -38,6 +38,10 @@ class Transport {
   /// From now on at most about `bytes` wait unsent behind send(): for a peer that does not take everything at once.
   /// 0: no bound.
   virtual void limit_unsent(std::uint32_t bytes) = 0;
+  /// From now on the connection breaks where the peer's machine does not acknowledge what was sent, or has no room for
+  /// it, for so long. 0: as long as the system waits, many minutes. For TCP only: the end of a Unix socket's peer is
+  /// known at once.
+  virtual void limit_unacknowledged(std::uint32_t ms) = 0;
   /// The descriptor to wait on, or -1 for a transport that is not one of the kernel's.
   [[nodiscard]] virtual int descriptor() const = 0;
 };

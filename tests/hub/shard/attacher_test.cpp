@@ -360,6 +360,7 @@ class UnpollableTransport final : public Transport {
   IoResult send(std::span<const iovec> pieces) override { return pipe_->send(pieces); }
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
+  void limit_unacknowledged(std::uint32_t) override {}
   [[nodiscard]] int descriptor() const override { return ::fileno(file_); }
 
  private:

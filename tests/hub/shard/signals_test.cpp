@@ -161,6 +161,25 @@ TEST(Signals, MergesReportsWithinTheInterval) {
   EXPECT_EQ(a.reports()[0].count + a.reports()[1].count, 5u);
 }
 
+// Its silence is not looked at while it is not read: that its machine is gone tells the kernel.
+TEST(Signals, WhoIsNotReadHasToTakeWhatItIsSent) {
+  Limits limits;
+  limits.unacknowledged_ms = 1'234;
+  HubRig rig(1, limits);
+  FakeNode& a = rig.join(0);
+  Signals& signals = rig.state(0).signals;
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 0u) << "who is read and does not take LATEST messages may stay";
+  signals.apply_hold(a.id, true);
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 1'234u);
+  signals.apply_hold(a.id, true);
+  signals.apply_hold(a.id, false);
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 1'234u) << "held by another one still";
+  rig.rejoin(a);
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 1'234u) << "a new connection of one who is held";
+  signals.apply_hold(a.id, false);
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 0u);
+}
+
 TEST(Signals, TwoNodesThatFloodEachOtherDoNotStandStill) {
   HubRig rig(2, small_limits());
   FakeNode& a = rig.join(0);

@@ -126,6 +126,16 @@ TEST(SocketTransport, LimitsWhatWaitsUnsentOnTcp) {
   EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NOTSENT_LOWAT), 4'096);
 }
 
+TEST(SocketTransport, LimitsHowLongWhatWasSentIsNotAcknowledged) {
+  const auto ends = tcp_ends();
+  EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), 0) << "the system's own";
+  for (const std::uint32_t ms : {100u, 15'000u, 3'600'000u, 0u}) {
+    ends->near->limit_unacknowledged(ms);
+    EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), static_cast<int>(ms));
+  }
+  unix_ends()->near->limit_unacknowledged(1'000);
+}
+
 TEST(SocketTransport, LimitsWhatWaitsUnsentOnUnixSockets) {
   const auto limited = unix_ends();
   limited->near->limit_unsent(16'384);

@@ -15,6 +15,7 @@ class NullTransport final : public Transport {
   }
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
+  void limit_unacknowledged(std::uint32_t) override {}
   [[nodiscard]] int descriptor() const override { return -1; }
 };
 
