@@ -25,6 +25,7 @@
 #include "hub/control/table_publisher.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/pattern.hpp"
+#include "tests/hub/data/support/route_rig.hpp"
 
 extern "C" {
 /// Where callgrind switches its counting on and off: never inlined, known by this name.
@@ -231,6 +232,27 @@ Work subscribers(std::size_t count) {
   };
 }
 
+/// Sessions of so many nodes end, one after the other, each with one service whose last message the hub keeps.
+Work retained(std::size_t count) {
+  struct World {
+    testing::RouteRig rig;
+    Run message = rig.make_run(7u << 20 | 1, {"last"}, {.kind = proto::Kind::group});
+  };
+  auto world = std::make_shared<World>();
+  return [world, count] {
+    RetainedMessages& kept = world->rig.retained;
+    for (std::uint32_t i = 1; i <= count; ++i) {
+      proto::FrameHeader header = world->message.header();
+      header.dst = make_id<GroupId>(HubId{7}, i).value();
+      header.src = make_id<NodeId>(HubId{7}, i).value();
+      kept.keep(world->message, header);
+    }
+    if (kept.groups() != count) wrong("a message was not kept");
+    for (std::uint32_t i = 1; i <= count; ++i) kept.forget_provider(make_id<NodeId>(HubId{7}, i));
+    if (kept.groups() != 0) wrong("a message outlived its provider's session");
+  };
+}
+
 /// Looks for what is in hall-3 among so many names that begin with the same letters, as often.
 Work neighbours(std::size_t count) {
   struct World {
@@ -301,6 +323,7 @@ constexpr Script kScripts[] = {
     {"acks", acks},
     {"wrong_tokens", wrong_tokens},
     {"subscribers", subscribers},
+    {"retained", retained},
     {"neighbours", neighbours},
     {"patterns", patterns},
     {"pattern_parts", pattern_parts},

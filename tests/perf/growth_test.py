@@ -23,6 +23,7 @@ SCRIPTS = {
     "acks": (100, 10_000, 2.5),
     "wrong_tokens": (1, 32, 1.02),
     "subscribers": (50, 1_500, 1.6),
+    "retained": (100, 10_000, 1.6),
     "neighbours": (40, 1_000, 1.5),
     "patterns": (10, 1_000, 1.2),
     "pattern_parts": (2, 16, 16),

@@ -23,9 +23,32 @@ Mail mail_about(MailKind kind, const GroupStart& start) {
 
 RetainedMessages::Entry& RetainedMessages::entry(const proto::FrameHeader& header) {
   std::unique_ptr<Entry>& place = entries_[header.dst];
-  if (!place) place = std::make_unique<Entry>();
-  place->provider = NodeId{header.src};
+  if (!place) {
+    place = std::make_unique<Entry>();
+    place->group = header.dst;
+  }
+  if (place->provider != NodeId{header.src}) set_provider(*place, NodeId{header.src});
   return *place;
+}
+
+void RetainedMessages::set_provider(Entry& entry, NodeId provider) {
+  leave_provider(entry);
+  entry.provider = provider;
+  Entry*& first = first_of_[provider.value()];
+  entry.after = std::exchange(first, &entry);
+  if (entry.after != nullptr) entry.after->before = &entry;
+}
+
+void RetainedMessages::leave_provider(Entry& entry) {
+  if (entry.after != nullptr) entry.after->before = entry.before;
+  if (entry.before != nullptr) {
+    entry.before->after = entry.after;
+  } else if (entry.after != nullptr) {
+    first_of_[entry.provider.value()] = entry.after;
+  } else {
+    first_of_.erase(entry.provider.value());  // none if it is new
+  }
+  entry.before = entry.after = nullptr;
 }
 
 void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
@@ -72,15 +95,24 @@ bool RetainedMessages::may_keep(Entry& kept, std::uint64_t bytes) {
   return false;
 }
 
-void RetainedMessages::forget(GroupId group) { entries_.erase(group.value()); }
+void RetainedMessages::forget(GroupId group) {
+  const auto found = entries_.find(group.value());
+  if (found == entries_.end()) return;
+  leave_provider(*found->second);
+  entries_.erase(found);
+}
 
 void RetainedMessages::forget_provider(NodeId provider) {
-  boost::unordered::erase_if(entries_, [&](const auto& each) { return each.second->provider == provider; });
+  const auto found = first_of_.find(provider.value());
+  Entry* each = found == first_of_.end() ? nullptr : found->second;
+  first_of_.erase(provider.value());
+  while (each != nullptr) entries_.erase(std::exchange(each, each->after)->group);
 }
 
 void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
-  for (const auto& [group, entry] : entries_) {
-    if (entry->provider == former) entry->provider = provider;
+  if (former == provider) return;
+  for (auto found = first_of_.find(former.value()); found != first_of_.end(); found = first_of_.find(former.value())) {
+    set_provider(*found->second, provider);
   }
 }
 

@@ -56,12 +56,17 @@ class RetainedMessages {
     KeptMessage message;
   };
   struct Entry {
+    std::uint32_t group = 0;
     NodeId provider;
+    Entry* before = nullptr;  ///< of the same provider
+    Entry* after = nullptr;
     KeptMessage last;
     std::array<Arriving, proto::kLaneCount> arriving;
   };
 
   [[nodiscard]] Entry& entry(const proto::FrameHeader& header);
+  void set_provider(Entry& entry, NodeId provider);
+  void leave_provider(Entry& entry);
   void keep_fragment(Entry& kept, const Run& run, const proto::FrameHeader& header);
   [[nodiscard]] bool may_keep(Entry& kept, std::uint64_t bytes);
   void hand(const GroupStart& start, const KeptMessage& message);
@@ -73,6 +78,8 @@ class RetainedMessages {
   EgressContext& context_;
   std::uint32_t starts_ = 0;  ///< asked for
   boost::unordered_flat_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
+  /// The first entry of each provider: sessions end all the time, and most of them had provided nothing.
+  boost::unordered_flat_map<std::uint32_t, Entry*> first_of_;
 };
 
 }  // namespace gimnet::hub

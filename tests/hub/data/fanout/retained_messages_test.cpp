@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <random>
+
+#include "tests/hub/data/support/route_rig.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -190,6 +194,49 @@ TEST_F(RetainedMessagesTest, LivesThroughItsProvidersGraceTimeAndNotLonger) {
   rig.release(provider);
   rig.turn();
   EXPECT_EQ(rig.state(0).retained.groups(), 0u);
+}
+
+// Groups begin and end, their providers leave and have other ids, in any order.
+TEST(RetainedMessages, KeepsNothingOfAProviderThatLeft) {
+  testing::RouteRig rig;
+  std::map<std::uint32_t, std::uint32_t> provider_of;
+  std::mt19937 random(1);  // NOLINT(cert-msc51-cpp): the same on every run
+  const auto below = [&random](std::uint32_t bound) { return static_cast<std::uint32_t>(random() % bound); };
+  const auto node = [](std::uint32_t index) { return make_id<NodeId>(HubId{7}, index); };
+  std::uint32_t newest = 20;
+  for (int step = 0; step < 5'000; ++step) {
+    const std::uint32_t group = 1 + below(40);
+    const std::uint32_t provider = newest - below(20);
+    switch (below(8)) {
+      case 0:
+        rig.retained.forget(GroupId{HubRig::group(group)});
+        provider_of.erase(group);
+        break;
+      case 1:
+        rig.retained.forget_provider(node(provider));
+        std::erase_if(provider_of, [&](const auto& each) { return each.second == provider; });
+        break;
+      case 2:
+        rig.retained.renumber_provider(node(provider), node(++newest));
+        for (auto& [each, of] : provider_of) of = of == provider ? newest : of;
+        break;
+      default: {
+        hub::Run run = rig.make_run(HubRig::group(group), {"last"}, {.kind = Kind::group});
+        proto::FrameHeader header = run.header();
+        std::uint32_t& of = provider_of.try_emplace(group, provider).first->second;
+        if (below(5) == 0) of = provider;
+        header.src = node(of).value();
+        rig.retained.keep(run, header);
+      }
+    }
+    ASSERT_EQ(rig.retained.groups(), provider_of.size()) << "step " << step;
+  }
+  for (std::uint32_t each = 1; each <= newest; ++each) {
+    rig.retained.forget_provider(node(each));
+    std::erase_if(provider_of, [&](const auto& entry) { return entry.second == each; });
+    ASSERT_EQ(rig.retained.groups(), provider_of.size()) << "provider " << each;
+  }
+  EXPECT_EQ(rig.retained.groups(), 0u);
 }
 
 TEST_F(RetainedMessagesTest, AfterABreakWithoutResumeTheLastComesAgain) {
