@@ -11,7 +11,7 @@ import unittest
 
 from support.processes import GIMNET, TCPHUB, Hub, Process, run_gimnet, start_recv
 from support.waiting import wait_until
-from support.wire import OPENING, Client, hello
+from support.wire import CTRL, OPENING, Client, hello
 
 
 class Case(unittest.TestCase):
@@ -186,6 +186,29 @@ class Reload(Case):
         self.file.unlink()
         self.assertEqual(self.ctl("reload").code, 1)
         self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)
+
+    def test_without_descriptors_it_says_so_and_changes_nothing(self):
+        hub = self.configured("[limits]\nservices_per_node = 10\n")
+        more = self.file.parent / "conf.d"
+        more.mkdir()
+        (more / "strict.toml").write_text("[limits]\nservices_per_node = 0\n")
+        self.assertEqual(self.ctl("reload").code, 0)
+        self.file.write_text("[limits]\nservices_per_node = 5\nsubscriptions_per_node = 5\n")
+        admin = Client(self, hub, local=True).join(role=2)
+        pid = hub.process.popen.pid
+        soft, hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (3, hard))
+        answer = admin.ask(CTRL, 7)
+        self.assertEqual(answer[1], 2)
+        for words in ("stays in force", f"{self.file}: cannot read this file: Too many open files", "(ulimit -n)"):
+            self.assertIn(words, answer[2])
+        hub.process.signal(signal.SIGHUP)
+        wait_until(lambda: hub.process.err.count("the former one stays in force") == 2, "the refusals in the log")
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (soft, hard))
+        self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1, "the stricter file rules still")
+        reloaded = self.ctl("reload")
+        self.assertEqual(reloaded.code, 0, reloaded.err)
+        self.assertEqual(reloaded.out.decode().splitlines(), ["limits.subscriptions_per_node: 1024 -> 5"])
 
     def test_sighup_reads_it_again(self):
         hub = self.configured("[limits]\nservices_per_node = 10\n")

@@ -75,26 +75,37 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   return given;
 }
 
+/// What to do about it; `otherwise` where it is not that the process has no descriptor left.
+std::string remedy(const std::error_code& error, const std::string& otherwise) {
+  const bool shortage = error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system;
+  if (!shortage) return "; " + otherwise;
+  return "; there is no descriptor left to read it with: raise the limit (ulimit -n) or let a node go, then try again";
+}
+
 /// The whole file, or why it cannot be had.
 struct FileText {
   std::string text;
   std::string error;
 };
 
+FileText no_text(const std::error_code& error) {
+  return {{}, error.message() + remedy(error, "give the path of a TOML file with --config")};
+}
+
 FileText read_file(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (error || !fs::exists(status)) {
-    return {{}, error ? error.message() : std::generic_category().message(ENOENT)};
+    return no_text(error ? error : std::error_code{ENOENT, std::generic_category()});
   }
-  if (fs::is_directory(status)) return {{}, "it is a folder"};
+  if (fs::is_directory(status)) return {{}, "it is a folder; give the path of a TOML file with --config"};
   errno = 0;
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) return {{}, std::generic_category().message(errno != 0 ? errno : EIO)};
+  if (!stream) return no_text({errno != 0 ? errno : EIO, std::generic_category()});
   FileText file;
   file.text.resize(kConfigBytesMax + 1);
   stream.read(file.text.data(), static_cast<std::streamsize>(file.text.size()));
-  if (stream.bad()) return {{}, std::generic_category().message(EIO)};
+  if (stream.bad()) return no_text({EIO, std::generic_category()});
   file.text.resize(static_cast<std::size_t>(stream.gcount()));
   return file;
 }
@@ -111,8 +122,7 @@ void read_one(const std::string& path, ReadConfiguration& read) {
   const FileText file = read_file(path);
   read.files.push_back(path);
   if (!file.error.empty()) {
-    read.faults.push_back(
-        {path, "cannot read this file: " + file.error + "; give the path of a TOML file with --config"});
+    read.faults.push_back({path, "cannot read this file: " + file.error});
     return;
   }
   TomlFile toml = read_toml(file.text, path);
@@ -131,11 +141,15 @@ void read_one(const std::string& path, ReadConfiguration& read) {
 std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
   std::vector<std::string> files;
   std::error_code error;
-  if (!fs::is_directory(folder, error)) return files;
+  const fs::file_status status = fs::status(folder, error);
+  if (status.type() == fs::file_type::not_found || (!error && !fs::is_directory(status))) return files;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (entry->path().extension() == ".toml") files.push_back(entry->path().string());
   }
-  if (error) faults.push_back({folder.string(), "cannot read this folder: " + error.message() + "; give it rights"});
+  if (error) {
+    faults.push_back(
+        {folder.string(), "cannot read this folder: " + error.message() + remedy(error, "give it rights")});
+  }
   std::ranges::sort(files);
   if (files.size() > kConfigFilesMax) {
     faults.push_back({folder.string(), "there are " + std::to_string(files.size()) + " files; at most " +

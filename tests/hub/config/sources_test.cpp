@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <cstdlib>
@@ -124,6 +125,26 @@ TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
   EXPECT_THAT(read().faults[0].line(), HasSubstr("hub.toml: cannot read this file: No such file or directory"));
   ASSERT_EQ(::mkdir(folder_.path("hub.toml").c_str(), 0700), 0);
   EXPECT_THAT(read().faults[0].line(), HasSubstr("it is a folder"));
+}
+
+TEST_F(SourcesTest, WithoutDescriptorsNothingIsReadAndThatIsSaid) {
+  write("hub.toml", "hub_id = 9\n");
+  make_conf_d();
+  write("conf.d/more.toml", "shards = 3\n");
+  EXPECT_THAT(read().faults, IsEmpty());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const ReadConfiguration nothing = read();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  ASSERT_THAT(nothing.faults, SizeIs(2));
+  EXPECT_THAT(nothing.faults[0].line(),
+              HasSubstr("hub.toml: cannot read this file: Too many open files; there is no "));
+  EXPECT_THAT(nothing.faults[0].line(), HasSubstr("(ulimit -n)"));
+  EXPECT_THAT(nothing.faults[1].line(),
+              HasSubstr("conf.d: cannot read this folder: Too many open files; there is no "));
 }
 
 TEST_F(SourcesTest, TheUsersFileIsFoundAndNoneIsNeeded) {
