@@ -205,6 +205,7 @@ class Node {
   void close();
 
   [[nodiscard]] Peer peer() const;
+  /// After close(): as it was then.
   [[nodiscard]] NodeState state() const;
 
   // ---- sending

@@ -30,6 +30,25 @@ def is_connected(hub, name):
     return any(node["connected"] for node in hub.nodes() if node["name"] == name)
 
 
+class Stream:
+    """Numbers, 20 a second, from one client to one destination, until the test ends. `sent` is the last one."""
+
+    def __init__(self, test, client, destination, kind):
+        self.sent = 0
+        self._client, self._destination, self._kind = client, destination, kind
+        self._stopping = threading.Event()
+        thread = threading.Thread(target=self._run)
+        thread.start()
+        test.addCleanup(thread.join)
+        test.addCleanup(self._stopping.set)
+
+    def _run(self):
+        while not self._stopping.wait(0.05):
+            self.sent += 1
+            data = bytes(KEY) + struct.pack("<IBBH", self.sent, 0, 0, 0) + b"%d" % self.sent
+            self._client.send(self._client.frame(self._destination, data, kind=self._kind, flags=FLAG_KEYED))
+
+
 class Stopped(unittest.TestCase):
     def test_a_stopped_receiver_is_closed_as_silent_and_told_when_it_is_back(self):
         hub = Hub(self, shards=2)
@@ -54,6 +73,36 @@ class Stopped(unittest.TestCase):
         self.assertEqual((second.code, stopped.wait()), (0, 0), second.err)
         self.assertIn("silent", stopped.err, "the reason, told to the receiver also if it ends at once")
         self.assertEqual(stopped.out, b"before\n" * 10 + b"after\n" * 10)
+
+    def cut_off(self, command, *arguments):
+        """20 messages a second: a reader for whom there is always a next one looks at its connection all the same."""
+        hub = Hub(self)
+        source = Client(self, hub).join("A")
+        source.pong = lambda ping: None  # whatever it sends tells the hub that it is alive
+        group = source.ask(NS, 7, text(3, "B"))[3]
+        reader = start_gimnet(self, hub, command, *arguments, "--raw")
+        destination, kind = group, GROUP
+        if command == "recv":
+            hub_id, index = map(int, hub.wait_for_node("R")["id"].split("."))
+            destination, kind = hub_id << 20 | index, UNICAST
+        stream = Stream(self, source, destination, kind)
+        wait_until(lambda: reader.out, "a message")
+        reader.signal(signal.SIGSTOP)
+        wait_until(lambda: hub.counter("silent") == 1, "the hub to close it as silent")
+        last = stream.sent  # what is sent from now on can come over another connection only
+        reader.signal(signal.SIGCONT)
+        wait_until(lambda: int(reader.out.split()[-1]) > last, "a message after that")
+        reader.signal(signal.SIGINT)
+        self.assertEqual(reader.wait(), 130, reader.err)
+        self.assertRegex(reader.err, "gimnet: the connection broke \\(.*\n(.*\n)*gimnet: connected again as ")
+        self.assertIn("silent", reader.err)
+        self.assertNotIn("too slow", reader.err)
+
+    def test_echo_of_a_live_stream_says_that_it_was_cut_off_and_why(self):
+        self.cut_off("echo", "A/B")
+
+    def test_recv_of_a_live_stream_says_that_it_was_cut_off_and_why(self):
+        self.cut_off("recv", "--name", "R")
 
     def test_who_keeps_alive_but_does_not_read_is_a_slow_consumer(self):
         hub = Hub(self, "--limit", "slow_consumer_ms=1000", "--limit", "silent_ms=60000")

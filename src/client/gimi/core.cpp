@@ -146,6 +146,12 @@ nif_status Core::connect(const NodeOptions& options) {
 void Core::close() {
   if (closed_.exchange(true)) return;
   clerk_.stop();
+  {
+    // Whoever waits and leaves now may ask what had become of the connection.
+    NodeState state = state_now();
+    const MutexLock lock(mutex_);
+    closed_state_ = std::move(state);
+  }
   end(Ending::closed());
   static_cast<void>(nif_close(node()));
 }
@@ -160,6 +166,14 @@ void Core::end(const Ending& ending) {
 }
 
 NodeState Core::state() const {
+  {
+    const MutexLock lock(mutex_);
+    if (closed_state_) return *closed_state_;
+  }
+  return state_now();
+}
+
+NodeState Core::state_now() const {
   NodeState state;
   nif_info info{};
   info.struct_size = sizeof info;

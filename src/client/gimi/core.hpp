@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -26,12 +27,13 @@ class Core {
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
 
-  void close();
+  void close() GIMNET_EXCLUDES(mutex_);
   /// The node was given this name by the hub, "" for none.
   void on_renamed() { services_.on_renamed(state().name); }
 
   [[nodiscard]] nif_node* node() const { return uplink_.node(); }
-  [[nodiscard]] NodeState state() const;
+  /// After close(): as it was then.
+  [[nodiscard]] NodeState state() const GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Inbox& inbox() { return inbox_; }
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
@@ -42,6 +44,7 @@ class Core {
  private:
   explicit Core(const NodeOptions& options);
   [[nodiscard]] nif_status connect(const NodeOptions& options);
+  [[nodiscard]] NodeState state_now() const;
 
   static nif_verdict on_incoming(void* user, const nif_incoming* in);
   [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
@@ -71,6 +74,8 @@ class Core {
   std::uint32_t reconnects_ = 0;  ///< the library's thread: as the messages that come now count them
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};
+  mutable Mutex mutex_;
+  std::optional<NodeState> closed_state_ GIMNET_GUARDED_BY(mutex_);
 };
 
 }  // namespace gimnet::gimi

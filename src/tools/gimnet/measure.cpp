@@ -101,6 +101,7 @@ ExitCode measure(Session& session, Measure measure) {
     meters.print(Span::recent);
     report_ns = std::max(report_ns + kReportNs, steady_now_ns());
   }
+  watch.look_at_end();
   meters.print(Span::whole);
   if (!failure.sentence.empty() && !session.stopped()) return session.fail(failure);
   return session.finish_stream(bounds, meters.messages());

@@ -11,8 +11,6 @@
 namespace gimnet::tool {
 namespace {
 
-constexpr Timeout kLookAtConnection{500};
-
 void print(Session& session, const Message& message, const Absent& absent) {
   Output& output = session.output();
   if (session.options().raw) {
@@ -64,18 +62,17 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
     if (!message && message.is(Status::timeout)) {
       session.output().flush();
       if (!session.output().ok()) break;
-      message = receive(bounds.wait(kLookAtConnection));
+      message = receive(bounds.wait(ConnectionWatch::kPeriod));
     }
+    const std::int64_t now_ns = steady_now_ns();
+    watch.look_now_and_then(now_ns);
+    if (message) watch.take(*message);
     const LostCounts counts = session.node().lost();
     lost.take(counts);
     if (missed != nullptr) missed->take_lost(counts);
-    const std::int64_t now_ns = steady_now_ns();
     say_all(lost.news(now_ns));
     if (missed != nullptr) say_all(missed->news(now_ns));
-    if (!message && message.is(Status::timeout)) {
-      watch.look();
-      continue;
-    }
+    if (!message && message.is(Status::timeout)) continue;
     if (!message) {
       failure = message.failure();
       break;
@@ -86,11 +83,11 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
     ++printed;
     if (!session.output().ok()) break;
   }
+  watch.look_at_end();  // it may have broken, and be back, since the last look
   lost.take(session.node().lost());
   say_all(lost.rest());
   if (missed != nullptr) say_all(missed->rest());
   if (!failure.sentence.empty()) return session.fail(failure);
-  watch.look();  // it may have broken and be back since the last look
   return session.finish_stream(bounds, printed);
 }
 

@@ -7,8 +7,6 @@
 namespace gimnet::tool {
 namespace {
 
-constexpr Timeout kLookAtConnection{500};
-
 /// Prints what is to be seen. True: it was an event that the user asked for.
 bool print(Session& session, ToolFilter& filter, const WatchEvent& event) {
   const Options& options = session.options();
@@ -33,13 +31,14 @@ ExitCode run_watch(Session& session) {
     auto event = watch->receive(kNoWait);
     if (!event && event.is(Status::timeout)) {
       session.output().flush();
-      event = watch->receive(bounds.wait(kLookAtConnection));
+      event = watch->receive(bounds.wait(ConnectionWatch::kPeriod));
     }
-    if (!event && event.is(Status::timeout)) {
-      connection.look();
-      continue;
+    connection.look_now_and_then(steady_now_ns());
+    if (!event && event.is(Status::timeout)) continue;
+    if (!event) {
+      connection.look_at_end();
+      return session.fail(event.failure());
     }
-    if (!event) return session.fail(event.failure());
     if (print(session, filter, *event)) ++events;
     if (event->change != Change::ended) continue;
     session.output().flush();

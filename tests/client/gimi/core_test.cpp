@@ -118,6 +118,16 @@ TEST_F(WithoutReconnecting, ClosingAfterwardsAnswersClosed) {
   EXPECT_TRUE(node_->receive().is(Status::closed));
 }
 
+TEST_F(Reconnected, AClosedNodeTellsHowItStoodThen) {
+  const NodeState before = node_->state();
+  node_->close();
+  const NodeState after = node_->state();
+  EXPECT_EQ(after.peer, before.peer);
+  EXPECT_TRUE(after.connected);
+  EXPECT_FALSE(after.ended);
+  EXPECT_EQ(after.reconnects, before.reconnects);
+}
+
 TEST_F(Reconnected, MessagesTellOverWhichConnectionTheyCame) {
   const std::string text = "x";
   for (std::uint32_t connection = 0; connection < 3; ++connection) {
