@@ -10,13 +10,25 @@ namespace {
 constexpr std::string_view kTcp = "tcp://";
 constexpr std::string_view kUnix = "unix:";
 
-/// What was probably meant by an address without its scheme.
+bool is_host(std::string_view text) {
+  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-";
+  return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+/// What was probably meant by an address without its scheme or its port.
 std::string advice_for(std::string_view url) {
+  std::string meant;
+  if (url.starts_with('/')) meant = std::string(kUnix) + std::string(url);
   if (url.find("://") == std::string_view::npos && url.find(':') != std::string_view::npos) {
-    const std::string meant = std::string(kTcp) + std::string(url);
-    if (parse_endpoint(meant)) return "did you mean " + meant + "?";
+    meant = std::string(kTcp) + std::string(url);
   }
-  return "give tcp://host:port or unix:/path";
+  if (!meant.empty() && parse_endpoint(meant)) return "did you mean " + meant + "?";
+  std::string advice = "give tcp://host:port or unix:/path";
+  const std::string_view host = url.starts_with(kTcp) ? url.substr(kTcp.size()) : url;
+  if (is_host(host)) {
+    advice += ", such as " + std::string(kTcp) + std::string(host) + ":" + std::to_string(kDefaultPort);
+  }
+  return advice;
 }
 
 Failure not_understood(std::string_view url, std::string_view why) {

@@ -51,8 +51,11 @@ Failure cannot_connect(const Endpoint& endpoint, int error) {
   nif_status status = NIF_NO_HUB;
   if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS) status = NIF_NO_MEMORY;
   if (error == EACCES || error == EPERM) status = NIF_SYSTEM;
-  return {status, "cannot connect to " + endpoint.url() + ": " + system_error_text(error) +
-                      (status == NIF_NO_HUB ? "; is the hub running there?" : "")};
+  std::string remedy = status == NIF_NO_HUB ? "; is the hub running there?" : "";
+  if (error == EACCES && endpoint.transport == Endpoint::Transport::unix_socket) {
+    remedy = "; it is another user's: connect as the user that runs the hub, or over TCP";
+  }
+  return {status, "cannot connect to " + endpoint.url() + ": " + system_error_text(error) + remedy};
 }
 
 /// Waits for a connect() under way. Nothing: connected.

@@ -12,7 +12,7 @@ namespace gimnet::proto {
 inline constexpr std::size_t kNameBytesMax = 255;
 inline constexpr std::size_t kNamePartsMax = 16;
 
-/// What is wrong with a name, as a clause for a sentence ("it has an empty part"); nullptr: nothing is.
+/// What is wrong with a name, as a clause for a sentence ("it is empty"); nullptr: nothing is.
 [[nodiscard]] const char* name_fault(std::string_view name);
 [[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
 

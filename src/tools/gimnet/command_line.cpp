@@ -52,7 +52,10 @@ CommandLineEnding wrong(const std::string& sentence, const Called& called) {
 CommandLineEnding unknown_command(std::string_view word) {
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
-  return wrong("there is no command '" + std::string(word) + "'" + did_you_mean(word, names), {});
+  // What other tools have as commands.
+  const bool is_option = word == "help" || word == "version";
+  const std::string nearest = is_option ? "; did you mean --" + std::string(word) + "?" : did_you_mean(word, names);
+  return wrong("there is no command '" + std::string(word) + "'" + nearest, {});
 }
 
 /// A line each: the whole help is longer than a screen.
@@ -68,18 +71,22 @@ CommandLineEnding missing_command(const CLI::App& app) {
   return {ExitCode::usage, text};
 }
 
-CommandLineEnding unknown_action(std::string_view word) {
-  return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" + did_you_mean(word, kCtlActions),
-               {"ctl", ""});
-}
-
-CommandLineEnding missing_action() {
+std::string all_actions() {
   std::string names;
   for (const std::string_view action : kCtlActions) {
     names += (names.empty() ? "" : action == kCtlActions.back() ? " or " : ", ") + std::string(action);
   }
-  return wrong("action is missing: " + names, {"ctl", ""});
+  return names;
 }
+
+CommandLineEnding unknown_action(std::string_view word) {
+  const std::string nearest = did_you_mean(word, kCtlActions);
+  return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" +
+                   (nearest.empty() ? ": give " + all_actions() : nearest),
+               {"ctl", ""});
+}
+
+CommandLineEnding missing_action() { return wrong("action is missing: " + all_actions(), {"ctl", ""}); }
 
 /// What CLI11 cannot know.
 std::string contradiction(const Options& options) {
@@ -88,6 +95,11 @@ std::string contradiction(const Options& options) {
                              options.command == Command::hz || options.command == Command::bw;
   if (names_service && options.target.find_first_of("/*") == std::string::npos) {
     return "'" + options.target + "' is no full name of a service: write NODE/SERVICE";
+  }
+  const bool is_one_part = options.target.find('/') == std::string::npos;
+  if (names_service && options.command != Command::pub && is_one_part &&
+      options.target.find("**") == std::string::npos) {
+    return "'" + options.target + "' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all";
   }
   if (options.command == Command::pub) {
     const auto slash = options.target.rfind('/');
@@ -120,7 +132,11 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, const Called& ca
 
 /// A word that nothing takes.
 std::string unexpected(const std::string& word, const std::vector<const CLI::Option*>& options, const Called& called) {
-  if (!word.starts_with('-')) return "'" + word + "' is one word too many for " + called.text();
+  if (!word.starts_with('-')) {
+    const bool may_be_name = called.command == "recv";
+    return "'" + word + "' is one word too many for " + called.text() +
+           (may_be_name ? "; did you mean --name " + word + "?" : "");
+  }
   const std::string given = word.substr(0, word.find('='));
   std::vector<std::string> names;
   for (const CLI::Option* option : options) {

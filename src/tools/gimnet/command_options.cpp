@@ -15,8 +15,9 @@ namespace gimnet::tool {
 namespace {
 
 void add_key(CLI::App& command, Options& options) {
-  command.add_option("--type", options.key.type, "message type, a whole number, default 0");
-  command.add_option("--instance", options.key.instance, "instance of the type, a whole number, default 0");
+  command.add_option("--type", options.key.type, "message type, a whole number up to 4294967295, default 0");
+  command.add_option("--instance", options.key.instance,
+                     "instance of the type, a whole number up to 4294967295, default 0");
 }
 
 // The most that any hub can be told to take (docs/operations.md); what this one takes it says itself.

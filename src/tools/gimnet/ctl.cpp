@@ -145,7 +145,8 @@ ExitCode run_ctl(Session& session) {
   how.reconnect = false;
   if (const auto ending = only_reads(action) ? session.join_to_look(how) : session.join(how)) {
     const bool by_socket = session.join_failure().starts_with("the hub at unix:");
-    if (*ending == ExitCode::denied && !by_socket) say("changing needs the hub's Unix socket: --hub unix:/PATH");
+    if (*ending == ExitCode::denied && !by_socket)
+      say("changing needs the hub's Unix socket: --hub unix:/PATH, as `tcphub` prints it");
     return *ending;
   }
   switch (action) {

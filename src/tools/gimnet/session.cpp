@@ -67,7 +67,10 @@ std::optional<Peer> Session::find(std::string_view name) {
   if (peer) return *peer;
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
-    failure.sentence = "there is no node '" + std::string(name) + "'" + nearest_name("node", name);
+    failure.sentence = "there is no node '" + std::string(name) + "'";
+    failure.sentence += is_service(name)
+                            ? ": that is a service of the node " + std::string(name.substr(0, name.rfind('/')))
+                            : nearest_name("node", name);
   }
   code_ = fail(failure);
   return std::nullopt;
@@ -76,6 +79,19 @@ std::optional<Peer> Session::find(std::string_view name) {
 bool Session::is_listed(std::string_view name) {
   const auto nodes = node_->nodes("**");
   return nodes && std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
+}
+
+bool Session::is_service(std::string_view name) {
+  if (name.find('/') == std::string_view::npos) return false;
+  const auto services = node_->services(name);
+  return services && std::ranges::any_of(*services, [&](const ServiceRecord& service) { return service.name == name; });
+}
+
+std::string Session::wider_pattern(const std::string& kind, const std::string& word) {
+  const std::string wider = word + "/**";
+  const auto is_any = [](const auto& found) { return found && !found->empty(); };
+  const bool any = kind == "node" ? is_any(node_->nodes(wider)) : is_any(node_->services(wider));
+  return any ? "; did you mean '" + wider + "'?" : "";
 }
 
 /// What to do where no hub answers: `remedy`, or name another.
@@ -106,7 +122,9 @@ std::string Session::nearest_name(const std::string& kind, std::string_view word
 ExitCode Session::fail_unmatched(const std::string& kind) {
   output_.flush();
   const std::string& target = options_.target;
-  return fail({Status::not_found, "no " + kind + " matches '" + target + "'" + nearest_name(kind, target)});
+  const std::string wider = wider_pattern(kind, target);
+  return fail({Status::not_found,
+               "no " + kind + " matches '" + target + "'" + (wider.empty() ? nearest_name(kind, target) : wider)});
 }
 
 ExitCode Session::fail(const Failure& failure) {

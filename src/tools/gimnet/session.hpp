@@ -66,6 +66,9 @@ class Session {
   [[nodiscard]] std::string advice(std::string remedy) const;
   [[nodiscard]] bool is_listed(std::string_view name);
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
+  /// A suggestion where names of nodes or services begin with the word; "" if none do.
+  [[nodiscard]] std::string wider_pattern(const std::string& kind, const std::string& word);
+  [[nodiscard]] bool is_service(std::string_view name);
 
   const Options& options_;
   StopSignal& stop_;

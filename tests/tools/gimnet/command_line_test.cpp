@@ -67,6 +67,21 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"status"}).command, Command::status);
 }
 
+TEST(CommandLine, SuggestsWhatANewcomerMeant) {
+  const auto said = [](std::initializer_list<const char*> words, const char* part) {
+    const std::string text = refusal(words);
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  said({"help"}, "there is no command 'help'; did you mean --help?");
+  said({"version"}, "did you mean --version?");
+  said({"recv", "B"}, "'B' is one word too many for gimnet recv; did you mean --name B?");
+  said({"hz", "*"}, "'*' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all");
+  said({"echo", "robot*"}, "'robot*' matches no service");
+  said({"pub", "*"}, "'*' is no full name of a service: write NODE/SERVICE");
+  said({"ctl", "list"}, ": give connections, routes, kick, reassign, drain, reload or log");
+  EXPECT_EQ(options({"hz", "**"}).target, "**");
+}
+
 TEST(CommandLine, NodesMayBeCalledAsCommandsAre) {
   for (const auto& [word, command] : kCommands) {
     const std::string name(word);
