@@ -50,8 +50,7 @@ void StopSignal::watch() {
       signal_ = signal;
       changed_.notify_all();
     }
-    const std::uint64_t one = 1;
-    static_cast<void>(::write(descriptor_, &one, sizeof one));
+    static_cast<void>(::eventfd_write(descriptor_, 1));
     const MutexLock lock(action_mutex_);
     if (action_) std::exchange(action_, nullptr)();
   }
