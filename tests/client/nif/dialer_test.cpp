@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <random>
 #include <thread>
 
 #include "tests/client/nif/support/fake_hub.hpp"
@@ -66,6 +69,21 @@ TEST(Dialer, BacksOffFrom50MillisecondsToASecond) {
   }
   backoff.reset();
   EXPECT_EQ(backoff.next_ns(50 * kMs), 0);
+}
+
+TEST(Dialer, BacksOffWithinBoundsHoweverOftenItFails) {
+  Backoff backoff;
+  std::mt19937_64 random{5};
+  std::int64_t longest = 0;
+  for (int failures = 0; failures < 1'000'000; ++failures) {
+    const std::int64_t wait_ns = backoff.next_ns(random());
+    ASSERT_GE(wait_ns, 0);
+    ASSERT_LT(wait_ns, 1'000'000'000);
+    longest = std::max(longest, wait_ns);
+  }
+  EXPECT_GT(longest, 990'000'000) << "it goes on waiting up to a second";
+  EXPECT_EQ(backoff.next_ns(999'999'999), 999'999'999);
+  EXPECT_LT(backoff.next_ns(UINT64_MAX), 1'000'000'000);
 }
 
 }  // namespace
