@@ -33,6 +33,12 @@ class Services(unittest.TestCase):
                 self.assertEqual(echo.out, data)
                 hub.quiet_status(self)
 
+    def test_publishing_ends_without_waiting_for_the_keep_alive(self):
+        hub = Hub(self, "--limit", "keep_alive_ms=60000", "--limit", "silent_ms=120000")  # `pub` waits 10 s at most
+        echo = start_gimnet(self, hub, "echo", "robot/odom", "-n", "2", "--raw")
+        pub = run_gimnet(hub, "pub", "robot/odom", "--wait", "1", data=b"one\ntwo\n")
+        self.assertEqual((pub.code, echo.wait(), echo.out), (0, 0, b"one\ntwo\n"), pub.err)
+
     def test_the_last_line_stays_for_who_comes_late(self):
         hub = Hub(self)
         pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay", "--json",

@@ -126,6 +126,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
   frame_bytes_max_ = session.frame_bytes_max;
   pauses_.clear();
   socket_ = &socket;
+  asked_ = false;
   full_ = false;
   broken_ = false;
   last_write_ns_ = steady_now_ns();
@@ -210,6 +211,7 @@ bool Outbound::write_last() {
 bool Outbound::on_confirm(std::uint64_t count) {
   const MutexLock lock(mutex_);
   const bool possible = queue_.confirm(count);
+  asked_ = false;
   notify_waiting();
   return possible;
 }

@@ -115,6 +115,7 @@ class Outbound {
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own)
       GIMNET_REQUIRES(mutex_);
@@ -139,7 +140,8 @@ class Outbound {
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
-  bool lost_ GIMNET_GUARDED_BY(mutex_) = false;  ///< frames were given up unconfirmed, and drain() has not said so yet
+  bool lost_ GIMNET_GUARDED_BY(mutex_) = false;   ///< frames were given up unconfirmed, and drain() has not said so yet
+  bool asked_ GIMNET_GUARDED_BY(mutex_) = false;  ///< drain() asked this hub for a CONFIRM, and none came since
   Socket* socket_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
   std::vector<std::byte> goodbye_ GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written

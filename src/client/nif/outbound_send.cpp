@@ -20,6 +20,8 @@ constexpr std::int64_t kLookNs = 1'000;
 constexpr std::size_t kHeldBytesMax = 64 * 1024;
 /// After so many quick sends in a row gathering them pays for the wake-up of the library's thread.
 constexpr std::uint32_t kQuickSends = 4;
+/// Of a PING that asks for a CONFIRM; HubClock, which counts from 1, takes its PONG for nothing that it asked.
+constexpr std::uint32_t kAskSequence = 0;
 /// How long the receiver of a message may leave its window closed before it is asked whether it is still there.
 constexpr std::int64_t kProbeNs = 1'000'000'000;
 
@@ -251,6 +253,18 @@ nif_status Outbound::flush() {
   return NIF_OK;
 }
 
+/// The hub says by itself only now and then what it took, but always when it is asked by a PING. True: it was asked.
+/// One question at a time: the answer to an earlier one may be all that is wanted, and if not the next one follows it.
+bool Outbound::ask_for_confirm() {
+  if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written()) return false;
+  std::array<std::byte, proto::flow::kFrameSizeMax> frame;
+  const proto::flow::Ping ping{kAskSequence, wall_now_ns()};
+  const std::size_t size = proto::flow::encode_frame(ping, NodeId{0}, frame);
+  asked_ = put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
+  if (asked_) write_or_leave(false);
+  return asked_;
+}
+
 nif_status Outbound::drain(Deadline deadline) {
   const MutexLock lock(mutex_);
   for (;;) {
@@ -262,7 +276,7 @@ nif_status Outbound::drain(Deadline deadline) {
                   "the connection was lost before everything was confirmed; some of it may not have arrived");
     }
     if (queue_.all_written() && !writing_ && queue_.retained_bytes() == 0) return NIF_OK;
-    if (write_here()) continue;
+    if (write_here() || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {
       return fail(NIF_TIMEOUT, "not everything was written and confirmed within the time given");
     }

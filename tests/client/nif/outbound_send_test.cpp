@@ -302,6 +302,49 @@ TEST(OutboundSend, DrainWaitsForWritingAndConfirmation) {
   EXPECT_EQ(counters_of(connected.node.get()).retained_bytes, 0u);
 }
 
+/// The keep-alive of these hubs is an hour, so a PING is the question of a nif_drain().
+std::optional<proto::flow::Ping> next_question(FakeConnection& hub) { return hub.next_flow<proto::flow::Ping>(); }
+
+TEST(OutboundSend, DrainAsksForAConfirmAndAgainWhereThatWasNotAll) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome(1u << 20);
+  welcome.keep_alive_ms = welcome.silent_ms = 3'600'000;
+  Connected connected = connect_to(hub, default_options("robot"), welcome);
+  nif_node* const node = connected.node.get();
+  ASSERT_EQ(nif_drain(node, 0), NIF_OK) << "nothing to ask for";
+  ASSERT_EQ(send(node, kPeerId, "a"), NIF_OK);
+  EXPECT_EQ(nif_drain(node, 0), NIF_TIMEOUT);
+  EXPECT_EQ(nif_drain(node, 0), NIF_TIMEOUT);
+  ASSERT_TRUE(connected.hub.next_message());
+  EXPECT_TRUE(next_question(connected.hub)) << "behind what it asks about";
+  ASSERT_EQ(send(node, kPeerId, "b"), NIF_OK);
+  std::thread draining([&] { EXPECT_EQ(nif_drain(node, NIF_FOREVER), NIF_OK); });
+  const auto second = connected.hub.next();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->header.kind, proto::Kind::unicast) << "asked once, however often nif_drain() is called";
+  connected.hub.send(proto::flow::Confirm{1});
+  EXPECT_TRUE(next_question(connected.hub)) << "the answer was not about all that was sent";
+  connected.hub.send(proto::flow::Confirm{2});
+  draining.join();
+}
+
+TEST(OutboundSend, DrainAsksTheNewConnectionAfterAResume) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome(1u << 20);
+  welcome.keep_alive_ms = welcome.silent_ms = 3'600'000;
+  Connected connected = connect_to(hub, default_options("robot"), welcome);
+  nif_node* const node = connected.node.get();
+  ASSERT_EQ(send(node, kPeerId, "a"), NIF_OK);
+  std::thread draining([&] { EXPECT_EQ(nif_drain(node, NIF_FOREVER), NIF_OK); });
+  EXPECT_TRUE(next_question(connected.hub));
+  connected.hub.close();
+  welcome.resumed = true;
+  connected.hub = hub.admit(welcome);
+  EXPECT_TRUE(next_question(connected.hub)) << "the question went with the connection";
+  connected.hub.send(proto::flow::Confirm{1});
+  draining.join();
+}
+
 TEST(OutboundSend, DrainTellsOnceThatTheHubForgotWhatItHadNotConfirmed) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options("robot"), make_welcome(1u << 20));

@@ -141,6 +141,20 @@ TEST(Keeper, ConfirmsWhatItTookWithKeepAlive) {
   EXPECT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1)) << "nothing new to confirm";
 }
 
+TEST(Keeper, ConfirmsWhatItTookWhenAsked) {
+  HubRig rig;
+  FakeNode& a = rig.join(0, {.resume = true});
+  FakeNode& b = rig.join(0);
+  rig.send(a, b.id.value(), "one");
+  rig.send_flow(a, proto::flow::Ping{});
+  rig.settle();
+  ASSERT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1));
+  EXPECT_EQ(a.flow_of<proto::flow::Confirm>()[0].count, 1u);
+  rig.send_flow(a, proto::flow::Ping{});
+  rig.settle();
+  EXPECT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1)) << "nothing new to confirm";
+}
+
 TEST(Keeper, ConfirmsAtAQuarterOfThePeersBuffer) {
   HubRig rig;
   FakeNode& a = rig.join(0, {.resume = true, .resume_bytes = 4'000});
