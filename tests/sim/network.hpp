@@ -45,6 +45,7 @@ class WireTransport final : public hub::Transport {
   hub::IoResult send(std::span<const iovec>) override { return {}; }
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
+  void limit_unacknowledged(std::uint32_t) override {}
   [[nodiscard]] int descriptor() const override { return -1; }
   [[nodiscard]] const WirePointer& wire() const { return wire_; }
 
