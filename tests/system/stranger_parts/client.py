@@ -5,7 +5,7 @@ import socket
 import struct
 import time
 
-from stranger.bitestream import BOOL, OPAQUE, TEXT, U16, U32, U64, U8, fields, put
+from stranger_parts.bitestream import BOOL, OPAQUE, TEXT, U16, U32, U64, U8, fields, put
 
 OPENING = bytes.fromhex("47494d6e65740100")
 UNICAST, GROUP, LIST, BROADCAST, SERVICE, REPORT, FLOW, TAKEN = range(8)
@@ -34,7 +34,7 @@ class Denied(Exception):
 class Stranger:
     """Single-threaded; keeps alive whenever it waits."""
 
-    def __init__(self, address, patience_s=20.0):
+    def __init__(self, address, patience_s=60.0):
         scheme, _, rest = address.partition(":")
         if scheme == "unix":
             self.socket = socket.socket(socket.AF_UNIX)
@@ -47,6 +47,7 @@ class Stranger:
         self.patience_s = patience_s
         self.id, self.welcome, self.requests = 0, {}, 0
         self.taken = 0  # data frames of this epoch
+        self.answers_pings = True
         self.waiting = collections.deque()
         self.unread = bytearray()
 
@@ -77,7 +78,7 @@ class Stranger:
         seen.add(("kind", kind))
         if kind == FLOW:
             seen.add(("FLOW", got.body[0]))
-            if got.body[0] == PING:
+            if got.body[0] == PING and self.answers_pings:
                 self.flow(PONG, got.body[4:16] + struct.pack("<q", time.time_ns()))
         elif kind < 16 and kind != REPORT:
             self.taken += 1
@@ -108,16 +109,19 @@ class Stranger:
 
     # ---- section 3
 
-    def join(self, name="", role=0, token=b"", epoch=0, resume=False, hub_epoch=0, taken=0, description=""):
+    def read_opening(self):
+        if self._exactly(8) != OPENING:
+            raise ConnectionError("no hub")
+
+    def join(self, name="", role=0, token=b"", epoch=0, resume=False, frame_bytes=0, hub_epoch=0, taken=0, description=""):
         body = b""
         for key, kind, content in ((1, U8, role), (2, TEXT, name), (3, OPAQUE, token), (4, U64, epoch), (5, BOOL, resume),
-                                   (8, TEXT, description), (9, U64, hub_epoch), (10, U64, taken)):
+                                   (6, U32, frame_bytes), (8, TEXT, description), (9, U64, hub_epoch), (10, U64, taken)):
             if content:
                 body += put(key, kind, content)
         self.socket.sendall(OPENING)
         self.write(LINK, 0, struct.pack("<HH", HELLO, 0) + body, src=0)
-        if self._exactly(8) != OPENING:
-            raise ConnectionError("no hub")
+        self.read_opening()
         got = self.read()
         seen.add(("LINK", HELLO))
         operation, request = struct.unpack_from("<HH", got.body)
@@ -125,13 +129,15 @@ class Stranger:
             raise ConnectionError(f"neither WELCOME nor GOODBYE: {got}")
         seen.add(("LINK", WELCOME))
         self.welcome = fields(got.body[4:])
+        if 16 in self.welcome:
+            seen.add(("GOODBYE", self.welcome[16]))  # of the connection before
         self.id = self.welcome[1]
         return self
 
     def leave(self):
         """Says GOODBYE and waits until the hub has closed."""
         self.write(LINK, 0, struct.pack("<HH", GOODBYE, 0) + put(1, U16, 0))
-        seen.add(("LINK", GOODBYE))
+        seen.update({("LINK", GOODBYE), ("GOODBYE", 0)})
         try:
             while True:
                 self.read()
@@ -180,9 +186,9 @@ class Stranger:
         mine = struct.pack("<HH", operation, 0)
         return fields(self.wait(lambda got: got.kind == NS and got.body[:4] == mine).body[4:])
 
-    def report(self):
-        """(reason, count, header of the last frame)."""
-        got = self.wait(lambda frame: frame.kind == REPORT)
+    def report(self, wanted=None):
+        """(reason, count, header of the last frame) of the next REPORT, or of the next one of that reason."""
+        got = self.wait(lambda frame: frame.kind == REPORT and wanted in (None, frame.body[0]))
         reason, count = struct.unpack_from("<B3xI", got.body)
         seen.add(("reason", reason))
         return reason, count, got.body[8:24]

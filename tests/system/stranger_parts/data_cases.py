@@ -4,10 +4,10 @@ import random
 import struct
 import time
 
-from stranger import client as wire
-from stranger.bitestream import BOOL, TEXT, U8, put
-from stranger.case import Case
-from stranger.client import BROADCAST, FLOW, GROUP, LIST, NS, SERVICE, TAKEN, UNICAST, u32
+from stranger_parts import client as wire
+from stranger_parts.bitestream import BOOL, TEXT, U8, put
+from stranger_parts.case import Case
+from stranger_parts.client import BROADCAST, FLOW, GROUP, LIST, NS, SERVICE, TAKEN, UNICAST, u32
 from support.processes import start_recv
 
 

@@ -2,9 +2,9 @@
 
 import struct
 
-from stranger.bitestream import TEXT, U16, U8, every, fields, put
-from stranger.case import Case
-from stranger.client import CTRL, NS, Denied, Refused, Stranger, u32
+from stranger_parts.bitestream import TEXT, U16, U8, every, fields, put
+from stranger_parts.case import Case
+from stranger_parts.client import CTRL, NS, Denied, Refused, u32
 
 
 class Names(Case):
@@ -51,6 +51,16 @@ class Names(Case):
                 who.ask(NS, operation, body)
             self.assertEqual(denied.exception.args[0], status, denied.exception)
             self.assertTrue(denied.exception.args[1])
+
+    def test_limits(self):
+        hub = self.hub("--limit", "services_per_node=1", "--limit", "subscriptions_per_node=1", "--limit", "watches_per_node=1")
+        robot = self.stranger(hub, "robot")
+        for operation, body, another in ((7, put(3, TEXT, "a"), put(3, TEXT, "b")), (10, put(3, TEXT, "r/a"), put(3, TEXT, "r/b")),
+                                         (6, u32(3, 1), u32(3, 2))):
+            robot.ask(NS, operation, body)
+            with self.assertRaises(Denied) as denied:
+                robot.ask(NS, operation, another)
+            self.assertEqual(denied.exception.args[0], 6)
 
     def test_rates(self):
         hub = self.hub("--limit", "declarations_burst=2", "--limit", "declarations_per_s=1", "--limit", "oddities_burst=2",
@@ -134,7 +144,6 @@ class Administration(Case):
             self.assertEqual(denied.exception.args[0], 5)
             self.assertIn("Unix socket", denied.exception.args[1])
 
-
     def test_routes(self):
         hub = self.hub(hub_id=5)
         made = self.stranger(hub, "one")
@@ -149,9 +158,7 @@ class Administration(Case):
             with self.assertRaises(Denied) as denied:
                 one.ask(CTRL, operation, body)
             self.assertEqual(denied.exception.args[0], 5)
-        admin = Stranger(f"unix:{hub.socket_path}")
-        self.addCleanup(admin.close)
-        admin.join(role=2)
+        admin = self.administrator(hub)
         self.assertTrue(fields(admin.ask(CTRL, 8, put(3, TEXT, "warning")))[3])
         admin.ask(CTRL, 7)
         admin.ask(CTRL, 5, u32(3, two.id) + u32(4, 7 << 20 | 500))
@@ -162,8 +169,3 @@ class Administration(Case):
         self.assertEqual(self.goodbye(one), 15)
         admin.ask(CTRL, 6)
         self.assertEqual(self.goodbye(again), 7)
-
-    def goodbye(self, who):
-        with self.assertRaises(Refused) as refused:
-            who.wait(lambda got: False)
-        return refused.exception.args[0]
