@@ -2,7 +2,7 @@
 """A whole conversation of version 1 with a hub, as it was recorded once, is understood by the hub of today: each answer has
 all that it had then, apart from tokens, epochs, times and the words of sentences.
 
-    conversation_test.py --record    records it anew: only for what the recording does not have yet"""
+    conversation_test.py --record NAME    records that one anew: only for what is not recorded yet"""
 
 import pathlib
 import struct
@@ -11,18 +11,28 @@ import unittest
 
 from support import conversation
 from support.conversation import Step
+from support.conversation_scenes import SCENES
 from support.processes import Hub
+from support.waiting import wait_until
 from support.wire import (BROADCAST, CREDIT, CTRL, FLAG_KEYED, FLAG_REPORT, FLOW, GOODBYE, GROUP, HEADER, LINK, LIST, NS,
                           OPENING, REPORT, SERVICE, UNICAST, WELCOME, Client, Closed, Frame, control, frame, hello, number, text,
                           value)
 
-RECORDING = pathlib.Path(__file__).resolve().parent.parent / "vectors" / "conversation" / "version_1.txt"
+RECORDINGS = pathlib.Path(__file__).resolve().parent.parent / "vectors" / "conversation"
+RECORDING = RECORDINGS / "version_1.txt"
 TITLE = """A conversation of three nodes with a hub, version 1.0, as it was recorded. Later hubs and libraries go on understanding it:
 tests/system/conversation_test.py plays the nodes' side to a hub, tests/client/nif/conversation_test.cpp the hub's side to
 NIF. WHO > what a node sent, WHO < what the hub sent: the header in four words, and what is behind it."""
 RENUMBERED = 7 << 20 | 100
 # Nobody is silent too long on a slow machine: who has nothing to say here does not read either.
 ARGUMENTS = ("--limit", "silent_ms=3000000", "--limit", "keep_alive_ms=600000")
+
+
+def cut(test, hub, client, name):
+    """The connection breaks; returns when the hub has seen it."""
+    client.socket.close()
+    witness = Client(test, hub).join()
+    wait_until(lambda: 3 not in witness.ask(NS, 5, text(3, name) + number(6, 1, True)), f"{name} is away")
 
 
 class Recorded(Client):
@@ -36,7 +46,7 @@ class Recorded(Client):
         rest = data
         while rest:
             size = len(OPENING) if rest.startswith(OPENING) else HEADER + struct.unpack_from("<I", rest)[0]
-            if not conversation.is_keep_alive(rest[:size]):
+            if not conversation.is_keep_alive(rest[:size], False):
                 self.steps.append(Step(self.who, False, rest[:size]))
             rest = rest[size:]
         return super().send(data)
@@ -50,7 +60,7 @@ class Recorded(Client):
     def next(self):
         got = super().next()
         data = frame(got.dst, got.src, got.payload, got.kind, got.flags, got.lane)
-        if not conversation.is_keep_alive(data):
+        if not conversation.is_keep_alive(data, True):
             self.steps.append(Step(self.who, True, data))
         return got
 
@@ -148,6 +158,20 @@ def converse(test, hub):
     return steps
 
 
+class Stage:
+    """Where a scene is played to be recorded."""
+
+    def __init__(self, test, hub):
+        self.test, self.hub, self.steps = test, hub, []
+
+    def client(self, who):
+        return Recorded(self.test, self.hub, who, self.steps, local=who == "admin")
+
+    def cut(self, client):
+        self.steps.append(Step(client.who, False, b""))
+        cut(self.test, self.hub, client, client.who)
+
+
 class Player:
     """Plays the nodes' side of a recording."""
 
@@ -161,10 +185,12 @@ class Player:
         return self.clients[who]
 
     def say(self, step):
+        if step.is_break:
+            return cut(self.test, self.hub, self.client(step.who), step.who)
         data = step.data
         for recorded, now in self.tokens.items():
             data = data.replace(recorded, now)
-        self.client(step.who).send(data)
+        return self.client(step.who).send(data)
 
     def hear(self, step):
         client = self.client(step.who)
@@ -173,7 +199,7 @@ class Player:
         while True:
             got = client.next()
             data = frame(got.dst, got.src, got.payload, got.kind, got.flags, got.lane)
-            if conversation.is_keep_alive(data):
+            if conversation.is_keep_alive(data, True):
                 continue
             if got.kind == LINK and got.operation == WELCOME:
                 client.id = got.dst
@@ -182,14 +208,14 @@ class Player:
             return heard
 
     def note_token(self, recorded, heard):
-        key = {(LINK, WELCOME): 2, (NS, 0x8001): 5, (NS, 0x8002): 5}.get((recorded.kind, self.operation(recorded)))
-        if key is None:
-            return
-        then, now = (dict((k, v) for k, _, v in conversation.values(step.data[HEADER + 4:])).get(key)
-                     for step in (recorded, heard))
-        if then and now:
-            self.test.assertEqual(len(then), len(now), "tokens of the same size")
-            self.tokens[then] = now
+        """And epochs: nodes say again what they were told."""
+        keys = {(LINK, WELCOME): (2, 5), (NS, 0x8001): (5,), (NS, 0x8002): (5,)}
+        for key in keys.get((recorded.kind, self.operation(recorded)), ()):
+            then, now = (dict((k, v) for k, _, v in conversation.values(step.data[HEADER + 4:])).get(key)
+                         for step in (recorded, heard))
+            if then and now:
+                self.test.assertEqual(len(then), len(now), "tokens of the same size")
+                self.tokens[then] = now
 
     @staticmethod
     def operation(step):
@@ -198,8 +224,22 @@ class Player:
 
 class Conversation(unittest.TestCase):
     def test_the_hub_of_today_answers_as_it_did(self):
-        player = Player(self, Hub(self, *ARGUMENTS))
-        for place, step in enumerate(conversation.load(RECORDING)):
+        self.play(RECORDING)
+
+    def test_the_hub_of_today_plays_each_scene_as_it_did(self):
+        for name, scene in SCENES.items():
+            with self.subTest(scene=name):
+                self.play(RECORDINGS / f"version_1_{name}.txt", *scene.arguments)
+
+    def test_the_scenes_have_what_they_are_for(self):
+        for name, scene in SCENES.items():
+            words = {("<" if step.from_hub else ">") + step.words()
+                     for step in conversation.load(RECORDINGS / f"version_1_{name}.txt")}
+            self.assertEqual(set(scene.has) - words, set(), f"not in {name}, of {words}")
+
+    def play(self, recording, *arguments):
+        player = Player(self, Hub(self, *ARGUMENTS, *arguments))
+        for place, step in enumerate(conversation.load(recording)):
             with self.subTest(place=place, who=step.who, what=step.words()):
                 if not step.from_hub:
                     player.say(step)
@@ -237,12 +277,20 @@ class Conversation(unittest.TestCase):
 
 
 class Record(unittest.TestCase):
+    name = ""
+
     def test_record(self):
-        conversation.save(RECORDING, TITLE, converse(self, Hub(self, *ARGUMENTS)))
+        if not self.name:
+            return conversation.save(RECORDING, TITLE, converse(self, Hub(self, *ARGUMENTS)))
+        scene = SCENES[self.name]
+        stage = Stage(self, Hub(self, *ARGUMENTS, *scene.arguments))
+        scene.play(stage)
+        return conversation.save(RECORDINGS / f"version_1_{self.name}.txt", scene.title, stage.steps)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--record"]:
+    if sys.argv[1:2] == ["--record"]:
+        Record.name = " ".join(sys.argv[2:])
         unittest.main(argv=sys.argv[:1], defaultTest="Record")
     else:
         unittest.main(defaultTest="Conversation")

@@ -1,24 +1,29 @@
 """Recorded conversations (tests/vectors/conversation): files of lines `WHO > HEX` for a frame, or the opening, that a node
-sent, and `WHO < HEX` for one from the hub, in an order in which they can be played again. `#` begins a comment."""
+sent, and `WHO < HEX` for one from the hub, in an order in which they can be played again. `00*500` stands for 500 such
+bytes, `WHO x` for a connection that breaks without a word, as the hub has seen when the next line comes. `#` begins a
+comment."""
 
 import dataclasses
+import re
 import struct
 
-from support.wire import (BROADCAST, CTRL, FLOW, GOODBYE, GROUP, HEADER, HELLO, LINK, LIST, NS, OPENING, PING, PONG, REPORT,
-                          SERVICE, UNICAST, WELCOME)
+from support.wire import (BROADCAST, CTRL, FLAG_EXT, FLOW, GOODBYE, GROUP, HEADER, HELLO, LINK, LIST, NS, OPENING, PING, PONG,
+                          REPORT, SERVICE, TAKEN, UNICAST, WELCOME)
 
 NESTED = 14
+TRACE = 1  # extension: u16 of all, u8 type, u8 size, u32 slots used; of a slot u32 hub, u32 0, then two times
 KINDS = {UNICAST: "UNICAST", GROUP: "GROUP", LIST: "LIST", BROADCAST: "BROADCAST", SERVICE: "SERVICE", REPORT: "REPORT",
-         FLOW: "FLOW", LINK: "LINK", NS: "NS", CTRL: "CTRL"}
+         FLOW: "FLOW", TAKEN: "TAKEN", LINK: "LINK", NS: "NS", CTRL: "CTRL"}
 
 OPERATIONS = {
     LINK: {1: "HELLO", 2: "WELCOME", 3: "GOODBYE"},
     NS: {1: "REGISTER", 2: "UNREGISTER", 3: "RESOLVE", 4: "REVERSE", 5: "LIST", 6: "WATCH", 7: "ADVERTISE", 8: "WITHDRAW",
          9: "SERVICES", 10: "SUBSCRIBE", 11: "UNSUBSCRIBE", 12: "UNWATCH", 13: "WATCH_TAKEN", 32: "SERVICE_MOVED",
          33: "SUBSCRIBER_JOINED", 34: "SUBSCRIBER_LEFT", 37: "WATCH_EVENTS"},
-    CTRL: {1: "HUB_INFO", 2: "STATISTICS", 3: "CONNECTIONS", 4: "KICK", 5: "REASSIGN", 7: "RELOAD", 8: "LOG_LEVEL",
-           9: "ROUTES"},
+    CTRL: {1: "HUB_INFO", 2: "STATISTICS", 3: "CONNECTIONS", 4: "KICK", 5: "REASSIGN", 6: "DRAIN", 7: "RELOAD",
+           8: "LOG_LEVEL", 9: "ROUTES"},
 }
+FLOWS = ("", "PING", "PONG", "CREDIT", "PAUSE", "RESUME", "CONFIRM", "SKIP")
 
 # What is another one each time: (kind, operation): paths of keys. Sentences are for people, and may be put in other words.
 VOLATILE = {
@@ -37,7 +42,7 @@ VOLATILE = {
 
 @dataclasses.dataclass
 class Step:
-    """One frame, or an opening, that somebody sent."""
+    """One frame, or an opening, that somebody sent; no bytes: the connection breaks."""
 
     who: str
     from_hub: bool
@@ -46,6 +51,10 @@ class Step:
     @property
     def is_opening(self):
         return self.data == OPENING
+
+    @property
+    def is_break(self):
+        return not self.data
 
     @property
     def kind(self):
@@ -58,33 +67,53 @@ class Step:
     def words(self):
         if self.is_opening:
             return "the opening"
+        if self.is_break:
+            return "the connection breaks"
         name = KINDS.get(self.kind, str(self.kind))
         if self.kind in (LINK, NS, CTRL):
             operation, request = struct.unpack_from("<HH", self.data, HEADER)
             what = OPERATIONS[self.kind].get(operation & 0x7FFF, f"operation {operation & 0x7FFF}")
             numbered = f", request {request}" if request else ""
             return f"{name}, {'answer to ' if operation & 0x8000 else ''}{what}{numbered}"
+        if self.kind == FLOW:
+            return f"FLOW, {FLOWS[self.data[HEADER]]}"
         return f"{name}, {len(self.data) - HEADER} bytes"
 
 
-def is_keep_alive(data):
-    """Times and counts of their own: no part of what was said."""
-    return data != OPENING and data[12] == FLOW and data[HEADER] in (PING, PONG)
+def is_keep_alive(data, from_hub):
+    """The hub's PING and the answer to it come when they want: no part of what was said."""
+    return data != OPENING and data[12] == FLOW and data[HEADER] == (PING if from_hub else PONG)
 
 
 def load(path):
     steps = []
     for line in path.read_text(encoding="utf-8").splitlines():
         words = line.split("#")[0].split()
+        for index, word in enumerate(words):
+            byte, _, count = word.partition("*")
+            words[index] = byte * int(count) if count else word
         if words:
             steps.append(Step(words[0], words[1] == "<", bytes.fromhex("".join(words[2:]))))
     return steps
 
 
+def short(data):
+    """Hex digits; long runs of one byte as 00*500."""
+    words, end = [], 0
+    for run in re.finditer(rb"(?s)(.)\1{63,}", data):
+        words += [data[end:run.start()].hex(), f"{run[1].hex()}*{len(run[0])}"]
+        end = run.end()
+    return " ".join(word for word in (*words, data[end:].hex()) if word)
+
+
 def save(path, title, steps):
     lines = [f"# {line}" for line in title.splitlines()]
     for step in steps:
-        header, body = step.data[:HEADER].hex(" ", 4), step.data[HEADER:].hex()
+        if step.is_break:
+            lines += [f"# {step.who}: {step.words()}", f"{step.who} x"]
+            continue
+        header = step.data[:HEADER].hex(" ", 4)
+        body = short(step.data[HEADER:])
         sign = "<" if step.from_hub else ">"
         lines += [f"# {step.who} {'is told' if step.from_hub else 'says'}: {step.words()}",
                   f"{step.who} {sign} {step.data.hex()}" if step.is_opening else f"{step.who} {sign} {header} {body}".rstrip()]
@@ -116,13 +145,23 @@ def without(content, volatile, path=()):
     return kept
 
 
+def without_times(step):
+    """What a hub writes into a PONG, and into the first slot of a TRACE that stands in front, is another time each time."""
+    body = step.data[HEADER:]
+    if step.kind == FLOW and body[0] == PONG:
+        return body[:16]
+    if step.kind != FLOW and step.data[13] & FLAG_EXT and body[2] == TRACE:
+        return body[:16] + bytes(16) + body[32:]
+    return body
+
+
 def stable(step):
     """What has to be the same each time: header without the length, and the values that are not volatile."""
     if step.is_opening:
         return "opening", [], step.data[:6]
     header = step.data[4:HEADER]
     if step.kind not in (LINK, NS, CTRL):
-        return header, [], step.data[HEADER:]
+        return header, [], without_times(step)
     operation = step.operation
     volatile = set(VOLATILE.get((step.kind, operation), ()))
     content = values(step.data[HEADER + 4:])
