@@ -78,6 +78,7 @@ enum class Happening : std::uint8_t {
   renumbered_away,
   renumbered_came_back,
   renumbered_to_taken,
+  renumbered_to_awaited,
   named_by_former_id,
   configuration_changed,
   configuration_refused,

@@ -62,6 +62,7 @@ struct Past {
   std::set<std::uint32_t> groups;
   std::vector<Kicked> kicked;
   std::uint64_t token_numbers = 0;  ///< given so far
+  milliseconds returns_until{};     ///< nodes of the past may come back under their ids
 };
 
 /// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was told and what it

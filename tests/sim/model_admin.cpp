@@ -75,7 +75,11 @@ void Model::judge_reassign(const Asked& asked) {
   if (index == asked.index || !legal) return require_status(asked, Status::bad_request, Checker::answers);
   const auto resting = resting_ids_.find(to);
   const bool rests = resting != resting_ids_.end() && resting->second > asked.now;
-  if (sessions_.contains(to) || rests || sessions_.at(index).renumbered) {
+  const bool awaited = asked.now < past_.returns_until;
+  if (sessions_.contains(to) || rests || awaited || sessions_.at(index).renumbered) {
+    if (awaited && past_.nodes.contains(to) && !sessions_.contains(to)) {
+      census_.add(Happening::renumbered_to_awaited);
+    }
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);
   }

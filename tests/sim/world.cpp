@@ -55,6 +55,7 @@ void World::begin_life(Past past) {
   Result<hub::HubStart> start = hub::next_start(disk_, milliseconds{HubLife::wall_ns(setting_) / 1'000'000});
   require(start.has_value(), Checker::convergence, "the hub cannot start again");
   disk_ = start->state;
+  if (disk_.boot > 1) past.returns_until = setting_.agenda.now_ms() + milliseconds{setting_.plan.limits.grace_ms};
   // Fewer than a real start grants, so that more are asked for.
   start->nodes.count = hub::IndexPool::kBlock / 2 + setting_.random.between(1, 200);
   start->groups.count = hub::IndexPool::kBlock / 2 + setting_.random.between(1, 200);

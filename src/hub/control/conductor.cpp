@@ -35,7 +35,14 @@ LogSubject subject(std::string_view reason, const Session& session) {
   return {reason, log_peer(session.origin.transport, session.origin.address)};
 }
 
-Sessions::Options sessions_options(const HubFacts& facts, Placement placement, const HubStart& start) {
+/// Until when nodes that were here before this start may come back; nothing: there were none.
+std::optional<milliseconds> returns_until(const HubFacts& facts, const Limits& limits, const HubStart& start) {
+  if (start.state.boot <= 1) return std::nullopt;
+  return facts.started + milliseconds{limits.grace_ms};
+}
+
+Sessions::Options sessions_options(const HubFacts& facts, Placement placement, const Limits& limits,
+                                   const HubStart& start) {
   Sessions::Options options;
   options.hub = facts.id;
   options.shards = facts.shards;
@@ -45,6 +52,7 @@ Sessions::Options sessions_options(const HubFacts& facts, Placement placement, c
   options.nodes = start.nodes;
   options.groups = start.groups;
   options.kicked = start.state.kicked;
+  if (const auto until = returns_until(facts, limits, start)) options.returns_until = *until;
   return options;
 }
 
@@ -62,16 +70,14 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
     : facts_(std::move(facts)),
       limits_(limits),
       wiring_(std::move(wiring)),
-      membership_(sessions_options(facts_, placement, wiring_.start), limits),
+      membership_(sessions_options(facts_, placement, limits, wiring_.start), limits),
       watches_(HubTitle{facts_.id, facts_.name}, epoch_of(wiring_.start), limits),
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       keeper_(wiring_.start.state, wiring_.keep_state),
-      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}) {
+      runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}),
+      returns_until_(returns_until(facts_, limits, wiring_.start)) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
-  if (wiring_.start.state.boot > 1) {
-    wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
-    returns_until_ = facts_.started + milliseconds{limits_.grace_ms};
-  }
+  if (returns_until_) wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {

@@ -154,15 +154,13 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
     return Failure{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
                                              " and has not come back under it yet; try again when it has"};
   }
-  if (!sessions_.renumber(session, index, now)) {
-    const Session* holder = sessions_.find(index);
-    const std::string id = to_string(make_id<NodeId>(hub_of(sessions_.node_id(session)), index));
-    const std::string held = holder == nullptr || holder->name.empty() ? "" : " '" + holder->name.str() + "'";
-    return Failure{proto::Status::taken,
-                   holder != nullptr ? "the id " + id + " is that of another node" + held + "; choose a free one"
-                                     : "the id " + id +
-                                           " rests, since a node had it a moment ago; choose another "
-                                           "one, or try again in a minute"};
+#ifndef GIMNET_BUG_RETURNING_ID_GIVEN_AWAY
+  const bool awaited = sessions_.find(index) == nullptr && sessions_.returns_expected_for(now) > milliseconds{0};
+#else
+  const bool awaited = false;
+#endif
+  if (awaited || !sessions_.renumber(session, index, now)) {
+    return Failure{proto::Status::taken, why_taken(make_id<NodeId>(hub_of(sessions_.node_id(session)), index), now)};
   }
   const NameStanding standing =
       directory_.is_provisional(session.name) ? NameStanding::provisional : NameStanding::final;
@@ -183,6 +181,19 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
                                    "an administrator gave this node the id " + to_string(sessions_.node_id(session)) +
                                        "; come back with the token"});
   return std::nullopt;
+}
+
+std::string Membership::why_taken(NodeId node, milliseconds now) const {
+  const std::string id = to_string(node);
+  if (const Session* holder = sessions_.find(index_of(node))) {
+    const std::string held = holder->name.empty() ? "" : " '" + holder->name.str() + "'";
+    return "the id " + id + " is that of another node" + held + "; choose a free one";
+  }
+  if (const milliseconds left = sessions_.returns_expected_for(now); left > milliseconds{0}) {
+    return "the hub was restarted a moment ago, and if a node had the id " + id +
+           ", its node has not come back yet; try again in " + std::to_string((left.count() + 999) / 1'000) + " s";
+  }
+  return "the id " + id + " rests, since a node had it a moment ago; choose another one, or try again in a minute";
 }
 
 void Membership::tick(milliseconds now, Effects& effects) {

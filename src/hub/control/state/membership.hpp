@@ -58,7 +58,8 @@ class Membership {
   void kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects);
 
   /// The session's node goes on under another index, with name, services, subscriptions and token. Errors: taken (held,
-  /// or at rest), bad_request (no index of a node). nullopt: done.
+  /// at rest, or perhaps that of a node that has not come back since a restart), bad_request (no index of a node).
+  /// nullopt: done.
   [[nodiscard]] std::optional<Failure> renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now,
                                                 Effects& effects);
 
@@ -108,6 +109,8 @@ class Membership {
   /// The session that the request is for: the one whose token it shows, or a new one.
   [[nodiscard]] Result<Joined, Refusal> session_for(const JoinRequest& request, const Sessions::Claim& claim,
                                                     std::chrono::milliseconds now, Effects& effects);
+  /// Why that id cannot be given to another node.
+  [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
   void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
                          Effects& effects);

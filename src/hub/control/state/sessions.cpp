@@ -23,6 +23,7 @@ Sessions::Sessions(const Options& options, const Limits& limits)
       hub_(options.hub),
       placement_(options.placement),
       secret_(options.secret),
+      returns_until_(options.returns_until),
       last_number_(first_number(options.boot)),
       indices_(kIndexMost, resting_time(limits), options.nodes),
       kicked_(options.kicked),

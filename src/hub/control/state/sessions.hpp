@@ -86,6 +86,8 @@ class Sessions {
     IndexRange nodes{};                  ///< indices for newcomers
     IndexRange groups{};                 ///< the same for services
     std::vector<SessionToken> kicked{};  ///< not honoured any more
+    /// Until then nodes of before a restart may come back under their ids, which this start does not know.
+    std::chrono::milliseconds returns_until{};
   };
   Sessions(const Options& options, const Limits& limits);
 
@@ -129,6 +131,12 @@ class Sessions {
   /// The session goes on under another index; the former one rests, and leads here until somebody else has it.
   /// False: the index is held, rests, or is none.
   [[nodiscard]] bool renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
+  /// How long nodes that were here before a restart may still be on their way back, each under an index that is free:
+  /// what outlived the hub does not tell under which, those that an administrator gave least of all. Not above 0: no
+  /// longer.
+  [[nodiscard]] std::chrono::milliseconds returns_expected_for(std::chrono::milliseconds now) const {
+    return returns_until_ - now;
+  }
   /// Under which index a node goes on that had this one: the same, unless renumber() gave it another.
   [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
   /// The indices that the session's node had before.
@@ -182,6 +190,7 @@ class Sessions {
   const HubId hub_;
   const Placement placement_;
   const Secret secret_;
+  const std::chrono::milliseconds returns_until_;
   SessionNumber last_number_;
   IndexPool indices_;
   NumberFloor floor_;

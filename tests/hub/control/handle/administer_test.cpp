@@ -25,7 +25,9 @@ namespace ns = proto::ns;
 
 class AdministerTest : public ::testing::Test, protected TestConductor {
  protected:
-  AdministerTest() { set_log_level(LogLevel::off); }
+  explicit AdministerTest(const HubStart& start = {}) : TestConductor(Placement::spread, start) {
+    set_log_level(LogLevel::off);
+  }
   ~AdministerTest() override { set_log_level(LogLevel::info); }
 
   Node join_admin() {
@@ -199,6 +201,29 @@ TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
   hear(again);
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}));
   EXPECT_TRUE(nodes.find(500).exists());
+}
+
+class RestartedAdministerTest : public AdministerTest {
+ protected:
+  RestartedAdministerTest() : AdministerTest(second_start()) {}
+  static HubStart second_start() {
+    HubStart start{{}, {4'097, IndexPool::kBlock}, {4'097, IndexPool::kBlock}};
+    start.state.boot = 2;
+    return start;
+  }
+};
+
+TEST_F(RestartedAdministerTest, AnIdThatANodeMayComeBackUnderIsTakenForAGraceTime) {
+  const NodeId of_before = make_id<NodeId>(kHub, 1);
+  now = facts().started + std::chrono::milliseconds{limits.grace_ms} - 1ms;
+  const proto::Refusal refusal = refused(admin_, ctrl::Reassign{robot_.id, of_before});
+  EXPECT_EQ(refusal.status, Status::taken);
+  EXPECT_THAT(refusal.sentence, HasSubstr("its node has not come back yet"));
+  EXPECT_EQ(index_of(robot_.id), 4'098u) << "and nothing else was changed";
+  EXPECT_TRUE(nodes.find(4'098).exists());
+  now += 1ms;
+  ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, of_before}));
+  EXPECT_TRUE(nodes.find(1).exists());
 }
 
 // Whose WELCOME is lost knows its former id only, and comes back with that one's token.

@@ -25,6 +25,7 @@ class RestartTest : public ::testing::Test {
     options.boot = boot;
     options.nodes = options.groups = {mark, IndexPool::kBlock};
     options.kicked = std::move(kicked);
+    if (boot > 1) options.returns_until = std::chrono::milliseconds{limits_.grace_ms};
     return std::make_unique<Membership>(options, limits_);
   }
   static Node join(Membership& hub, const std::string& name, std::span<const std::byte> token = {}) {
@@ -82,6 +83,35 @@ TEST_F(RestartTest, AKickedNodeStaysKicked) {
   before->kick(*before->sessions().find(bad.first), "why", 0ms, effects);
   const auto after = start(before->durable().node_mark, 2, before->durable().kicked);
   EXPECT_NE(join(*after, "bad", bad.second).first, bad.first);
+}
+
+// Whichever id it is: one that an administrator gave before the restart is beyond the mark.
+TEST_F(RestartTest, NoIdIsGivenAwayThatANodeMayComeBackUnder) {
+  const auto before = start(1, 1);
+  const Node absent = join(*before, "absent");
+  const auto after = start(before->durable().node_mark, 2);
+  Session& other = *after->sessions().find(join(*after, "other").first);
+  Effects effects;
+  const std::chrono::milliseconds over{limits_.grace_ms};
+  for (const std::uint32_t index : {absent.first, std::uint32_t{500'000}}) {
+    const auto refused = after->renumber(other, index, over - 1ms, effects);
+    ASSERT_TRUE(refused);
+    EXPECT_EQ(refused->status, proto::Status::taken);
+    EXPECT_NE(refused->sentence.find("has not come back yet; try again in 1 s"), std::string::npos)
+        << refused->sentence;
+  }
+  EXPECT_TRUE(effects.empty());
+  EXPECT_EQ(join(*after, "absent", absent.second).first, absent.first);
+  const auto held = after->renumber(other, absent.first, over - 1ms, effects);
+  ASSERT_TRUE(held);
+  EXPECT_NE(held->sentence.find("another node 'absent'"), std::string::npos) << held->sentence;
+  EXPECT_FALSE(after->renumber(other, 500'000, over, effects)) << "nobody is expected any more";
+}
+
+TEST_F(RestartTest, OfAHubsFirstStartNobodyIsExpectedBack) {
+  const auto hub = start(1, 1);
+  Effects effects;
+  EXPECT_FALSE(hub->renumber(*hub->sessions().find(join(*hub, "A").first), 100, 0ms, effects));
 }
 
 TEST_F(RestartTest, AnotherNameAnotherIdentityOrAnotherHubIsNotHonoured) {
