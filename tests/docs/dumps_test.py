@@ -10,7 +10,7 @@ import unittest
 import dumps
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system"))
-from stranger import bitestream  # noqa: E402  (reads Bitestream as the document says, apart from the library)
+from stranger_parts import bitestream  # noqa: E402  (reads Bitestream as the document says, apart from the library)
 
 PAGE = dumps.PROTOCOL.read_text(encoding="utf-8")
 SECTIONS = dict(re.findall(r"^## (\d+)\.[^\n]*\n(.*?)(?=^## |\Z)", PAGE, re.S | re.M))
