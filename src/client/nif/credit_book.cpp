@@ -51,7 +51,11 @@ std::uint32_t CreditBook::epoch_for(std::uint32_t group) {
   const MutexLock lock(mutex_);
   const auto found = accounts_.find(group);
   if (found == accounts_.end()) {
-    if (accounts_.size() >= kAccountsMax) return 0;
+    if (accounts_.size() >= kAccountsMax) {
+      // Of subscriptions that ended nobody tells. Plain ones that go on count early then, which nobody is told.
+      std::erase_if(accounts_, [](const auto& entry) { return entry.second.state != State::counted; });
+      if (accounts_.size() >= kAccountsMax) return 0;
+    }
     accounts_.emplace(group, Account{});
     return epoch_;
   }

@@ -50,7 +50,7 @@ class CreditBook {
     std::uint64_t taken = 0;
     std::uint64_t told = 0;
   };
-  /// Groups, at most: beyond them only those that the hub counts are added, and no message is counted early.
+  /// Groups, at most, but for those that the hub counts, which stay: all others make way for one more.
   static constexpr std::size_t kAccountsMax = 4096;
   /// Plain groups that are known without the lock.
   static constexpr std::size_t kPlainSlots = 64;

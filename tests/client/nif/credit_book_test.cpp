@@ -276,6 +276,19 @@ TEST(CreditBook, CountsWhatComesBeforeASubscribeThatBrokeIsAskedAgain) {
   asking.join();
 }
 
+TEST(CreditBook, FormerGroupsMakeWay) {
+  constexpr std::uint32_t kGroups = 4096;
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  for (std::uint32_t i = 1; i <= kGroups; ++i) {
+    publish(connected.hub, kGroup + i);
+    EXPECT_NE(take(connected.node.get()).epoch, 0u);
+  }
+  subscribe_late(connected, 1);
+  static_cast<void>(take(connected.node.get()));
+  EXPECT_EQ(credited(connected.hub), 1u);
+}
+
 TEST(CreditBook, AGroupWithoutAWindowMayHaveOneAfterABreak) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
