@@ -2,7 +2,7 @@
 
 import struct
 
-from stranger_parts.bitestream import TEXT, U16, U8, every, fields, put
+from stranger_parts.bitestream import F64, TEXT, U16, U8, every, fields, put
 from stranger_parts.case import Case
 from stranger_parts.client import CTRL, NS, Denied, Refused, u32
 
@@ -61,6 +61,37 @@ class Names(Case):
             with self.assertRaises(Denied) as denied:
                 robot.ask(NS, operation, another)
             self.assertEqual(denied.exception.args[0], 6)
+
+    def test_terms_of_zero_count_as_absent_and_others_out_of_range_are_answered_limit(self):
+        hub = self.hub()
+        robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
+        for window, answered in ((0, 1), (1_024, 1_024)):
+            robot.advertise("map", delivery=put(7, U8, 2), window=u32(10, window))
+            self.assertEqual(viewer.subscribe("robot/map")[8], answered)
+        for terms in (u32(4, 0), put(6, F64, 0.0), put(6, F64, 0.001), put(6, F64, 1_000.0), u32(5, 64)):
+            self.assertEqual(viewer.subscribe("robot/map", terms)[8], 1_024)
+        for terms in (u32(4, 1_025), u32(5, 0), u32(5, 65), put(6, F64, 0.0009), put(6, F64, 1_001.0), put(6, F64, -1.0)):
+            with self.assertRaises(Denied) as denied:
+                viewer.subscribe("robot/map", terms)
+            self.assertEqual(denied.exception.args[0], 6)
+        with self.assertRaises(Denied) as denied:
+            robot.advertise("other", delivery=put(7, U8, 2), window=u32(10, 1_025))
+        self.assertEqual(denied.exception.args[0], 6)
+
+    def test_words_that_are_too_long(self):
+        hub = self.hub()
+        robot, admin = self.stranger(hub, "robot"), self.administrator(hub)
+        for who, kind, operation, begin, key, most in ((admin, CTRL, 4, u32(3, robot.id + 9), 4, 256), (admin, CTRL, 8, b"", 3, 256),
+                                                       (robot, NS, 5, b"", 3, 255), (robot, NS, 7, put(3, TEXT, "a"), 8, 4_096)):
+            codes = []
+            for size in (most, most + 1):
+                try:
+                    who.ask(kind, operation, begin + put(key, TEXT, "x" * size))
+                    codes.append(0)
+                except Denied as denied:
+                    codes.append(denied.args[0])
+            # No node has that id, no level that name: so far it was read.
+            self.assertEqual(codes, [{4: 3, 8: 2}.get(operation, 0) if kind == CTRL else 0, 2])
 
     def test_rates(self):
         hub = self.hub("--limit", "declarations_burst=2", "--limit", "declarations_per_s=1", "--limit", "oddities_burst=2",
