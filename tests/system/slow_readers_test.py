@@ -344,6 +344,40 @@ class Floods(unittest.TestCase):
             self.assertEqual(recv.stdout.read(), data)
         self.assertEqual((send.wait(), recv.returncode), (0, 0), send.err)
 
+    def test_messages_of_any_size_wait_for_a_reader_who_pauses_for_longer_than_the_hub_would(self):
+        for size, count in ((300_000, 150), (1_000_000, 50), (2_000_000, 25)):
+            with self.subTest(size=size):
+                self.pause(b"".join(b"%d %s\n" % (number, b"x" * size) for number in range(count)), count)
+
+    def pause(self, data, count):
+        hub = Hub(self, "--limit", "block_ms=300", "--limit", "slow_consumer_ms=600000", "--limit", "silent_ms=600000")
+        recv = subprocess.Popen([GIMNET, "--hub", hub.url, "recv", "--name", "B", "--raw", "-n", str(count)],
+                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.addCleanup(recv.stdout.close)
+        self.addCleanup(recv.wait)
+        self.addCleanup(recv.kill)
+        hub.wait_for_node("B")
+        send = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE).feed(data)
+        accepted = [0] * 5
+
+        def stands_still():
+            accepted.append(hub.counter("accepted"))
+            return accepted[-1] > 100 and len(set(accepted[-5:])) == 1
+        wait_until(stands_still, "a full way")
+        # What waits at the hub from now on is given up later than this.
+        witness, sender = Client(self, hub, receive_bytes=4096).join(), Client(self, hub).join()
+        for _ in range(30):
+            sender.send(sender.frame(witness.id, bytes(60000)))
+        wait_until(lambda: hub.counter("dropped.timed_out") > 0, "the hub to give up what waits")
+        got = []
+        reading = threading.Thread(target=lambda: got.append(recv.stdout.read()))
+        reading.start()
+        self.addCleanup(reading.join)
+        self.addCleanup(recv.kill)
+        self.assertEqual(send.wait(), 0, send.err)
+        reading.join()
+        self.assertEqual((recv.wait(), got[0] == data), (0, True))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -13,6 +13,9 @@ namespace gimnet {
 
 /// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
 inline constexpr std::size_t kWindowMax = 64;
+/// Most payload bytes of them; one message may always go. So much the receiver's library holds for a program that
+/// stands still (NodeOptions::receive_bytes), so that nothing waits in a hub, which does not hold it for ever.
+inline constexpr std::size_t kWindowBytesMax = std::size_t{1} << 20;
 /// Messages that a queue keeps if nobody says otherwise.
 inline constexpr std::size_t kQueueMessagesDefault = 64;
 /// Most messages that a queue can be told to keep.
@@ -60,7 +63,7 @@ struct QueueOptions {
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
 };
 
-/// What a sender does when as many messages as its window allows are not acknowledged.
+/// What a sender does when as much as its window allows is not acknowledged.
 enum class AtFullWindow : std::uint8_t {
   wait,         ///< until there is room, at most the time given to send()
   skip,         ///< send nothing and answer Status::window_full
@@ -78,8 +81,9 @@ struct PaceOptions {
 struct SendOptions {
   MessageKey key;
   Lane lane = Lane::normal;
-  /// 1..kWindowMax: synchronized, at most that many are not acknowledged; data do not pile up on the way, and each
-  /// receiver sets its own pace. 0: unsynchronized, as fast as the network takes it; nothing is acknowledged.
+  /// 1..kWindowMax: synchronized, at most that many, and kWindowBytesMax of them, are not acknowledged; data do not
+  /// pile up on the way, and each receiver sets its own pace. 0: unsynchronized, as fast as the network takes it;
+  /// nothing is acknowledged.
   std::size_t window = 0;
   AtFullWindow at_full = AtFullWindow::wait;
   bool timestamp = false;        ///< tell the receiver when it was sent: 8 bytes more

@@ -23,7 +23,7 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
     auto turn = take_turn(data, deadline);
     if (!turn) return turn.failure();
     if (*turn == Turn::held) return {};
-    sequence = window_.open(steady_now_ns());
+    sequence = window_.open(data.size(), steady_now_ns());
     to = destination_;
   }
   const nif_status status = transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
@@ -41,17 +41,18 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
           Status::not_found,
           "not sent to " + service_ + ": nobody accepts it at the moment; it can be sent to again when it is back"};
     }
-    if (!sending_ && window_.has_room()) {
+    const bool room = window_.has_room(data.size());
+    if (!sending_ && room) {
       if (std::exchange(held_, std::nullopt)) ++counts_.skipped;
       sending_ = true;
       return Turn::send;
     }
-    if (!window_.has_room() && options_.at_full == AtFullWindow::skip) {
+    if (!room && options_.at_full == AtFullWindow::skip) {
       ++counts_.skipped;
       return Failure{Status::window_full, "not sent to " + target() + ": " + std::to_string(window_.size()) +
                                               " messages wait for their acknowledgement"};
     }
-    if (!window_.has_room() && options_.at_full == AtFullWindow::hold_latest) {
+    if (!room && options_.at_full == AtFullWindow::hold_latest) {
       hold(data);
       return Turn::held;
     }
@@ -170,7 +171,7 @@ bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   settle_freed(freed, doubt.empty() ? "the receiver answered a later question, but did not get them" : doubt);
   if (answers) asked_.clear();
   if (freed.lost != 0 || window_.empty()) forget_doubts();
-  return held_ && window_.has_room();
+  return held_ && window_.has_room(held_->size());
 }
 
 void SendStream::on_lost(std::uint32_t sequence, const std::string& why) {
@@ -229,9 +230,9 @@ bool SendStream::tick(std::int64_t now_ns) {
     to = destination_;
     if (end_ || (window_.empty() && !held_)) return watched_ = false;
     if (sending_) return true;  // what that thread sends stands before a PING that could be put behind it now
-    if (held_ && window_.has_room()) {
+    if (held_ && window_.has_room(held_->size())) {
       data = std::exchange(held_, std::nullopt);
-      sequence = window_.open(now_ns);
+      sequence = window_.open(data->size(), now_ns);
     } else if (window_.ping_due(now_ns)) {
       ping = window_.ping_number() != 0 ? window_.ping_number() : uplink_.next_ping();
       if (ping != window_.ping_number()) asked_ = std::exchange(doubt_, "");

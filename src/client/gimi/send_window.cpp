@@ -24,19 +24,28 @@ bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_
 
 }  // namespace
 
-bool SendWindow::has_room() const {
+bool SendWindow::has_room(std::size_t bytes) const {
   if (!synchronized()) return true;
+  // What the receiver's library holds for a program that stands still must not have to wait in a hub.
+  const bool fits = unacknowledged_ == 0 || unacknowledged_bytes_ + bytes <= kWindowBytesMax;
   // The span keeps the oldest within reach of the bitmap of any ACK.
-  return unacknowledged_ < messages_max_ &&
+  return fits && unacknowledged_ < messages_max_ &&
          (waiting_.empty() || next_sequence_ - waiting_.front().sequence <= kWindowMax);
 }
 
-std::uint32_t SendWindow::open(std::int64_t now_ns) {
-  GIMNET_ASSERT(has_room());
+void SendWindow::free(Waiting& waiting) {
+  waiting.acknowledged = true;
+  --unacknowledged_;
+  unacknowledged_bytes_ -= waiting.bytes;
+}
+
+std::uint32_t SendWindow::open(std::size_t bytes, std::int64_t now_ns) {
+  GIMNET_ASSERT(has_room(bytes));
   const std::uint32_t sequence = next_sequence_++;
   if (!synchronized()) return sequence;
-  waiting_.push_back({sequence, false, now_ns});
+  waiting_.push_back({sequence, false, bytes, now_ns});
   ++unacknowledged_;
+  unacknowledged_bytes_ += bytes;
   return sequence;
 }
 
@@ -44,7 +53,7 @@ bool SendWindow::cancel(std::uint32_t sequence) {
   GIMNET_ASSERT(sequence + 1 == next_sequence_);
   next_sequence_ = sequence;
   if (waiting_.empty() || waiting_.back().sequence != sequence) return false;
-  if (!waiting_.back().acknowledged) --unacknowledged_;
+  if (!waiting_.back().acknowledged) free(waiting_.back());
   waiting_.pop_back();
   return true;
 }
@@ -56,15 +65,14 @@ SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t b
   for (Waiting& waiting : waiting_) {
     if (waiting.acknowledged) continue;
     if (is_acknowledged(waiting.sequence, highest, bitmap)) {
-      waiting.acknowledged = true;
+      free(waiting);
       ++freed.acknowledged;
       if (waiting.sequence == highest && pong == 0) round_trip_ns_ = now_ns - waiting.sent_ns;
     } else if (answers_ping && at_or_before(waiting.sequence, ping_covers_)) {
-      waiting.acknowledged = true;
+      free(waiting);
       ++freed.lost;
     }
   }
-  unacknowledged_ -= freed.acknowledged + freed.lost;
   if (answers_ping) ping_number_ = 0;
   drop_front();
   return freed;
@@ -73,8 +81,7 @@ SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t b
 SendWindow::Freed SendWindow::lose(std::uint32_t sequence) {
   for (Waiting& waiting : waiting_) {
     if (waiting.sequence != sequence || waiting.acknowledged) continue;
-    waiting.acknowledged = true;
-    --unacknowledged_;
+    free(waiting);
     drop_front();
     return {0, 1};
   }
@@ -85,6 +92,7 @@ SendWindow::Freed SendWindow::lose_all() {
   const Freed freed{0, unacknowledged_};
   waiting_.clear();
   unacknowledged_ = 0;
+  unacknowledged_bytes_ = 0;
   drop_front();
   return freed;
 }

@@ -24,12 +24,13 @@ class SendWindow {
   explicit SendWindow(std::size_t messages_max) : messages_max_(messages_max) {}
 
   [[nodiscard]] bool synchronized() const { return messages_max_ != 0; }
-  [[nodiscard]] bool has_room() const;
+  /// For a message of so many bytes. A message always has room where no other waits, whatever its size.
+  [[nodiscard]] bool has_room(std::size_t bytes) const;
   [[nodiscard]] std::size_t size() const { return waiting_.size(); }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
 
-  /// The sequence of the next DATA, which waits from now on. REQUIRES: has_room().
-  std::uint32_t open(std::int64_t now_ns);
+  /// The sequence of the next DATA, which waits from now on. REQUIRES: has_room() for it.
+  std::uint32_t open(std::size_t bytes, std::int64_t now_ns);
   /// The DATA of the last open() was not sent. False: it did not wait any more.
   bool cancel(std::uint32_t sequence);
 
@@ -54,8 +55,11 @@ class SendWindow {
   struct Waiting {
     std::uint32_t sequence;
     bool acknowledged;
+    std::size_t bytes;
     std::int64_t sent_ns;
   };
+  /// It does not count any more.
+  void free(Waiting& waiting);
   [[nodiscard]] std::int64_t patience_ns() const;
   void drop_front();
 
@@ -63,6 +67,7 @@ class SendWindow {
   /// Ascending; acknowledged ones only behind one that is not. Limit: messages_max_
   std::deque<Waiting> waiting_;
   std::size_t unacknowledged_ = 0;
+  std::size_t unacknowledged_bytes_ = 0;
   std::uint32_t next_sequence_ = 1;
   std::uint32_t ping_number_ = 0;
   std::uint32_t ping_covers_ = 0;  ///< the last DATA before the open PING

@@ -9,23 +9,63 @@ constexpr std::int64_t kMs = 1'000'000;
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
 void fill(SendWindow& window, std::size_t messages) {
-  for (std::size_t i = 0; i < messages; ++i) window.open(0);
+  for (std::size_t i = 0; i < messages; ++i) window.open(1, 0);
 }
 
 TEST(SendWindow, TakesAsManyAsItWasTold) {
   SendWindow window(3);
   fill(window, 3);
-  EXPECT_FALSE(window.has_room());
+  EXPECT_FALSE(window.has_room(1));
   EXPECT_EQ(window.acknowledge(1, 0, 0, kMs).acknowledged, 1u);
-  EXPECT_TRUE(window.has_room());
-  EXPECT_EQ(window.open(0), 4u);
-  EXPECT_FALSE(window.has_room());
+  EXPECT_TRUE(window.has_room(1));
+  EXPECT_EQ(window.open(1, 0), 4u);
+  EXPECT_FALSE(window.has_room(1));
+}
+
+TEST(SendWindow, TakesAsManyBytesAsFitAndNotOneMore) {
+  SendWindow window(64);
+  window.open(kWindowBytesMax - 10, 0);
+  EXPECT_TRUE(window.has_room(10));
+  EXPECT_FALSE(window.has_room(11));
+  window.open(10, 0);
+  EXPECT_TRUE(window.has_room(0));
+  EXPECT_FALSE(window.has_room(1));
+  EXPECT_EQ(window.acknowledge(1, 0, 0, kMs).acknowledged, 1u);
+  EXPECT_TRUE(window.has_room(kWindowBytesMax - 10));
+  EXPECT_FALSE(window.has_room(kWindowBytesMax - 9));
+}
+
+TEST(SendWindow, TakesOneOfAnySize) {
+  SendWindow window(64);
+  EXPECT_TRUE(window.has_room(std::size_t{1} << 30));
+  window.open(std::size_t{1} << 30, 0);
+  EXPECT_FALSE(window.has_room(0));
+  EXPECT_EQ(window.acknowledge(1, 0, 0, kMs).acknowledged, 1u);
+  EXPECT_TRUE(window.has_room(std::size_t{1} << 30));
+}
+
+TEST(SendWindow, BytesAreFreedHoweverAMessageEnds) {
+  SendWindow window(64);
+  const auto open = [&] {
+    EXPECT_TRUE(window.has_room(kWindowBytesMax)) << "nothing waits";
+    return window.open(kWindowBytesMax, 0);
+  };
+  static_cast<void>(window.lose(open()));
+  static_cast<void>(window.cancel(open()));
+  open();
+  static_cast<void>(window.lose_all());
+  const std::uint32_t asked = open();
+  window.ping_sent(9, 0);
+  EXPECT_EQ(window.acknowledge(asked - 1, 0, 9, kMs).lost, 1u);
+  window.open(1, 0);
+  EXPECT_TRUE(window.has_room(kWindowBytesMax - 1)) << "bytes of those that ended count still";
+  EXPECT_FALSE(window.has_room(kWindowBytesMax));
 }
 
 TEST(SendWindow, CountsNothingWhenUnsynchronized) {
   SendWindow window(0);
-  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence) EXPECT_EQ(window.open(0), sequence);
-  EXPECT_TRUE(window.has_room());
+  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence) EXPECT_EQ(window.open(1, 0), sequence);
+  EXPECT_TRUE(window.has_room(1));
   EXPECT_TRUE(window.empty());
 }
 
@@ -50,9 +90,9 @@ TEST(SendWindow, StaysWithinReachOfTheBitmap) {
   SendWindow window(kWindowMax);
   fill(window, 64);
   EXPECT_EQ(window.acknowledge(64, kAll >> 2, 0, kMs).acknowledged, 63u);  // all but 1
-  EXPECT_TRUE(window.has_room());
-  EXPECT_EQ(window.open(0), 65u);
-  EXPECT_FALSE(window.has_room()) << "66 could not be acknowledged together with 1";
+  EXPECT_TRUE(window.has_room(1));
+  EXPECT_EQ(window.open(1, 0), 65u);
+  EXPECT_FALSE(window.has_room(1)) << "66 could not be acknowledged together with 1";
 }
 
 TEST(SendWindow, IgnoresAcksOfWhatWasNeverSent) {
@@ -65,7 +105,7 @@ TEST(SendWindow, IgnoresAcksOfWhatWasNeverSent) {
 
 TEST(SendWindow, AsksWhenAnAckIsLate) {
   SendWindow window(2);
-  window.open(0);
+  window.open(1, 0);
   EXPECT_FALSE(window.ping_due(200 * kMs - 1));
   EXPECT_TRUE(window.ping_due(200 * kMs));
   window.ping_sent(9, 200 * kMs);
@@ -79,7 +119,7 @@ TEST(SendWindow, AsksWhenAnAckIsLate) {
 
 TEST(SendWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
   SendWindow window(2);
-  window.open(0);
+  window.open(1, 0);
   window.ping_sent(9, 200 * kMs);
   window.ping_not_sent();
   EXPECT_TRUE(window.ping_due(200 * kMs));
@@ -93,10 +133,10 @@ TEST(SendWindow, AsksAgainAtOnceWhereThePingCouldNotBeSent) {
 
 TEST(SendWindow, WaitsLongerWhereTheWayIsLong) {
   SendWindow window(2);
-  window.open(0);
+  window.open(1, 0);
   static_cast<void>(window.acknowledge(1, 0, 0, 100 * kMs));
   EXPECT_EQ(window.round_trip_ns(), 100 * kMs);
-  window.open(1000 * kMs);
+  window.open(1, 1000 * kMs);
   EXPECT_FALSE(window.ping_due(1400 * kMs - 1));
   EXPECT_TRUE(window.ping_due(1400 * kMs));
 }
@@ -123,11 +163,11 @@ TEST(SendWindow, APongOfAnotherPingFreesNothing) {
 
 TEST(SendWindow, TimeAloneNeverFrees) {
   SendWindow window(1);
-  window.open(0);
+  window.open(1, 0);
   for (std::int64_t now = 0; now < 3600'000 * kMs; now += 1000 * kMs) {
     if (window.ping_due(now)) window.ping_sent(9, now);
   }
-  EXPECT_FALSE(window.has_room());
+  EXPECT_FALSE(window.has_room(1));
 }
 
 TEST(SendWindow, FreesWhatIsKnownToBeLost) {
@@ -143,7 +183,7 @@ TEST(SendWindow, FreesWhatIsKnownToBeLost) {
 
 TEST(SendWindow, HurriesWhenSomethingIsDoubtful) {
   SendWindow window(3);
-  window.open(0);
+  window.open(1, 0);
   window.hurry();
   EXPECT_TRUE(window.ping_due(1));
   window.ping_sent(1, 1);
@@ -152,10 +192,10 @@ TEST(SendWindow, HurriesWhenSomethingIsDoubtful) {
 
 TEST(SendWindow, TakesBackWhatWasNotSent) {
   SendWindow window(1);
-  const std::uint32_t sequence = window.open(0);
+  const std::uint32_t sequence = window.open(1, 0);
   EXPECT_TRUE(window.cancel(sequence));
-  EXPECT_TRUE(window.has_room());
-  EXPECT_EQ(window.open(0), sequence);
+  EXPECT_TRUE(window.has_room(1));
+  EXPECT_EQ(window.open(1, 0), sequence);
   static_cast<void>(window.lose_all());
   EXPECT_FALSE(window.cancel(sequence)) << "it did not wait any more";
 }
