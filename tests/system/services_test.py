@@ -2,6 +2,7 @@
 """Services, names and pings through `gimnet`, and through a raw client that looks at the frames."""
 
 import json
+import signal
 import struct
 import subprocess
 import time
@@ -48,6 +49,24 @@ class Services(unittest.TestCase):
         echo = run_gimnet(hub, "echo", "robot/map", "-n", "1", "--raw")
         self.assertEqual((echo.code, echo.out), (0, b"new\n"), echo.err)
         pub.signal(2)
+        self.assertEqual(pub.wait(), 130, pub.err)
+
+    def test_the_last_line_stays_when_the_hub_is_killed_and_started_again(self):
+        hub = Hub(self)
+        pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay",
+                           stdin=subprocess.PIPE).feed(b"old\nnew\n")
+        wait_until(lambda: "stays until Ctrl-C" in pub.err, "the end of its input")
+        subscriber = start_gimnet(self, hub, "echo", "robot/map", "--raw")
+        wait_until(lambda: subscriber.out == b"new\n", "the last line")
+        for _ in range(2):
+            hub.process.signal(signal.SIGKILL)
+            hub.process.wait()
+            hub = hub.again(self)
+            echo = run_gimnet(hub, "echo", "robot/map", "-n", "1", "--raw")
+            self.assertEqual((echo.code, echo.out), (0, b"new\n"), echo.err)
+        hub.wait_for_node("robot")
+        self.assertEqual(subscriber.out, b"new\n", "who had it gets it once")
+        pub.signal(signal.SIGINT)
         self.assertEqual(pub.wait(), 130, pub.err)
 
     def test_json_of_a_message(self):

@@ -14,11 +14,20 @@ Declarations::~Declarations() {
 void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
   const MutexLock lock(mutex_);
   services_.insert_or_assign(service.service, Service{service, group});
+  if (service.retain) {
+    outbound_.follow_retained(service.service, group.value());
+  } else {
+    outbound_.forget_retained(service.service);
+  }
 }
 
 void Declarations::remove_service(GroupId group) {
   const MutexLock lock(mutex_);
-  std::erase_if(services_, [group](const auto& entry) { return entry.second.group == group; });
+  std::erase_if(services_, [&](const auto& entry) {
+    const bool ends = entry.second.group == group;
+    if (ends) outbound_.forget_retained(entry.first);
+    return ends;
+  });
 }
 
 void Declarations::add_subscription(const proto::ns::Subscribe& subscription, GroupId group) {
@@ -37,14 +46,17 @@ void Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   if (found != subscriptions_.end()) found->second.group = event.new_group;
 }
 
-void Declarations::declare_again() {
+void Declarations::declare_again(bool forgotten) {
   services_due_.clear();
   subscriptions_due_.clear();
   under_way_ = 0;
   ++round_;
   {
     const MutexLock lock(mutex_);
-    for (const auto& [name, service] : services_) services_due_.push_back(name);
+    for (auto& [name, service] : services_) {
+      services_due_.push_back(name);
+      service.last_due |= forgotten && service.request.retain;
+    }
     for (const auto& [name, subscription] : subscriptions_) subscriptions_due_.push_back(name);
   }
   declaring_ = !services_due_.empty();
@@ -105,6 +117,14 @@ bool Declarations::declare_subscription(const std::string& full_name) {
   return true;
 }
 
+/// Before answered(), which lets newer messages go: they are behind it in the queue.
+void Declarations::bring_last(const std::string& name, Service& service, bool moved) {
+  outbound_.follow_retained(name, service.group.value());
+  service.last_due |= moved;
+  if (service.group == GroupId{} || !std::exchange(service.last_due, false)) return;
+  outbound_.send_last_again(name);
+}
+
 void Declarations::on_advertised(const std::string& service, const proto::Payload& payload) {
   const auto answer = proto::decode_answer<proto::ns::AdvertiseAnswer>(payload);
   const GroupId group = answer ? answer->group : GroupId{};
@@ -116,6 +136,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     if (found != services_.end()) {
       former = std::exchange(found->second.group, group);
       changed = former != group;
+      if (found->second.request.retain) bring_last(service, found->second, changed);
     }
   }
   if (changed) {

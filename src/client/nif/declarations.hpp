@@ -31,7 +31,9 @@ class Declarations {
 
   /// A new connection: declares everything again, a few requests at a time. Changes are put into `events` by later
   /// calls of take_events(). GROUP messages wait until the services are through.
-  void declare_again() GIMNET_EXCLUDES(mutex_);
+  /// `forgotten`: what the hub kept of retained services may be gone; it gets their last messages again, before newer
+  /// ones.
+  void declare_again(bool forgotten) GIMNET_EXCLUDES(mutex_);
   /// Goes on declaring where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
   void on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
@@ -46,6 +48,7 @@ class Declarations {
   struct Service {
     proto::ns::Advertise request;
     GroupId group;
+    bool last_due = false;  ///< retained, and the hub may not have the last message
   };
   struct Subscription {
     proto::ns::Subscribe request;
@@ -55,6 +58,7 @@ class Declarations {
   void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  void bring_last(const std::string& name, Service& service, bool moved) GIMNET_REQUIRES(mutex_);
   void answered();
 
   RequestTable& requests_;

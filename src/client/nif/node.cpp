@@ -137,7 +137,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   if (space.size() < admitted.rest.size()) return false;
   std::copy(admitted.rest.begin(), admitted.rest.end(), space.begin());
   if (!first) {
-    declarations_.declare_again();
+    declarations_.declare_again(!session_.resumed || *let_go > 0);
     watches_.declare_again();
   }
   const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), {wall_now_ns(), steady_now_ns()});
@@ -222,7 +222,7 @@ void Node::take_new_name() {
   // The token is for the new name: a program that is started again under the former one could not use it.
   tokens_.rename(name_);
   keep_token();
-  declarations_.declare_again();
+  declarations_.declare_again(false);  // services have other groups then, which tells
 }
 
 void Node::on_taken(std::uint32_t from, const proto::Taken& taken) { outbound_.on_taken(from, taken); }

@@ -1,7 +1,10 @@
 #include "client/nif/outbound.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+
+#include "proto/frame/fragmenter.hpp"
 
 namespace gimnet::nif {
 namespace {
@@ -163,6 +166,53 @@ void Outbound::end(const Failure& failure) {
   state_ = State::ended;
   end_ = failure;
   changed_.notify_all();
+}
+
+void Outbound::follow_retained(const std::string& service, std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  last_.follow(service, group);
+}
+
+void Outbound::forget_retained(const std::string& service) {
+  const MutexLock lock(mutex_);
+  last_.forget(service);
+}
+
+bool Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset) {
+  const proto::FrameHeader& header = parts.header;
+  const std::size_t bytes = proto::prefix_size(parts) + parts.payload_size;
+  const bool replaceable = header.policy() == proto::Policy::latest && last.payload.size() <= proto::kUncutMessageMax;
+  const auto memory = replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, parts.key))
+                                  : queue_.append(header.lane, bytes);
+  if (memory.empty()) return false;
+  const std::size_t prefix = proto::write_prefix(parts, memory);
+  std::copy_n(last.payload.data() + offset, parts.payload_size, memory.data() + prefix);
+  count_appended(bytes);
+  return true;
+}
+
+void Outbound::send_last_again(const std::string& service) {
+  const MutexLock lock(mutex_);
+  const LastMessage* const last = last_.find(service);
+  if (last == nullptr || state_ != State::connected) return;
+  proto::FrameParts parts = last->parts();
+  parts.header.src = id_;
+  parts.header.flags &= static_cast<std::uint8_t>(~proto::kFlagReport);  // it was asked for at its first sending
+  const auto total = static_cast<std::uint32_t>(last->payload.size());
+  std::uint32_t piece_max = proto::kUncutMessageMax;
+  if (proto::needs_fragment_header(total)) parts.fragment = proto::FragmentHeader{next_message_++, 0, total};
+  if (total > proto::kUncutMessageMax) {
+    const std::size_t prefix = proto::prefix_size(parts) - proto::kHeaderSize;
+    piece_max = static_cast<std::uint32_t>(std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
+  }
+  std::uint32_t offset = 0;
+  do {
+    parts.payload_size = std::min(piece_max, total - offset);
+    if (parts.fragment) parts.fragment->offset = offset;
+    if (!put_piece(*last, parts, offset)) break;
+    offset += static_cast<std::uint32_t>(parts.payload_size);
+  } while (offset < total);
+  write_or_leave(false);
 }
 
 void Outbound::set_declaring(bool declaring) {

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
 #include "client/nif/platform.hpp"
@@ -45,6 +47,10 @@ class Outbound {
   bool post(const proto::flow::Message& message) GIMNET_EXCLUDES(mutex_);
   /// A frame of a data kind that the library sends by itself; it does not wait for room.
   bool post_data(std::span<const std::byte> frame, std::uint8_t lane) GIMNET_EXCLUDES(mutex_);
+  /// The own service of that name is retained and has this group now (0: none): its last message is kept, see
+  /// LastMessages.
+  void follow_retained(const std::string& service, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  void forget_retained(const std::string& service) GIMNET_EXCLUDES(mutex_);
   /// Waits until connected. NIF_OK, or why it will not be.
   [[nodiscard]] nif_status wait_connected(Deadline deadline) GIMNET_EXCLUDES(mutex_);
   void add_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);
@@ -73,6 +79,9 @@ class Outbound {
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
   /// While a callback of the program runs, senders do not leave writing to the library's thread.
   void set_library_busy(bool busy) { library_busy_.store(busy, std::memory_order_relaxed); }  // see library_busy_
+  /// Sends the last message of a retained service, of which the hub knows nothing, behind what waits in its lane. Does
+  /// not wait for room.
+  void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
   /// GROUP messages wait until the services are declared again.
   void set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
 
@@ -112,6 +121,8 @@ class Outbound {
                                          Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
@@ -149,6 +160,7 @@ class Outbound {
   std::unordered_map<std::uint64_t, InProgress*> in_progress_ GIMNET_GUARDED_BY(mutex_);  ///< by stream
   std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
+  LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
 

@@ -242,6 +242,7 @@ nif_status Outbound::send(Outgoing& message, Deadline deadline) {
   const nif_status status = whole ? send_whole(message, deadline) : send_fragments(message, deadline);
   if (status != NIF_OK) return status;
   ++messages_sent_;
+  if (message.parts().header.kind == proto::Kind::group && !last_.empty()) last_.keep(message);
   if (whole) write_or_leave(message.more());
   return NIF_OK;
 }

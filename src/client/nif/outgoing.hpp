@@ -37,6 +37,8 @@ class Outgoing {
                    std::uint32_t offset, std::uint32_t piece_size, bool report);
   /// Writes the key, if there is one, and the first bytes of the payload behind it. REQUIRES: it has as many.
   void write_start(std::span<std::byte> start);
+  /// The whole payload. REQUIRES: `to` has its size.
+  void copy_to(std::span<std::byte> to) { copy_payload(to.data(), 0, static_cast<std::uint32_t>(to.size())); }
 
  private:
   [[nodiscard]] std::optional<Failure> read_address(const nif_outgoing& message);
