@@ -109,6 +109,15 @@ constexpr std::array kTable{
     LimitInfo{"watch_changes", "changes", &Limits::watch_changes, 1, 10'000'000,
               "kept for watches that are behind; one that is further behind gets a new snapshot", true},
     LimitInfo{"watch_bytes", "bytes", &Limits::watch_bytes, 64 * kKiB, 16 * kGiB, "memory of watch_changes", true},
+    LimitInfo{"watch_event_bytes", "bytes", &Limits::watch_event_bytes, 8 * kKiB, 64 * kKiB,
+              "one WATCH_EVENTS; it is sent once the longest change, of less than 6 KiB, might not fit any more", true},
+    LimitInfo{"watch_window", "frames", &Limits::watch_window, 1, 1'024,
+              "WATCH_EVENTS of one watch that were not answered with WATCH_TAKEN", true},
+    LimitInfo{
+        "watch_window_per_node", "frames", &Limits::watch_window_per_node, 1, 65'536,
+        "the same of all watches of a node: they wait in control_bytes, beside its answers; one frame each watch may "
+        "always have",
+        true},
     LimitInfo{"drain_ms", "ms", &Limits::drain_ms, 0, kHour, "time for what waits to be written at the end", true},
     LimitInfo{"farewell_ms", "ms", &Limits::farewell_ms, 0, 60'000,
               "time for who was told GOODBYE to read it and close, before the hub does"},

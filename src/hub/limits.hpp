@@ -69,6 +69,9 @@ struct Limits {
   std::uint64_t watches = 16'384;
   std::uint64_t watch_changes = 65'536;
   std::uint64_t watch_bytes = 16ull << 20;
+  std::uint64_t watch_event_bytes = 10 * 1024;
+  std::uint64_t watch_window = 4;
+  std::uint64_t watch_window_per_node = 12;
   std::uint64_t drain_ms = 10'000;
   std::uint64_t farewell_ms = 1'000;
   // The log

@@ -13,14 +13,10 @@ using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
 constexpr std::size_t kQuotedMax = 60;
-/// A page is full at this size; the longest change has about 5 KiB, so that no frame has more than 10.
-constexpr std::size_t kPageBytes = 4 * 1024;
-/// No page has more: the shortest record has more than 32 bytes.
-constexpr std::size_t kPageRecords = kPageBytes / 32;
-/// Of one watch, and of a node's together: what waits for a node that takes nothing leaves room for its answers. One
-/// frame each watch may always have, so that none waits for another.
-constexpr std::size_t kUnderWayMost = 4;
-constexpr std::size_t kUnderWayTogether = 12;
+/// No change is longer: a page that has more room than this takes one more.
+constexpr std::size_t kChangeBytesMax = 6 * 1024;
+/// No record is shorter.
+constexpr std::size_t kRecordBytesLeast = 32;
 
 }  // namespace
 
@@ -164,11 +160,15 @@ bool Watches::serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const 
   return false;
 }
 
+bool Watches::is_full(const Page& page) const {
+  return page.bytes.size() + kChangeBytesMax >= limits_.watch_event_bytes;
+}
+
 /// Nothing to tell, or not the time to tell it.
 bool Watches::is_idle(const Watcher& watcher, const Watch& watch) const {
   if (watch.phase == Phase::live && watch.seen == journal_.version()) return true;
   if (watch.under_way == 0) return false;
-  return watch.under_way >= kUnderWayMost || watcher.under_way >= kUnderWayTogether;
+  return watch.under_way >= limits_.watch_window || watcher.under_way >= limits_.watch_window_per_node;
 }
 
 void Watches::begin(Watch& watch) {
@@ -206,7 +206,7 @@ void Watches::add_changes(Watch& watch, Page& page, Turn& turn) const {
     const Journal::Note& note = journal_.at(++watch.seen);
     if (!wants(watch, note)) continue;
     page.bytes.insert(page.bytes.end(), note.bytes.begin(), note.bytes.end());
-    page.full = page.bytes.size() >= kPageBytes;
+    page.full = is_full(page);
   }
 }
 
@@ -238,7 +238,8 @@ bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
   if (!watch.few || !watch.pattern) return false;
   if (page.full || turn.work == 0) return true;  // at another time
   const bool of_nodes = watch.phase == Phase::nodes;
-  const ListingRequest request{&*watch.pattern, watch.cursor, false, kPageRecords, limits_.scan_records};
+  const ListingRequest request{&*watch.pattern, watch.cursor, false, limits_.watch_event_bytes / kRecordBytesLeast,
+                               limits_.scan_records};
   const std::optional<Listed> listed =
       of_nodes ? list_few_nodes(turn.membership, request) : list_few_services(turn.membership.services(), request);
   watch.few = listed.has_value();
@@ -290,7 +291,7 @@ void Watches::add(const ns::Change& change, Page& page) const {
   proto::bitestream::Writer writer;
   ns::write_change(writer, change);
   page.bytes.insert(page.bytes.end(), writer.bytes().begin(), writer.bytes().end());
-  page.full = page.bytes.size() >= kPageBytes;
+  page.full = is_full(page);
 }
 
 proto::Payload Watches::finish(Watch& watch, Page page) const {

@@ -17,7 +17,8 @@ namespace gimnet::hub {
 /// Who watches which names and services, and how much of it each has been told. A watch is a place in the journal: one
 /// that fell off its end is told the present state from the start again. Each serve() does a bounded piece of work,
 /// and each node takes part in it in turn.
-/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records.
+/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records,
+/// watch_event_bytes, watch_window, watch_window_per_node.
 class Watches {
  public:
   Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits);
@@ -77,6 +78,7 @@ class Watches {
 
   [[nodiscard]] bool serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send);
   [[nodiscard]] bool is_idle(const Watcher& watcher, const Watch& watch) const;
+  [[nodiscard]] bool is_full(const Page& page) const;
   void begin(Watch& watch);
   [[nodiscard]] Page next_page(Watch& watch, Turn& turn);
   void add_changes(Watch& watch, Page& page, Turn& turn) const;

@@ -2,12 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <deque>
-#include <map>
 #include <set>
 
-// Tests name the members that matter and leave the others at their defaults, on purpose.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#include "tests/hub/control/support/watched_hub.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -18,92 +15,7 @@ using proto::ns::Change;
 using proto::ns::ChangeKind;
 namespace ns = proto::ns;
 
-constexpr std::uint64_t kEpoch = 77;
-constexpr HubId kHub{7};
-
-/// A hub's state and those who watch it, who take what they are told when the test says so.
-class WatchesTest : public ::testing::Test {
- protected:
-  Session& join(const std::string& name) {
-    JoinRequest request;
-    request.name = name;
-    request.origin = Origin{"tcp", "127.0.0.1:5000"};
-    Effects effects;
-    Session& session = *membership.join(request, now, effects)->session;
-    note(effects);
-    return session;
-  }
-  void end(Session& session, bool for_good) {
-    Effects effects;
-    membership.connection_ended(session, {for_good, proto::GoodbyeCode::done, ""}, now, effects);
-    note(effects);
-  }
-  std::uint32_t advertise(const Session& session, const std::string& service, const std::string& metadata = {}) {
-    Effects effects;
-    ServiceTerms terms;
-    terms.metadata = metadata;
-    const auto done =
-        membership.services().advertise(session.index, session.name.str() + "/" + service, terms, now, effects);
-    EXPECT_TRUE(done);
-    note(effects);
-    return done->group;
-  }
-  void note(const Effects& effects) {
-    for (const Effect& effect : effects) {
-      if (const auto* node = std::get_if<NodeNoted>(&effect)) watches.note(*node, membership, now);
-      if (const auto* service = std::get_if<ServiceNoted>(&effect)) watches.note(*service, membership, now);
-    }
-  }
-  Status watch(const Session& session, const ns::Watch& wanted) {
-    const auto answer = watches.watch(session.index, wanted);
-    return answer ? Status::done : answer.error().status;
-  }
-  void serve() {
-    while (watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
-      EXPECT_LE(payload.size(), 10u * 1024);
-      const auto events = proto::decode<ns::WatchEvents>(payload);
-      ASSERT_TRUE(events) << events.error().sentence;
-      waiting[node].push_back(*events);
-    })) {
-    }
-  }
-  /// What a node was told and has not taken yet, as "kind name"; it takes all of it.
-  std::vector<std::string> take(const Session& session) {
-    std::vector<std::string> told;
-    for (serve(); !waiting[session.index].empty(); serve()) {
-      const ns::WatchEvents events = waiting[session.index].front();
-      waiting[session.index].pop_front();
-      watches.taken(session.index, {events.watch, 1});
-      for (const Change& change : events.changes) told.push_back(text_of(change));
-    }
-    return told;
-  }
-  static std::string text_of(const Change& change) {
-    static const std::map<ChangeKind, std::string> kKinds{{ChangeKind::begin, "begin"},
-                                                          {ChangeKind::present, "present"},
-                                                          {ChangeKind::end, "end"},
-                                                          {ChangeKind::joined, "joined"},
-                                                          {ChangeKind::left, "left"},
-                                                          {ChangeKind::away, "away"},
-                                                          {ChangeKind::back, "back"},
-                                                          {ChangeKind::renamed, "renamed"},
-                                                          {ChangeKind::changed, "changed"},
-                                                          {ChangeKind::advertised, "advertised"},
-                                                          {ChangeKind::withdrawn, "withdrawn"}};
-    std::string text = kKinds.at(change.kind);
-    if (change.node) text += " " + change.node->name;
-    if (change.service) text += " " + change.service->name;
-    if (!change.former_name.empty()) text += " from " + change.former_name;
-    return text;
-  }
-
-  using Texts = std::vector<std::string>;
-  Limits limits;
-  std::chrono::milliseconds now{1'000};
-  Membership membership{Sessions::Options{kHub, 2, Placement::spread}, limits};
-  Watches watches{HubTitle{kHub, "hub-7"}, kEpoch, limits};
-  std::map<std::uint32_t, std::deque<ns::WatchEvents>> waiting;
-};
+class WatchesTest : public ::testing::Test, protected WatchedHub {};
 
 TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
   Session& viewer = join("viewer");
@@ -246,6 +158,63 @@ TEST_F(WatchesTest, ASlowWatcherIsSentLittleAndCostsNobodyElse) {
   const Texts late = take(slow);
   EXPECT_EQ(late.back(), "joined robot-999");
   EXPECT_EQ(watches.resyncs(), 0u);
+}
+
+TEST_F(WatchesTest, AtMostAWindowOfOneWatchIsUnderWay) {
+  limits.watch_window = 3;
+  Session& viewer = join("viewer");
+  ASSERT_EQ(watch(viewer, {.watch = 1}), Status::done);
+  for (int i = 0; i < 10; ++i) {
+    join("robot-" + std::to_string(i));
+    serve();
+  }
+  EXPECT_EQ(waiting[viewer.index].size(), 3u);
+  watches.taken(viewer.index, {1, 1});
+  serve();
+  EXPECT_EQ(waiting[viewer.index].size(), 4u) << "one was taken: one more";
+  limits.watch_window = 4;
+  serve();
+  join("late");
+  serve();
+  EXPECT_EQ(waiting[viewer.index].size(), 5u) << "and one more with a wider window";
+}
+
+TEST_F(WatchesTest, AtMostAWindowOfANodesWatchesIsUnderWay) {
+  limits.watch_window_per_node = 3;
+  Session& viewer = join("viewer");
+  for (const std::uint32_t number : {1u, 2u}) ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
+  for (int i = 0; i < 10; ++i) {
+    join("robot-" + std::to_string(i));
+    serve();
+  }
+  EXPECT_EQ(waiting[viewer.index].size(), 3u) << "each watch alone might have four";
+  limits.watch_window_per_node = 4;
+  serve();
+  EXPECT_EQ(waiting[viewer.index].size(), 4u);
+}
+
+TEST_F(WatchesTest, EventsAreAsLargeAsTheLimitSays) {
+  const std::string longest(4'096, 'm');
+  Session& viewer = join("viewer");
+  Session& robot = join("robot");
+  for (int i = 0; i < 40; ++i) advertise(robot, "service-" + std::to_string(i), longest);
+  std::size_t before = 0;
+  for (const std::uint64_t bytes : {8u * 1024, 10u * 1024, 64u * 1024}) {
+    limits.watch_event_bytes = bytes;
+    ASSERT_EQ(watch(viewer, {.watch = 1}), Status::done);
+    std::size_t frames = 0;
+    std::size_t most = 0;
+    for (serve(); !waiting[viewer.index].empty(); serve()) {
+      ++frames;
+      most = std::max(most, waiting[viewer.index].front().changes.size());
+      waiting[viewer.index].pop_front();
+      watches.taken(viewer.index, {1, 1});
+    }
+    EXPECT_GT(most, before) << bytes;
+    EXPECT_GE(frames * most, 40u);
+    before = bytes == 8u * 1024 ? most - 1 : most;
+  }
+  EXPECT_GT(before, 10u) << "of more than 4 KiB each";
 }
 
 TEST_F(WatchesTest, NoWatchOfANodeWaitsForAnother) {
