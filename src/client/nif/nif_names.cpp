@@ -26,7 +26,6 @@ using gimnet::nif::check_pattern;
 using gimnet::nif::Deadline;
 using gimnet::nif::deadline_after;
 using gimnet::nif::fail;
-using gimnet::nif::Failure;
 using gimnet::nif::Node;
 using gimnet::nif::with_waiting_node;
 
