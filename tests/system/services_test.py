@@ -69,6 +69,30 @@ class Services(unittest.TestCase):
         pub.signal(signal.SIGINT)
         self.assertEqual(pub.wait(), 130, pub.err)
 
+    def test_who_publishes_a_line_that_is_too_large_to_be_kept_is_told(self):
+        hub = Hub(self)
+        largest = (1 << 20) - 16  # GIMI's header
+        for size, kept in ((largest, True), (largest + 1, False)):
+            pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay",
+                               stdin=subprocess.PIPE).feed(b"x" * size + b"\n")
+            wait_until(lambda: "stays until Ctrl-C" in pub.err, "the end of its input")
+            self.assertEqual("bytes is too large to be kept" in pub.err, not kept, pub.err)
+            self.assertEqual(hub.counter("not_retained") != 0, not kept, "what it says is what the hub does")
+            pub.signal(signal.SIGINT)
+            self.assertEqual(pub.wait(), 130, pub.err)
+
+    def test_terms_that_the_hub_forbids_are_wrong_arguments(self):
+        hub = Hub(self)
+        pub = start_gimnet(self, hub, "pub", "robot/odom", stdin=subprocess.PIPE)
+        hub.wait_for_node("robot")
+        for words, said in ((["echo", "robot/odom", "--depth", "65"], "depth of a subscription must be 1 to 64;"),
+                            (["echo", "nobody/here", "--window", "1025"], "window of a subscription must be 1 to 1024;"),
+                            (["echo", "nobody/*", "--window", "1025"], "window of a subscription must be 1 to 1024;"),
+                            (["pub", "a/b", "--delivery", "sync:1025"], "n of delivery sync(n) must be 1 to 1024;")):
+            tool = run_gimnet(hub, *words, data=b"x\n")
+            self.assertEqual((tool.code, tool.out, said in tool.err), (2, b"", True), tool.err)
+        pub.feed(b"")
+
     def test_json_of_a_message(self):
         hub = Hub(self)
         echo = start_gimnet(self, hub, "echo", "a/b/c", "-n", "2", "--json")

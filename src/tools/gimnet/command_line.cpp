@@ -58,6 +58,19 @@ CommandLineEnding unknown_command(std::string_view word) {
   return wrong("there is no command '" + std::string(word) + "'" + nearest, {});
 }
 
+/// A word before the command that looks like an option and is none, whose value was taken for the command; "" if there
+/// is no such word. REQUIRES: `command` is one of the arguments.
+std::string_view stranger_before(std::string_view command, std::span<const char* const> arguments,
+                                 const CLI::App& app) {
+  for (const char* const argument : arguments) {
+    if (argument == command.data()) break;
+    const std::string_view word = argument;
+    if (!word.starts_with('-')) continue;
+    if (app.get_option_no_throw(std::string(word.substr(0, word.find('=')))) == nullptr) return word;
+  }
+  return {};
+}
+
 /// A line each: the whole help is longer than a screen.
 CommandLineEnding missing_command(const CLI::App& app) {
   constexpr std::size_t kColumn = 10;
@@ -177,7 +190,11 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   const Called called = called_by(arguments.subspan(arguments.empty() ? 0 : 1));
   const auto* known = kCommands.begin();
   while (known != kCommands.end() && known->first != called.command) ++known;
-  if (!called.command.empty() && known == kCommands.end()) return unknown_command(called.command);
+  if (!called.command.empty() && known == kCommands.end()) {
+    const std::string_view stranger = stranger_before(called.command, arguments, app);
+    if (stranger.empty()) return unknown_command(called.command);
+    return wrong(unexpected(std::string(stranger), options_of(app, {}), {}), {});
+  }
   const bool acts = std::ranges::find(kCtlActions, called.action) != kCtlActions.end();
   if (!called.action.empty() && !acts) return unknown_action(called.action);
   std::string sentence;

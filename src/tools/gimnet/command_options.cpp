@@ -100,7 +100,7 @@ void add_pub(CLI::App& app, Options& options) {
   pub.add_option_function<std::string>(
       "--delivery", [&options](const std::string& word) { read_delivery(word, options); },
       "stream: all messages; latest: only the newest waits; sync:N: at most N, 1 to 1000000, that a subscriber has not "
-      "taken");
+      "taken; sync: as sync:1");
   pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
   pub.add_flag("--stay", options.stay, "go on after the input has ended, until Ctrl-C: the service stays");
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")

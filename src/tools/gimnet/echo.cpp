@@ -7,11 +7,12 @@ namespace gimnet::tool {
 ExitCode run_echo(Session& session) {
   if (const auto ending = session.join({})) return *ending;
   Subscriptions subscriptions(session.node(), session.options().target, session.options().pace);
-  if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
-  if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   // Whoever asks for less than all has gaps on purpose.
-  const PaceOptions& pace = session.options().pace;
-  const bool all = pace.window == 0 && pace.depth == PaceOptions{}.depth && pace.rate_hz <= 0.0;
+  const bool all = !wants_less(session.options().pace);
+  if (const auto opened = subscriptions.open(); !opened) {
+    return code_of_terms(session.fail(opened.failure()), opened.failure().status, !all);
+  }
+  if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   MissedMessages missed;
   return print_messages(
       session, [&](Timeout timeout) { return subscriptions.receive(timeout); }, all ? &missed : nullptr);

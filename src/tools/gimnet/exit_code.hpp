@@ -43,4 +43,9 @@ enum class ExitCode : std::uint8_t {
   }
 }
 
+/// `code` of a request of which the user chose the `terms`: those that the hub's limits forbid are wrong words of his.
+[[nodiscard]] constexpr ExitCode code_of_terms(ExitCode code, Status status, bool terms) {
+  return terms && status == Status::limit && code == exit_code_of(status) ? ExitCode::usage : code;
+}
+
 }  // namespace gimnet::tool

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "base/clock.hpp"
+#include "proto/gimi/message_header.hpp"
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/json_writer.hpp"
@@ -16,6 +17,9 @@ namespace {
 
 /// How long the last lines may take to leave.
 constexpr Timeout kDrain{10'000};
+/// What a hub keeps of a retained service, unless its limit `retained_bytes` is another one, and its provider's
+/// library.
+constexpr std::size_t kRetainedMax = std::size_t{1} << 20;
 /// How often the connection is looked at.
 constexpr std::int64_t kLookNs = 200'000'000;
 
@@ -57,6 +61,25 @@ class Standing {
   std::int64_t next_look_ns_ = 0;
 };
 
+/// Nobody else could say so to whoever publishes: a hub only counts what it does not keep.
+class Retaining {
+ public:
+  explicit Retaining(const Options& options) : told_(!options.retain) {}
+
+  /// Says, once, what will not come to those who subscribe later.
+  void look_at(std::string_view line) {
+    if (told_ || line.size() + proto::gimi::kMessagePrefixMax <= kRetainedMax) return;
+    told_ = true;
+    say("a line of " + std::to_string(line.size()) +
+        " bytes is too large to be kept for who subscribes later: at most " +
+        std::to_string(kRetainedMax - proto::gimi::kMessagePrefixMax) +
+        " bytes are, unless the hub's limit retained_bytes says otherwise");
+  }
+
+ private:
+  bool told_;
+};
+
 Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
@@ -65,12 +88,14 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
   const Progress progress([&] {
     return std::to_string(publisher.published()) + " published to " + std::to_string(publisher.subscribers());
   });
+  Retaining retaining(session.options());
   std::string_view line;
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
         if (!standing.stands_until(next_ns)) return standing.outcome();
         next_ns += period_ns;
+        retaining.look_at(line);
         if (auto sent = publisher.publish(line, period_ns == 0 && input.has_line() ? More::yes : More::no); !sent) {
           return sent;
         }
@@ -130,7 +155,10 @@ ExitCode run_pub(Session& session) {
   service.lane = options.lane;
   service.key = options.key;
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
-  if (!publisher) return session.fail(publisher.failure());
+  if (!publisher) {
+    const bool terms = options.delivery == Delivery::sync;
+    return code_of_terms(session.fail(publisher.failure()), publisher.failure().status, terms);
+  }
   Standing standing(session);
   auto sent = wait_for_subscribers(session, *publisher, standing);
   if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing);

@@ -17,7 +17,22 @@ constexpr Timeout kLookAgain{1'000};
 
 }  // namespace
 
-Outcome<void> Subscriptions::open() { return is_pattern(word_) ? look_again() : subscribe(word_); }
+bool wants_less(const PaceOptions& pace) {
+  return pace.window != 0 || pace.depth != PaceOptions{}.depth || pace.rate_hz > 0.0;
+}
+
+Outcome<void> Subscriptions::open() {
+  if (!is_pattern(word_)) return subscribe(word_);
+  if (auto done = look_again(); !done) return done;
+  return all_.empty() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
+}
+
+/// Whether the hub takes the pace, before there is a service to which it could say no: by a subscription that ends at
+/// once, of a service that nobody has.
+Outcome<void> Subscriptions::ask_terms() {
+  auto subscription = node_.subscribe("gimnet-echo/terms", {1, AtFullQueue::stop_reading}, kSubscribe, pace_);
+  return subscription ? Outcome<void>{} : subscription.failure();
+}
 
 Outcome<void> Subscriptions::subscribe(const std::string& service) {
   auto subscription = node_.subscribe(service, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);

@@ -12,6 +12,9 @@ namespace gimnet::tool {
 /// Are several names meant?
 [[nodiscard]] inline bool is_pattern(std::string_view word) { return word.find('*') != std::string_view::npos; }
 
+/// Not all messages are wanted, and the hub has to take the terms.
+[[nodiscard]] bool wants_less(const PaceOptions& pace);
+
 /// The services that a word of the command line names: one by its full name, which need not exist yet, or all that
 /// match a pattern, those that come later too. Thread safety: one thread.
 class Subscriptions {
@@ -34,6 +37,7 @@ class Subscriptions {
   [[nodiscard]] Outcome<void> subscribe(const std::string& service);
   /// Takes what is new, and lets go of what is gone.
   [[nodiscard]] Outcome<void> look_again();
+  [[nodiscard]] Outcome<void> ask_terms();
 
   Node& node_;
   std::string word_;

@@ -74,6 +74,10 @@ TEST(CommandLine, SuggestsWhatANewcomerMeant) {
   };
   said({"help"}, "there is no command 'help'; did you mean --help?");
   said({"version"}, "did you mean --version?");
+  said({"--hbu", "x", "status"}, "there is no option --hbu for gimnet; did you mean --hub?");
+  said({"--colour", "never", "status"}, "there is no option --colour for gimnet; did you mean --color?");
+  said({"--colour=never", "statsu"}, "there is no option --colour for gimnet; did you mean --color?");
+  said({"--json", "--hub", "x", "statsu"}, "there is no command 'statsu'; did you mean status?");
   said({"recv", "B"}, "'B' is one word too many for gimnet recv; did you mean --name B?");
   said({"hz", "*"}, "'*' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all");
   said({"echo", "robot*"}, "'robot*' matches no service");

@@ -148,6 +148,10 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
     return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to 1048574"};
   }
   const std::uint32_t former = session.index;
+  if (index == former) {
+    return Failure{proto::Status::taken,
+                   "this node has the id " + to_string(sessions_.node_id(session)) + " already; choose a free one"};
+  }
   // Messages for an id that the node never learned of would wait for it, and it would take none of them. A WELCOME that
   // was sent may have been lost: that is why it has to be heard of.
   if (session.renumbered) {

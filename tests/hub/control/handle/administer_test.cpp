@@ -6,6 +6,7 @@
 #include <tuple>
 #include <vector>
 
+#include "base/id_text.hpp"
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
@@ -181,7 +182,9 @@ TEST_F(AdministerTest, WhoIsKickedWatchesNothingAnyMore) {
 
 TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, admin_.id}).status, Status::taken);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, robot_.id}).status, Status::taken);
+  const auto own = refused(admin_, ctrl::Reassign{robot_.id, robot_.id});
+  EXPECT_EQ(own.status, Status::taken);
+  EXPECT_EQ(own.sentence, "this node has the id " + to_string(robot_.id) + " already; choose a free one");
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(HubId{8}, 5)}).status, Status::bad_request);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 0)}).status, Status::bad_request);
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex)}).status, Status::bad_request);
