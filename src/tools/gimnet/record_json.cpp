@@ -15,13 +15,15 @@ void write(JsonWriter& json, const NodeRecord& node) {
   json.member("joined_ms", node.joined_ms).member("services", node.services).end_object();
 }
 
-void write(JsonWriter& json, const ServiceRecord& service) {
+void write(JsonWriter& json, const ServiceRecord& service, std::optional<std::string_view> place) {
   json.begin_object().member("name", service.name).member("node", service.node.text());
   json.member("type", service.key.type).member("instance", service.key.instance);
   json.member("direction", text_of(service.direction)).member("delivery", delivery_of(service));
   json.member("retain", service.retain);
   json.member("group", service.group_id).member("subscribers", service.subscribers);
-  json.member("metadata", service.metadata).member("hub", service.hub_name).end_object();
+  json.member("metadata", service.metadata).member("hub", service.hub_name);
+  if (place) json.member("place", *place);
+  json.end_object();
 }
 
 }  // namespace gimnet::tool

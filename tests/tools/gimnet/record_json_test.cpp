@@ -22,6 +22,10 @@ TEST(RecordJson, OfAService) {
           R"({"name":"robot/odom","node":"7.17","type":4,"instance":2,"direction":"provides","delivery":"latest",)"),
       0u)
       << json.str();
+  EXPECT_EQ(json.str().find("place"), std::string::npos) << "it is not known here";
+  JsonWriter placed;
+  write(placed, service, "127.0.0.1:4000");
+  EXPECT_TRUE(placed.str().ends_with(R"("hub":"lab","place":"127.0.0.1:4000"})")) << placed.str();
 }
 
 }  // namespace
