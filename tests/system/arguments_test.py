@@ -120,6 +120,9 @@ class WrongForGimnet(unittest.TestCase):
         tool = run_gimnet(hub, "recv", "--name", "no spaces")
         self.assertEqual(tool.code, 2)
         self.assertIn("no spaces", tool.err)
+        tool = run_gimnet(hub, "recv", "--name", "7.1")
+        self.assertEqual(tool.code, 2)
+        self.assertIn("'7.1': it reads as the id of a node does, NUMBER.NUMBER", tool.err)
 
     def test_a_reader_of_the_output_that_went_away_had_enough(self):
         hub = Hub(self)

@@ -47,7 +47,7 @@ class Handshakes(HostileInput):
                 self.refused_as(["malformed"], OPENING + data)
 
     def test_bad_names_and_roles(self):
-        for name in ("/", "a//b", "a b", "x" * 256, "/".join("a" * 17)):
+        for name in ("/", "a//b", "a b", "x" * 256, "/".join("a" * 17), "7.1"):
             with self.subTest(name=name):
                 self.refused_as(["bad_name", "malformed"], OPENING + hello(name))
         for role in (1, 2, 3, 255):

@@ -30,9 +30,11 @@ nif_status ask(Node& node, const Request& request, Answer& answer, const char* w
   return NIF_OK;
 }
 
-inline nif_status check_name(const char* name, const char* what) {
+/// `fault_of`: the rules, proto::name_fault or a stricter one.
+inline nif_status check_name(const char* name, const char* what,
+                             const char* (*fault_of)(std::string_view) = proto::name_fault) {
   if (name == nullptr) return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
-  const char* fault = proto::name_fault(name);
+  const char* fault = fault_of(name);
   if (fault == nullptr) return NIF_OK;
   return fail(NIF_BAD_NAME, std::string("cannot ") + what + " '" + name + "': " + fault);
 }

@@ -23,7 +23,8 @@ extern "C" {
 
 nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (const nif_status status = check_name(name, "take the name"); status != NIF_OK) return status;
+    if (const nif_status status = check_name(name, "take the name", gimnet::proto::node_name_fault); status != NIF_OK)
+      return status;
     ns::RegisterNameAnswer answer;
     const nif_status status =
         ask(found, ns::RegisterName{name}, answer, "take the name", name, deadline_after(timeout_ms));

@@ -32,7 +32,7 @@ std::optional<Failure> read_identity(const nif_options& given, Options& options)
   if (given.name != nullptr) options.name = given.name;
   if (given.description != nullptr) options.description = given.description;
   if (options.description.size() > kDescriptionBytesMax) return bad("the description is over 256 bytes");
-  const char* fault = options.name.empty() ? nullptr : proto::name_fault(options.name);
+  const char* fault = options.name.empty() ? nullptr : proto::node_name_fault(options.name);
   if (fault != nullptr) {
     return Failure{NIF_BAD_NAME, "cannot connect as '" + options.name + "': " + std::string(fault)};
   }

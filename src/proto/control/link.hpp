@@ -51,7 +51,7 @@ struct Hello {
   static constexpr const char* kName = "HELLO";
 
   Role role = Role::node;        ///< as sent: may be a value that is not listed
-  std::string name;              ///< empty: none wanted. As sent: check with name_fault()
+  std::string name;              ///< empty: none wanted. As sent: check with node_name_fault()
   std::vector<std::byte> token;  ///< empty: a new session
   std::uint64_t epoch = 0;       ///< random, new for each life of this end's counts
   bool resume = false;           ///< wanted

@@ -39,6 +39,16 @@ const char* part_fault(std::string_view part) {
   return nullptr;
 }
 
+bool is_number(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// Of numbers of any size: what is no id today may be one for somebody else.
+bool reads_as_id(std::string_view name) {
+  const auto dot = name.find('.');
+  return dot != std::string_view::npos && is_number(name.substr(0, dot)) && is_number(name.substr(dot + 1));
+}
+
 enum class Wildcards { refused, allowed };
 
 const char* fault(std::string_view text, Wildcards wildcards) {
@@ -56,6 +66,11 @@ const char* fault(std::string_view text, Wildcards wildcards) {
 }  // namespace
 
 const char* name_fault(std::string_view name) { return fault(name, Wildcards::refused); }
+
+const char* node_name_fault(std::string_view name) {
+  if (const char* found = name_fault(name)) return found;
+  return reads_as_id(name) ? "it reads as the id of a node does, NUMBER.NUMBER" : nullptr;
+}
 
 bool valid_pattern(std::string_view pattern) { return fault(pattern, Wildcards::allowed) == nullptr; }
 

@@ -15,6 +15,9 @@ inline constexpr std::size_t kNamePartsMax = 16;
 /// What is wrong with a name, as a clause for a sentence ("it is empty"); nullptr: nothing is.
 [[nodiscard]] const char* name_fault(std::string_view name);
 [[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
+/// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends there means the id.
+[[nodiscard]] const char* node_name_fault(std::string_view name);
+[[nodiscard]] inline bool valid_node_name(std::string_view name) { return node_name_fault(name) == nullptr; }
 
 /// A name, of which parts may be `*` (one part) or `**` (any number, none included).
 [[nodiscard]] bool valid_pattern(std::string_view pattern);

@@ -90,6 +90,7 @@ TEST_F(WatchTableTest, ANameThatIsHeldIsRefused) {
   EXPECT_TRUE(taken.is(Status::taken));
   EXPECT_NE(taken.failure().sentence.find(viewer.peer().text()), std::string::npos) << taken.failure().sentence;
   EXPECT_TRUE(robot.take_name("a//b", kWait).is(Status::bad_name));
+  EXPECT_TRUE(robot.take_name("7.1", kWait).is(Status::bad_name)) << "who sends there would reach somebody else";
   EXPECT_EQ(robot.state().name, "robot");
 }
 

@@ -36,6 +36,17 @@ TEST(Names, HaveAtMost16Parts) {
   EXPECT_STREQ(name_fault(repeated("a", 17)), "it has more than 16 parts");
 }
 
+TEST(Names, OfNodesDoNotReadAsIdsDo) {
+  for (const char* name : {"7.17", "0.0", "007.1", "4095.1048575", "99999999999999999999.1"}) {
+    EXPECT_STREQ(node_name_fault(name), "it reads as the id of a node does, NUMBER.NUMBER") << name;
+    EXPECT_TRUE(valid_name(name)) << "as that of a service within its node, or a pattern: " << name;
+  }
+  for (const char* name : {"7", "7.", ".7", "7.17.1", "7.17/a", "a/7.17", "v7.17", "7.17a", "7-17", "7.-1"}) {
+    EXPECT_TRUE(valid_node_name(name)) << name;
+  }
+  EXPECT_STREQ(node_name_fault("a b"), name_fault("a b"));
+}
+
 TEST(Patterns, AreNamesWithWildcardParts) {
   for (const char* pattern : {"a", "*", "**", "a/*", "*/a/**", "**/**"}) EXPECT_TRUE(valid_pattern(pattern)) << pattern;
   for (const char* pattern : {"", "a*", "***", "*/", "**a", "a//*"}) EXPECT_FALSE(valid_pattern(pattern)) << pattern;

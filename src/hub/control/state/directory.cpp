@@ -31,7 +31,7 @@ bool Directory::is_provisional(std::string_view name) const {
 
 std::optional<Refusal> Directory::refusal(std::string_view name, const Session* claimant, const Sessions& sessions,
                                           std::chrono::milliseconds now) const {
-  if (const char* fault = proto::name_fault(name)) {
+  if (const char* fault = proto::node_name_fault(name)) {
     return Refusal{proto::GoodbyeCode::bad_name,
                    "the name '" + escaped(name, kQuotedMax) + "' cannot be taken: " + fault + "; choose another one"};
   }

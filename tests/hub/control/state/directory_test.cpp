@@ -66,6 +66,11 @@ TEST_F(DirectoryTest, BadNamesAreToldWhichRuleTheyBreak) {
   EXPECT_EQ(refusal->code, proto::GoodbyeCode::bad_name);
   EXPECT_FALSE(directory_.refusal(std::string(255, 'a'), nullptr, sessions_, 0ms));
   EXPECT_TRUE(directory_.refusal(std::string(256, 'a'), nullptr, sessions_, 0ms));
+  const auto id = directory_.refusal("7.1", nullptr, sessions_, 0ms);
+  ASSERT_TRUE(id);
+  EXPECT_EQ(id->code, proto::GoodbyeCode::bad_name);
+  EXPECT_EQ(id->sentence,
+            "the name '7.1' cannot be taken: it reads as the id of a node does, NUMBER.NUMBER; choose another one");
   const auto hostile = directory_.refusal("\x1b[2J", nullptr, sessions_, 0ms);
   ASSERT_TRUE(hostile);
   EXPECT_THAT(hostile->sentence, HasSubstr("\\x1b"));
