@@ -47,7 +47,10 @@ struct Limits {
   std::uint64_t slow_consumer_bytes = 4'096;
   std::uint64_t resume_bytes = 1ull << 20;
   std::uint64_t report_interval_ms = 10;
+  std::uint64_t reports = 4'096;
   std::uint64_t socket_send_bytes = 256 * 1024;
+  std::uint64_t unsent_ms = 40;
+  std::uint64_t unsent_bytes = 128 * 1024;
   // Between shards
   std::uint64_t mailbox_entries = 8'192;
   std::uint64_t mailbox_bytes = 16ull << 20;

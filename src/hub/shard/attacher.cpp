@@ -2,6 +2,7 @@
 
 #include <sys/random.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "hub/shard/control_frame.hpp"
@@ -26,8 +27,9 @@ void Attacher::attach(AttachCommand command) {
   Connection& connection = session_of(command);
   closer_.fence(connection);
   connection.transport = std::move(command.transport);
-  connection.transport->limit_unsent(kFirstUnsentBytes);
-  connection.unsent_limit = kFirstUnsentBytes;
+  connection.unsent_limit =
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(kFirstUnsentBytes, state_.limits.unsent_bytes));
+  connection.transport->limit_unsent(connection.unsent_limit);
   connection.attachment = command.attachment;
   connection.connected = true;
   connection.tell_heard = command.tell_heard;

@@ -6,11 +6,9 @@
 namespace gimnet::hub {
 namespace {
 
-/// What may wait unsent in the kernel on a connection that does not take everything at once: about so long at its
-/// measured rate, between these bounds (docs/architecture.md, "Freshness").
-constexpr std::uint64_t kUnsentMs = 40;
+/// What may wait unsent in the kernel on a connection that does not take everything at once: unsent_ms at its measured
+/// rate, at least so much, at most unsent_bytes (docs/architecture.md, "Freshness").
 constexpr std::uint64_t kUnsentBytesMin = 4 * 1024;
-constexpr std::uint64_t kUnsentBytesMax = 128 * 1024;
 constexpr std::uint64_t kRateWindowMs = 200;
 /// Above this rate what waits in the kernel is gone in a moment, and bounding it costs a quarter of the throughput.
 constexpr std::uint64_t kFastBytesPerS = 10 << 20;
@@ -163,7 +161,8 @@ void Flusher::adapt_unsent_limit(Connection& connection, std::uint64_t taken) {
   const std::uint64_t rate = (taken - progress.rate_bytes) * 1'000 / passed_ms;
   progress.rate_bytes = taken;
   progress.rate_since_ms = state_.now_ms;
-  const std::uint64_t wanted = std::clamp(rate * kUnsentMs / 1'000, kUnsentBytesMin, kUnsentBytesMax);
+  const std::uint64_t wanted =
+      std::clamp(rate * state_.limits.unsent_ms / 1'000, kUnsentBytesMin, state_.limits.unsent_bytes);
   const auto limit = rate > kFastBytesPerS ? 0u : static_cast<std::uint32_t>(wanted);
   // A change that matters; each is a system call.
   if (limit > connection.unsent_limit / 4 * 5 || limit < connection.unsent_limit / 4 * 3) {

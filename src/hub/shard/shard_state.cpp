@@ -11,7 +11,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       budget(hub_shared.budget),
       pool(static_cast<std::uint32_t>(hub_shared.limits.frame_bytes), budget),
       pieces(budget),
-      drops(tally, hub_shared.limits.report_interval_ms),
+      drops(tally, hub_shared.limits.report_interval_ms, hub_shared.limits.reports),
       signals(*this),
       egress{.limits = limits,
              .pool = pool,

@@ -232,6 +232,27 @@ TEST(Flusher, BoundsWhatWaitsUnsentBehindASlowConnection) {
   EXPECT_LE(b.pipe.unsent_limit(), 20'000u) << "at most 100 ms of it";
 }
 
+TEST(Flusher, WhatMayWaitUnsentIsATimeAndAtMostBytes) {
+  const auto unsent_at = [](std::uint64_t ms, std::uint64_t bytes) {
+    Limits limits;
+    limits.unsent_ms = ms;
+    limits.unsent_bytes = bytes;
+    HubRig rig(1, limits);
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0);
+    b.pipe.set_room(60'000);
+    for (int i = 0; i < 60; ++i) rig.send(a, b.id.value(), std::string(10'000, 'x'));
+    for (int step = 0; step < 10; ++step) {
+      rig.pass_ms(100);
+      b.read(20'000);  // 200 KB/s
+    }
+    return b.pipe.unsent_limit();
+  };
+  EXPECT_GT(unsent_at(1'000, 1 << 20), 128u * 1024) << "what it takes in a second";
+  EXPECT_EQ(unsent_at(1'000, 150'000), 150'000u) << "bounded";
+  EXPECT_EQ(unsent_at(1'000, 4'096), 4'096u) << "from its first byte on";
+}
+
 TEST(Flusher, ABrokenTransportEndsTheConnectionOnly) {
   HubRig rig;
   FakeNode& a = rig.join(0);

@@ -28,7 +28,7 @@ void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::Dro
   auto note = std::find_if(notes_.begin(), notes_.end(),
                            [&](const Note& each) { return each.sender == sender && each.reason == reason; });
   if (note == notes_.end()) {
-    if (notes_.size() == kNotesMax) return;
+    if (notes_.size() == notes_max_) return;
     note = notes_.emplace(notes_.end());
     note->sender = sender;
     note->reason = reason;

@@ -16,7 +16,9 @@ namespace gimnet::hub {
 class DropBook {
  public:
   /// interval_ms: the shortest time between two reports to one sender for one reason.
-  DropBook(Tally& tally, std::uint64_t interval_ms) : tally_(tally), interval_ms_(interval_ms) {}
+  /// notes_max: senders and reasons remembered at once; the drops of more are counted but not reported.
+  DropBook(Tally& tally, std::uint64_t interval_ms, std::uint64_t notes_max)
+      : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
   /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one header but for the
   /// length.
@@ -51,9 +53,6 @@ class DropBook {
   }
 
  private:
-  /// Senders and reasons remembered at once; the drops of more are counted but not reported.
-  static constexpr std::size_t kNotesMax = 4096;
-
   struct Note {
     NodeId sender;
     proto::DropReason reason{};
@@ -69,7 +68,8 @@ class DropBook {
 
   Tally& tally_;
   const std::uint64_t interval_ms_;
-  std::vector<Note> notes_;
+  const std::uint64_t notes_max_;
+  std::vector<Note> notes_;  ///< Limit: reports
 };
 
 }  // namespace gimnet::hub

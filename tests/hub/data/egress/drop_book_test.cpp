@@ -31,7 +31,7 @@ void drop(DropBook& book, const std::string& text, std::uint32_t src, DropReason
 
 TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
   Tally tally;
-  DropBook book(tally, 10);
+  DropBook book(tally, 10, 4'096);
   drop(book, "quiet", 1, DropReason::queue_full, 0);
   EXPECT_FALSE(book.pending());
   drop(book, "loud", 1, DropReason::queue_full);
@@ -48,7 +48,7 @@ TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
 // What is to be written again after a break may come from many senders, one behind the other.
 TEST(DropBook, ReportsEachOfFramesWithDifferentHeaders) {
   Tally tally;
-  DropBook book(tally, 10);
+  DropBook book(tally, 10, 4'096);
   std::vector<std::byte> all;
   const auto add = [&all](const std::string& text, std::uint32_t src, std::uint8_t flags) {
     const auto one = EgressRig::bytes(text, {.flags = flags, .src = src});
@@ -70,7 +70,7 @@ TEST(DropBook, ReportsEachOfFramesWithDifferentHeaders) {
 
 TEST(DropBook, MergesBySenderAndReasonAndKeepsTheLastFrame) {
   Tally tally;
-  DropBook book(tally, 10);
+  DropBook book(tally, 10, 4'096);
   drop(book, "one", 1, DropReason::queue_full);
   EgressRig rig;
   const hub::Run run = rig.run({"two", "three", "four!"}, {.flags = proto::kFlagReport, .src = 1});
@@ -87,7 +87,7 @@ TEST(DropBook, MergesBySenderAndReasonAndKeepsTheLastFrame) {
 
 TEST(DropBook, SaysNoMoreThanOneAnInterval) {
   Tally tally;
-  DropBook book(tally, 10);
+  DropBook book(tally, 10, 4'096);
   drop(book, "one", 1, DropReason::queue_full);
   EXPECT_EQ(flush(book, 1'000).size(), 1u);
   drop(book, "two", 1, DropReason::queue_full);
@@ -97,11 +97,26 @@ TEST(DropBook, SaysNoMoreThanOneAnInterval) {
 }
 
 // So many senders at once that some are only counted; later ones are heard again.
+TEST(DropBook, ReportsAsManySendersAndReasonsAsItIsTold) {
+  for (const std::uint64_t notes_max : {1u, 3u}) {
+    Tally tally;
+    DropBook book(tally, 10, notes_max);
+    for (std::uint32_t src = 1; src <= notes_max; ++src) drop(book, "x", src, DropReason::away);
+    drop(book, "one beyond", 9, DropReason::away);
+    drop(book, "one beyond", 1, DropReason::queue_full);
+    drop(book, "of one that it knows", 1, DropReason::away);
+    const auto sent = flush(book, 1'000);
+    ASSERT_EQ(sent.size(), notes_max);
+    EXPECT_EQ(proto::decode_report(sent[0].payload)->count, 2u);
+    EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::away)], notes_max + 2) << "counted all the same";
+  }
+}
+
 TEST(DropBook, ForgetsSendersThatAreQuiet) {
   Tally tally;
-  DropBook book(tally, 10);
+  DropBook book(tally, 10, 4'096);
   for (std::uint32_t src = 1; src <= 5'000; ++src) drop(book, "x", src, DropReason::away);
-  EXPECT_EQ(flush(book, 1'000).size(), 4'096u);
+  EXPECT_FALSE(flush(book, 1'000).empty());
   for (std::uint64_t now = 1'000; book.pending() && now < 2'000; now += 10) flush(book, now);
   EXPECT_FALSE(book.pending());
   drop(book, "x", 9'000, DropReason::away);

@@ -195,6 +195,22 @@ TEST(FullOutbox, BlockOfASenderThatComesThoughHeldIsDroppedBeyondWhatWasUnderWay
   EXPECT_TRUE(rig.ledger_exact());
 }
 
+TEST(FullOutbox, TheRestOfTheOldestOfTooManyCutMessagesIsLetThrough) {
+  for (const std::uint32_t cut : {64u, 65u}) {
+    EgressRig rig(small_limits());
+    TestConnection connection(rig);
+    block(connection);
+    for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.flags = kDrop});
+    for (std::uint32_t number = 1; number <= cut; ++number) {
+      rig.push_fragment(connection.outbox, number, 0, 2'000, std::string(1'000, 'a'), {.flags = kDrop});
+    }
+    EXPECT_EQ(rig.dropped(DropReason::queue_full), cut);
+    rig.push_fragment(connection.outbox, 1, 1'000, 2'000, std::string(1'000, 'a'), {.flags = kDrop, .lane = 2});
+    EXPECT_EQ(rig.dropped(DropReason::cut_message), cut == 64 ? 1u : 0u) << cut;
+    EXPECT_TRUE(rig.ledger_exact());
+  }
+}
+
 TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);

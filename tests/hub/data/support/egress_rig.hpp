@@ -39,7 +39,7 @@ class EgressRig {
         lease(budget),
         pool(static_cast<std::uint32_t>(limits.frame_bytes), lease),
         pieces(lease),
-        drops(tally, limits.report_interval_ms),
+        drops(tally, limits.report_interval_ms, limits.reports),
         context{limits, pool, pieces, lease, tally, drops, signals, 1'000'000, 1'000'000'000} {}
 
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
