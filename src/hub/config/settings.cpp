@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <optional>
 
 #include "base/suggest.hpp"
@@ -39,8 +40,22 @@ bool has_kind(const Given& given, Kind wanted, const std::string& example, Fault
   return false;
 }
 
+/// What may be written instead of a value that is no whole number: the nearest one to what can be read as a number, or
+/// the usual one.
+std::uint64_t nearest_number(const Value& value, std::uint64_t least, std::uint64_t most, std::uint64_t usual) {
+  if (value.kind != Kind::text && value.kind != Kind::fraction) return usual;
+  double number = 0.0;
+  const char* const last = value.text.data() + value.text.size();
+  const auto [end, error] = std::from_chars(value.text.data(), last, number);
+  if (error != std::errc{} || end != last || !std::isfinite(number)) return usual;
+  if (number <= static_cast<double>(least)) return least;
+  if (number >= static_cast<double>(most)) return most;
+  return static_cast<std::uint64_t>(std::llround(number));
+}
+
 std::optional<std::size_t> number_in(const Given& given, std::size_t least, std::size_t most, Faults& faults) {
-  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(least), faults)) return std::nullopt;
+  const std::uint64_t instead = nearest_number(given.value, least, most, least);
+  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(instead), faults)) return std::nullopt;
   const std::string& text = given.value.text;
   std::size_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -204,9 +219,8 @@ void apply_limit(Configuration& configuration, const Given& given, std::string_v
   }
   // A text may have a suffix: "64k".
   const bool number = given.value.kind == Kind::text || given.value.kind == Kind::words;
-  if (!number && !has_kind(given, Kind::integer, std::string{name} + " = " + std::to_string(limit->least), faults)) {
-    return;
-  }
+  const std::uint64_t instead = nearest_number(given.value, limit->least, limit->most, Limits{}.*(limit->field));
+  if (!number && !has_kind(given, Kind::integer, std::string{name} + " = " + std::to_string(instead), faults)) return;
   std::string error = set_limit(configuration.options.limits, *limit, given.value.text);
   if (error.empty()) return;
   // Of a file the place says where that stands; of the environment only the variable's name can.

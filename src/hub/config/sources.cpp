@@ -142,7 +142,12 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
   std::vector<std::string> files;
   std::error_code error;
   const fs::file_status status = fs::status(folder, error);
-  if (status.type() == fs::file_type::not_found || (!error && !fs::is_directory(status))) return files;
+  if (status.type() == fs::file_type::not_found) return files;
+  if (!error && !fs::is_directory(status)) {
+    faults.push_back({folder.string(),
+                      "this is not a folder, of which the *.toml would be read; make it one, or give it another name"});
+    return files;
+  }
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (entry->path().extension() == ".toml") files.push_back(entry->path().string());
   }

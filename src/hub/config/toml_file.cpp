@@ -31,6 +31,8 @@ namespace {
 
 constexpr std::size_t kQuotedMax = 120;
 constexpr std::string_view kOnlyTable = "limits";
+/// What a whole number of TOML may consist of.
+constexpr std::string_view kNumberCharacters = "0123456789abcdefABCDEFox_+-";
 /// Each try to read the rest leaves out one line more at least; a file that needs more of them is left alone.
 constexpr std::size_t kTriesMax = 2 * kConfigFaultsMax;
 /// Stands for a table whose header cannot be read: what is in it is nobody's.
@@ -60,6 +62,17 @@ class Lines {
       const bool header = trimmed(line).starts_with('[');
       line = header ? "[\"" + std::string{kLostTable} + std::to_string(number) + "\"]" : std::string{};
     }
+  }
+  /// The number that ends right before the column (from 1, in characters), and where it begins.
+  [[nodiscard]] std::pair<std::string_view, std::size_t> number_before(std::size_t number, std::size_t column) const {
+    const std::string_view line = lines_[number - 1];
+    std::size_t end = 0;
+    for (std::size_t at = 1; at < column && end < line.size(); ++at) {
+      end += std::max<std::size_t>(character_size(line.substr(end)), 1);
+    }
+    std::size_t begin = end;
+    while (begin > 0 && kNumberCharacters.find(line[begin - 1]) != std::string_view::npos) --begin;
+    return {line.substr(begin, end - begin), column - (end - begin)};
   }
   /// Column (from 1, in bytes) of the first character that is no blank.
   [[nodiscard]] std::size_t first_column(std::size_t number) const {
@@ -130,6 +143,12 @@ Fault fault_of(const toml::parse_error& error, const Lines& lines, const std::st
   if (what.starts_with("cannot redefine")) {
     return {place_of(name, line, lines.first_column(line)),
             "'" + escaped(quoted_part(what), kQuotedMax) + "' is given twice; leave one of them out"};
+  }
+  if (what.ends_with("is not representable in 64 bits")) {
+    // It is told behind the number.
+    const auto [number, column] = lines.number_before(line, error.source().begin.column);
+    return {place_of(name, line, column), "no key can be '" + escaped(number, kQuotedMax) +
+                                              "': it does not fit in 64 bits; give a number that is nearer to 0"};
   }
   return {place_of(name, line, error.source().begin.column),
           "this is not TOML: " + escaped(what, kQuotedMax) + "; write KEY = VALUE, texts in quotes"};

@@ -72,7 +72,13 @@ TEST(Settings, EveryLimitIsAKeyWithItsLeastAndItsMost) {
 }
 
 TEST(Settings, TheWrongTypeIsToldWithTheRightOne) {
-  EXPECT_EQ(fault("shards = '2'"), "f:1:10: shards is a whole number, not a text: write shards = 1");
+  EXPECT_EQ(fault("shards = '2'"), "f:1:10: shards is a whole number, not a text: write shards = 2");
+  EXPECT_THAT(fault("shards = 'many'"), HasSubstr("write shards = 1"));
+  EXPECT_THAT(fault("shards = 99.5"), HasSubstr("a fraction: write shards = 16"));
+  EXPECT_THAT(fault("[limits]\nturn_bytes = true"), HasSubstr("write turn_bytes = 262144")) << "its default";
+  EXPECT_THAT(fault("[limits]\nturn_bytes = 5000.4"), HasSubstr("write turn_bytes = 5000"));
+  EXPECT_THAT(fault("[limits]\nturn_bytes = 0.5"), HasSubstr("write turn_bytes = 4096"));
+  EXPECT_THAT(fault("[limits]\nturn_bytes = nan"), HasSubstr("write turn_bytes = 262144"));
   EXPECT_EQ(fault("insecure = 'yes'"), "f:1:12: insecure is true or false, not a text: write insecure = true");
   EXPECT_EQ(fault("hub_name = 5"), "f:1:12: hub_name is a text, not a whole number: write hub_name = \"hall\"");
   EXPECT_THAT(fault("listen = 7450"), HasSubstr("write listen = [\"tcp://127.0.0.1:7450\"]"));

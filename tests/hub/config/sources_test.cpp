@@ -127,6 +127,16 @@ TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
   EXPECT_THAT(read().faults[0].line(), HasSubstr("it is a folder"));
 }
 
+TEST_F(SourcesTest, AFileInThePlaceOfTheFolderIsTold) {
+  write("hub.toml", "hub_id = 9\n");
+  write("conf.d", "hub_id = 8\n");
+  const ReadConfiguration configuration = read();
+  ASSERT_THAT(configuration.faults, SizeIs(1));
+  EXPECT_EQ(configuration.faults[0].line(),
+            folder_.path("conf.d") +
+                ": this is not a folder, of which the *.toml would be read; make it one, or give it another name");
+}
+
 TEST_F(SourcesTest, WithoutDescriptorsNothingIsReadAndThatIsSaid) {
   write("hub.toml", "hub_id = 9\n");
   make_conf_d();

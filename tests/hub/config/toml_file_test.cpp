@@ -102,6 +102,17 @@ TEST(TomlFile, AnErrorInALongerValueCostsThatValueAlone) {
   EXPECT_THAT(keys(open), ElementsAre("hub_id"));
 }
 
+TEST(TomlFile, ANumberThatIsTooLargeIsToldWhereItStands) {
+  const TomlFile file = read_toml(
+      "[limits]\na = 9223372036854775807\nb =  9223372036854775808 # c\n\"\u00e4\" = -99999999999999999999\n"
+      "c = 0xffff_ffff_ffff_ffff_f\nd = [1, 99999999999999999999]\ne = 2\n",
+      "f");
+  EXPECT_THAT(places(file), ElementsAre("f:3:6", "f:4:7", "f:5:5", "f:6:9"));
+  EXPECT_EQ(file.faults[1].sentence,
+            "no key can be '-99999999999999999999': it does not fit in 64 bits; give a number that is nearer to 0");
+  EXPECT_THAT(keys(file), ElementsAre("limits.a", "limits.e"));
+}
+
 TEST(TomlFile, AListThatIsNotClosedHidesNothing) {
   for (const std::string list :
        {"listen = [", "listen = [ 'a'", "listen = [\n  'a',", "listen = [[", "listen = [\n\n# x\n"}) {
