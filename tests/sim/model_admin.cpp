@@ -77,9 +77,7 @@ void Model::judge_reassign(const Asked& asked) {
   const bool rests = resting != resting_ids_.end() && resting->second > asked.now;
   const bool awaited = asked.now < past_.returns_until;
   if (sessions_.contains(to) || rests || awaited || sessions_.at(index).renumbered) {
-    if (awaited && past_.nodes.contains(to) && !sessions_.contains(to)) {
-      census_.add(Happening::renumbered_to_awaited);
-    }
+    if (awaited && !rests && !sessions_.contains(to)) census_.add(Happening::renumbered_to_awaited);
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);
   }
