@@ -37,7 +37,8 @@ bool valid_naively(std::string_view text, bool wildcards) {
   if (parts.size() > 16) return false;
   for (const auto& part : parts) {
     if (wildcards && (part == "*" || part == "**")) continue;
-    if (part.empty() || part.find_first_not_of(kAllowed) != std::string::npos) return false;
+    if (part.empty() || part == "." || part == ".." || part.find_first_not_of(kAllowed) != std::string::npos)
+      return false;
   }
   return true;
 }

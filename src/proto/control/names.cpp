@@ -33,6 +33,7 @@ std::optional<Parts> split(std::string_view text) {
 
 const char* part_fault(std::string_view part) {
   if (part.empty()) return "it has an empty part: between two parts stands one /";
+  if (part == "." || part == "..") return "it has a part . or .., which belongs into paths";
   for (const char c : part) {
     if (!is_name_character(c)) return "it has a character other than A-Z a-z 0-9 . _ - and /";
   }

@@ -18,7 +18,8 @@ TEST(Names, AcceptPartsOfTheAllowedCharacters) {
 }
 
 TEST(Names, RefuseEverythingElse) {
-  for (const char* name : {"", "/", "a/", "/a", "a//b", "a b", "a*", "*", "**", "a\n", "\xC3\xA4", "a\\b", "a:b"}) {
+  for (const char* name : {"", "/", "a/", "/a", "a//b", "a b", "a*", "*", "**", "a\n", "\xC3\xA4", "a\\b", "a:b", ".",
+                           "..", "a/../b", "./a", "a/."}) {
     EXPECT_FALSE(valid_name(name)) << name;
   }
   EXPECT_FALSE(valid_name(std::string("a\0b", 3)));
