@@ -49,7 +49,7 @@ class ShardWorld {
  public:
   ShardWorld()
       : shared_{kHub,   limits_,     nodes_,    groups_,      quiescence_, budget_,
-                inbox_, {&mailbox_}, {&waker_}, {&counters_}, {&queues_}},
+                inbox_, {&mailbox_}, {&waker_}, {&counters_}, {&sessions_}},
         shard_(std::make_unique<IoShard>(ShardIndex{0}, shared_, IoShard::Options{})) {
     for (std::uint32_t i = 0; i < 2; ++i) {
       node_[i].id = make_id<NodeId>(kHub, i + 1);
@@ -225,7 +225,7 @@ class ShardWorld {
   Waker waker_;
   Mailbox mailbox_{1, {limits_.mailbox_entries, limits_.mailbox_bytes}, waker_};
   ShardCounters counters_;
-  QueueGauges queues_{8};
+  SessionGauges sessions_{8};
   const HubShared shared_;
   GroupMembers members_;
   Node node_[2];

@@ -82,8 +82,8 @@ struct Ground {
           *wakers.back()));
       counters.push_back(std::make_unique<ShardCounters>());
       readable.push_back(counters.back().get());
-      queues.push_back(std::make_unique<QueueGauges>(nodes_most));
-      readable_queues.push_back(queues.back().get());
+      sessions.push_back(std::make_unique<SessionGauges>(nodes_most));
+      readable_sessions.push_back(sessions.back().get());
     }
   }
 
@@ -98,11 +98,11 @@ struct Ground {
                      .mailboxes = {},
                      .wakers = {},
                      .counters = {},
-                     .queues = {}};
+                     .sessions = {}};
     for (const auto& mailbox : mailboxes) result.mailboxes.push_back(mailbox.get());
     for (const auto& waker : wakers) result.wakers.push_back(waker.get());
     for (const auto& counter : counters) result.counters.push_back(counter.get());
-    for (const auto& gauges : queues) result.queues.push_back(gauges.get());
+    for (const auto& gauges : sessions) result.sessions.push_back(gauges.get());
     return result;
   }
 
@@ -114,10 +114,10 @@ struct Ground {
   std::vector<std::unique_ptr<Waker>> wakers;
   std::vector<std::unique_ptr<Mailbox>> mailboxes;
   std::vector<std::unique_ptr<ShardCounters>> counters;
-  std::vector<std::unique_ptr<QueueGauges>> queues;
+  std::vector<std::unique_ptr<SessionGauges>> sessions;
   std::vector<const ShardCounters*> readable;
   RefusalCounters refusals;
-  std::vector<const QueueGauges*> readable_queues;
+  std::vector<const SessionGauges*> readable_sessions;
 };
 
 HubFacts facts_of(const HubOptions& options) {
@@ -149,7 +149,7 @@ struct Hub::Parts {
                                     ground.readable,
                                     from.start,
                                     keep_state(),
-                                    ground.readable_queues,
+                                    ground.readable_sessions,
                                     &ground.refusals,
                                     [this] { return reloader.read_again(); },
                                     [this](LogLevel level) { reloader.note_log_level(level); }}) {

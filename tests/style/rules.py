@@ -16,7 +16,7 @@ REQUIREMENTS = "docs/requirements.md"
 # Who may include whom: the table of docs/architecture.md, "May include". Longest prefix wins.
 _BASE = ("base",)
 _PROTO = _BASE + ("proto",)
-_HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/queue_gauges.hpp")
+_HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/session_gauges.hpp")
 _CONCURRENT = _PROTO + _HUB_PARTS + ("hub/concurrent",)
 _DATA = _CONCURRENT + ("hub/transport/transport.hpp", "hub/data")
 _SHARD = _DATA + ("hub/transport", "hub/shard")
@@ -29,7 +29,7 @@ MAY_INCLUDE = {
     "hub/limits.hpp": _BASE,
     "hub/limits.cpp": _BASE + ("hub/limits.hpp",),
     "hub/observe/counters.hpp": _PROTO,
-    "hub/observe/queue_gauges.hpp": _PROTO + ("hub/observe/counters.hpp",),
+    "hub/observe/session_gauges.hpp": _PROTO + ("hub/observe/counters.hpp",),
     "hub/observe/counters.cpp": _PROTO + ("hub/observe/counters.hpp",),
     "hub/concurrent": _CONCURRENT,
     "hub/data": _DATA,

@@ -122,6 +122,12 @@ struct ConnectionRecord {
   std::string peer;       ///< its address
   bool connected = false;
   std::uint64_t queued_bytes = 0;  ///< waiting for it at the hub
+  // Since its session began, over all its connections; as the hub's counters of the same names. 0: the hub is older.
+  std::uint64_t accepted = 0;        ///< frames that the hub took from it
+  std::uint64_t received_bytes = 0;  ///< that the hub had from it
+  std::uint64_t delivered = 0;       ///< frames handed to its connection; where resume is on, confirmed by it
+  std::uint64_t sent_bytes = 0;      ///< that the hub wrote to it
+  std::uint64_t dropped = 0;         ///< frames that were for it
 };
 
 }  // namespace gimnet

@@ -138,8 +138,10 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout t
     for (const auto& found : page->connections) {
       if (found.node <= request.after) return records;  // a hub that goes round in circles is not followed
       request.after = found.node;
+      const proto::ctrl::ConnectionCounts& counts = found.counts;
       records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport, found.peer,
-                         found.connected, found.queued_bytes});
+                         found.connected, counts.queued_bytes, counts.accepted, counts.received_bytes, counts.delivered,
+                         counts.sent_bytes, counts.dropped});
     }
     if (!page->more || page->connections.empty()) return records;
   }

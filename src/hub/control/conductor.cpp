@@ -176,8 +176,9 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
   Effects effects;
-  HandlerContext context{facts_,         limits_,          membership_,        watches_, wiring_.counters, now, effects,
-                         wiring_.queues, wiring_.refusals, &request_counters_, this};
+  HandlerContext context{facts_, limits_, membership_,      watches_,         wiring_.counters,
+                         now,    effects, wiring_.sessions, wiring_.refusals, &request_counters_,
+                         this};
   const Request request{*session, view->header, payload};
   const NodeId dst{proto::load_header(event.frame.data()).dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);

@@ -19,9 +19,9 @@
 #include "hub/control/table_publisher.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
+#include "hub/observe/session_gauges.hpp"
 #include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {
@@ -34,13 +34,13 @@ class Conductor final : private Administration {
   struct Wiring {
     ShardProxy& shards;
     TablePublisher::Tables tables;
-    std::span<const ShardCounters* const> counters;  ///< one per shard
-    HubStart start{};                                ///< its state was kept already
-    StateKeeper::Keep keep_state{};                  ///< or none: in memory only
-    std::span<const QueueGauges* const> queues{};    ///< one per shard, or none
-    const RefusalCounters* refusals = nullptr;       ///< or none
-    ReadAgain read_again{};                          ///< or none: the configuration stays as it is
-    std::function<void(LogLevel)> note_log_level{};  ///< told of levels that were set by request; or none
+    std::span<const ShardCounters* const> counters;    ///< one per shard
+    HubStart start{};                                  ///< its state was kept already
+    StateKeeper::Keep keep_state{};                    ///< or none: in memory only
+    std::span<const SessionGauges* const> sessions{};  ///< one per shard, or none
+    const RefusalCounters* refusals = nullptr;         ///< or none
+    ReadAgain read_again{};                            ///< or none: the configuration stays as it is
+    std::function<void(LogLevel)> note_log_level{};    ///< told of levels that were set by request; or none
   };
   /// `limits` is what the conductor's thread goes by; reload() changes it.
   Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring);

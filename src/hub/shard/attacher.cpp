@@ -77,6 +77,7 @@ Connection& Attacher::session_of(const AttachCommand& command) {
   connection->node = command.node;
   connection->slot = command.session.slot;
   connection->generation = command.session.generation;
+  connection->outbox.set_counters(state_.sessions.begin(connection->slot, connection->generation));
   state_.recipients.put(*connection);
   state_.counters.sessions.add(1);
   state_.connections[slot] = std::move(connection);
@@ -108,6 +109,8 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   state_.counters.resumed.add(1);
   state_.counters.gap_frames.add(rewind.lost);
   state_.tally.delivered += rewind.confirmed;
+  connection.outbox.counters()->delivered.add(rewind.confirmed);
+  connection.outbox.count_dropped(rewind.lost);
   state_.tally.drop(proto::DropReason::link_lost, rewind.lost);
   state_.tally.queued -= static_cast<std::int64_t>(rewind.confirmed + rewind.lost);
   if (partial.frames != 0) replay.push_back(std::move(partial));
@@ -125,6 +128,7 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command, 
   std::uint64_t lost = partial.frames;
   if (connection.resume) lost += connection.resume->kept.clear();
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
+  connection.outbox.count_dropped(lost);
   state_.tally.drop(proto::DropReason::link_lost, lost);
   state_.tally.queued -= static_cast<std::int64_t>(lost);
   connection.resume.reset();

@@ -71,12 +71,13 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   if (connection.waits_when_away) return;
   const Run partial = connection.writer.take_partial();
   if (partial.frames != 0) {
+    connection.outbox.count_dropped(partial.frames);
     state_.tally.queued -= partial.frames;
     state_.drops.drop(partial.bytes, partial.size, partial.frames, proto::DropReason::link_lost);
   }
   connection.outbox.drop_all(proto::DropReason::link_lost, state_.egress);
   state_.pacer.on_away(connection);
-  if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
+  if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
 }
 
 void Closer::tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code, std::string sentence) {
@@ -98,7 +99,7 @@ void Closer::release(SessionRef session) {
   connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);
   state_.pacer.forget(*connection);
   state_.retained.forget_provider(connection->node);
-  state_.queues.set(connection->slot, 0);
+  state_.sessions.set_queued(connection->slot, 0);
   state_.recipients.remove(*connection);
   state_.counters.sessions.subtract(1);
   state_.connections[session.slot.value()].reset();

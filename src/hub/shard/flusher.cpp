@@ -38,6 +38,7 @@ void Flusher::flush(Connection& connection) {
   if (!connection.connected || connection.blocked) return let_wait(connection);
   const std::uint64_t sent_before = state_.tally.sent_bytes;
   const std::uint64_t control_before = state_.tally.sent_control_bytes;
+  const std::uint64_t delivered_before = state_.tally.delivered;
   const Flush result = connection.writer.flush(
       connection.outbox, connection.resume ? &connection.resume->kept : nullptr, *connection.transport, state_.egress);
   const std::uint64_t sent = state_.tally.sent_bytes - sent_before;
@@ -47,6 +48,9 @@ void Flusher::flush(Connection& connection) {
     state_.signals.arm(connection);
   }
   connection.sent_bytes += sent;
+  SessionCounters& counters = *connection.outbox.counters();
+  counters.sent_bytes.store(connection.sent_bytes);
+  counters.delivered.add(state_.tally.delivered - delivered_before);
   if (sent_data && connection.progress) connection.progress->data_end = connection.sent_bytes;
   if (sent != 0) connection.last_sent_ms = state_.now_ms;
   switch (result) {
@@ -71,14 +75,14 @@ void Flusher::flush(Connection& connection) {
 void Flusher::let_wait(Connection& connection) {
   connection.outbox.settle(state_.egress);
   connection.outbox.signal_room(state_.egress);
-  state_.queues.set(connection.slot, connection.outbox.waiting_bytes());
+  state_.sessions.set_queued(connection.slot, connection.outbox.waiting_bytes());
   connection.gauged = true;
 }
 
 void Flusher::on_emptied(Connection& connection) {
   connection.outbox.on_emptied(state_.egress);
   connection.outbox.signal_room(state_.egress);
-  if (std::exchange(connection.gauged, false)) state_.queues.set(connection.slot, 0);
+  if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
   if (connection.draining && state_.nothing_follows) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
   }

@@ -49,10 +49,14 @@ void Reader::read(Connection& connection) {
   if (result.status == IoStatus::would_block) return;
   if (result.status != IoStatus::ok) return closer_.on_broken(connection);
   state_.tally.received_bytes += result.bytes;
+  SessionCounters& counters = *connection.outbox.counters();
+  counters.received_bytes.add(result.bytes);
+  const std::uint64_t accepted_before = state_.tally.accepted;
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
   if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
   if (connection.tell_heard) tell_heard(connection);
   const bool open = process(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
+  counters.accepted.add(state_.tally.accepted - accepted_before);
   state_.fanout.post_all();
   const std::uint64_t posted = state_.fanout.take_posted();
   if (!open) return;
@@ -243,6 +247,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
   if (!connection.resume) return;
   const std::uint64_t confirmed = connection.resume->kept.confirm(confirm.count);
   state_.tally.delivered += confirmed;
+  connection.outbox.counters()->delivered.add(confirmed);
   state_.tally.queued -= static_cast<std::int64_t>(confirmed);
   if (confirmed != 0 && connection.progress) connection.progress->block_since_ms = state_.now_ms;
   state_.recipients.mark_dirty(connection);

@@ -7,7 +7,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       shared(hub_shared),
       limits(hub_shared.limits),
       counters(*hub_shared.counters[index.value()]),
-      queues(*hub_shared.queues[index.value()]),
+      sessions(*hub_shared.sessions[index.value()]),
       budget(hub_shared.budget),
       pool(static_cast<std::uint32_t>(hub_shared.limits.frame_bytes), budget),
       pieces(budget),

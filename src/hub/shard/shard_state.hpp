@@ -16,7 +16,7 @@
 #include "hub/data/route/router.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/queue_gauges.hpp"
+#include "hub/observe/session_gauges.hpp"
 #include "hub/shard/connection.hpp"
 #include "hub/shard/control_inbox.hpp"
 #include "hub/shard/poller.hpp"
@@ -37,7 +37,7 @@ struct HubShared {
   std::vector<Mailbox*> mailboxes;       ///< by shard
   std::vector<Waker*> wakers;            ///< by shard
   std::vector<ShardCounters*> counters;  ///< by shard
-  std::vector<QueueGauges*> queues;      ///< by shard
+  std::vector<SessionGauges*> sessions;  ///< by shard
 };
 
 /// All that a shard's parts work on. Thread safety: one shard. The members are in the order in which they need each
@@ -49,7 +49,7 @@ struct ShardState {
   const HubShared& shared;
   Limits limits;  ///< this shard's own: changed between two steps of its work
   ShardCounters& counters;
-  QueueGauges& queues;
+  SessionGauges& sessions;
   Tally tally;
   BudgetLease budget;
   BufferPool pool;

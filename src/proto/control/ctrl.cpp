@@ -10,6 +10,7 @@ namespace {
 
 /// Heads, keys, lengths and numbers of any record.
 constexpr std::size_t kRecordOverhead = 128;
+constexpr std::size_t kConnectionOverhead = 192;
 
 std::vector<Counter> read_counters(Fields& counters) {
   std::vector<Counter> found;
@@ -102,7 +103,7 @@ Connections Connections::read(Fields& fields) {
 }
 
 std::size_t page_bytes_max(const ConnectionRecord& record) {
-  return kRecordOverhead + record.name.size() + record.transport.size() + record.peer.size();
+  return kConnectionOverhead + record.name.size() + record.transport.size() + record.peer.size();
 }
 
 void ConnectionsAnswer::write(bitestream::Writer& writer) const {
@@ -114,7 +115,12 @@ void ConnectionsAnswer::write(bitestream::Writer& writer) const {
     put_clean_text(writer, 4, record.transport, kRemarkBytesMax);
     put_clean_text(writer, 5, record.peer, kRemarkBytesMax);
     writer.put_bool(6, record.connected);
-    writer.put_u64(7, record.queued_bytes);
+    writer.put_u64(7, record.counts.queued_bytes);
+    writer.put_u64(8, record.counts.accepted);
+    writer.put_u64(9, record.counts.received_bytes);
+    writer.put_u64(10, record.counts.delivered);
+    writer.put_u64(11, record.counts.sent_bytes);
+    writer.put_u64(12, record.counts.dropped);
     writer.end_nested();
   }
   writer.put_bool(4, more);
@@ -129,7 +135,12 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
     connection.transport = record.text(4, "transport", kRemarkBytesMax);
     connection.peer = record.text(5, "peer", kRemarkBytesMax);
     connection.connected = record.flag(6, "connected", false);
-    connection.queued_bytes = record.number<std::uint64_t>(7, "number of queued bytes", 0);
+    connection.counts.queued_bytes = record.number<std::uint64_t>(7, "number of queued bytes", 0);
+    connection.counts.accepted = record.number<std::uint64_t>(8, "number of accepted frames", 0);
+    connection.counts.received_bytes = record.number<std::uint64_t>(9, "number of received bytes", 0);
+    connection.counts.delivered = record.number<std::uint64_t>(10, "number of delivered frames", 0);
+    connection.counts.sent_bytes = record.number<std::uint64_t>(11, "number of sent bytes", 0);
+    connection.counts.dropped = record.number<std::uint64_t>(12, "number of dropped frames", 0);
     return connection;
   });
   answer.more = fields.flag(4, "more", false);

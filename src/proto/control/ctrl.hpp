@@ -111,6 +111,18 @@ struct Connections {
   friend bool operator==(const Connections&, const Connections&) = default;
 };
 
+/// What waits for a node now, and what it came to since its session began; but for the first, what the shards count
+/// under the same names. 0 of a hub that does not tell.
+struct ConnectionCounts {
+  std::uint64_t queued_bytes = 0;
+  std::uint64_t accepted = 0;  ///< frames from it
+  std::uint64_t received_bytes = 0;
+  std::uint64_t delivered = 0;  ///< frames to it
+  std::uint64_t sent_bytes = 0;
+  std::uint64_t dropped = 0;  ///< frames to it
+  friend bool operator==(const ConnectionCounts&, const ConnectionCounts&) = default;
+};
+
 struct ConnectionRecord {
   NodeId node;
   std::string name;
@@ -118,7 +130,7 @@ struct ConnectionRecord {
   std::string transport;  ///< "tcp" or "unix"
   std::string peer;       ///< its address
   bool connected = false;
-  std::uint64_t queued_bytes = 0;
+  ConnectionCounts counts;
   friend bool operator==(const ConnectionRecord&, const ConnectionRecord&) = default;
 };
 /// Bytes that the record takes in an answer, at most: an answer has to fit in a frame.

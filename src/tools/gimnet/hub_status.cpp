@@ -61,17 +61,21 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
   for (const ConnectionRecord& connection : connections) {
     json.begin_object().member("id", connection.node.text()).member("name", connection.name);
     json.member("shard", connection.shard).member("transport", connection.transport).member("peer", connection.peer);
-    json.member("connected", connection.connected).member("queued_bytes", connection.queued_bytes).end_object();
+    json.member("connected", connection.connected).member("queued_bytes", connection.queued_bytes);
+    json.member("accepted", connection.accepted).member("received_bytes", connection.received_bytes);
+    json.member("delivered", connection.delivered).member("sent_bytes", connection.sent_bytes);
+    json.member("dropped", connection.dropped).end_object();
   }
   json.end_array();
 }
 
 std::string connections_table(const std::vector<ConnectionRecord>& connections, Paint paint) {
-  Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "QUEUED", "PEER"});
+  Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "ACCEPTED", "DELIVERED", "DROPPED", "QUEUED", "PEER"});
   for (const ConnectionRecord& connection : connections) {
     table.add({connection.node.text(), connection.name.empty() ? "-" : connection.name,
                std::to_string(connection.shard), connection.transport, connection.connected ? "connected" : "away",
-               std::to_string(connection.queued_bytes), connection.peer},
+               std::to_string(connection.accepted), std::to_string(connection.delivered),
+               std::to_string(connection.dropped), std::to_string(connection.queued_bytes), connection.peer},
               connection.connected ? Tone::plain : Tone::warning);
   }
   return table.text(paint);

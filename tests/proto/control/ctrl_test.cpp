@@ -44,8 +44,10 @@ TEST(CtrlMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_answer("ctrl/statistics_answer", 2,
                 StatisticsAnswer{{{0, {{"accepted", 10}, {"delivered", 9}}}, {1, {{"accepted", 0}}}}});
   expect_request("ctrl/connections", 3, Connections{NodeId{0x00700010}, 2});
-  expect_answer("ctrl/connections_answer", 3,
-                ConnectionsAnswer{{{NodeId{0x00700011}, "robot", 1, "tcp", "127.0.0.1:40000", true, 4096}}, false});
+  expect_answer(
+      "ctrl/connections_answer", 3,
+      ConnectionsAnswer{
+          {{NodeId{0x00700011}, "robot", 1, "tcp", "127.0.0.1:40000", true, {4096, 100, 1200, 10, 160, 3}}}, false});
   expect_request("ctrl/routes", 9, Routes{});
   expect_answer("ctrl/routes_answer", 9, RoutesAnswer{{{HubId{7}, "lab", HubId{7}, 0, 3}}});
 }
@@ -87,6 +89,18 @@ TEST(CtrlMessages, SkipCountersThatAreNotNumbers) {
   const auto answer = decode_answer<StatisticsAnswer>(assemble_control({StatisticsAnswer::kOperation, 1}, body));
   ASSERT_TRUE(answer);
   EXPECT_EQ(*answer, (StatisticsAnswer{{{0, {{"accepted", 1}}}}}));
+}
+
+TEST(CtrlMessages, AConnectionMayComeWithoutCounts) {
+  bitestream::Writer body;
+  body.put_u16(1, 0);
+  body.begin_nested(3);
+  body.put_u32(1, 0x00700011);
+  body.end_nested();
+  const auto answer = decode_answer<ConnectionsAnswer>(assemble_control({ConnectionsAnswer::kOperation, 1}, body));
+  ASSERT_TRUE(answer);
+  ASSERT_EQ(answer->connections.size(), 1u);
+  EXPECT_EQ(answer->connections[0].counts, ConnectionCounts{});
 }
 
 TEST(CtrlMessages, RecordsFitInTheBytesThatArePlannedForThem) {

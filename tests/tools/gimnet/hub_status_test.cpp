@@ -11,7 +11,7 @@ HubStatus status() {
   status.shards = {
       {0, {{"accepted", 10}, {"delivered", 8}, {"queued", 1}, {"pinned_bytes_max", 50}, {"dropped.away", 1}}},
       {1, {{"accepted", 5}, {"copies", 3}, {"delivered", 8}, {"pinned_bytes_max", 20}, {"dropped.away", 0}}}};
-  status.connections = {{Peer{(7u << 20) | 1}, "robot", 1, "tcp", "127.0.0.1:5", true, 9}};
+  status.connections = {{Peer{(7u << 20) | 1}, "robot", 1, "tcp", "127.0.0.1:5", true, 9, 100, 1200, 20, 320, 3}};
   return status;
 }
 
@@ -40,6 +40,10 @@ TEST(HubStatus, IsWrittenAsJson) {
       std::string::npos)
       << "only the sum can be exact: " << json;
   EXPECT_NE(json.find(R"({"id":"7.1","name":"robot","shard":1,"transport":"tcp")"), std::string::npos);
+  EXPECT_NE(json.find(R"("connected":true,"queued_bytes":9,"accepted":100,"received_bytes":1200,"delivered":20,)"
+                      R"("sent_bytes":320,"dropped":3})"),
+            std::string::npos)
+      << json;
 }
 
 TEST(HubStatus, IsWrittenForPeople) {
@@ -47,6 +51,7 @@ TEST(HubStatus, IsWrittenForPeople) {
   EXPECT_NE(text.find("15 accepted + 3 copies = 16 delivered + 1 dropped + 1 queued\n"), std::string::npos) << text;
   EXPECT_NE(text.find("dropped.away: 1"), std::string::npos);
   EXPECT_NE(text.find("7.1  robot"), std::string::npos);
+  EXPECT_NE(text.find("connected  100       20         3        9"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -45,6 +45,11 @@ ctrl::StatisticsAnswer statistics(const HandlerContext& context) {
   return answer;
 }
 
+ctrl::ConnectionCounts counts_of(const SessionCounts& counts) {
+  return {counts.queued_bytes, counts.accepted,   counts.received_bytes,
+          counts.delivered,    counts.sent_bytes, counts.dropped};
+}
+
 ctrl::ConnectionsAnswer connections(const HandlerContext& context, const ctrl::Connections& wanted) {
   ctrl::ConnectionsAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
@@ -59,7 +64,9 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context, const ctrl::C
     record.peer = session.origin.address.str();
     record.connected = session.connected;
     const std::size_t shard = session.place.shard.value();
-    if (shard < context.queues.size()) record.queued_bytes = context.queues[shard]->queued_bytes(session.place.slot);
+    if (shard < context.sessions.size()) {
+      record.counts = counts_of(context.sessions[shard]->counts(session.place.slot, session.place.generation));
+    }
     if (!budget.take(ctrl::page_bytes_max(record))) {
       answer.more = true;
       break;

@@ -10,9 +10,9 @@
 #include "hub/control/state/watches.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/counters.hpp"
-#include "hub/observe/queue_gauges.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/observe/request_counters.hpp"
+#include "hub/observe/session_gauges.hpp"
 #include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
@@ -36,11 +36,11 @@ struct HandlerContext {
   Watches& watches;
   std::span<const ShardCounters* const> counters;  ///< one per shard
   std::chrono::milliseconds now;
-  Effects& effects;                              ///< carried out before the answer leaves
-  std::span<const QueueGauges* const> queues{};  ///< one per shard, or none
-  const RefusalCounters* refusals = nullptr;     ///< or none
-  const RequestCounters* requests = nullptr;     ///< or none
-  Administration* administration = nullptr;      ///< or none
+  Effects& effects;                                  ///< carried out before the answer leaves
+  std::span<const SessionGauges* const> sessions{};  ///< one per shard, or none
+  const RefusalCounters* refusals = nullptr;         ///< or none
+  const RequestCounters* requests = nullptr;         ///< or none
+  Administration* administration = nullptr;          ///< or none
 };
 
 /// A request of kind NS or CTRL. Valid until: the handler returns.

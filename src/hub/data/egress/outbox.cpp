@@ -249,6 +249,7 @@ void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
   for (RingQueue<Run>& replay = lanes_->replay; !replay.empty(); replay.pop_front()) {
     const Run& run = replay.front();
     tell_lost(run);
+    count_dropped(run.frames);
     context.tally.queued -= run.frames;
     context.drops.drop_mixed(run.bytes, run.size, reason);
   }

@@ -10,6 +10,7 @@
 #include "hub/data/egress/lane_queue.hpp"
 #include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
+#include "hub/observe/session_gauges.hpp"
 
 namespace gimnet::hub {
 
@@ -50,6 +51,14 @@ class Outbox {
   /// Who is told of messages of counted groups that are dropped here; nullptr: nobody.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
   [[nodiscard]] const CountedGroups* counted_groups() const { return counted_; }
+  /// Where it is counted what of the session's frames came to what; nullptr: nowhere. Valid until: as SessionGauges.
+  void set_counters(SessionCounters& counters) { counters_ = &counters; }
+  [[nodiscard]] SessionCounters* counters() const { return counters_; }
+  /// So many frames that were for this connection are dropped, here or on their way here.
+  void count_dropped(std::uint64_t frames) const {
+    if (counters_ != nullptr) counters_->dropped.add(frames);
+  }
+
   /// Messages of that group of which the end still waits in a lane.
   [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
   /// Frames that were for this connection did not get here.
@@ -158,6 +167,7 @@ class Outbox {
   RingQueue<Run> control_;
   std::unique_ptr<Lanes> lanes_;  ///< nullptr: no data since it was made or trimmed
   CountedGroups* counted_ = nullptr;
+  SessionCounters* counters_ = nullptr;
   BufferRef chunk_;  ///< where copies go
   std::uint32_t chunk_used_ = 0;
   std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk

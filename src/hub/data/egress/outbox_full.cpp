@@ -42,6 +42,7 @@ bool Outbox::is_cut(const Entry& entry, const proto::FrameHeader& header, Egress
   if (cut == all.end()) return false;
   if (entry.complete) all.erase(cut);
   tell_lost(entry);
+  count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
   context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, proto::DropReason::cut_message);
   return true;
@@ -130,6 +131,7 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
     cut.push_back({NodeId{entry.run.header().src}, entry.message_number});
   }
   tell_lost(entry);
+  count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
   do {
     if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason);

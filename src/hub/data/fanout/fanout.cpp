@@ -21,6 +21,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
   context_.owner.check_here();
   if (!recipient.connected && !recipient.waits_when_away) {
     recipient.outbox.tell_lost(run);
+    recipient.outbox.count_dropped(run.frames);
     context_.drops.drop(run.bytes, run.size, run.frames, proto::DropReason::away);
     return;
   }
@@ -38,6 +39,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
       push(recipient, frame, frame.header(), handover);
     } else {
       recipient.outbox.tell_lost(frame);
+      recipient.outbox.count_dropped(1);
       context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::too_large);
     }
   }

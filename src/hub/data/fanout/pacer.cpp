@@ -60,7 +60,7 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
   if (subscription.awaits_start) return false;
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
-    context_.drops.drop(run.bytes, run.size, run.frames, DropReason::away);
+    drop(subscription, run, DropReason::away);
   } else if (header.has(proto::kFlagFragment)) {
     give_up_stalled(subscription);
     offer_fragment(subscription, run, header, handover);
@@ -68,7 +68,7 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
     release(subscription);
   } else {
     give_up_stalled(subscription);
-    abandon(subscription.open(header.lane & proto::kLaneMask), DropReason::cut_message);
+    abandon(subscription, subscription.open(header.lane & proto::kLaneMask), DropReason::cut_message);
     offer_plain(subscription, run, header, handover);
   }
   return true;
@@ -86,7 +86,7 @@ void Pacer::begin_plain(PacedSubscription& subscription) const {
 void Pacer::give_up_stalled(PacedSubscription& subscription) {
   for (Open& open : subscription.open()) {
     if (open.state == State::none || context_.now_ms - open.came_ms < context_.limits.block_ms) continue;
-    abandon(open, DropReason::cut_message);
+    abandon(subscription, open, DropReason::cut_message);
   }
 }
 
@@ -102,7 +102,7 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const p
       subscription.on_begun(now_us());
       pass(subscription, frame, 1, header, handover);
     } else if (context_.budget.exhausted()) {
-      context_.drops.drop(frame.bytes, frame.size, 1, DropReason::over_budget);
+      drop(subscription, frame, DropReason::over_budget);
     } else {
       keep(scratch_, frame, handover);
       hold(subscription, scratch_, header.lane & proto::kLaneMask);
@@ -125,16 +125,16 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, cons
     open.next_offset = fragment.offset;
   }
   if (fragment.offset == 0) {
-    abandon(open, DropReason::cut_message);
+    abandon(subscription, open, DropReason::cut_message);
     begin_message(subscription, open, fragment.message);
   } else if (open.state == State::none || open.number != fragment.message || open.next_offset != fragment.offset) {
-    abandon(open, DropReason::cut_message);
-    return context_.drops.drop(run.bytes, run.size, 1, DropReason::cut_message);
+    abandon(subscription, open, DropReason::cut_message);
+    return drop(subscription, run, DropReason::cut_message);
   }
   open.next_offset = fragment.offset + size;
   open.came_ms = context_.now_ms;
   if (open.state == State::arriving && context_.budget.exhausted()) {
-    abandon(open, DropReason::over_budget);
+    abandon(subscription, open, DropReason::over_budget);
     open.state = State::cut;
   }
   switch (open.state) {
@@ -149,7 +149,7 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, cons
     case State::cut:
     case State::plain:
     case State::none:
-      context_.drops.drop(run.bytes, run.size, 1, DropReason::cut_message);
+      drop(subscription, run, DropReason::cut_message);
       if (ends) open.state = State::none;
   }
 }
@@ -167,8 +167,8 @@ void Pacer::end_message(PacedSubscription& subscription, Open& open) {
   hold(subscription, open.message, static_cast<std::size_t>(&open - subscription.open().data()));
 }
 
-void Pacer::abandon(Open& open, DropReason reason) {
-  drop(open.message, reason);
+void Pacer::abandon(PacedSubscription& subscription, Open& open, DropReason reason) {
+  drop(subscription, open.message, reason);
   open.message.clear();
   open.state = State::none;
 }
@@ -195,18 +195,23 @@ void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::siz
 }
 
 void Pacer::drop_oldest(PacedSubscription& subscription, DropReason reason) {
-  drop(subscription.oldest(), reason);
+  drop(subscription, subscription.oldest(), reason);
   subscription.pop_oldest();
 }
 
 void Pacer::drop_held(PacedSubscription& subscription, DropReason reason) {
   while (subscription.held() != 0) drop_oldest(subscription, reason);
-  for (Open& open : subscription.open()) abandon(open, reason);
+  for (Open& open : subscription.open()) abandon(subscription, open, reason);
 }
 
-void Pacer::drop(const KeptMessage& message, DropReason reason) {
+void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, DropReason reason) {
   context_.tally.queued -= message.frames();
-  message.for_each([&](const Run& run) { context_.drops.drop(run.bytes, run.size, run.frames, reason); });
+  message.for_each([&](const Run& run) { drop(subscription, run, reason); });
+}
+
+void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason) {
+  subscription.recipient().outbox.count_dropped(run.frames);
+  context_.drops.drop(run.bytes, run.size, run.frames, reason);
 }
 
 bool Pacer::on_credit(const Recipient& recipient, GroupId group, std::uint64_t total) {

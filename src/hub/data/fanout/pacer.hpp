@@ -60,14 +60,15 @@ class Pacer {
   void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);
   void end_message(PacedSubscription& subscription, Open& open);
   /// A message that will not end: what is kept of it goes.
-  void abandon(Open& open, proto::DropReason reason);
+  void abandon(PacedSubscription& subscription, Open& open, proto::DropReason reason);
   void pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended, const proto::FrameHeader& header,
             Handover handover);
   void keep(KeptMessage& message, const Run& frame, Handover handover);
   void hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane);
   void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
   void drop_held(PacedSubscription& subscription, proto::DropReason reason);
-  void drop(const KeptMessage& message, proto::DropReason reason);
+  void drop(PacedSubscription& subscription, const KeptMessage& message, proto::DropReason reason);
+  void drop(PacedSubscription& subscription, const Run& run, proto::DropReason reason);
   void release(PacedSubscription& subscription);
   void release_oldest(PacedSubscription& subscription);
   [[nodiscard]] bool release_open(PacedSubscription& subscription);

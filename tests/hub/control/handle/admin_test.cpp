@@ -111,5 +111,24 @@ TEST_F(AdminTest, TellsWhereConnectionsAre) {
   EXPECT_FALSE(rest.more);
 }
 
+TEST_F(AdminTest, TellsWhatEachNodeCameTo) {
+  const Node robot = join("robot");
+  const auto counts = [&] {
+    return ask_hub<ctrl::ConnectionsAnswer>(robot, ctrl::Connections{}).connections[0].counts;
+  };
+  EXPECT_EQ(counts(), ctrl::ConnectionCounts{}) << "its shard has not seen it yet";
+  SessionGauges& shard = sessions[robot.shard.value()];
+  SessionCounters& its = shard.begin(robot.session.slot, robot.session.generation);
+  its.accepted.add(1);
+  its.received_bytes.add(2);
+  its.delivered.add(3);
+  its.sent_bytes.add(4);
+  its.dropped.add(5);
+  shard.set_queued(robot.session.slot, 6);
+  EXPECT_EQ(counts(), (ctrl::ConnectionCounts{6, 1, 2, 3, 4, 5}));
+  static_cast<void>(shard.begin(robot.session.slot, robot.session.generation - 1));
+  EXPECT_EQ(counts(), ctrl::ConnectionCounts{}) << "those are another session's";
+}
+
 }  // namespace
 }  // namespace gimnet::hub

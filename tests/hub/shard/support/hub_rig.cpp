@@ -84,7 +84,7 @@ HubRig::HubRig(std::size_t shards, Limits limits)
   std::vector<Mailbox*> mailboxes;
   std::vector<Waker*> wakers;
   std::vector<ShardCounters*> counters;
-  std::vector<QueueGauges*> queues;
+  std::vector<SessionGauges*> sessions;
   for (std::size_t i = 0; i < shards; ++i) {
     wakers_.push_back(std::make_unique<Waker>());
     mailboxes_.push_back(std::make_unique<Mailbox>(
@@ -93,11 +93,11 @@ HubRig::HubRig(std::size_t shards, Limits limits)
     wakers.push_back(wakers_.back().get());
     mailboxes.push_back(mailboxes_.back().get());
     counters.push_back(counters_.back().get());
-    queues_.push_back(std::make_unique<QueueGauges>(kGaugedSlots));
-    queues.push_back(queues_.back().get());
+    sessions_.push_back(std::make_unique<SessionGauges>(kGaugedSlots));
+    sessions.push_back(sessions_.back().get());
   }
   shared_.emplace(
-      HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_, mailboxes, wakers, counters, queues});
+      HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_, mailboxes, wakers, counters, sessions});
   for (std::size_t i = 0; i < shards; ++i) {
     shards_.push_back(
         std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_, IoShard::Options{}));
@@ -151,6 +151,7 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
 
 void HubRig::release(FakeNode& node) {
   nodes_.publish(index_of(node.id), {});
+  released_ = true;
   command(node.shard.value(), ReleaseCommand{node.session});
 }
 
@@ -241,6 +242,38 @@ void HubRig::turn_shard(std::size_t shard) {
   const Ledger sums = ledger();
   EXPECT_TRUE(sums.exact()) << "accepted " << sums.accepted << " + copies " << sums.copies << " != delivered "
                             << sums.delivered << " + dropped " << sums.dropped << " + queued " << sums.queued;
+  if (!released_ && next_index_ <= kGaugedSlots) check_sessions(sums);
+}
+
+/// What the sessions came to is what the shards came to, but for drops of which nobody knows for whom the frame was.
+void HubRig::check_sessions(const Ledger& sums) const {
+  SessionCounts all;
+  for (std::size_t shard = 0; shard < shards_.size(); ++shard) {
+    for (const auto& connection : shards_[shard]->state().connections) {
+      if (connection == nullptr) continue;
+      const SessionCounts counts = sessions_[shard]->counts(connection->slot, connection->generation);
+      all.accepted += counts.accepted;
+      all.received_bytes += counts.received_bytes;
+      all.delivered += counts.delivered;
+      all.sent_bytes += counts.sent_bytes;
+      all.dropped += counts.dropped;
+    }
+  }
+  EXPECT_EQ(all.accepted, sums.accepted);
+  EXPECT_EQ(all.received_bytes, sum(&ShardCounters::received_bytes));
+  EXPECT_EQ(all.delivered, sums.delivered);
+  EXPECT_EQ(all.sent_bytes, sum(&ShardCounters::sent_bytes));
+  using proto::DropReason;
+  std::uint64_t known = 0;
+  for (const DropReason reason :
+       {DropReason::queue_full, DropReason::replaced, DropReason::too_old, DropReason::too_large, DropReason::link_lost,
+        DropReason::over_budget, DropReason::timed_out, DropReason::cut_message}) {
+    known += dropped(reason);
+  }
+  // Of these, only those for a session that is there.
+  const std::uint64_t perhaps = dropped(DropReason::away) + dropped(DropReason::no_subscriber);
+  EXPECT_GE(all.dropped, known);
+  EXPECT_LE(all.dropped, known + perhaps);
 }
 
 void HubRig::turn() {

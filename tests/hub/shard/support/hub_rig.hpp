@@ -137,6 +137,9 @@ class HubRig {
   [[nodiscard]] std::vector<ShardEvent> take_events();
   [[nodiscard]] std::optional<DetachedEvent> take_detached();
   [[nodiscard]] ShardState& state(std::size_t shard) { return shards_[shard]->state(); }
+  [[nodiscard]] SessionCounts counts(const FakeNode& node) const {
+    return sessions_[node.shard.value()]->counts(node.session.slot, node.session.generation);
+  }
   [[nodiscard]] Connection* connection(const FakeNode& node) { return state(node.shard.value()).find(node.session); }
   [[nodiscard]] HubId hub() const { return HubId{7}; }
   [[nodiscard]] NodeTable& nodes() { return nodes_; }
@@ -150,6 +153,7 @@ class HubRig {
   void attach(FakeNode& node, const JoinSpec& spec, bool new_session);
   void publish(std::uint32_t index, std::unique_ptr<GroupMembers> group);
   [[nodiscard]] std::uint64_t activity() const;
+  void check_sessions(const Ledger& sums) const;
 
   Limits limits_;
   NodeTable nodes_;
@@ -161,12 +165,13 @@ class HubRig {
   std::vector<std::unique_ptr<Mailbox>> mailboxes_;
   std::vector<std::unique_ptr<ShardCounters>> counters_;
   static constexpr std::size_t kGaugedSlots = 1024;
-  std::vector<std::unique_ptr<QueueGauges>> queues_;
+  std::vector<std::unique_ptr<SessionGauges>> sessions_;
   std::optional<HubShared> shared_;
   std::vector<std::unique_ptr<IoShard>> shards_;
   std::deque<FakeNode> nodes_played_;
   std::vector<std::unique_ptr<const GroupMembers>> members_;
   std::uint32_t next_index_ = 1;
+  bool released_ = false;  ///< a session ended: what it came to is not known any more
 };
 
 }  // namespace gimnet::hub::testing
