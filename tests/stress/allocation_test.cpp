@@ -65,7 +65,7 @@ class Traffic {
         observer_,
         [this](const Statistics& now) {
           read_all();
-          return now["accepted"] == sent_ && now["queued"] == 0;
+          return now["accepted"] == sent_ && now["queued"] == 0 && now["delivered"] == received();
         },
         "the end of a round");
   }
@@ -90,6 +90,12 @@ class Traffic {
   }
 
  private:
+  /// Frames that all nodes read.
+  [[nodiscard]] std::uint64_t received() const {
+    std::uint64_t sum = 0;
+    for (const RawNode& node : nodes_) sum += node.frames_got();
+    return sum;
+  }
   static std::vector<std::string> arguments() {
     // On a slow machine a round has pauses: what the hub takes for idle gives memory back, and needs it anew.
     return {"--shards",    "3",

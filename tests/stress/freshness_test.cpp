@@ -55,6 +55,7 @@ class Reader {
   }
 
   [[nodiscard]] RawNode& node() { return node_; }
+  [[nodiscard]] const RawNode& node() const { return node_; }
 
  private:
   RawNode node_;
@@ -190,6 +191,9 @@ class LatestScene {
 
   [[nodiscard]] std::uint64_t highest_age_bytes() const { return *std::max_element(ages_.begin(), ages_.end()); }
   [[nodiscard]] std::uint64_t published() const { return published_; }
+  /// Frames.
+  [[nodiscard]] std::uint64_t sent() const { return publisher_.frames_sent(); }
+  [[nodiscard]] std::uint64_t received() const { return reader_.node().frames_got(); }
   [[nodiscard]] bool is_whole_and_newer() const { return is_whole_and_newer_; }
   [[nodiscard]] std::uint64_t lost() const { return reassembler_.lost_messages(); }
   [[nodiscard]] std::string ages_text() const {
@@ -246,6 +250,11 @@ void expect_fresh(std::uint16_t publisher_shard) {
   EXPECT_LE(scene.highest_age_bytes(), 2 * kLatestBytes) << scene.ages_text();
   ::testing::Test::RecordProperty("ages", scene.ages_text());
   EXPECT_GT(scene.published(), 100u);
+  RawNode observer(hub.unix_url());
+  const Statistics end = wait_for(
+      observer, [&](const Statistics& now) { return now["accepted"] == scene.sent(); }, "all that was published");
+  EXPECT_EQ(end["copies"], 0u);
+  EXPECT_GE(end["delivered"], scene.received());
 }
 
 TEST(Freshness, LatestIsWholeAndYoungFromTheSameShard) { expect_fresh(0); }

@@ -110,6 +110,7 @@ TEST(IdleNodes, CostTheHubAtMostOneKibibyteEach) {
   const Statistics end = Statistics::of(observer);
   EXPECT_EQ(end["connections"], kNodes + 1) << end.text();
   EXPECT_EQ(end["silent"], 0u);
+  EXPECT_EQ(end["accepted"] + end["delivered"] + end.dropped(), 0u) << "nobody sent anything";
   EXPECT_LE((highest - before) / static_cast<std::int64_t>(kNodes), kBytesPerNode)
       << before << " bytes before, " << highest << " with " << kNodes << " nodes";
 }

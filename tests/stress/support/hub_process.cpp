@@ -1,6 +1,7 @@
 #include "tests/stress/support/hub_process.hpp"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -13,7 +14,9 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/size.hpp"
+#include "tests/stress/support/statistics.hpp"
 
 namespace gimnet::stress {
 namespace {
@@ -92,7 +95,21 @@ void HubProcess::launch() {
   if (!(line >> ready >> tcp_url_ >> unix_url_) || ready != "ready") throw std::runtime_error("tcphub is not ready");
 }
 
+void HubProcess::expect_exact_ledger() noexcept {
+  try {
+    if (!is_running()) throw std::runtime_error("it ended by itself");
+    // Also where it is full: who administers it always gets in.
+    JoinOptions options;
+    options.hello.role = proto::Role::admin;
+    RawNode observer(unix_url_, options);
+    static_cast<void>(wait_for_exact_ledger(observer));
+  } catch (const std::exception& error) {
+    ADD_FAILURE() << "tcphub at the end of the test: " << error.what();
+  }
+}
+
 HubProcess::~HubProcess() {
+  expect_exact_ledger();
   if (pid_ > 0) {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);

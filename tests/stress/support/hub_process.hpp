@@ -12,8 +12,8 @@
 namespace gimnet::stress {
 
 /// The shipped tcphub as a process of its own, on a free port and a Unix socket in a new temporary folder. Ended and
-/// cleaned up when this goes; it dies with the test program, too.
-/// Thread safety: none.
+/// cleaned up when this goes; it dies with the test program, too. In the end it has to be alive and to have an exact
+/// ledger: else the test fails. Thread safety: none.
 class HubProcess {
  public:
   /// `arguments` beside the addresses, for example {"--shards", "2"}. Returns when the hub is ready.
@@ -33,6 +33,7 @@ class HubProcess {
 
  private:
   void launch();
+  void expect_exact_ledger() noexcept;
 
   std::string folder_;
   std::vector<std::string> arguments_;

@@ -8,6 +8,13 @@
 #include <cstring>
 
 namespace gimnet::stress {
+namespace {
+
+bool is_for_nodes(proto::Kind kind) {
+  return kind < proto::Kind::link && kind != proto::Kind::report && kind != proto::Kind::flow;
+}
+
+}  // namespace
 
 RawNode::RawNode(const std::string& url, const JoinOptions& options) {
   begin_join(url, options);
@@ -72,7 +79,9 @@ std::optional<Frame> RawNode::next() {
     if (header.frame_size() > rest.size()) return std::nullopt;
     taken_ += header.frame_size();
     const Frame frame{header, rest.first(header.frame_size())};
-    if (!handle(frame)) return frame;
+    if (handle(frame)) continue;
+    if (is_for_nodes(frame.header.kind)) ++frames_got_;
+    return frame;
   }
 }
 
@@ -120,6 +129,7 @@ void RawNode::put(proto::FrameParts parts, std::span<const std::byte> payload) {
   const std::size_t before = out_.size();
   out_.resize(before + proto::prefix_size(parts) + payload.size());
   if (proto::write_frame(parts, payload, std::span(out_).subspan(before)) == 0) throw std::runtime_error("no frame");
+  if (is_for_nodes(parts.header.kind)) ++frames_sent_;
 }
 
 void RawNode::put_flow(const proto::flow::Message& message) {

@@ -64,6 +64,9 @@ class RawNode {
   [[nodiscard]] Frame wait_next(const Deadline& deadline = Deadline());
   /// Bytes taken from the socket since the beginning.
   [[nodiscard]] std::uint64_t bytes_read() const { return bytes_read_; }
+  /// Frames for nodes that put() was given, and frames of nodes that next() gave: what the hub's ledger counts.
+  [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
+  [[nodiscard]] std::uint64_t frames_got() const { return frames_got_; }
   /// Position in bytes_read() of the end of the frame that next() gave last.
   [[nodiscard]] std::uint64_t position() const { return bytes_read_ - (buffer_.size() - taken_); }
 
@@ -118,6 +121,8 @@ class RawNode {
   std::vector<std::byte> buffer_;
   std::size_t taken_ = 0;
   std::uint64_t bytes_read_ = 0;
+  std::uint64_t frames_sent_ = 0;
+  std::uint64_t frames_got_ = 0;
   std::vector<std::byte> out_;
   std::size_t written_ = 0;
   std::map<Target, bool> paused_;

@@ -1,5 +1,6 @@
 #include "tests/stress/support/statistics.hpp"
 
+#include <optional>
 #include <stdexcept>
 
 #include "proto/control/ctrl.hpp"
@@ -30,12 +31,27 @@ bool Statistics::is_balanced() const {
   return (*this)["accepted"] + (*this)["copies"] == (*this)["delivered"] + dropped() + (*this)["queued"];
 }
 
+bool Statistics::has_the_ledger_of(const Statistics& other) const {
+  const auto same = [&](const char* name) { return (*this)[name] == other[name]; };
+  return same("accepted") && same("copies") && same("delivered") && same("queued") && dropped() == other.dropped();
+}
+
 std::string Statistics::text() const {
   std::string text;
   for (const auto& [name, value] : counters_) {
     if (value != 0) text += name + "=" + std::to_string(value) + " ";
   }
   return text;
+}
+
+Statistics wait_for_exact_ledger(RawNode& observer) {
+  std::optional<Statistics> last;
+  const auto is_settled = [&](const Statistics& now) {
+    const bool settled = last && now.is_balanced() && now.has_the_ledger_of(*last);
+    last = now;
+    return settled;
+  };
+  return wait_for(observer, is_settled, "a quiet hub with an exact ledger");
 }
 
 Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics&)>& condition,

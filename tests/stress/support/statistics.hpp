@@ -30,6 +30,7 @@ class Statistics {
   [[nodiscard]] std::uint64_t dropped() const;
   /// accepted + copies = delivered + dropped + queued.
   [[nodiscard]] bool is_balanced() const;
+  [[nodiscard]] bool has_the_ledger_of(const Statistics& other) const;
   /// All counters that are not zero, for messages.
   [[nodiscard]] std::string text() const;
 
@@ -37,6 +38,10 @@ class Statistics {
   std::map<std::string, std::uint64_t> counters_;
   std::map<std::size_t, std::map<std::string, std::uint64_t>> by_shard_;
 };
+
+/// What the hub counted as soon as nothing moves: twice in a row the same ledger, which is exact. Throws, with the last
+/// counters, when there is no such moment.
+[[nodiscard]] Statistics wait_for_exact_ledger(RawNode& observer);
 
 /// Asks until the condition holds, and returns what held; throws, with the last counters, when time is over.
 [[nodiscard]] Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics&)>& condition,
