@@ -224,7 +224,12 @@ class Player:
 
 class Conversation(unittest.TestCase):
     def test_the_hub_of_today_answers_as_it_did(self):
-        self.play(RECORDING)
+        player = self.play(RECORDING)
+        sent, got = ({who: getattr(client, frames) for who, client in player.clients.items()}
+                     for frames in ("frames_sent", "frames_got"))
+        # A list of two, and a frame for nobody. The viewer asked for resume, and left without a word on what it had got.
+        player.hub.expect_ledger(self, accepted=sum(sent.values()), copies=1, delivered=sum(got.values()) - got["viewer"],
+                                 dropped={"no_such_node": 1, "link_lost": got["viewer"]})
 
     def test_the_hub_of_today_plays_each_scene_as_it_did(self):
         for name, scene in SCENES.items():
@@ -251,6 +256,7 @@ class Conversation(unittest.TestCase):
                 then, now = conversation.stable(step), conversation.stable(heard)
                 self.assertEqual((now[0], now[2]), (then[0], then[2]))
                 self.assertTrue(conversation.covers(now[1], then[1]), f"{now[1]} lacks something of {then[1]}")
+        return player
 
     def test_the_recording_is_whole(self):
         steps = conversation.load(RECORDING)

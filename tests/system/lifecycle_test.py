@@ -7,6 +7,7 @@ import signal
 import unittest
 
 from support.processes import TCPHUB, Hub, Process, run_gimnet, start_gimnet, start_recv
+from support.tap import Tap
 from support.waiting import PATIENCE_S, wait_until
 from support.wire import Client, Closed
 
@@ -18,7 +19,7 @@ class Ends(unittest.TestCase):
         sender = Client(self, hub).join(shard=1)
         for number in range(1000):
             sender.send(sender.frame(receiver.id, number.to_bytes(4, "little")))
-        wait_until(lambda: hub.status()["ledger"]["accepted"] >= 1000, "the hub took 1,000 frames")
+        wait_until(lambda: hub.counter("accepted") == sender.frames_sent, "the hub took all of them")
         hub.process.signal(signal.SIGTERM)
         frames = receiver.until_closed()
         data = [frame.payload for frame in frames if frame.src == sender.id]
@@ -52,11 +53,14 @@ class Ends(unittest.TestCase):
         sender = Client(self, hub).join()
         for _ in range(40):
             sender.send(sender.frame(slow.id, bytes(60000), lane=2))
-        wait_until(lambda: hub.status()["ledger"]["accepted"] >= 20, "frames that wait")
+        wait_until(lambda: hub.counter("accepted") == sender.frames_sent == 40, "frames that wait")
+        self.assertGreater(hub.quiet_status(self)["ledger"]["queued"], 0)
         hub.process.signal(signal.SIGTERM)
         self.assertEqual(sender.goodbye(), "draining")
         with self.assertRaises((ConnectionError, Closed, AssertionError)):
             Client(self, hub).join("late")
+        slow.socket.close()
+        self.assertEqual(hub.process.wait(), 0, hub.process.err)
 
     def test_a_port_freed_by_kill_9_can_be_bound(self):
         first = Hub(self)
@@ -129,9 +133,12 @@ class Nodes(unittest.TestCase):
         wait_until(lambda: "connect again" in receiver.err, "the words that it tries")
         second = Hub(self, listen=[first.url])
         second.wait_for_node("B")
-        self.assertEqual(run_gimnet(second, "send", "B", data=b"hello\n").code, 0)
+        tap = Tap(self, second)
+        self.assertEqual(run_gimnet(tap, "send", "B", data=b"hello\n").code, 0)
         self.assertEqual(receiver.wait(), 0)
         self.assertEqual(receiver.out, b"hello\n")
+        # What the sender sent went to the receiver, and the other way round.
+        second.expect_ledger(self, accepted=lambda: tap.sent() + tap.got(), delivered=lambda: tap.sent() + tap.got())
 
     def test_a_silent_newcomer_does_not_stay(self):
         hub = Hub(self, "--limit", "handshake_ms=200")

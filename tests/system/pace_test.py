@@ -46,6 +46,8 @@ class Windows(unittest.TestCase):
         provider.publish(10)
         client.send(client.frame(0, struct.pack("<B3xIQ", CREDIT, provider.group, 6), kind=FLOW))
         self.assertEqual([take(), take()], [11, 12])
+        hub.expect_ledger(self, accepted=provider.sequence, delivered=client.frames_got,
+                          dropped={"replaced": provider.sequence - client.frames_got})
 
     def test_numbers_out_of_range_are_refused_with_words(self):
         hub = Hub(self)
@@ -84,6 +86,12 @@ class Windows(unittest.TestCase):
             provider.publish()
             wait_until(lambda: echo.out_size > before, "one message, one window")
         self.assertEqual(hub.counter("bad_credits"), 0)
+        # What was on its way when a connection was cut counts as delivered, and not all of it was read.
+        wait_until(lambda: hub.counter("accepted") == provider.client.frames_sent, "all that was published")
+        ledger = hub.quiet_status(self)["ledger"]
+        self.assertEqual((ledger["copies"], ledger["queued"]), (0, 0))
+        self.assertGreaterEqual(ledger["delivered"], echo.out.count(b"\n"))
+        self.assertLessEqual(ledger["delivered"], provider.sequence)
 
 
 class Retained(unittest.TestCase):
@@ -98,6 +106,9 @@ class Retained(unittest.TestCase):
                 late = run_gimnet(hub, "echo", "A/B", "-n", "1", "--raw")
                 self.assertEqual((late.code, late.out), (0, b"5.........\n"), late.err)
                 self.assertEqual(run_gimnet(hub, "echo", "A/B", "-n", "1", "--raw").out, b"5.........\n")
+                # Nobody was there for the five; the last one was copied for each of the two who came.
+                hub.expect_ledger(self, accepted=provider.client.frames_sent, copies=2, delivered=2,
+                                  dropped={"no_subscriber": 5})
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ class Services(unittest.TestCase):
                 pub = run_gimnet(hub, "pub", "robot/odom", "--wait", "1", "--shard", str(shards - 1), data=data)
                 self.assertEqual((pub.code, echo.wait()), (0, 0), pub.err)
                 self.assertEqual(echo.out, data)
-                hub.quiet_status(self)
+                hub.expect_ledger(self, accepted=1000, delivered=1000)
 
     def test_publishing_ends_without_waiting_for_the_keep_alive(self):
         hub = Hub(self, "--limit", "keep_alive_ms=60000", "--limit", "silent_ms=120000")  # `pub` waits 10 s at most
@@ -48,6 +48,7 @@ class Services(unittest.TestCase):
         self.assertEqual(json.loads(pub.out), {"published": 2, "subscribers": 0})
         echo = run_gimnet(hub, "echo", "robot/map", "-n", "1", "--raw")
         self.assertEqual((echo.code, echo.out), (0, b"new\n"), echo.err)
+        hub.expect_ledger(self, accepted=2, copies=1, delivered=1, dropped={"no_subscriber": 2})
         pub.signal(2)
         self.assertEqual(pub.wait(), 130, pub.err)
 
@@ -123,6 +124,7 @@ class Services(unittest.TestCase):
                 "(`gimnet status` counts what the hub dropped)\n")
         self.assertEqual((lines.err, objects.err, paced.err), (said, said, ""))
         self.assertEqual([json.loads(line)["missed"] for line in objects.out.splitlines()], [0, 941])
+        hub.expect_ledger(self, accepted=provider.frames_sent, copies=4, delivered=6)
 
     def test_echo_blames_a_broken_connection_for_what_did_not_come_across_it(self):
         hub = Hub(self)
@@ -156,6 +158,7 @@ class Services(unittest.TestCase):
             self.assertEqual(run_gimnet(hub, "pub", "robot/odom", "--wait", "1", data=line).code, 0)
         self.assertEqual(echo.wait(), 0)
         self.assertEqual(echo.out, b"before\nafter\n")
+        hub.expect_ledger(self, accepted=2, delivered=2)
 
     def test_services_and_nodes_are_listed(self):
         hub = Hub(self)
@@ -190,8 +193,7 @@ class Services(unittest.TestCase):
         echoes = [start_gimnet(self, hub, "echo", "a/b", "-n", "100", "--raw", "--shard", str(i % 2)) for i in range(4)]
         pub = run_gimnet(hub, "pub", "a/b", "--wait", "4", data=b"x\n" * 100)
         self.assertEqual([pub.code, *(echo.wait() for echo in echoes)], [0] * 5)
-        ledger = hub.quiet_status(self)["ledger"]
-        self.assertEqual((ledger["accepted"], ledger["copies"], ledger["delivered"]), (100, 300, 400))
+        hub.expect_ledger(self, accepted=100, copies=300, delivered=sum(echo.out.count(b"\n") for echo in echoes))
 
 
 class Measures(unittest.TestCase):

@@ -4,7 +4,6 @@
 import json
 import os
 import signal
-import socket
 import struct
 import unittest
 
@@ -48,18 +47,6 @@ def message(client, target, sequence, data):
     return client.frame(target, struct.pack("<IIIBBH", 0, 0, sequence, 0, 0, 0) + data, flags=FLAG_KEYED)
 
 
-class UnixClient(Client):
-    """The same over the hub's Unix socket."""
-
-    def __init__(self, test, hub):  # pylint: disable=super-init-not-called
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        test.addCleanup(self.socket.close)
-        self.socket.settimeout(20.0)
-        self.socket.connect(hub.socket_path)
-        self.id, self.welcome, self.pinged = 0, {}, 0
-        self._bytes = bytearray()
-
-
 class Restart(unittest.TestCase):
     def kill(self, hub):
         hub.process.signal(signal.SIGKILL)
@@ -88,6 +75,7 @@ class Restart(unittest.TestCase):
         # J may still come: it is away, not unknown.
         again.send(again.frame(j_id, b"?", flags=FLAG_REPORT))
         self.assertEqual(again.next_where(lambda got: got.kind == REPORT).payload[0], AWAY)
+        hub.expect_ledger(self, accepted=again.frames_sent, delivered=1, dropped={"away": 1})
         # J was killed with the hub; started again, it has its id and name, too.
         start_recv(self, hub, "J")
         self.assertEqual(id_of(hub, "J"), j_id)
@@ -123,6 +111,7 @@ class Restart(unittest.TestCase):
         provider.popen.stdin.write(b"go on\n")
         provider.popen.stdin.flush()
         wait_until(lambda: watcher.out.endswith(b"go on\n"), "the message at the subscriber")
+        hub.expect_ledger(self, accepted=1, delivered=1)
 
 
 class Programs(unittest.TestCase):
@@ -166,6 +155,8 @@ class Programs(unittest.TestCase):
             for receiver in receivers:
                 wait_until(lambda r=receiver: r.out == expected, f"{expected} at every receiver")
         self.assertGreaterEqual(proxy.dropped, 100)
+        self.assertEqual(peer.frames_sent, 100)
+        hub.expect_ledger(self, accepted=peer.frames_sent, delivered=sum(r.out.count(b"\n") for r in receivers))
         self.assertEqual([id_of(hub, name) for name in names], ids)
         self.assertEqual(resolved(hub), 0)
 
@@ -217,10 +208,10 @@ class Tokens(unittest.TestCase):
     def test_one_of_another_identity_counts_as_none(self):
         hub = Hub(self)
         over_tcp = Client(self, hub).join()
-        over_unix = UnixClient(self, hub).join()
-        self.assertNotEqual(UnixClient(self, hub).join(token=over_tcp.welcome[2]).id, over_tcp.id)
+        over_unix = Client(self, hub, local=True).join()
+        self.assertNotEqual(Client(self, hub, local=True).join(token=over_tcp.welcome[2]).id, over_tcp.id)
         self.assertNotEqual(Client(self, hub).join(token=over_unix.welcome[2]).id, over_unix.id)
-        self.assertEqual(UnixClient(self, hub).join(token=over_unix.welcome[2]).id, over_unix.id)
+        self.assertEqual(Client(self, hub, local=True).join(token=over_unix.welcome[2]).id, over_unix.id)
 
     def test_goodbye_frees_id_and_name_at_once(self):
         hub = Hub(self)

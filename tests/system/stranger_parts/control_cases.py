@@ -199,4 +199,7 @@ class Administration(Case):
         admin.ask(CTRL, 4, u32(3, one.id) + put(4, TEXT, "enough"))
         self.assertEqual(self.goodbye(one), 15)
         admin.ask(CTRL, 6)
-        self.assertEqual(self.goodbye(again), 7)
+        for who in (again, admin):
+            self.assertEqual(self.goodbye(who), 7)
+            who.close()
+        self.assertEqual(hub.process.wait(), 0, hub.process.err)

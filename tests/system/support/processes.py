@@ -19,18 +19,18 @@ GIMNET = str(BIN / "gimnet")
 
 
 class Process:
-    """A program whose output is gathered in memory by threads. Ended, at the latest, by end()."""
+    """A program whose output is gathered in memory by threads, or goes to a file of the test's. Ended, at the latest, by
+    end()."""
 
-    def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None):
+    def __init__(self, arguments, stdin=subprocess.DEVNULL, env=None, stdout=subprocess.PIPE):
         environment = dict(os.environ)
         environment.pop("GIMNET_HUB", None)
         environment.pop("STATE_DIRECTORY", None)
         environment.update({"XDG_RUNTIME_DIR": HOME.name, "XDG_STATE_HOME": HOME.name}, **(env or {}))
-        self.popen = subprocess.Popen(arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                      env=environment)
+        self.popen = subprocess.Popen(arguments, stdin=stdin, stdout=stdout, stderr=subprocess.PIPE, env=environment)
         self._out, self._err = bytearray(), bytearray()
         self._threads = [threading.Thread(target=self._drain, args=pair, daemon=True)
-                         for pair in ((self.popen.stdout, self._out), (self.popen.stderr, self._err))]
+                         for pair in ((self.popen.stdout, self._out), (self.popen.stderr, self._err)) if pair[0]]
         for thread in self._threads:
             thread.start()
 
@@ -94,7 +94,8 @@ class Process:
 
 
 class Hub:
-    """A tcphub of its own, on a free port and a Unix socket in a folder of its own. Ends with the test."""
+    """A tcphub of its own, on a free port and a Unix socket in a folder of its own. Ends with the test, at whose end it has
+    to have an exact ledger, if it lives then."""
 
     def __init__(self, test, *arguments, shards=1, hub_id=7, listen=None, state=None):
         self._how = {"shards": shards, "hub_id": hub_id}
@@ -114,6 +115,22 @@ class Hub:
         self.addresses = line.split()[1:]
         self.url = self.addresses[0]
         self.socket_path = next((url[5:] for url in self.addresses if url.startswith("unix:")), None)
+        # Where a hub that is full, or that others swamp, still takes somebody who asks.
+        self._admin_url = self.addresses[-1]
+        test.addCleanup(self._look_at_its_end, test)
+
+    def _look_at_its_end(self, test):
+        """Behind all who came to it: their connections are closed by now."""
+        code = self.process.popen.poll()
+        if code is None:
+            try:
+                self.quiet_status(test)
+                return
+            except AssertionError:
+                if not self.socket_path or os.path.exists(self.socket_path):
+                    raise
+            code = self.process.wait()  # it drains: it takes nobody who asks any more
+        test.assertIn(code, (0, -signal.SIGKILL), f"tcphub ended by itself: {self.process.err}")
 
     def again(self, test):
         """The hub started anew: same arguments, addresses and state. Its process has ended."""
@@ -145,13 +162,40 @@ class Hub:
         last = [None]
 
         def settled():
-            status = self.status()
+            asked = run_gimnet(self._admin_url, "status", "--json")
+            test.assertEqual(asked.code, 0, asked.err)
+            status = json.loads(asked.out)
             same = last[0] is not None and last[0]["ledger"] == status["ledger"] and status["ledger"]["exact"]
             last[0] = status
             return status if same else None
-        status = wait_until(settled, "a quiet hub with an exact ledger")
-        test.assertTrue(status["ledger"]["exact"], status["ledger"])
-        return status
+        try:
+            return wait_until(settled, "a quiet hub with an exact ledger")
+        except AssertionError as error:
+            raise AssertionError(f"{error}; it was last {last[0] and last[0]['ledger']}") from None
+
+    def expect_ledger(self, test, accepted, delivered, copies=0, dropped=None, queued=0):
+        """The hub's ledger is, at a quiet moment, what senders and receivers counted themselves: numbers, or functions that
+        count. `dropped`: {reason: frames}, all that there are. Returns the status."""
+        seen = [None]
+
+        def number(term):
+            return term() if callable(term) else term
+
+        def as_counted():
+            status = self.quiet_status(test)
+            terms = {key: status["ledger"][key] for key in ("accepted", "copies", "delivered", "queued")}
+            reasons = {name[len("dropped."):]: value for name, value in status["counters"].items()
+                       if name.startswith("dropped.") and value}
+            wanted = {"accepted": number(accepted), "copies": number(copies), "delivered": number(delivered),
+                      "queued": number(queued)}
+            wanted_reasons = {reason: number(term) for reason, term in (dropped or {}).items() if number(term)}
+            seen[0] = (terms, reasons), (wanted, wanted_reasons)
+            return status if seen[0][0] == seen[0][1] else None
+        try:
+            return wait_until(as_counted, "the ledger as it was counted")
+        except AssertionError:
+            test.assertEqual(*seen[0], "what the hub counted, and what others did")
+            raise
 
     def wait_for_node(self, name):
         def there():
@@ -159,9 +203,9 @@ class Hub:
         return wait_until(there, f"node {name}")
 
 
-def start_gimnet(test, hub, *arguments, stdin=subprocess.DEVNULL):
-    """gimnet, running; ends with the test."""
-    process = Process([GIMNET, "--hub", hub.url if hasattr(hub, "url") else hub, *arguments], stdin=stdin)
+def start_gimnet(test, hub, *arguments, **pipes):
+    """gimnet, running; ends with the test. `pipes`: stdin and stdout as of Process."""
+    process = Process([GIMNET, "--hub", hub.url if hasattr(hub, "url") else hub, *arguments], **pipes)
     test.addCleanup(process.end)
     return process
 
@@ -177,8 +221,8 @@ def run_gimnet(hub, *arguments, data=b"", patience_s=2 * PATIENCE_S):
     return process
 
 
-def start_recv(test, hub, name, *arguments):
+def start_recv(test, hub, name, *arguments, **pipes):
     """`gimnet recv`, known to the hub."""
-    process = start_gimnet(test, hub, "recv", "--name", name, "--raw", *arguments)
+    process = start_gimnet(test, hub, "recv", "--name", name, "--raw", *arguments, **pipes)
     hub.wait_for_node(name)
     return process

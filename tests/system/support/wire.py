@@ -1,11 +1,12 @@
 """The protocol of docs/protocol.md with a socket and struct, so that the hub is not tested by its own code."""
 
 import dataclasses
-import os
+import random
 import socket
 import struct
 import time
 
+from support.tap import FrameCount
 from support.waiting import PATIENCE_S
 
 HEADER = 16
@@ -108,7 +109,8 @@ class Closed(Exception):
 
 
 class Client:
-    """A connection to a hub. Reads only when asked to. The test's `clients` lists them all."""
+    """A connection to a hub. Reads only when asked to. The test's `clients` lists them all. Counts the frames of nodes that
+    it sent, and that next() gave."""
 
     def __init__(self, test, hub, receive_bytes=None, local=False):
         """`local`: over the hub's Unix socket."""
@@ -122,10 +124,15 @@ class Client:
         self.socket.settimeout(PATIENCE_S)
         self.socket.connect(hub.socket_path if local else ("127.0.0.1", hub.port))
         self.id, self.welcome, self.pinged = 0, {}, 0
-        self._bytes = bytearray()
+        self._bytes, self._sent, self.frames_got = bytearray(), FrameCount(), 0
+
+    @property
+    def frames_sent(self):
+        return self._sent.frames
 
     def send(self, data):
         self.socket.sendall(data)
+        self._sent.feed(data)
         return self
 
     def join(self, name=None, **how):
@@ -140,6 +147,12 @@ class Client:
         opening = self._take(8)
         assert opening == OPENING, opening
         return self.next()
+
+    def read_ahead(self):
+        """What was read and not taken yet: for who goes on reading from the socket itself."""
+        taken = bytes(self._bytes)
+        self._bytes.clear()
+        return taken
 
     def _take(self, size):
         while len(self._bytes) < size:
@@ -158,6 +171,7 @@ class Client:
         """The next frame of any kind. PINGs are answered. Closed: there is none."""
         length, dst, src, kind, flags, _, lane = struct.unpack("<IIIBBBB", self._take(16))
         got = Frame(dst, src, kind, flags, lane, self._take(length))
+        self.frames_got += kind < LINK and kind not in (REPORT, FLOW)
         if kind == FLOW and got.payload[0] == PING:
             self.pinged += 1
             try:
@@ -204,5 +218,6 @@ class Client:
         return self.next_where(lambda got: got.kind == kind and got.operation == operation | 0x8000).fields
 
 
-def random_bytes(size):
-    return os.urandom(min(size, 4096)) * (size // 4096 + 1) if size > 4096 else os.urandom(size)
+def varied_bytes(size, seed=0):
+    """Bytes in which no two places look alike, so that parts that are swapped, repeated or lost are seen."""
+    return random.Random(f"{seed} {size}").randbytes(size)
