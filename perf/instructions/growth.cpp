@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bench/hub/data/support/null_transport.hpp"
 #include "client/gimi/ack_book.hpp"
 #include "client/nif/name_cache.hpp"
 #include "client/nif/pause_table.hpp"
@@ -307,12 +308,47 @@ Work pattern_parts(std::size_t count) {
   };
 }
 
+/// So many frames of 16 bytes in turns to the same 8 nodes of a hub that has an eightieth as many nodes, 800 a turn.
+Work forwarding(std::size_t count) {
+  constexpr std::uint32_t kFirstNode = 2;
+  constexpr std::uint32_t kDestinations = 8;
+  constexpr std::size_t kFramesPerTurn = 800;
+  struct World {
+    hub::testing::RouteRig rig;
+    benchmarks::NullTransport transport;
+    std::vector<GatherWriter> writers;
+    std::vector<hub::Run> runs;
+  };
+  const auto nodes = static_cast<std::uint32_t>(count / 80);
+  const auto world = std::make_shared<World>(World{{}, {}, std::vector<GatherWriter>(kFirstNode + nodes), {}});
+  for (std::uint32_t i = 0; i < nodes; ++i) world->rig.add_here(kFirstNode + i);
+  for (std::uint32_t i = 0; i < kDestinations; ++i) {
+    const auto node = make_id<NodeId>(HubId{7}, kFirstNode + i * (nodes / kDestinations)).value();
+    world->runs.push_back(world->rig.make_run(node, {"0123456789abcdef"}));
+  }
+  return [world, count] {
+    for (std::size_t i = 1; i <= count; ++i) {
+      const hub::Run& run = world->runs[i % kDestinations];
+      world->rig.router.route(run, run.header());
+      if (i % kFramesPerTurn != 0) continue;
+      for (Recipient* recipient : world->rig.recipients.dirty()) {
+        recipient->dirty = false;
+        static_cast<void>(world->writers[recipient->slot.value()].flush(recipient->outbox, nullptr, world->transport,
+                                                                        world->rig.egress.context));
+        recipient->outbox.on_emptied(world->rig.egress.context);
+      }
+      world->rig.recipients.dirty().clear();
+    }
+  };
+}
+
 struct Script {
   std::string_view name;
   Work (*make)(std::size_t count);
 };
 
 constexpr Script kScripts[] = {
+    {"forwarding", forwarding},
     {"duplicate_keys", duplicate_keys},
     {"long_keys", long_keys},
     {"nested_bomb", nested_bomb},

@@ -12,7 +12,9 @@ from driver import instructions  # noqa: E402
 
 # Script: few, many, and how many times more a piece may cost among many. Names are found in a tree: among a hundred times
 # as many they are seven comparisons deeper. Of parts of a pattern each is compared with each of the name, 16 x 16 at most.
+# A hub of 10 nodes and one of 10,000 forward to eight of them at the same cost.
 SCRIPTS = {
+    "forwarding": (800, 800_000, 1.02),
     "duplicate_keys": (1_000, 100_000, 1.2),
     "long_keys": (40, 4_000, 1.2),
     "nested_bomb": (1_000, 100_000, 1.2),
