@@ -312,7 +312,6 @@ Work pattern_parts(std::size_t count) {
 Work forwarding(std::size_t count) {
   constexpr std::uint32_t kFirstNode = 2;
   constexpr std::uint32_t kDestinations = 8;
-  constexpr std::size_t kFramesPerTurn = 800;
   struct World {
     hub::testing::RouteRig rig;
     benchmarks::NullTransport transport;
@@ -320,7 +319,8 @@ Work forwarding(std::size_t count) {
     std::vector<hub::Run> runs;
   };
   const auto nodes = static_cast<std::uint32_t>(count / 80);
-  const auto world = std::make_shared<World>(World{{}, {}, std::vector<GatherWriter>(kFirstNode + nodes), {}});
+  auto world = std::make_shared<World>();
+  world->writers = std::vector<GatherWriter>(kFirstNode + nodes);
   for (std::uint32_t i = 0; i < nodes; ++i) world->rig.add_here(kFirstNode + i);
   for (std::uint32_t i = 0; i < kDestinations; ++i) {
     const auto node = make_id<NodeId>(HubId{7}, kFirstNode + i * (nodes / kDestinations)).value();
@@ -330,7 +330,7 @@ Work forwarding(std::size_t count) {
     for (std::size_t i = 1; i <= count; ++i) {
       const hub::Run& run = world->runs[i % kDestinations];
       world->rig.router.route(run, run.header());
-      if (i % kFramesPerTurn != 0) continue;
+      if (i % 800 != 0) continue;
       for (Recipient* recipient : world->rig.recipients.dirty()) {
         recipient->dirty = false;
         static_cast<void>(world->writers[recipient->slot.value()].flush(recipient->outbox, nullptr, world->transport,
