@@ -107,11 +107,22 @@ void Flusher::on_write_failed(Connection& connection) {
 
 void Flusher::watch(Connection& connection) {
   if (connection.progress) return;
-  connection.progress = std::make_unique<Progress>();
+  if (spare_.empty()) {
+    connection.progress = std::make_unique<Progress>();
+  } else {
+    connection.progress = std::move(spare_.back());
+    spare_.pop_back();
+    *connection.progress = Progress{};
+  }
   Progress& progress = *connection.progress;
   progress.since_ms = progress.block_since_ms = progress.rate_since_ms = state_.now_ms;
   progress.taken_bytes = progress.block_taken_bytes = progress.rate_bytes = taken_bytes(connection);
   progress.data_end = connection.sent_bytes;
+}
+
+void Flusher::end_watch(Connection& connection) {
+  if (spare_.size() < kSpareMax) spare_.push_back(std::move(connection.progress));
+  connection.progress.reset();
 }
 
 void Flusher::on_writable(Connection& connection) {
@@ -129,7 +140,7 @@ void Flusher::look_after(Connection& connection) {
   // Where messages were dropped because it took nothing, an empty queue does not say that it has caught up.
   const bool caught_up = taken_bytes(connection) >= progress.owed_bytes;
   if (connection.outbox.empty() && !connection.writer.in_frame() && caught_up) {
-    connection.progress.reset();
+    end_watch(connection);
     return;
   }
   // What the kernel calls unsent counts its own bookkeeping on some transports: never less than before.

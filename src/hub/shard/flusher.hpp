@@ -13,7 +13,7 @@ inline constexpr std::uint32_t kFirstUnsentBytes = 64 * 1024;
 /// Thread safety: one shard.
 class Flusher {
  public:
-  Flusher(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
+  Flusher(ShardState& state, Closer& closer) : state_(state), closer_(closer) { spare_.reserve(kSpareMax); }
 
   /// All connections that have something to write. Returns whether some of them could have written more.
   bool flush_dirty();
@@ -31,12 +31,18 @@ class Flusher {
   void on_write_failed(Connection& connection);
   /// From here on look_after() asks whether the connection gets on.
   void watch(Connection& connection);
+  /// It has taken everything.
+  void end_watch(Connection& connection);
   void on_emptied(Connection& connection);
   void adapt_unsent_limit(Connection& connection, std::uint64_t taken);
 
+  /// Of connections that wait again and again, so many do not allocate for it.
+  static constexpr std::size_t kSpareMax = 256;
+
   ShardState& state_;
   Closer& closer_;
-  std::vector<Connection*> again_;  ///< used up their share of this turn
+  std::vector<Connection*> again_;                ///< used up their share of this turn
+  std::vector<std::unique_ptr<Progress>> spare_;  ///< of connections that have got on. Limit: kSpareMax
 };
 
 }  // namespace gimnet::hub

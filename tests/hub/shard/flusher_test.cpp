@@ -40,6 +40,26 @@ TEST(Flusher, GoesOnWhereTheTransportStopped) {
   }
 }
 
+TEST(Flusher, TheNextOneThatWaitsTakesNoNewMemoryToBeWatched) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  const Progress* used = nullptr;
+  for (int i = 0; i < 3; ++i) {
+    FakeNode& waiting = rig.join(0);
+    waiting.pipe.set_room(1'000);
+    for (int message = 0; message < 3; ++message) rig.send(a, waiting.id.value(), std::string(1'000, 'x'));
+    rig.settle_without_reading();
+    const std::unique_ptr<Progress>& progress = rig.connection(waiting)->progress;
+    ASSERT_TRUE(progress);
+    EXPECT_EQ(progress->since_ms, rig.now_ms) << "nothing is left of the one before";
+    EXPECT_TRUE(used == nullptr || progress.get() == used);
+    used = progress.get();
+    rig.settle();
+    rig.pass_ms(200);
+    EXPECT_FALSE(progress) << "it has taken everything";
+  }
+}
+
 TEST(Flusher, ClosesASlowConsumerAndTellsIt) {
   HubRig rig;
   FakeNode& a = rig.join(0);
