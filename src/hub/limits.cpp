@@ -46,9 +46,11 @@ constexpr std::array kTable{
               "kicked nodes whose tokens a restarted hub still refuses; one more lets the oldest go", true},
     LimitInfo{"keep_alive_ms", "ms", &Limits::keep_alive_ms, 10, kHour, "a silent end says PING after this time"},
     LimitInfo{"silent_ms", "ms", &Limits::silent_ms, 30, kHour, "a node that was not heard for this time is closed"},
-    LimitInfo{"unacknowledged_ms", "ms", &Limits::unacknowledged_ms, 100, kHour,
-              "a node over TCP that is not read, since it went on after PAUSE, and takes nothing for this time is gone",
-              true},
+    LimitInfo{
+        "unacknowledged_ms", "ms", &Limits::unacknowledged_ms, 100, kHour,
+        "a node over TCP that is not read, since it went on after PAUSE, and takes nothing for this time is written "
+        "to no more; it ends once what it sent is taken, at most max(grace_ms, silent_ms) later",
+        true},
     LimitInfo{"lane0_bytes", "bytes", &Limits::lane0_bytes, 16 * kKiB, kGiB, "waiting for one node, real-time lane",
               true},
     LimitInfo{"lane1_bytes", "bytes", &Limits::lane1_bytes, 16 * kKiB, kGiB, "waiting for one node, normal lane", true},
