@@ -16,8 +16,12 @@ void Closer::close(Connection& connection, proto::GoodbyeCode code, std::string 
   tell(connection, false, code, std::move(sentence));
 }
 
-void Closer::on_broken(Connection& connection) {
+void Closer::on_end(Connection& connection) {
   if (!connection.tail.empty()) state_.counters.unfinished_frames.add(1);
+  on_broken(connection);
+}
+
+void Closer::on_broken(Connection& connection) {
   detach(connection, false);
   tell(connection, false, proto::GoodbyeCode::done, {});
 }

@@ -13,7 +13,9 @@ class Closer {
 
   /// Says GOODBYE, as far as the peer still listens, ends the connection, and tells the conductor.
   void close(Connection& connection, proto::GoodbyeCode code, std::string sentence);
-  /// The connection broke.
+  /// The peer's end, or an error, was read: nothing comes any more. In the middle of a frame that is counted.
+  void on_end(Connection& connection);
+  /// The connection is of no use any more. What the peer had sent need not have been read.
   void on_broken(Connection& connection);
   /// The peer said GOODBYE.
   void on_goodbye(Connection& connection, proto::GoodbyeCode code, std::string sentence);

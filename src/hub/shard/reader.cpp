@@ -47,7 +47,7 @@ void Reader::read(Connection& connection) {
   const IoResult result = connection.transport->receive(share);
   ++state_.tally.receive_calls;
   if (result.status == IoStatus::would_block) return;
-  if (result.status != IoStatus::ok) return closer_.on_broken(connection);
+  if (result.status != IoStatus::ok) return closer_.on_end(connection);
   state_.tally.received_bytes += result.bytes;
   SessionCounters& counters = *connection.outbox.counters();
   counters.received_bytes.add(result.bytes);

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <thread>
@@ -119,6 +120,25 @@ class GonePeer : public ::testing::TestWithParam<Family> {
     }
     ASSERT_EQ(rig_.sum(&ShardCounters::held_reads), 1u);
     for (int i = 0; i < 16; ++i) send(to);
+  }
+  /// The same, so that it is read no more in the middle of a frame; what it sends last is half a frame, too.
+  void fill_in_the_middle(FakeNode& to) {
+    std::vector<std::byte> bytes =
+        HubRig::frame(sender_, to.id.value(), std::string(kFrameBytes - proto::kHeaderSize, 'x'));
+    const auto half = static_cast<std::ptrdiff_t>(kFrameBytes / 2);
+    write(std::span(bytes).first(kFrameBytes / 2));
+    std::rotate(bytes.begin(), bytes.begin() + half, bytes.end());
+    const auto send_two_halves = [&] {
+      write(bytes);
+      ++sent_;
+    };
+    for (int i = 0; i < 1'000 && rig_.sum(&ShardCounters::held_reads) == 0; ++i) {
+      send_two_halves();
+      turn();
+    }
+    ASSERT_EQ(rig_.sum(&ShardCounters::held_reads), 1u);
+    ASSERT_FALSE(rig_.state(0).find(sender_.id)->tail.empty());
+    for (int i = 0; i < 16; ++i) send_two_halves();
   }
   /// Everybody reads until nothing comes any more.
   void deliver(FakeNode& to) {
@@ -256,6 +276,47 @@ TEST_P(GonePeer, DelaysNoDrain) {
   rig_.command(0, DrainCommand{60'000});
   deliver(to);
   EXPECT_EQ(rig_.sum(&ShardCounters::connections), 0u);
+}
+
+TEST_P(GonePeer, BrokeItsFrameWhereItIsReadToTheEnd) {
+  FakeNode& to = rig_.join(0);
+  join();
+  to.pipe.set_room(0);
+  fill_in_the_middle(to);
+  vanish();
+  deliver(to);
+  EXPECT_THAT(to.frames, SizeIs(sent_));
+  EXPECT_EQ(rig_.sum(&ShardCounters::connections), 1u);
+  EXPECT_EQ(rig_.sum(&ShardCounters::unfinished_frames), 1u);
+}
+
+TEST_P(GonePeer, BrokeNoFrameWhereTheHubEndsInTheMiddleOfOne) {
+  FakeNode& to = rig_.join(0);
+  join();
+  to.pipe.set_room(0);
+  fill_in_the_middle(to);
+  vanish();
+  rig_.now_ms += 1'100;
+  turn();  // PING cannot be written
+  ASSERT_TRUE(rig_.state(0).find(sender_.id)->write_failed);
+  rig_.command(0, DrainCommand{60'000});
+  deliver(to);
+  EXPECT_EQ(rig_.sum(&ShardCounters::connections), 0u);
+  EXPECT_EQ(rig_.sum(&ShardCounters::unfinished_frames), 0u);
+}
+
+TEST_P(GonePeer, BrokeNoFrameWhereItsTimeIsOverInTheMiddleOfOne) {
+  FakeNode& other = rig_.join(0);
+  join(true);
+  fill_in_the_middle(sender_);
+  vanish();
+  for (std::uint64_t ms = 0; ms < 2 * limits_.grace_ms; ms += 500) {
+    rig_.now_ms += 500;
+    rig_.send_flow(other, proto::flow::Pong{});
+    turn();
+  }
+  EXPECT_TRUE(end());
+  EXPECT_EQ(rig_.sum(&ShardCounters::unfinished_frames), 0u);
 }
 
 /// Only a Unix socket tells that its far end takes nothing any more and goes on sending: TCP has no word for it.
