@@ -23,7 +23,9 @@ struct Limits {
   std::uint64_t handshake_bytes = 1'024;
   std::uint64_t handshake_ms = 5'000;
   std::uint64_t handshakes = 4'096;
-  std::uint64_t handshakes_per_address = 16;
+  // 3 % of `handshakes`, and more than the programs that a busy robot starts at once behind one address: its kernel has
+  // their connections before they run and say HELLO.
+  std::uint64_t handshakes_per_address = 128;
   std::uint64_t nodes = 100'000;
   std::uint64_t administrators = 8;
   std::uint64_t grace_ms = 30'000;

@@ -43,12 +43,12 @@ TEST_F(WaitingRoomTest, WhoseHelloIsThereByNowDoesNotMakeWay) {
 }
 
 TEST_F(WaitingRoomTest, AtTheLimitOfAnAddressItsOldestGoes) {
-  ASSERT_EQ(limits_.handshakes_per_address, 16u);
+  ASSERT_EQ(limits_.handshakes_per_address, 128u);
   for (const char* address : {"10.0.0.1", "[fe80::1]", "[::ffff:10.0.0.1]"}) {
     Peer& other = enter_from("10.0.0.2");
     Peer& oldest = enter_from(address);
     Peer& second = enter_from(address);
-    for (int i = 2; i < 16; ++i) enter_from(address);
+    for (int i = 2; i < 128; ++i) enter_from(address);
     const std::size_t waiting = room_.waiting();
     EXPECT_FALSE(timed_out(oldest)) << "at the limit";
     enter_from(address);
@@ -56,7 +56,7 @@ TEST_F(WaitingRoomTest, AtTheLimitOfAnAddressItsOldestGoes) {
     const auto goodbye = oldest.receive_goodbye();
     ASSERT_TRUE(goodbye);
     EXPECT_EQ(goodbye->code, GoodbyeCode::hello_timeout);
-    EXPECT_THAT(goodbye->sentence, HasSubstr("handshakes_per_address is 16"));
+    EXPECT_THAT(goodbye->sentence, HasSubstr("handshakes_per_address is 128"));
     EXPECT_FALSE(timed_out(second));
     EXPECT_FALSE(timed_out(other)) << "of another address";
   }
@@ -87,7 +87,16 @@ TEST_F(WaitingRoomTest, WhoWaitsNoMoreHasNoPlaceOfItsAddress) {
 }
 
 TEST_F(WaitingRoomTest, ManyOfOneAddressWhoSayHelloAtOnceAllGetIn) {
-  for (int i = 0; i < 100; ++i) enter_from("10.0.0.1").send(opening_and(hello("robot-" + std::to_string(i))));
+  for (int i = 0; i < 300; ++i) enter_from("10.0.0.1").send(opening_and(hello("robot-" + std::to_string(i))));
+  serve();
+  EXPECT_EQ(admitted_.size(), 300u);
+  EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 0u);
+}
+
+TEST_F(WaitingRoomTest, ARobotsProgramsWhoseConnectionsAreThereBeforeTheyRunAllGetIn) {
+  std::vector<Peer*> programs;
+  for (int i = 0; i < 100; ++i) programs.push_back(&enter_from("10.0.0.1"));
+  for (std::size_t i = 0; i < programs.size(); ++i) programs[i]->send(opening_and(hello("p-" + std::to_string(i))));
   serve();
   EXPECT_EQ(admitted_.size(), 100u);
   EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 0u);
