@@ -34,7 +34,7 @@ constexpr std::array kTable{
     LimitInfo{"handshakes", "connections", &Limits::handshakes, 1, 1'000'000,
               "connections without HELLO at a time; one more ends the oldest", true},
     LimitInfo{"handshakes_per_address", "connections", &Limits::handshakes_per_address, 1, 1'000'000,
-              "the same from one address of another machine; this machine's own connections do not count", true},
+              "the same from one address; connections over loopback or a Unix socket do not count", true},
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000, "sessions, those within their grace time included", true},
     LimitInfo{"administrators", "nodes", &Limits::administrators, 0, 1'024,
               "places beyond nodes, and descriptors, that are kept for administrators", true},

@@ -12,8 +12,8 @@ namespace gimnet::hub {
   return user == std::string_view::npos ? address : address.substr(user);
 }
 
-/// Who a peer is for limits on strangers: its address without the port; "" for this machine's own, who are many behind
-/// one address by right. Valid until: `address` changes.
+/// Who a peer is for limits on strangers: its address without the port; "" over loopback or a Unix socket, where many
+/// are behind one address by right. Valid until: `address` changes.
 [[nodiscard]] constexpr std::string_view remote_address(std::string_view transport, std::string_view address) {
   if (transport != "tcp") return {};
   const bool local = address.starts_with("127.") || address.starts_with("[::1]") || address.starts_with("[::ffff:127.");

@@ -20,7 +20,7 @@ namespace gimnet::hub {
 /// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else. Those who say HELLO are
 /// judged; those who are refused are told why, and given a moment to read it.
 /// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes, and
-/// limits.handshakes_per_address of them from one other machine; one more ends the oldest of these, unless its HELLO is
+/// limits.handshakes_per_address of them from one address; one more ends the oldest of these, unless its HELLO is
 /// there by now. As many may leave. Time is an argument.
 class WaitingRoom {
  public:
