@@ -56,7 +56,10 @@ class SessionGauges {
   }
   /// How many bytes wait for the slot's session.
   void set_queued(ConnectionSlot slot, std::uint64_t bytes) {
-    if (queued_ && slot.value() < slots_) queued_[slot.value()].store(bytes);
+    if (!queued_ || slot.value() >= slots_) return;
+    // The 0 of a session that begins or ends would make its page memory of its own.
+    Counter& queued = queued_[slot.value()];
+    if (queued.value() != bytes) queued.store(bytes);
   }
   /// As last written; all 0 of a session that its shard does not know yet. REQUIRES: the session holds its slot.
   [[nodiscard]] SessionCounts counts(ConnectionSlot slot, std::uint32_t generation) const {
