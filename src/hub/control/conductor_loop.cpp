@@ -88,6 +88,7 @@ struct ConductorLoop::Impl {
     const auto after =
         door.acceptor.accept_some([this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
     see_off_leaving();
+    serve_watches();  // a newcomer that finds no room has those served who said HELLO
     arm_timer();
     if (after == Acceptor::After::wait) return watch_door(door);
     door.pause.expires_after(milliseconds{Acceptor::kPauseMs});
