@@ -78,8 +78,10 @@ void SocketTransport::limit_unsent(std::uint32_t bytes) {
     // 0 is the system's own value: no bound.
     set_option(descriptor_, IPPROTO_TCP, TCP_NOTSENT_LOWAT, wanted);
   } else {
-    // A Unix socket has no mark for what is unsent, but its send buffer is all there is between the two ends.
-    set_option(descriptor_, SOL_SOCKET, SO_SNDBUF, bytes == 0 ? send_buffer_bytes_ : wanted);
+    // A Unix socket has no mark for what is unsent, but its send buffer is all there is between the two ends. The bound
+    // is on top of the buffer's own, and never raises it.
+    set_option(descriptor_, SOL_SOCKET, SO_SNDBUF,
+               bytes == 0 ? send_buffer_bytes_ : std::min(wanted, send_buffer_bytes_));
   }
 }
 

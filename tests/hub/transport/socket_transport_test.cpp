@@ -143,5 +143,18 @@ TEST(SocketTransport, LimitsWhatWaitsUnsentOnUnixSockets) {
   EXPECT_LT(fill(*limited->near), fill(*free->near));
 }
 
+TEST(SocketTransport, ABoundOfWhatWaitsUnsentDoesNotRaiseTheBufferOfAUnixSocket) {
+  Limits limits;
+  limits.socket_send_bytes = 16 * 1'024;
+  const auto ends = unix_ends(limits);
+  const int whole = option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF);
+  for (const std::uint32_t bytes : {16u * 1'024 + 1, 128u * 1'024, 1u << 30, 0u}) {
+    ends->near->limit_unsent(bytes);
+    EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF), whole) << bytes;
+  }
+  ends->near->limit_unsent(8 * 1'024);
+  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF), whole / 2);
+}
+
 }  // namespace
 }  // namespace gimnet::hub
