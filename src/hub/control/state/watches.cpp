@@ -15,7 +15,7 @@ namespace ns = proto::ns;
 constexpr std::size_t kQuotedMax = 60;
 /// No change is longer: a page that has more room than this takes one more.
 constexpr std::size_t kChangeBytesMax = 6 * 1024;
-/// No record is shorter.
+/// No record is shorter: how many fill a page, which takes none once a longest change might not fit.
 constexpr std::size_t kRecordBytesLeast = 32;
 
 }  // namespace
@@ -238,8 +238,8 @@ bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
   if (!watch.few || !watch.pattern) return false;
   if (page.full || turn.work == 0) return true;  // at another time
   const bool of_nodes = watch.phase == Phase::nodes;
-  const ListingRequest request{&*watch.pattern, watch.cursor, false, limits_.watch_event_bytes / kRecordBytesLeast,
-                               limits_.scan_records};
+  const std::size_t records = (limits_.watch_event_bytes - kChangeBytesMax) / kRecordBytesLeast;
+  const ListingRequest request{&*watch.pattern, watch.cursor, false, records, limits_.scan_records};
   const std::optional<Listed> listed =
       of_nodes ? list_few_nodes(turn.membership, request) : list_few_services(turn.membership.services(), request);
   watch.few = listed.has_value();
