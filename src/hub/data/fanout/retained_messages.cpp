@@ -106,7 +106,10 @@ void RetainedMessages::forget_provider(NodeId provider) {
   const auto found = first_of_.find(provider.value());
   Entry* each = found == first_of_.end() ? nullptr : found->second;
   first_of_.erase(provider.value());
-  while (each != nullptr) entries_.erase(std::exchange(each, each->after)->group);
+  while (each != nullptr) {
+    const std::uint32_t group = std::exchange(each, each->after)->group;  // not the one that goes with its entry
+    entries_.erase(group);
+  }
 }
 
 void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
