@@ -18,7 +18,8 @@ void for_each_counter(const ShardCounters& counters,
 /// "refused.no_descriptor".
 void for_each_counter(const RefusalCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
-/// The same for HubNS requests: "names.resolve" and so on, "names.unknown", "names.refused.not_found" and so on.
+/// The same for requests about names and services: "names.resolve" and so on, "names.unknown",
+/// "names.refused.not_found" and so on; and for those about the hub: "ctrl.kick" and so on.
 void for_each_counter(const RequestCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 
