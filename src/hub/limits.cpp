@@ -74,7 +74,7 @@ constexpr std::array kTable{
               "kept for one node until it confirms them, where it asked for resume", true},
     LimitInfo{"report_interval_ms", "ms", &Limits::report_interval_ms, 1, 10'000,
               "least time between two REPORTs of one reason to one node"},
-    LimitInfo{"reports", "reports", &Limits::reports, 1, 1'000'000,
+    LimitInfo{"reports", "reports", &Limits::reports, 1, 16'384,
               "senders and reasons of which a shard prepares REPORTs; the drops of more are counted, but not reported"},
     LimitInfo{"socket_send_bytes", "bytes", &Limits::socket_send_bytes, 4 * kKiB, 64 * kMiB,
               "send buffer of a socket in the kernel", true},
