@@ -72,6 +72,7 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
   own_names_.insert(name);
   const MutexLock lock(mutex_);
   if (end_) published->end(end_);
+  published_by_name_.insert_or_assign(name, published.get());
   published_by_group_[group] = published.get();
   return published_.emplace_back(std::move(published)).get();
 }
@@ -96,6 +97,7 @@ void ServiceTable::withdraw(PublishedService& service) {
   service.end({Status::closed, "the service was withdrawn"});
   {
     const MutexLock lock(mutex_);
+    published_by_name_.erase(service.name());
     for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
       if (place->second != &service) continue;
       group = place->first;
@@ -120,8 +122,9 @@ void ServiceTable::set_place(SubscribedService& service, const ServicePlace& pla
   constexpr std::size_t kFormerGroups = 4;
   service.place = place;
   service.on_group(place.group);
-  if (place.group == 0 || std::ranges::find(service.groups, place.group) != service.groups.end()) return;
-  subscribed_by_group_[place.group] = &service;
+  if (place.group == 0) return;
+  subscribed_by_group_[place.group] = &service;  // also a former one again, which was another service's meanwhile
+  std::erase(service.groups, place.group);
   service.groups.push_back(place.group);
   if (service.groups.size() <= kFormerGroups) return;
   forget_group(service, service.groups.front());
@@ -243,19 +246,18 @@ void ServiceTable::on_renamed(const std::string& own_name) {
 
 void ServiceTable::on_own_service_moved(const std::string& name, std::uint32_t group) {
   const MutexLock lock(mutex_);
-  for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
-    PublishedService* service = place->second;
-    if (service->name() != name) continue;
-    published_by_group_.erase(place);
-    if (group != 0) published_by_group_[group] = service;
-    service->on_group(group);
-    return;
-  }
+  const auto known = published_by_name_.find(name);
+  if (known == published_by_name_.end()) return;
+  PublishedService* const service = known->second;
+  // By service, not by id: a hub that lost its state may have given its former group to another one.
+  std::erase_if(published_by_group_, [service](const auto& entry) { return entry.second == service; });
+  if (group != 0) published_by_group_[group] = service;
+  service->on_group(group);
 }
 
 void ServiceTable::on_reconnected() {
   const MutexLock lock(mutex_);
-  for (auto& [group, service] : published_by_group_) service->on_reconnected();
+  for (auto& [name, service] : published_by_name_) service->on_reconnected();
 }
 
 void ServiceTable::end(const Ending& ending) {

@@ -87,6 +87,8 @@ class ServiceTable {
   Mutex mutex_;
   std::size_t open_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::vector<std::unique_ptr<PublishedService>> published_ GIMNET_GUARDED_BY(mutex_);
+  /// Those that were not withdrawn; also one that the hub did not take again, which has no group.
+  std::map<std::string, PublishedService*, std::less<>> published_by_name_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::string, std::unique_ptr<SubscribedService>, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, SubscribedService*> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);

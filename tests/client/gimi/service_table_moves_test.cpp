@@ -1,0 +1,196 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "client/gimi/service_table.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/client/gimi/support/conversation.hpp"
+
+// Services that have other group ids after a break: a hub that lost its state gives them anew, in the order in which it
+// is asked, so that one has the former id of another.
+
+namespace gimnet::gimi {
+namespace {
+
+using test::Conversation;
+using test::kKey;
+using test::kOwnId;
+using test::kPeerId;
+using test::Operation;
+
+namespace ns = proto::ns;
+
+constexpr std::uint32_t kFirst = (7u << 20) | 11;
+constexpr std::uint32_t kSecond = (7u << 20) | 12;
+
+using Groups = std::map<std::string, std::uint32_t>;
+
+/// The parameter: the service of which the hub tells first.
+class MovedServices : public Conversation, public testing::WithParamInterface<const char*> {
+ protected:
+  MovedServices() : Conversation(true) {}
+  /// So that what the test declared need not wait for an answer when it goes.
+  void close_node() {
+    hub_.close();
+    node_->close();
+  }
+
+  [[nodiscard]] Publisher advertise(const std::string& name, std::uint32_t group) {
+    PublishOptions options;
+    options.key = kKey;
+    std::optional<Publisher> made;
+    std::thread asking([&] { made.emplace(node_->advertise(name, options).or_throw()); });
+    answer_all<ns::Advertise>({{name, group}});
+    asking.join();
+    return *made;
+  }
+
+  [[nodiscard]] Subscription subscribe(const std::string& name, std::uint32_t group) {
+    std::optional<Subscription> made;
+    std::thread asking([&] { made.emplace(node_->subscribe(name).or_throw()); });
+    answer_all<ns::Subscribe>({{name, group}});
+    asking.join();
+    return *made;
+  }
+
+  /// The connection breaks, and what the node declares again by Request gets those groups; 0: is refused.
+  template <class Request>
+  void come_back(const Groups& groups) {
+    hub_.close();
+    hub_ = fake_.admit(nif::test::make_welcome());
+    answer_all<Request>(groups);
+    settle_down();
+  }
+
+  /// What the hub said before was seen to by the node. A message that was read together with it may overtake the events
+  /// that it led to.
+  void settle_down() {
+    hub_.send(proto::flow::Ping{77, 1});
+    while (const auto pong = hub_.next_flow<proto::flow::Pong>()) {
+      if (pong->sequence == 77) break;
+    }
+    answer({++sequence_, Operation::data, 0, 0}, {});
+    EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
+  }
+
+  void expect_published(const Publisher& publisher, std::uint32_t group) {
+    publisher.publish(publisher.name()).or_throw();
+    const test::Taken taken = next();
+    EXPECT_EQ(taken.data, publisher.name());
+    EXPECT_EQ(taken.frame.dst, group) << publisher.name();
+  }
+
+  /// A message that comes for the group.
+  void expect_received(const Subscription& subscription, std::uint32_t group) {
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::group;
+    parts.header.dst = group;
+    parts.header.src = kPeerId;
+    parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
+    std::string header(8, '\0');
+    header[0] = static_cast<char>(++sequence_);
+    hub_.send(parts, header + subscription.name());
+    settle_down();
+    const auto message = subscription.try_receive();
+    ASSERT_TRUE(message) << subscription.name();
+    EXPECT_EQ(message->text(), subscription.name());
+  }
+
+  std::uint32_t sequence_ = 0;
+
+ private:
+  static const std::string& name_of(const ns::Advertise& request) { return request.service; }
+  static const std::string& name_of(const ns::Subscribe& request) { return request.name; }
+  static proto::Payload answer_to(const ns::Advertise& /*request*/, std::uint32_t group, std::uint16_t number) {
+    if (group != 0) return proto::encode_answer(ns::AdvertiseAnswer{GroupId{group}, 1}, number);
+    return proto::encode_refusal({ns::Advertise::kOperation, number}, {proto::Status::limit, "no more"});
+  }
+  static proto::Payload answer_to(const ns::Subscribe& /*request*/, std::uint32_t group, std::uint16_t number) {
+    ns::SubscribeAnswer answer;
+    answer.group = GroupId{group};
+    return proto::encode_answer(answer, number);
+  }
+
+  template <class Request>
+  void answer_all(const Groups& groups) {
+    std::map<std::string, proto::Payload> answers;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      std::uint16_t number = 0;
+      const auto request = hub_.next_request<Request>(number);
+      ASSERT_TRUE(request);
+      const std::string& name = name_of(*request);
+      ASSERT_TRUE(groups.contains(name)) << name;
+      answers.emplace(name, answer_to(*request, groups.at(name), number));
+    }
+    if (auto first = answers.extract(GetParam())) hub_.send_control(proto::Kind::ns, first.mapped());
+    for (const auto& [name, payload] : answers) hub_.send_control(proto::Kind::ns, payload);
+  }
+};
+
+class MovedOwnServices : public MovedServices {};
+class MovedSubscriptions : public MovedServices {};
+
+TEST_P(MovedOwnServices, ArePublishedToTheirOwnSubscribers) {
+  const Publisher odometry = advertise("odom", kFirst);
+  const Publisher map = advertise("map", kSecond);
+  come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
+  expect_published(odometry, kSecond);
+  expect_published(map, kFirst);
+  come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
+  expect_published(odometry, kFirst);
+  expect_published(map, kSecond);
+  close_node();
+}
+
+TEST_P(MovedOwnServices, CountTheirOwnSubscribers) {
+  const Publisher odometry = advertise("odom", kFirst);
+  const Publisher map = advertise("map", kSecond);
+  come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
+  ns::SubscriberJoined joined;
+  for (const auto& [group, count] : std::map<std::uint32_t, std::uint32_t>{{kFirst, 5}, {kSecond, 6}}) {
+    joined.group = GroupId{group};
+    joined.subscribers = count;
+    hub_.send_control(proto::Kind::ns, proto::encode(joined));
+  }
+  settle_down();
+  EXPECT_EQ(map.subscribers(), 5u);
+  EXPECT_EQ(odometry.subscribers(), 6u);
+  close_node();
+}
+
+TEST_P(MovedOwnServices, ComeBackAfterAHubThatRefusedThem) {
+  const Publisher odometry = advertise("odom", kFirst);
+  const Publisher map = advertise("map", kSecond);
+  come_back<ns::Advertise>({{"odom", 0}, {"map", 0}});
+  EXPECT_TRUE(odometry.publish("x").is(Status::refused));
+  come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
+  expect_published(odometry, kSecond);
+  expect_published(map, kFirst);
+  close_node();
+}
+
+TEST_P(MovedSubscriptions, GetTheirOwnMessages) {
+  const Subscription odometry = subscribe("robot/odom", kFirst);
+  const Subscription map = subscribe("robot/map", kSecond);
+  for (int i = 0; i < 3; ++i) {
+    come_back<ns::Subscribe>({{"robot/odom", kSecond}, {"robot/map", kFirst}});
+    expect_received(odometry, kSecond);
+    expect_received(map, kFirst);
+    come_back<ns::Subscribe>({{"robot/odom", kFirst}, {"robot/map", kSecond}});
+    expect_received(odometry, kFirst);
+    expect_received(map, kSecond);
+  }
+  close_node();
+}
+
+INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedOwnServices, testing::Values("map", "odom"),
+                         [](const auto& first) { return std::string(first.param) + "First"; });
+INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedSubscriptions, testing::Values("robot/map", "robot/odom"),
+                         [](const auto& first) { return std::string(first.param).substr(6) + "First"; });
+
+}  // namespace
+}  // namespace gimnet::gimi
