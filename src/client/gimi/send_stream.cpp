@@ -102,7 +102,8 @@ nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number
   return transmit(to, header_of(Operation::ping, number), sent, More::no, 0);
 }
 
-/// True: somebody should watch over the stream.
+/// True: somebody should watch over the stream. Another thread may have left a message to be held while this one was
+/// sending: it goes by tick() only, also where this one was not sent, or is acknowledged already.
 bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
   const MutexLock lock(mutex_);
   sending_ = false;
@@ -111,11 +112,11 @@ bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
     // It may have been given up with all others meanwhile; then it counts as never sent all the same.
     if (window_.synchronized() && !window_.cancel(sequence) && counts_.lost != 0) --counts_.lost;
     if (window_.empty()) forget_doubts();
-    return false;
+  } else {
+    ++counts_.sent;
+    unflushed_ = more == More::yes;
   }
-  ++counts_.sent;
-  unflushed_ = more == More::yes;
-  return !window_.empty() && !watched_;
+  return (!window_.empty() || held_) && !watched_;
 }
 
 void SendStream::watch_if_needed() {
