@@ -19,9 +19,10 @@ class ConnectionWatch {
   void look();
   /// As look(), at most once in kPeriod: for a loop in which something comes all the time. `now_ns` as steady_now_ns().
   void look_now_and_then(std::int64_t now_ns);
-  /// A message says over which connection it came: looks if that is another one than was known.
+  /// A message says over which connection it came: looks if that is a newer one than was known. Not at those that wait
+  /// since before a break: a tool that lags behind may have thousands of them.
   void take(const Message& message) {
-    if (message.reconnects() != reconnects_) look();
+    if (message.reconnects() > reconnects_) look();
   }
   /// As look(), where nobody will try to connect any more; also of a node that was closed.
   void look_at_end();
