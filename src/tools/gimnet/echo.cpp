@@ -10,7 +10,7 @@ ExitCode run_echo(Session& session) {
   // Whoever asks for less than all has gaps on purpose.
   const bool all = !wants_less(session.options().pace);
   if (const auto opened = subscriptions.open(); !opened) {
-    return code_of_terms(session.fail(opened.failure()), opened.failure().status, !all);
+    return code_of_terms(session.fail(opened.failure()), opened.failure(), !all);
   }
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   MissedMessages missed;

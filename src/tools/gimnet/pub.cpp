@@ -157,7 +157,7 @@ ExitCode run_pub(Session& session) {
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
   if (!publisher) {
     const bool terms = options.delivery == Delivery::sync;
-    return code_of_terms(session.fail(publisher.failure()), publisher.failure().status, terms);
+    return code_of_terms(session.fail(publisher.failure()), publisher.failure(), terms);
   }
   Standing standing(session);
   auto sent = wait_for_subscribers(session, *publisher, standing);
