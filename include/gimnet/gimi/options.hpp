@@ -13,8 +13,10 @@ namespace gimnet {
 
 /// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
 inline constexpr std::size_t kWindowMax = 64;
-/// Most payload bytes of them; one message may always go. So much the receiver's library holds for a program that
-/// stands still (NodeOptions::receive_bytes), so that nothing waits in a hub, which does not hold it for ever.
+/// Most payload bytes of them. A message that would be more, of any size, goes when no other waits for its ACK: where
+/// the sender does not wait (AtFullWindow) or several threads send, small ones can keep it from going.
+/// The receiver's library holds NodeOptions::receive_bytes for a program that stands still: 16 such windows by default.
+/// What comes beyond waits in its hub, which does not hold it for ever.
 inline constexpr std::size_t kWindowBytesMax = std::size_t{1} << 20;
 /// Messages that a queue keeps if nobody says otherwise.
 inline constexpr std::size_t kQueueMessagesDefault = 64;
