@@ -1,5 +1,6 @@
 #include "client/nif/declarations.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "client/nif/answer_status.hpp"
@@ -149,6 +150,10 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
   answered();
 }
 
+bool Declarations::is_subscribed(GroupId group) const {
+  return std::ranges::any_of(subscriptions_, [&](const auto& entry) { return entry.second.group == group; });
+}
+
 void Declarations::on_subscribed(const std::string& full_name, const proto::Payload& payload) {
   const auto answer = proto::decode_answer<proto::ns::SubscribeAnswer>(payload);
   const GroupId group = answer ? answer->group : GroupId{};
@@ -160,10 +165,11 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     if (found != subscriptions_.end()) {
       former = std::exchange(found->second.group, group);
       changed = former != group;
+      // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to another one.
+      if (changed && !is_subscribed(former)) credits_.forget(former);
     }
   }
   if (changed) {
-    credits_.forget(former);  // its SERVICE_MOVED was lost with the connection
     Record* record = make_event(NIF_SERVICE_MOVED, full_name);
     record->incoming.former_group = former.value();
     record->incoming.group = group.value();

@@ -59,6 +59,7 @@ class Declarations {
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   void bring_last(const std::string& name, Service& service, bool moved) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool is_subscribed(GroupId group) const GIMNET_REQUIRES(mutex_);
   void answered();
 
   RequestTable& requests_;

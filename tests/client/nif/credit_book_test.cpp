@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "proto/control/ns.hpp"
 #include "proto/frame/fragment_header.hpp"
@@ -301,6 +304,56 @@ TEST(CreditBook, AGroupWithoutAWindowMayHaveOneAfterABreak) {
   static_cast<void>(take(connected.node.get()));
   answer_subscribe(connected.hub, 1);
   EXPECT_EQ(credited(connected.hub), 1u);
+}
+
+/// The next request is SUBSCRIBE of `name`; its answer has to wait for its turn.
+std::uint16_t subscribe_of(FakeConnection& hub, const std::string& name) {
+  std::uint16_t number = 0;
+  const auto request = hub.next_request<proto::ns::Subscribe>(number);
+  EXPECT_TRUE(request && request->name == name);
+  return number;
+}
+
+void give(FakeConnection& hub, std::uint16_t number, std::uint32_t group) {
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{group};
+  answer.window = 1;
+  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+}
+
+/// A hub that began anew gives two services other groups, of the same numbers.
+void swap_groups(bool first_answers_first, std::uint32_t first_group, std::uint32_t second_group) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, test::default_options(), make_welcome());
+  const std::array<std::pair<const char*, std::uint32_t>, 2> services{{{"peer/a", kGroup}, {"peer/b", kMovedGroup}}};
+  for (const auto& [name, group] : services) {
+    const nif_pace pace{sizeof pace, 1, 0, 0.0};
+    std::thread asking([&, asked = name] {
+      EXPECT_EQ(nif_subscribe_paced(connected.node.get(), asked, &pace, nullptr, NIF_FOREVER), NIF_OK);
+    });
+    give(connected.hub, subscribe_of(connected.hub, name), group);
+    asking.join();
+  }
+  connected.hub.close();
+  connected.hub = hub.admit(make_welcome());
+  const std::uint16_t first = subscribe_of(connected.hub, "peer/a");
+  const std::uint16_t second = subscribe_of(connected.hub, "peer/b");
+  if (first_answers_first) give(connected.hub, first, first_group);
+  give(connected.hub, second, second_group);
+  if (!first_answers_first) give(connected.hub, first, first_group);
+  for (int i = 0; i < 2; ++i) static_cast<void>(take(connected.node.get(), NIF_SERVICE_MOVED));
+  for (const std::uint32_t group : {first_group, second_group}) {
+    publish(connected.hub, group);
+    static_cast<void>(take(connected.node.get()));
+    EXPECT_EQ(credited_of(connected.hub, group), 1u) << "the window would be shut for ever";
+  }
+}
+
+TEST(CreditBook, CountsGroupsThatAHubGaveToOthersWhenItBeganAnew) {
+  swap_groups(true, kMovedGroup, kGroup);
+  swap_groups(false, kMovedGroup, kGroup);
+  swap_groups(true, kMovedGroup, kMovedGroup + 1);
+  swap_groups(false, kMovedGroup + 1, kGroup);
 }
 
 }  // namespace
