@@ -257,8 +257,8 @@ nif_status nif_flush(nif_node* node);
 
 /** Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub.
  *  NIF_NOT_CONNECTED: broken without resume; or, once after each such loss, frames sent since the last nif_drain() were
- * given up unconfirmed, because the hub that came back does not know this connection: some may not have arrived.
- * NIF_TIMEOUT, NIF_CLOSED, NIF_REPLACED. */
+ * given up unconfirmed, because the hub that came back does not know this connection, or had left the resume buffer:
+ * some may not have arrived. NIF_TIMEOUT, NIF_CLOSED, NIF_REPLACED. */
 nif_status nif_drain(nif_node* node, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- receiving */

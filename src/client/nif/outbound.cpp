@@ -117,6 +117,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
     const auto skipped = queue_.resume_from(session.hub_taken);
     if (!skipped) return std::nullopt;
     missing = *skipped;
+    lost_ |= missing > 0;
     // What was queued under an id that the node does not have any more, which the hub need not remember.
     if (session.id != id_) queue_.set_source(session.id);
   } else {

@@ -357,5 +357,31 @@ TEST(OutboundSend, DrainTellsOnceThatTheHubForgotWhatItHadNotConfirmed) {
   EXPECT_EQ(nif_drain(connected.node.get(), NIF_FOREVER), NIF_OK);
 }
 
+TEST(OutboundSend, DrainTellsOnceThatFramesHadLeftTheResumeBuffer) {
+  FakeHub hub;
+  nif_options options = default_options("robot");
+  options.resume_bytes = 64;
+  proto::Welcome welcome = make_welcome(1u << 20);
+  Connected connected = connect_to(hub, options, welcome);
+  nif_node* const node = connected.node.get();
+  nif_outgoing message = NIF_OUTGOING_INIT;
+  message.to = kPeerId;
+  message.policy = NIF_DROP;
+  constexpr std::uint64_t kMessages = 20;
+  for (std::uint64_t i = 0; i < kMessages; ++i) {
+    ASSERT_EQ(nif_send(node, &message, NIF_FOREVER), NIF_OK);
+    ASSERT_TRUE(connected.hub.next_message());
+  }
+  ASSERT_GT(counters_of(node).frames_let_go, 0u);
+  connected.hub.close();
+  welcome.resumed = true;
+  connected.hub = hub.admit(welcome);
+  while (info_of(node).reconnects == 0) std::this_thread::yield();
+  EXPECT_EQ(nif_drain(node, 0), NIF_NOT_CONNECTED) << "the hub never had them, for all that this end knows";
+  for (auto i = counters_of(node).frames_let_go; i < kMessages; ++i) ASSERT_TRUE(connected.hub.next_message());
+  connected.hub.send(proto::flow::Confirm{kMessages});
+  EXPECT_EQ(nif_drain(node, NIF_FOREVER), NIF_OK);
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
