@@ -270,12 +270,13 @@ typedef enum nif_incoming_type {
   /** The hub could not deliver messages of this node [from: the hub, reason, count, text: name of the reason, payload:
    * the last such frame's 16-byte header and up to 16 bytes after it; to, kind, lane and flags are those of that frame,
    * so is key where it is KEYED]. Of a message over 4 KiB those bytes are as if it had come in one frame without a
-   * fragment header, as long as it is among the last 1,024 such messages that asked for reports or have over 1 MiB. */
+   * fragment header, as long as it is among the last 1,024 such messages that asked for reports or have over 1 MiB.
+   * Hubs merge reports: a program that ever asked for one gets those of messages over 1 MiB that did not, too. */
   NIF_REPORT = 1,
   /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so many messages].
-   * `cut_message`: a part did not come, or the connection broke before it. `too_large`. With `link_lost` the count is of
-   * frames, of which a large message has many, or NIF_COUNT_UNKNOWN: they had left a resume buffer unconfirmed when the
-   * connection broke, that of the hub or, from the own id, of this node. */
+   * `cut_message`: a part did not come, or the connection broke before it. `too_large`. With `link_lost` the count is
+   * of frames, of which a large message has many, or NIF_COUNT_UNKNOWN: they had left a resume buffer unconfirmed when
+   * the connection broke, that of the hub or, from the own id, of this node. */
   NIF_GAP = 2,
   /** Connected again after a break [from: own node id; flags: NIF_CONNECTED_*]. The library declares services and
    * subscriptions again by itself. Not delivered for the first connection, which nif_connect() made. */

@@ -298,7 +298,7 @@ bool Outbound::on_report(const proto::Report& report) {
     if (!rest || progress.undelivered == proto::DropReason::none) progress.undelivered = report.reason;
     notify_waiting();
   }
-  return reported_.is_unwanted(report);
+  return !reports_wanted_;
 }
 
 std::optional<ReportedMessages::Start> Outbound::message_of(const proto::Report& report) {

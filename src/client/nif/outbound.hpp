@@ -89,8 +89,8 @@ class Outbound {
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
   void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
-  /// True: it is about a message of which the program wants no reports. The library asks for those of every message of
-  /// more than a window, and some come when it is sent.
+  /// True: the program never asked for reports. The library does for every message of more than a window, and some come
+  /// when it is sent. Once the program does, it gets all: a hub merges them, whatever they are about.
   bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
   /// How the message with a fragment header began that the report is about, if that is known.
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
@@ -160,6 +160,7 @@ class Outbound {
   std::unordered_map<std::uint64_t, InProgress*> in_progress_ GIMNET_GUARDED_BY(mutex_);  ///< by stream
   std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
+  bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the program sent something with NIF_FLAG_REPORT
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;

@@ -239,6 +239,7 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
 nif_status Outbound::send(Outgoing& message, Deadline deadline) {
   const MutexLock lock(mutex_);
   const bool whole = message.size() <= proto::kUncutMessageMax;
+  reports_wanted_ |= message.reported();
   const nif_status status = whole ? send_whole(message, deadline) : send_fragments(message, deadline);
   if (status != NIF_OK) return status;
   ++messages_sent_;

@@ -11,9 +11,9 @@
 
 namespace gimnet::nif {
 
-/// How the last messages with a fragment header began whose frames ask for reports, and for whom they do: the program,
-/// or only this library. A REPORT repeats 16 bytes of a frame, and of a fragment those are hardly more than its header:
-/// they tell the number of the message, and nothing of what it is. Thread safety: one thread at a time. Memory: 48 KiB,
+/// How the last messages with a fragment header began whose frames ask for reports. A REPORT repeats 16 bytes of a
+/// frame, and of a fragment those are hardly more than its header: they tell the number of the message, and nothing of
+/// what it is. Thread safety: one thread at a time. Memory: 48 KiB,
 /// from the first message on.
 class ReportedMessages {
  public:
@@ -29,10 +29,6 @@ class ReportedMessages {
   /// behind other bytes (EXT, LIST ids), or the message is too old.
   [[nodiscard]] std::optional<Start> find(const proto::Report& report) const;
 
-  /// Is the report about a message of which the program wants no reports? It may come when the message is long sent.
-  /// Where the report tells no number, all remembered ones of that kind and destination decide.
-  [[nodiscard]] bool is_unwanted(const proto::Report& report) const;
-
   /// The number of the message that the report is about; nothing: it has none, or does not tell.
   [[nodiscard]] static std::optional<std::uint32_t> number_of(const proto::Report& report);
 
@@ -41,10 +37,8 @@ class ReportedMessages {
     std::uint32_t number = 0;  ///< 0: none
     std::uint32_t dst = 0;
     proto::Kind kind = proto::Kind::unicast;
-    bool wanted = false;  ///< by the program
     Start start{};
   };
-  [[nodiscard]] const Message* find_message(const proto::Report& report) const;
 
   std::vector<Message> messages_;
   std::size_t next_ = 0;  ///< the oldest, which the next one replaces

@@ -16,13 +16,12 @@ constexpr std::uint64_t kKey = 0x0706050403020100;
 /// A message that begins with its number, and the REPORT about a fragment of it.
 class Sent {
  public:
-  explicit Sent(std::uint32_t number, bool keyed = true, bool wanted = true)
-      : text_(std::to_string(number) + std::string(5'000, '.')) {
+  explicit Sent(std::uint32_t number, bool keyed = true) : text_(std::to_string(number) + std::string(5'000, '.')) {
     part_ = {text_.data(), text_.size()};
     message_.to = kPeerId;
     message_.parts = &part_;
     message_.part_count = 1;
-    if (wanted) message_.flags |= NIF_FLAG_REPORT;
+    message_.flags |= NIF_FLAG_REPORT;
     if (keyed) message_.flags |= NIF_FLAG_KEYED;
     message_.key = kKey;
     EXPECT_FALSE(outgoing.read(message_));
@@ -84,26 +83,6 @@ TEST(ReportedMessages, CountsThoseThatItRemembersAndNotTheirNumbers) {
   }
   EXPECT_TRUE(messages.find(Sent(1).report)) << "between them were others that asked for no reports";
   EXPECT_TRUE(messages.find(Sent(1025).report));
-}
-
-TEST(ReportedMessages, TellsForWhomAReportIs) {
-  ReportedMessages messages;
-  Sent wanted(1);
-  Sent unwanted(2, true, false);
-  proto::Report without_number = wanted.report;
-  without_number.header.flags |= proto::kFlagExt;
-  EXPECT_FALSE(messages.is_unwanted(unwanted.report)) << "nothing was sent yet";
-  EXPECT_FALSE(messages.is_unwanted(without_number));
-  messages.remember(2, unwanted.outgoing);
-  EXPECT_TRUE(messages.is_unwanted(unwanted.report));
-  EXPECT_TRUE(messages.is_unwanted(without_number)) << "there is no other that it can be about";
-  EXPECT_FALSE(messages.is_unwanted(wanted.report)) << "nothing is known of it";
-  messages.remember(1, wanted.outgoing);
-  EXPECT_TRUE(messages.is_unwanted(unwanted.report));
-  EXPECT_FALSE(messages.is_unwanted(wanted.report));
-  EXPECT_FALSE(messages.is_unwanted(without_number));
-  unwanted.report.header.flags &= static_cast<std::uint8_t>(~proto::kFlagFragment);
-  EXPECT_FALSE(messages.is_unwanted(unwanted.report)) << "of one frame, which asked by itself";
 }
 
 TEST(ReportedMessages, NeedsAFragmentHeaderAtItsPlace) {
