@@ -197,6 +197,11 @@ void Outbound::send_last_again(const std::string& service) {
   const LastMessage* const last = last_.find(service);
   if (last == nullptr || state_ != State::connected) return;
   proto::FrameParts parts = last->parts();
+  const proto::FrameHeader& header = parts.header;
+  const auto newer = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
+  if (newer != in_progress_.end() && newer->second->number != 0 && newer->second->epoch == epochs_) {
+    return;  // it goes on, and is about to be the last one
+  }
   parts.header.src = id_;
   parts.header.flags &= static_cast<std::uint8_t>(~proto::kFlagReport);  // it was asked for at its first sending
   const auto total = static_cast<std::uint32_t>(last->payload.size());

@@ -79,8 +79,8 @@ class Outbound {
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
   /// While a callback of the program runs, senders do not leave writing to the library's thread.
   void set_library_busy(bool busy) { library_busy_.store(busy, std::memory_order_relaxed); }  // see library_busy_
-  /// Sends the last message of a retained service, of which the hub knows nothing, behind what waits in its lane. Does
-  /// not wait for room.
+  /// Sends the last message of a retained service, of which the hub may know nothing, behind what waits in its lane,
+  /// unless a newer one goes on that had begun. Does not wait for room.
   void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
   /// GROUP messages wait until the services are declared again.
   void set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);

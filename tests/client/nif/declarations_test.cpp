@@ -148,5 +148,41 @@ TEST(Declarations, GiveNothingAgainOfAServiceThatIsNotRetained) {
   expect_published(connected.hub, kGroup, "newer");
 }
 
+/// What is in the middle of being sent is about to be the last message.
+TEST(Declarations, PutNothingBetweenTheFragmentsOfANewerMessage) {
+  FakeHub hub;
+  nif_options options = default_options("robot");
+  options.resume_bytes = 64 * 1024;
+  Connected connected = connect_to(hub, options, make_welcome(kResumeBytes));
+  nif_node* const node = connected.node.get();
+  advertise(connected, "map", kGroup, true);
+  ASSERT_EQ(publish(node, kGroup, "map"), NIF_OK);
+  ASSERT_EQ(nif_send_to(node, kPeerId, "x", 1), NIF_OK);
+  const std::string newer(256 * 1024, 'n');
+  std::thread publishing([&] { EXPECT_EQ(publish(node, kGroup, newer), NIF_OK); });
+  // It lets what the hub did not confirm go, down to the message to one node, and waits.
+  while (counters_of(node).frames_let_go == 0) std::this_thread::yield();
+  expect_published(connected.hub, kGroup, "map");
+  ASSERT_TRUE(connected.hub.next_message());
+  ASSERT_TRUE(connected.hub.next_message()) << "the first fragment";
+  come_back(hub, connected, true);
+  std::uint64_t frames = counters_of(node).frames_let_go;
+  std::string received;
+  while (received.size() < newer.size()) {
+    const auto frame = connected.hub.next_message();
+    ASSERT_TRUE(frame);
+    if (frame->header.kind == proto::Kind::ns) {
+      const auto number = proto::split_control(frame->view().payload)->header.request;
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
+      continue;
+    }
+    connected.hub.send(proto::flow::Confirm{++frames});
+    if (frame->header.kind == proto::Kind::group) received += frame->payload();
+  }
+  publishing.join();
+  EXPECT_TRUE(received == newer) << "an older message came between";
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
