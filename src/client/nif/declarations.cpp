@@ -7,6 +7,15 @@
 #include "client/nif/inbound.hpp"
 
 namespace gimnet::nif {
+namespace {
+
+/// Whether a hub takes a service that is advertised again for what it was.
+bool same_stream(proto::ns::Advertise former, const proto::ns::Advertise& now) {
+  former.metadata = now.metadata;
+  return former == now;
+}
+
+}  // namespace
 
 Declarations::~Declarations() {
   for (const Item& item : events_) item.storage->release();
@@ -14,7 +23,13 @@ Declarations::~Declarations() {
 
 void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
   const MutexLock lock(mutex_);
-  services_.insert_or_assign(service.service, Service{service, group});
+  Service& own = services_[service.service];
+  if (!same_stream(own.request, service)) {
+    outbound_.forget_retained(service.service);  // as the hub did
+    own.last_due = false;
+  }
+  own.request = service;
+  own.group = group;
   if (service.retain) {
     outbound_.follow_retained(service.service, group.value());
   } else {

@@ -40,11 +40,12 @@ void answer_advertise(FakeConnection& hub, const std::string& name, std::uint32_
                                         : proto::encode_refusal(header, {proto::Status::limit, "no more"}));
 }
 
-void advertise(Connected& connected, const char* name, std::uint32_t group, bool retain) {
+void advertise(Connected& connected, const char* name, std::uint32_t group, bool retain, std::uint32_t type = 0) {
   std::thread asking([&] {
     nif_service service{};
     service.struct_size = sizeof service;
     service.name = name;
+    service.message_type = type;
     service.retain = retain ? 1 : 0;
     std::uint32_t given = 0;
     EXPECT_EQ(nif_advertise(connected.node.get(), &service, &given, nullptr, NIF_FOREVER), NIF_OK);
@@ -146,6 +147,31 @@ TEST(Declarations, GiveNothingAgainOfAServiceThatIsNotRetained) {
   answer_advertise(connected.hub, "map", kGroup);
   EXPECT_EQ(publish(connected.node.get(), kGroup, "newer"), NIF_OK);
   expect_published(connected.hub, kGroup, "newer");
+}
+
+TEST(Declarations, ForgetTheLastMessageOfAServiceThatIsAnotherStreamNow) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  advertise(connected, "map", 12, true, 7);
+  come_back(hub, connected, false);
+  answer_advertise(connected.hub, "map", 12);
+  EXPECT_EQ(publish(connected.node.get(), 12, "newer"), NIF_OK);
+  expect_published(connected.hub, 12, "newer");
+}
+
+/// The program advertises once more while the library declares again, and hears of it first.
+TEST(Declarations, GiveTheLastMessageOfAServiceThatIsAdvertisedOnceMoreMeanwhile) {
+  for (const std::uint32_t group : {kGroup, 99u}) {
+    FakeHub hub;
+    Connected connected = with_map(hub, "map");
+    come_back(hub, connected, false);
+    std::uint16_t number = 0;
+    ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
+    advertise(connected, "map", group, true);
+    connected.hub.send_control(proto::Kind::ns,
+                               proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number));
+    expect_published(connected.hub, group, "map");
+  }
 }
 
 /// What is in the middle of being sent is about to be the last message.
