@@ -80,7 +80,7 @@ typedef struct nif_service {
 nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
                          int32_t timeout_ms);
 
-/** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's. */
+/** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's; NIF_BAD_ARGUMENT: group is 0. */
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
 
 /** One service of a list. Text: NUL-terminated, never NULL. */

@@ -182,6 +182,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
 
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (group == 0) return fail(NIF_BAD_ARGUMENT, "cannot withdraw the service: group is 0, which no service has");
     ns::WithdrawAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
     return declare(found, [&] {

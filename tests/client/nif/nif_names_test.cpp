@@ -240,5 +240,12 @@ TEST(NifNames, IgnoresAnswersToNothing) {
   nif_release(&in);
 }
 
+/// Services that a hub refused have it, until a hub takes them.
+TEST(NifNames, NoServiceHasTheGroupZero) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  EXPECT_EQ(nif_withdraw(connected.node.get(), 0, 0), NIF_BAD_ARGUMENT);
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
