@@ -26,7 +26,8 @@ struct LatestStream {
 /// Frames on their way out: four lanes of frames that wait, the frames of one write under way, and, where resume is on,
 /// the frames that were written and not confirmed. A write is gather(), the system call on what it gave out, commit().
 /// Between the two frames may be appended and confirmed; nothing else may be called.
-/// Thread safety: guarded by its owner. Limits: the owner asks has_room() before it appends.
+/// Thread safety: guarded by its owner. Limits: the owner asks has_room() before it appends, but for
+/// what it brings again after a reconnect.
 class SendQueue {
  public:
   struct Limits {
@@ -96,7 +97,7 @@ class SendQueue {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  using Runs = std::deque<FrameRun>;  ///< Limit: has_room()
+  using Runs = std::deque<FrameRun>;  ///< Limit: has_room(), and what LastMessages keeps
 
   [[nodiscard]] Place allocate(std::size_t size);
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;
