@@ -53,7 +53,7 @@ class TestConductor {
                                       kept.push_back(state);
                                       return keep_error;
                                     },
-                                    told,
+                                    gauges,
                                     &refusals,
                                     [this] { return read_again ? read_again() : Reloading{}; },
                                     [this](LogLevel level) { noted_level = level; }}) {}
@@ -139,7 +139,7 @@ class TestConductor {
   ShardCounters counters[2];
   const ShardCounters* readable[2] = {&counters[0], &counters[1]};
   SessionGauges sessions[2] = {SessionGauges{8}, SessionGauges{8}};
-  const SessionGauges* told[2] = {&sessions[0], &sessions[1]};
+  const SessionGauges* gauges[2] = {&sessions[0], &sessions[1]};
   RefusalCounters refusals;
   FakeShards shards{2};
   std::string identity = "open";  ///< of those who join

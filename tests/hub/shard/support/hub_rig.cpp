@@ -151,7 +151,6 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
 
 void HubRig::release(FakeNode& node) {
   nodes_.publish(index_of(node.id), {});
-  released_ = true;
   command(node.shard.value(), ReleaseCommand{node.session});
 }
 
@@ -162,7 +161,10 @@ void HubRig::renumber(FakeNode& node, std::uint32_t index) {
   command(node.shard.value(), RenumberCommand{node.session, node.id, "another id"});
 }
 
-void HubRig::command(std::size_t shard, ShardCommand command) { shards_[shard]->send(std::move(command)); }
+void HubRig::command(std::size_t shard, ShardCommand command) {
+  released_ |= std::holds_alternative<ReleaseCommand>(command);
+  shards_[shard]->send(std::move(command));
+}
 
 void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members, bool accepts) {
   auto group = std::make_unique<GroupMembers>();
