@@ -26,6 +26,7 @@ nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional, 
     if (const nif_status status = check_name(name, "take the name", gimnet::proto::node_name_fault); status != NIF_OK)
       return status;
     ns::RegisterNameAnswer answer;
+    found.begin_naming();
     const nif_status status =
         ask(found, ns::RegisterName{name}, answer, "take the name", name, deadline_after(timeout_ms));
     if (status != NIF_OK) return status;

@@ -195,18 +195,29 @@ void Node::on_service_moved(const proto::ns::ServiceMoved& event) {
 
 bool Node::on_watch_events(const proto::ns::WatchEvents& events) { return watches_.on_events(events); }
 
-void Node::on_name_decided(const std::string&, bool lost) {
+void Node::on_name_decided(const std::string& name, bool lost) {
   if (!lost) return;
+  take_new_name();  // with its token
+  {
+    const MutexLock lock(mutex_);
+    lost_name_ = name;
+  }
   set_name("", session_.token);
   take_new_name();
+}
+
+void Node::begin_naming() {
+  const MutexLock lock(mutex_);
+  lost_name_.clear();
 }
 
 void Node::set_name(const std::string& name, std::vector<std::byte> token) {
   {
     const MutexLock lock(mutex_);
-    copy_text(info_.name, sizeof info_.name, name);
+    const std::string& now = name == lost_name_ ? std::string() : name;
+    copy_text(info_.name, sizeof info_.name, now);
     info_.token_kept = 0;
-    new_name_ = NewName{name, std::move(token)};
+    new_name_ = NewName{now, std::move(token)};
   }
   wake_.raise();
 }

@@ -43,7 +43,10 @@ class Node final : private InboundHost {
   [[nodiscard]] NameCache& names() { return names_; }
   [[nodiscard]] CreditBook& credits() { return credits_; }
   /// The hub registered this node under another name, "" for none. The library's thread declares the services anew.
+  /// Not if the hub has taken that name back since begin_naming(), of which the library's thread may hear first.
   void set_name(const std::string& name, std::vector<std::byte> token) GIMNET_EXCLUDES(mutex_);
+  /// Before the hub is asked for a name.
+  void begin_naming() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] const Options& options() const { return options_; }
 
   [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
@@ -133,6 +136,7 @@ class Node final : private InboundHost {
     std::vector<std::byte> token;
   };
   std::optional<NewName> new_name_ GIMNET_GUARDED_BY(mutex_);  ///< given while connected, not seen to yet
+  std::string lost_name_ GIMNET_GUARDED_BY(mutex_);            ///< since begin_naming()
   Inbound::Counts inbound_counts_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t bytes_received_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t read_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
