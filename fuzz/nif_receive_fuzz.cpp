@@ -40,9 +40,10 @@ class Witness final : public InboundHost {
     const auto* confirm = std::get_if<proto::flow::Confirm>(&message);
     return confirm == nullptr || outbound_.on_confirm(confirm->count);
   }
-  void on_answer(proto::Kind kind, const proto::ControlView& answer) override {
+  std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) override {
     note("answer " + std::to_string(answer.header.request));
     FUZZ_MUST(!requests_.on_answer(kind, answer));
+    return {};
   }
   void on_service_moved(const proto::ns::ServiceMoved& event) override { note("moved " + event.name); }
   bool on_watch_events(const proto::ns::WatchEvents& events) override {

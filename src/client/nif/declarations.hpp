@@ -29,15 +29,14 @@ class Declarations {
   void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
-  /// A new connection: declares everything again, a few requests at a time. Changes are put into `events` by later
-  /// calls of take_events(). GROUP messages wait until the services are through.
-  /// `forgotten`: what the hub kept of retained services may be gone; it gets their last messages again, before newer
-  /// ones.
+  /// A new connection: declares everything again, a few requests at a time. GROUP messages wait until the services are
+  /// through. `forgotten`: what the hub kept of retained services may be gone; it gets their last messages again,
+  /// before newer ones.
   void declare_again(bool forgotten) GIMNET_EXCLUDES(mutex_);
   /// Goes on declaring where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
   void on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
-  /// What the answers brought that the program should know. Takes the references along.
+  /// What the last answer brought that the program should know. Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
   ~Declarations();
 

@@ -211,6 +211,11 @@ void Inbound::add_record(Record* record, std::size_t bytes) {
   batch_.push_back(item_of(record, bytes));
 }
 
+void Inbound::add_events(std::span<const Item> events) {
+  for (const Item& event : events) static_cast<Record*>(event.storage)->incoming.arrival_ns = arrival_.wall_ns;
+  batch_.insert(batch_.end(), events.begin(), events.end());
+}
+
 void Inbound::add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason) {
   ++counts_.gaps;
   Record* record = make_event(NIF_GAP, proto::drop_reason_name(reason));
@@ -244,7 +249,7 @@ Inbound::Verdict Inbound::take_names(const proto::FrameView& view) {
   const auto control = proto::split_control(view.payload);
   if (!control) return malformed("NS or CTRL without an operation");
   if (control->header.is_answer()) {
-    host_.on_answer(view.header.kind, *control);
+    add_events(host_.on_answer(view.header.kind, *control));
     return Verdict::going;
   }
   if (view.header.kind == proto::Kind::ns) return take_event(*control, view.payload);

@@ -28,7 +28,8 @@ class InboundHost {
  public:
   /// PING, PONG, PAUSE, RESUME, CONFIRM. False: it contradicts what was sent, the hub is wrong.
   [[nodiscard]] virtual bool on_flow(const proto::flow::Message& message) = 0;
-  virtual void on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
+  /// Returns the events that it leads to, which the program gets in its place; passes their references on.
+  [[nodiscard]] virtual std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
   virtual void on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
   [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
@@ -117,6 +118,7 @@ class Inbound {
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   void add_record(Record* record, std::size_t bytes);
+  void add_events(std::span<const Item> events);
   [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);
   void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);

@@ -175,7 +175,7 @@ bool Node::on_flow(const proto::flow::Message& message) {
   return true;
 }
 
-void Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
+std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
   if (kind == proto::Kind::ns && answer.header.operation == proto::ns::SubscribeAnswer::kOperation) {
     // Before the first message behind it, which the program may take before it has seen this answer.
     proto::Payload payload(proto::kControlHeaderSize);
@@ -185,6 +185,10 @@ void Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
     if (subscribed) credits_.open(subscribed->group, subscribed->window);
   }
   static_cast<void>(requests_.on_answer(kind, answer));
+  std::vector<Item> events = declarations_.take_events();
+  const std::vector<Item> ended_watches = watches_.take_events();
+  events.insert(events.end(), ended_watches.begin(), ended_watches.end());
+  return events;
 }
 
 void Node::on_service_moved(const proto::ns::ServiceMoved& event) {

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "client/nif/credit_book.hpp"
@@ -74,7 +75,7 @@ class Node final : private InboundHost {
 
   // InboundHost, on the library's thread.
   [[nodiscard]] bool on_flow(const proto::flow::Message& message) override;
-  void on_answer(proto::Kind kind, const proto::ControlView& answer) override;
+  [[nodiscard]] std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) override;
   void on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
   void on_name_decided(const std::string& name, bool lost) override;

@@ -73,8 +73,6 @@ void Node::turn() {
     take_new_name();
     declarations_.go_on();
     watches_.go_on();
-    received_.push(declarations_.take_events());
-    received_.push(watches_.take_events());
   }
   call_back();
 }

@@ -37,7 +37,8 @@ class WatchTable {
   void declare_again() GIMNET_EXCLUDES(mutex_);
   /// Goes on where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
-  /// What the program should know of watches that the hub did not take again. Takes the references along.
+  /// What the program should know of a watch that the hub did not take again, after its answer. Takes the references
+  /// along.
   [[nodiscard]] std::vector<Item> take_events();
 
  private:

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "client/nif/node.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
@@ -11,6 +13,13 @@
 
 namespace gimnet::nif::test {
 namespace {
+
+void add_message(std::vector<std::byte>& bytes, std::string_view payload) {
+  proto::FrameParts parts;
+  parts.header.dst = kOwnId;
+  parts.header.src = kPeerId;
+  add_frame(bytes, parts, payload);
+}
 
 TEST(NodeThread, PingsWhenItHasSentNothingAndAnswersPings) {
   FakeHub hub;
@@ -103,6 +112,51 @@ TEST(NodeThread, ConfirmationOfWhatWasNeverSentEndsTheConnection) {
   EXPECT_TRUE(connected.hub.wait_closed());
 }
 
+/// What the answers of one read lead to stands between the messages of that read.
+TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome());
+  nif_node* const node = connected.node.get();
+  std::uint16_t advertised = 0;
+  std::uint16_t subscribed = 0;
+  std::thread declaring([node] {
+    nif_service service{};
+    service.struct_size = sizeof service;
+    service.name = "odom";
+    std::uint32_t group = 0;
+    EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+  });
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(advertised));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{11}, 0}, advertised));
+  declaring.join();
+  std::thread subscribing([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(subscribed));
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, subscribed));
+  subscribing.join();
+  connected.hub.close();
+  connected.hub = hub.admit(make_welcome());
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(advertised));
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(subscribed));
+  std::vector<std::byte> bytes;
+  add_message(bytes, "1");
+  add_control(bytes, proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{12}, 0}, advertised));
+  add_message(bytes, "2");
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{22};
+  add_control(bytes, proto::Kind::ns, proto::encode_answer(answer, subscribed));
+  add_message(bytes, "3");
+  connected.hub.send(bytes);
+  for (const auto type : {NIF_DISCONNECTED, NIF_CONNECTED, NIF_MESSAGE, NIF_OWN_SERVICE_MOVED, NIF_MESSAGE,
+                          NIF_SERVICE_MOVED, NIF_MESSAGE}) {
+    nif_incoming in;
+    ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));
+    EXPECT_NE(in.arrival_ns, 0) << in.type;
+    nif_release(&in);
+  }
+}
+
 TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
   FakeHub hub;
   nif_options options = default_options();
@@ -114,10 +168,7 @@ TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
   ASSERT_TRUE(connection.read_hello());
   std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
   add_control(bytes, proto::Kind::link, proto::encode(make_welcome()));
-  proto::FrameParts parts;
-  parts.header.dst = kOwnId;
-  parts.header.src = kPeerId;
-  add_frame(bytes, parts, "at once");
+  add_message(bytes, "at once");
   connection.send(bytes);
   dialing.join();
   nif_incoming in;

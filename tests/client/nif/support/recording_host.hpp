@@ -29,7 +29,10 @@ class RecordingHost final : public InboundHost {
     flows.push_back(message);
     return !std::holds_alternative<proto::flow::Confirm>(message);
   }
-  void on_answer(proto::Kind, const proto::ControlView& answer) override { answers.push_back(answer.header.request); }
+  [[nodiscard]] std::vector<Item> on_answer(proto::Kind, const proto::ControlView& answer) override {
+    answers.push_back(answer.header.request);
+    return {};
+  }
   void on_service_moved(const proto::ns::ServiceMoved&) override {}
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
   void on_name_decided(const std::string& name, bool lost) override { decided = (lost ? "lost " : "kept ") + name; }
