@@ -83,6 +83,11 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
 /** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's; NIF_BAD_ARGUMENT: group is 0. */
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
 
+/** The same by its name, whatever group it has by now: also of a service that the hub moved or refuses at the moment.
+ *  The library declares it no more, whatever this answers; where the hub could not be told within the time given, it is
+ *  as soon as there is a connection. NIF_NOT_FOUND: this node has no such service. NIF_BAD_NAME. */
+nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeout_ms);
+
 /** One service of a list. Text: NUL-terminated, never NULL. */
 typedef struct nif_service_record {
   uint32_t group;

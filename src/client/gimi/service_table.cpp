@@ -92,20 +92,15 @@ Outcome<void> ServiceTable::accept(const std::string& own_name, const std::strin
 
 void ServiceTable::withdraw(PublishedService& service) {
   const MutexLock turn(asking_);
-  std::uint32_t group = 0;
   own_names_.erase(service.name());
   service.end({Status::closed, "the service was withdrawn"});
   {
     const MutexLock lock(mutex_);
     published_by_name_.erase(service.name());
-    for (auto place = published_by_group_.begin(); place != published_by_group_.end(); ++place) {
-      if (place->second != &service) continue;
-      group = place->first;
-      published_by_group_.erase(place);
-      break;
-    }
+    std::erase_if(published_by_group_, [&service](const auto& entry) { return entry.second == &service; });
   }
-  if (group != 0) static_cast<void>(nif_withdraw(uplink_.node(), group, kLeaveTimeoutMs));
+  // By name: NIF may know of a move that is not told here yet.
+  static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
 }
 
 SubscribedService& ServiceTable::entry(const std::string& full_name, const QueueOptions& options) {

@@ -30,6 +30,7 @@ void Declarations::add_service(const proto::ns::Advertise& service, GroupId grou
   }
   own.request = service;
   own.group = group;
+  own.ended = false;
   if (service.retain) {
     outbound_.follow_retained(service.service, group.value());
   } else {
@@ -44,6 +45,31 @@ void Declarations::remove_service(GroupId group) {
     if (ends) outbound_.forget_retained(entry.first);
     return ends;
   });
+}
+
+bool Declarations::begin_service(const std::string& service) {
+  const MutexLock lock(mutex_);
+  const auto found = services_.find(service);
+  return found != services_.end() && std::exchange(found->second.ended, false);
+}
+
+std::optional<GroupId> Declarations::end_service(const std::string& service) {
+  const MutexLock lock(mutex_);
+  const auto found = services_.find(service);
+  if (found == services_.end() || found->second.ended) return std::nullopt;
+  outbound_.forget_retained(service);
+  const GroupId group = found->second.group;
+  found->second.ended = true;
+  if (group == GroupId{} && !found->second.asked) services_.erase(found);
+  return group;
+}
+
+void Declarations::finish_service(const std::string& service, GroupId group) {
+  const MutexLock lock(mutex_);
+  const auto found = services_.find(service);
+  if (found == services_.end() || !found->second.ended) return;
+  // Where it moved meanwhile, on_advertised() saw to it; what is still asked for will be seen to there.
+  if (found->second.group == group && !found->second.asked) services_.erase(found);
 }
 
 void Declarations::add_subscription(const proto::ns::Subscribe& subscription, GroupId group) {
@@ -101,20 +127,36 @@ void Declarations::answered() {
 }
 
 bool Declarations::declare_service(const std::string& service) {
-  proto::ns::Advertise request;
-  {
-    const MutexLock lock(mutex_);
-    const auto found = services_.find(service);
-    if (found == services_.end()) return true;  // withdrawn meanwhile
-    request = found->second.request;
-    request.former_group = found->second.group;
-  }
+  // The request leaves under the lock: what the program asks for once it has changed something here comes behind it.
+  const MutexLock lock(mutex_);
+  const auto found = services_.find(service);
+  if (found == services_.end()) return true;  // withdrawn meanwhile
+  Service& own = found->second;
+  if (own.ended && !own.asked) return withdraw_service(service, own.group);
+  proto::ns::Advertise request = own.request;
+  request.former_group = own.group;
   const auto handler = [this, service, round = round_](const proto::Payload& payload) {
     if (round == round_) on_advertised(service, payload);
   };
   if (!requests_.ask_later(proto::Kind::ns, proto::encode(request), handler)) return false;
+  own.asked = true;
   ++under_way_;
   return true;
+}
+
+bool Declarations::withdraw_service(const std::string& service, GroupId group) {
+  const auto handler = [this, service, group, round = round_](const proto::Payload& payload) {
+    if (round == round_) on_withdrawn(service, group, payload);
+  };
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Withdraw{group}), handler)) return false;
+  ++under_way_;
+  return true;
+}
+
+void Declarations::on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload) {
+  const auto answer = proto::decode_answer<proto::ns::WithdrawAnswer>(payload);
+  if (answer || answer.error().status == proto::Status::not_found) finish_service(service, group);
+  answered();
 }
 
 bool Declarations::declare_subscription(const std::string& full_name) {
@@ -151,8 +193,15 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     const auto found = services_.find(service);
     if (found != services_.end()) {
       former = std::exchange(found->second.group, group);
-      changed = former != group;
-      if (found->second.request.retain) bring_last(service, found->second, changed);
+      found->second.asked = false;
+      changed = former != group && !found->second.ended;
+      if (found->second.ended && group == GroupId{}) {
+        services_.erase(found);
+      } else if (found->second.ended) {
+        services_due_.push_back(service);
+      } else if (found->second.request.retain) {
+        bring_last(service, found->second, changed);
+      }
     }
   }
   if (changed) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,14 @@ class Declarations {
 
   void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
+  /// The program is about to advertise a service of that name: one that ended is not withdrawn any more. True: there is
+  /// such a one, which ends again where the hub does not take the new one.
+  [[nodiscard]] bool begin_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  /// The service of that name ends: it is declared no more, and withdrawn wherever the hub may have it. Returns the
+  /// group to withdraw now, 0: none, the rest is the library's thread's; nothing: there is no such service.
+  [[nodiscard]] std::optional<GroupId> end_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  /// The hub does not have the group (any more) that end_service() named.
+  void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
   void remove_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
@@ -48,6 +57,8 @@ class Declarations {
     proto::ns::Advertise request;
     GroupId group;
     bool last_due = false;  ///< retained, and the hub may not have the last message
+    bool asked = false;     ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
+    bool ended = false;     ///< for the program, and the hub may still have it
   };
   struct Subscription {
     proto::ns::Subscribe request;
@@ -55,7 +66,9 @@ class Declarations {
   };
   void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
+  void on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   void bring_last(const std::string& name, Service& service, bool moved) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_subscribed(GroupId group) const GIMNET_REQUIRES(mutex_);

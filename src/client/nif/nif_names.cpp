@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -168,12 +169,16 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     }
     ns::AdvertiseAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
+    const bool ended = found.declarations().begin_service(request.service);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "advertise", request.service, deadline);
       if (asked == NIF_OK) found.declarations().add_service(request, answer.group);
       return asked;
     });
-    if (status != NIF_OK) return status;
+    if (status != NIF_OK) {
+      if (ended) static_cast<void>(found.declarations().end_service(request.service));
+      return status;
+    }
     *group = answer.group.value();
     if (subscribers != nullptr) *subscribers = answer.subscribers;
     return NIF_OK;
@@ -191,6 +196,21 @@ nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
       if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_service(GroupId{group});
       return status;
     });
+  });
+}
+
+nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeout_ms) {
+  return with_waiting_node(node, [&](Node& found) -> nif_status {
+    if (const nif_status status = check_name(name, "withdraw"); status != NIF_OK) return status;
+    const std::optional<GroupId> group = found.declarations().end_service(name);
+    if (!group)
+      return fail(NIF_NOT_FOUND, "cannot withdraw '" + std::string(name) + "': this node has no such service");
+    if (*group == GroupId{}) return NIF_OK;
+    ns::WithdrawAnswer answer;
+    const nif_status status = ask(found, ns::Withdraw{*group}, answer, "withdraw", name, deadline_after(timeout_ms));
+    if (status != NIF_OK && status != NIF_NOT_FOUND) return status;
+    found.declarations().finish_service(name, *group);
+    return NIF_OK;
   });
 }
 

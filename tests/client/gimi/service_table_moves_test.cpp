@@ -168,6 +168,26 @@ TEST_P(MovedOwnServices, ComeBackAfterAHubThatRefusedThem) {
   close_node();
 }
 
+TEST_P(MovedOwnServices, AreWithdrawnWhileTheyMove) {
+  std::optional<Publisher> odometry = advertise("odom", kFirst);
+  hub_.close();
+  hub_ = fake_.admit(nif::test::make_welcome());
+  std::uint16_t declared = 0;
+  ASSERT_TRUE(hub_.next_request<ns::Advertise>(declared));
+  std::thread leaving([&] { odometry.reset(); });
+  std::uint16_t former = 0;
+  ASSERT_TRUE(hub_.next_request<ns::Withdraw>(former));
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kSecond}, 0}, declared));
+  std::uint16_t now = 0;
+  const auto request = hub_.next_request<ns::Withdraw>(now);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->group, GroupId{kSecond});
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::WithdrawAnswer{}, now));
+  const proto::ControlHeader header{ns::Withdraw::kOperation, former};
+  hub_.send_control(proto::Kind::ns, proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
+  leaving.join();
+}
+
 TEST_P(MovedSubscriptions, GetTheirOwnMessages) {
   const Subscription odometry = subscribe("robot/odom", kFirst);
   const Subscription map = subscribe("robot/map", kSecond);

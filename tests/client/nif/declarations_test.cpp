@@ -159,6 +159,151 @@ TEST(Declarations, ForgetTheLastMessageOfAServiceThatIsAnotherStreamNow) {
   expect_published(connected.hub, 12, "newer");
 }
 
+/// The next request is WITHDRAW of that group; `known`: and the hub has such a service.
+void answer_withdraw(FakeConnection& hub, std::uint32_t group, bool known) {
+  std::uint16_t number = 0;
+  const auto request = hub.next_request<proto::ns::Withdraw>(number);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->group, GroupId{group});
+  const proto::ControlHeader header{proto::ns::Withdraw::kOperation, number};
+  hub.send_control(proto::Kind::ns, known
+                                        ? proto::encode_answer(proto::ns::WithdrawAnswer{}, number)
+                                        : proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
+}
+
+/// Skips what was received before the next NIF_OWN_SERVICE_MOVED; returns the group.
+std::uint32_t wait_for_move(nif_node* node) {
+  for (nif_incoming in; nif_receive(node, &in, NIF_FOREVER) == NIF_OK; nif_release(&in)) {
+    if (in.type != NIF_OWN_SERVICE_MOVED) continue;
+    nif_release(&in);
+    return in.group;
+  }
+  ADD_FAILURE();
+  return 0;
+}
+
+/// What comes next is not about services.
+void expect_nothing_declared(Connected& connected) {
+  EXPECT_EQ(nif_send_to(connected.node.get(), kPeerId, "x", 1), NIF_OK);
+  const auto frame = connected.hub.next_message();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->header.kind, proto::Kind::unicast);
+}
+
+TEST(Declarations, WithdrawAServiceThatMovesMeanwhile) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  come_back(hub, connected, false);
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
+  std::thread withdrawing([&] { EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK); });
+  std::uint16_t withdrawn = 0;
+  const auto request = connected.hub.next_request<proto::ns::Withdraw>(withdrawn);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->group, GroupId{kGroup}) << "the hub has it as another one by now";
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{99}, 0}, number));
+  answer_withdraw(connected.hub, 99, true);
+  connected.hub.send_control(proto::Kind::ns, proto::encode_refusal({proto::ns::Withdraw::kOperation, withdrawn},
+                                                                    {proto::Status::not_found, "no such service"}));
+  withdrawing.join();
+  expect_nothing_declared(connected);
+  come_back(hub, connected, false);
+  expect_nothing_declared(connected);
+}
+
+TEST(Declarations, WithdrawAServiceThatEndedDuringABreak) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  connected.hub.close();
+  while (info_of(connected.node.get()).connected != 0) std::this_thread::yield();
+  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", 0), NIF_NOT_CONNECTED);
+  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", 0), NIF_NOT_FOUND) << "it ended";
+  come_back(hub, connected, true, 2);
+  answer_withdraw(connected.hub, kGroup, true);
+  come_back(hub, connected, true, 2);
+  expect_nothing_declared(connected);
+}
+
+TEST(Declarations, WithdrawWhatBecameOfAServiceThatEndedUnanswered) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  come_back(hub, connected, false);
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
+  connected.hub.close();
+  while (info_of(connected.node.get()).connected != 0) std::this_thread::yield();
+  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", 0), NIF_NOT_CONNECTED);
+  come_back(hub, connected, false);
+  answer_advertise(connected.hub, "map", 99);
+  answer_withdraw(connected.hub, 99, true);
+  expect_nothing_declared(connected);
+}
+
+TEST(Declarations, ForgetAServiceThatEndedWhileAHubRefusedIt) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  come_back(hub, connected, false);
+  answer_advertise(connected.hub, "map", 0);
+  EXPECT_EQ(wait_for_move(connected.node.get()), 0u);
+  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK) << "the hub has nothing to say";
+  come_back(hub, connected, false);
+  expect_nothing_declared(connected);
+}
+
+/// The hub has not heard of its end when the program advertises the service anew.
+TEST(Declarations, DoNotWithdrawAServiceThatIsAdvertisedAnew) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  nif_node* const node = connected.node.get();
+  connected.hub.close();
+  while (info_of(node).connected != 0) std::this_thread::yield();
+  EXPECT_EQ(nif_withdraw_service(node, "map", 0), NIF_NOT_CONNECTED);
+  nif_service service{};
+  service.struct_size = sizeof service;
+  service.name = "map";
+  service.message_type = 8;
+  std::uint32_t group = 0;
+  EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, 0), NIF_NOT_CONNECTED) << "it ended all the same";
+  come_back(hub, connected, false);
+  answer_withdraw(connected.hub, kGroup, false);
+  expect_nothing_declared(connected);
+}
+
+TEST(Declarations, WithdrawNothingBehindAServiceThatIsAdvertisedAnew) {
+  FakeHub hub;
+  Connected connected = with_map(hub, "map");
+  nif_node* const node = connected.node.get();
+  connected.hub.close();
+  while (info_of(node).connected != 0) std::this_thread::yield();
+  EXPECT_EQ(nif_withdraw_service(node, "map", 0), NIF_NOT_CONNECTED);
+  std::thread asking([node] {
+    nif_service service{};
+    service.struct_size = sizeof service;
+    service.name = "map";
+    service.message_type = 8;
+    std::uint32_t group = 0;
+    EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(nif_send_to(node, kPeerId, "x", 1), NIF_OK);
+  });
+  connected.hub = hub.admit(make_welcome(kResumeBytes));
+  bool anew = false;
+  while (const auto frame = connected.hub.next_message()) {
+    if (frame->header.kind != proto::Kind::ns) break;
+    const auto payload = frame->view().payload;
+    const std::uint16_t number = proto::split_control(payload)->header.request;
+    if (const auto request = proto::decode<proto::ns::Advertise>(payload)) {
+      anew |= request->message_type == 8;
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
+    } else {
+      EXPECT_FALSE(anew) << "the program's new service is gone";
+      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::WithdrawAnswer{}, number));
+    }
+  }
+  asking.join();
+  EXPECT_TRUE(anew);
+}
+
 /// The program advertises once more while the library declares again, and hears of it first.
 TEST(Declarations, GiveTheLastMessageOfAServiceThatIsAdvertisedOnceMoreMeanwhile) {
   for (const std::uint32_t group : {kGroup, 99u}) {

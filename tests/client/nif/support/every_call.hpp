@@ -18,7 +18,7 @@ struct Call {
 };
 
 // One part of a name, so that the checks of arguments are passed.
-inline constexpr std::array<Call, 29> kCalls{{
+inline constexpr std::array<Call, 30> kCalls{{
     {"nif_get_info",
      [](nif_node* node) {
        nif_info info{};
@@ -92,6 +92,8 @@ inline constexpr std::array<Call, 29> kCalls{{
      },
      [](nif_node* node) { return nif_advertise(node, nullptr, nullptr, nullptr, 0); }, true},
     {"nif_withdraw", [](nif_node* node) { return nif_withdraw(node, 7, 0); }, nullptr, true},
+    {"nif_withdraw_service", [](nif_node* node) { return nif_withdraw_service(node, "a", 0); },
+     [](nif_node* node) { return nif_withdraw_service(node, nullptr, 0); }, true},
     {"nif_subscribe", [](nif_node* node) { return nif_subscribe(node, "a/b", nullptr, 0); },
      [](nif_node* node) { return nif_subscribe(node, nullptr, nullptr, 0); }, true},
     {"nif_subscribe_paced", [](nif_node* node) { return nif_subscribe_paced(node, "a/b", nullptr, nullptr, 0); },
