@@ -239,8 +239,7 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SERVICE_MOVED:
       return verdict_of(services_.on_service_moved(in.text, {in.group, {in.message_type, in.instance}}));
     case NIF_OWN_SERVICE_MOVED:
-      services_.on_own_service_moved(in.text, in.group);
-      return NIF_DONE;
+      return verdict_of(services_.on_own_service_moved(in.text, {in.former_group, in.group}));
     case NIF_NAME_LOST:
       on_renamed();
       return NIF_DONE;

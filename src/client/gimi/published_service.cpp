@@ -65,6 +65,11 @@ std::uint64_t PublishedService::published() {
   return published_;
 }
 
+std::uint32_t PublishedService::group() {
+  const MutexLock lock(mutex_);
+  return group_;
+}
+
 void PublishedService::on_group(std::uint32_t group) {
   const MutexLock lock(mutex_);
   group_ = group;

@@ -26,6 +26,8 @@ class PublishedService {
   [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
 
+  /// 0: the hub refuses it at the moment.
+  [[nodiscard]] std::uint32_t group() GIMNET_EXCLUDES(mutex_);
   void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   void on_subscribers(std::size_t count) GIMNET_EXCLUDES(mutex_);
   /// The node has another name now.

@@ -24,14 +24,17 @@ nif_service description_of(const std::string& name, MessageKey key, const std::s
 
 class ServiceTable::Asking {
  public:
-  explicit Asking(ServiceTable& table) : table_(table) {
+  /// `service`: an own one, that is advertised.
+  explicit Asking(ServiceTable& table, std::string service = {}) : table_(table) {
     const MutexLock lock(table_.mutex_);
     ++table_.open_;
+    table_.advertising_ = std::move(service);
   }
   ~Asking() {
     {
       const MutexLock lock(table_.mutex_);
       --table_.open_;
+      table_.advertising_.clear();
     }
     static_cast<void>(nif_deliver(table_.uplink_.node()));
   }
@@ -56,7 +59,7 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
                                                    const PublishOptions& options, Timeout timeout) {
   const MutexLock turn(asking_);
   if (auto failure = obstacle(own_name, name)) return *failure;
-  const Asking asking(*this);
+  const Asking asking(*this, name);
   nif_service service = description_of(name, options.key, options.metadata);
   service.direction = NIF_PROVIDES;
   service.delivery = static_cast<std::uint8_t>(options.delivery);
@@ -239,15 +242,17 @@ void ServiceTable::on_renamed(const std::string& own_name) {
   for (auto& service : published_) service->on_renamed(own_name);
 }
 
-void ServiceTable::on_own_service_moved(const std::string& name, std::uint32_t group) {
+ServiceTable::Place ServiceTable::on_own_service_moved(const std::string& name, const OwnMove& move) {
   const MutexLock lock(mutex_);
   const auto known = published_by_name_.find(name);
-  if (known == published_by_name_.end()) return;
+  if (known == published_by_name_.end()) return name == advertising_ ? Place::not_yet : Place::unknown;
   PublishedService* const service = known->second;
+  if (service->group() != move.former) return Place::unknown;
   // By service, not by id: a hub that lost its state may have given its former group to another one.
   std::erase_if(published_by_group_, [service](const auto& entry) { return entry.second == service; });
-  if (group != 0) published_by_group_[group] = service;
-  service->on_group(group);
+  if (move.group != 0) published_by_group_[move.group] = service;
+  service->on_group(move.group);
+  return Place::found;
 }
 
 void ServiceTable::on_reconnected() {

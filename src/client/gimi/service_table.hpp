@@ -59,7 +59,12 @@ class ServiceTable {
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_service_moved(const std::string& full_name, const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
-  void on_own_service_moved(const std::string& name, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  /// `unknown`: nor is one of an earlier service of that name, which had `former`.
+  struct OwnMove {
+    std::uint32_t former = 0;
+    std::uint32_t group = 0;
+  };
+  [[nodiscard]] Place on_own_service_moved(const std::string& name, const OwnMove& move) GIMNET_EXCLUDES(mutex_);
   void on_reconnected() GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
@@ -86,6 +91,7 @@ class ServiceTable {
 
   Mutex mutex_;
   std::size_t open_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::string advertising_ GIMNET_GUARDED_BY(mutex_);  ///< the service that the hub is asked for; "": none
   std::vector<std::unique_ptr<PublishedService>> published_ GIMNET_GUARDED_BY(mutex_);
   /// Those that were not withdrawn; also one that the hub did not take again, which has no group.
   std::map<std::string, PublishedService*, std::less<>> published_by_name_ GIMNET_GUARDED_BY(mutex_);

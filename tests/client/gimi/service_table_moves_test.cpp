@@ -202,6 +202,30 @@ TEST_P(MovedSubscriptions, GetTheirOwnMessages) {
   close_node();
 }
 
+/// The answer is here, and the asking thread has not entered the service yet.
+TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustAdvertised) {
+  nif::test::FakeHub hub;
+  nif::test::Connected connected =
+      nif::test::connect_to(hub, nif::test::default_options("robot"), nif::test::make_welcome());
+  Uplink uplink;
+  uplink.open(connected.node.get());
+  Inbox inbox(1, 1 << 20, [] {});
+  ServiceTable table(uplink, inbox, [](const std::string&, const ServicePlace&) {});
+  EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::unknown);
+  PublishedService* odometry = nullptr;
+  std::thread asking([&] { odometry = table.advertise("robot", "odom", {}, kForever).or_throw(); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(connected.hub.next_request<ns::Advertise>(number));
+  EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::not_yet);
+  EXPECT_EQ(table.on_own_service_moved("map", {kFirst, kSecond}), ServiceTable::Place::unknown) << "nobody asks for it";
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 0}, number));
+  asking.join();
+  EXPECT_EQ(table.on_own_service_moved("odom", {kSecond, 99}), ServiceTable::Place::unknown) << "of an earlier one";
+  EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::found);
+  EXPECT_EQ(odometry->group(), kSecond);
+  connected.hub.close();
+}
+
 INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedOwnServices, testing::Values("map", "odom"),
                          [](const auto& first) { return std::string(first.param) + "First"; });
 INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedSubscriptions, testing::Values("robot/map", "robot/odom"),
