@@ -28,7 +28,12 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
   }
   const nif_status status = transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
-  if (finish(sequence, status, more)) watch_if_needed();
+  bool unwatched = false;
+  {
+    const MutexLock lock(mutex_);
+    unwatched = finish(sequence, status, more);
+  }
+  if (unwatched) watch_if_needed();
   if (status == NIF_OK) return {};
   return failure;
 }
@@ -74,7 +79,6 @@ void SendStream::hold(BytesView data) {
 
 /// What a program was told to be held could not be sent yet.
 void SendStream::hold_again(std::vector<std::byte> data) {
-  const MutexLock lock(mutex_);
   if (held_) {
     ++counts_.skipped;  // a newer one came meanwhile
   } else if (end_ || destination_.id == 0) {
@@ -105,7 +109,6 @@ nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number
 /// True: somebody should watch over the stream. Another thread may have left a message to be held while this one was
 /// sending: it goes by tick() only, also where this one was not sent, or is acknowledged already.
 bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
-  const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();
   if (status != NIF_OK) {
@@ -245,7 +248,9 @@ bool SendStream::tick(std::int64_t now_ns) {
   }
   if (data) {
     const nif_status status = transmit(to, header_of(Operation::data, sequence), *data, More::no, 0);
+    const MutexLock lock(mutex_);
     static_cast<void>(finish(sequence, status, More::no));
+    // Before the turn is anybody else's, whose message is newer.
     if (status != NIF_OK) hold_again(std::move(*data));
     return true;
   }

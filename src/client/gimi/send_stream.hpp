@@ -88,9 +88,9 @@ class SendStream {
   [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header, BytesView data,
                                     More more, std::int32_t timeout_ms) const;
   [[nodiscard]] nif_status transmit_ping(const Destination& to, std::uint32_t number) const;
-  [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more) GIMNET_REQUIRES(mutex_);
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
-  void hold_again(std::vector<std::byte> data) GIMNET_EXCLUDES(mutex_);
+  void hold_again(std::vector<std::byte> data) GIMNET_REQUIRES(mutex_);
   void lose_all(const std::string& why) GIMNET_REQUIRES(mutex_);
   void forget_doubts() GIMNET_REQUIRES(mutex_);
   /// REQUIRES: something was lost.

@@ -88,64 +88,6 @@ TEST_F(SendStreamTest, HoldsOnlyTheLatest) {
   EXPECT_EQ(stream.counts().skipped, 2u);
 }
 
-/// Two threads on one stream: a message comes to be held while another is still on its way to the network, because the
-/// hub paused its destination.
-class HeldBehindAnother : public Conversation {
- protected:
-  static constexpr proto::flow::Target kTarget{proto::Kind::unicast, proto::Lane::normal, kPeerId};
-
-  HeldBehindAnother() : stream_(sender(1, AtFullWindow::hold_latest)) {
-    hub_.send(proto::flow::Pause{kTarget});
-    settle_down();
-  }
-
-  /// What the hub said before was seen to by the node.
-  void settle_down() {
-    const std::string text = "x";
-    answer({++sequence_, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
-    EXPECT_EQ(node_->receive(kKey, kForever)->sequence(), sequence_);
-  }
-
-  Sender stream_;
-  std::uint32_t sequence_ = 0;
-};
-
-TEST_F(HeldBehindAnother, GoesWhenTheAckOvertakesTheEndOfSending) {
-  std::thread sending([&] { stream_.send("1").or_throw(); });
-  while (stream_.counts().waiting != 1) std::this_thread::yield();
-  stream_.send("2").or_throw();
-  EXPECT_EQ(stream_.counts().waiting, 2u);
-  acknowledge(1);
-  settle_down();
-  EXPECT_EQ(stream_.counts().acknowledged, 1u);
-  hub_.send(proto::flow::Resume{kTarget});
-  EXPECT_EQ(next_data().data, "1");
-  sending.join();
-  ASSERT_EQ(next_data().data, "2");
-  acknowledge(2);
-  EXPECT_TRUE(stream_.settle());
-}
-
-TEST_F(HeldBehindAnother, GoesWhenTheOtherCannotBeSent) {
-  bool held = false;
-  // Where this thread is so late that the other one gave up before, there is nothing to be held: once more.
-  for (Timeout patience{100}; !held; patience *= 2) {
-    std::atomic<bool> over = false;
-    std::thread sending([&] {
-      EXPECT_TRUE(stream_.send("1", patience).is(Status::timeout));
-      over = true;
-    });
-    while (stream_.counts().waiting != 1 && !over) std::this_thread::yield();
-    held = stream_.send("2", kNoWait).ok();
-    sending.join();
-  }
-  EXPECT_EQ(stream_.counts().sent, 0u);
-  hub_.send(proto::flow::Resume{kTarget});
-  ASSERT_EQ(next_data().data, "2");
-  acknowledge(1);
-  EXPECT_TRUE(stream_.settle());
-}
-
 TEST_F(SendStreamTest, AsksForAMissingAckAndGivesUpWhatThePongDoesNotKnow) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
