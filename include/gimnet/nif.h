@@ -271,7 +271,9 @@ typedef enum nif_incoming_type {
    * the last such frame's 16-byte header and up to 16 bytes after it; to, kind, lane and flags are those of that frame,
    * so is key where it is KEYED]. Of a message over 4 KiB those bytes are as if it had come in one frame without a
    * fragment header, as long as it is among the last 1,024 such messages that asked for reports or have over 1 MiB.
-   * Hubs merge reports: a program that ever asked for one gets those of messages over 1 MiB that did not, too. */
+   * Hubs merge reports: a program that ever asked for one gets those of messages over 1 MiB that did not, too. Where
+   * the last frame was the library's own, which asked whether a receiver is still there, `kind` is 7 (TAKEN), and of
+   * the `count` messages before it only the reason is known. */
   NIF_REPORT = 1,
   /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so many messages].
    * `cut_message`: a part did not come, or the connection broke before it. `too_large`. With `link_lost` the count is

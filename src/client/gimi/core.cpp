@@ -345,6 +345,7 @@ void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view)
 }
 
 void Core::on_report(const nif_incoming& in) {
+  if (in.kind == static_cast<std::uint8_t>(proto::Kind::taken)) return streams_.on_doubt(report_words(in.text));
   if (!is_for_one(in)) return;
   const auto header = reported_header(in);
   const bool to_service = in.kind == NIF_SERVICE;

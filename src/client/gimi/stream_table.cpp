@@ -127,6 +127,11 @@ void StreamTable::on_report(const Report& report) {
   attend_(true);
 }
 
+void StreamTable::on_doubt(const std::string& why) {
+  for (SendStream* stream : all()) stream->on_doubt(why);
+  attend_(true);
+}
+
 void StreamTable::on_broken(const std::string& why) {
   for (SendStream* stream : all()) stream->on_broken(why);
 }

@@ -46,6 +46,8 @@ class StreamTable final : public StreamKeeper {
     std::string text;
   };
   void on_report(const Report& report) GIMNET_EXCLUDES(mutex_);
+  /// The hub could not deliver some frames, and does not say which.
+  void on_doubt(const std::string& why) GIMNET_EXCLUDES(mutex_);
   /// Everything that waits is lost, or nobody will ever tell.
   void on_broken(const std::string& why) GIMNET_EXCLUDES(mutex_);
   /// The connection broke at that time, and what waits may still be saved by a resume; 0: it is there again. When that

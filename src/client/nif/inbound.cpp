@@ -347,7 +347,8 @@ Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
   nif_incoming& in = record->incoming;
   in.from = view.header.src;
   in.reason = static_cast<std::uint32_t>(report->reason);
-  in.count = report->count;
+  // The question of this library that is the last of them is not one of the program's messages.
+  in.count = report->header.kind == proto::Kind::taken ? report->count - 1 : report->count;
   in.to = report->header.dst;
   in.kind = static_cast<std::uint8_t>(report->header.kind);
   in.lane = report->header.lane & proto::kLaneMask;

@@ -291,7 +291,8 @@ bool Outbound::on_report(const proto::Report& report) {
       if (progress->windowed && progress->dst == header.dst) progress->undelivered = report.reason;
     }
     notify_waiting();
-    return true;
+    // Others may be merged with it.
+    return report.count <= 1 || !reports_wanted_;
   }
   const auto found = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
   const auto number = ReportedMessages::number_of(report);

@@ -89,8 +89,9 @@ class Outbound {
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
   void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
-  /// True: the program never asked for reports. The library does for every message of more than a window, and some come
-  /// when it is sent. Once the program does, it gets all: a hub merges them, whatever they are about.
+  /// True: the program never asked for reports, or this is about a question of the library alone. The library asks for
+  /// reports of every message of more than a window, and some come when it is sent. Once the program does, it gets all:
+  /// a hub merges them, whatever they are about.
   bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
   /// How the message with a fragment header began that the report is about, if that is known.
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) GIMNET_EXCLUDES(mutex_);

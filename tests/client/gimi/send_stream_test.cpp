@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gimnet/gimi.hpp"
+#include "proto/frame/taken.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
 // Streams as they are seen on the wire, by a hub that answers what the test wants.
@@ -16,6 +17,7 @@ namespace gimnet::gimi {
 namespace {
 
 using test::Conversation;
+using test::Frame;
 using test::kAll;
 using test::kKey;
 using test::kPeerId;
@@ -217,6 +219,23 @@ TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   acknowledge(0, 0, ping.header.sequence);
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().lost, 2u);
+  EXPECT_EQ(stream.counts().loss, "the hub reports shard_full");
+}
+
+/// NIF asked on its own whether a receiver is still there, and the hub merged what it has to say of that with the loss.
+TEST_F(SendStreamTest, AReportThatNamesAnotherFrameMakesItAskAtOnce) {
+  const Sender stream = sender(3);
+  stream.send("1").or_throw();
+  next_data();
+  Frame question;
+  question.bytes.resize(proto::kHeaderSize + proto::kTakenSize);
+  question.header.kind = proto::Kind::taken;
+  question.header.dst = kPeerId + 1;
+  question.header.length = proto::kTakenSize;
+  proto::store_header(question.bytes.data(), question.header);
+  report(proto::DropReason::shard_full, 2, question);
+  acknowledge(0, 0, next().header.sequence);
+  EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().loss, "the hub reports shard_full");
 }
 

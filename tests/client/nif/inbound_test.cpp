@@ -248,6 +248,23 @@ TEST(Inbound, ReportsSayWhatBecameOfWhichFrame) {
   EXPECT_EQ(receiving.inbound.taken(), 0u) << "reports are not counted for resume";
 }
 
+TEST(Inbound, AReportDoesNotCountTheQuestionOfTheLibrary) {
+  Receiving receiving;
+  proto::Report report;
+  report.reason = proto::DropReason::no_such_node;
+  report.count = 3;
+  report.header.kind = proto::Kind::taken;
+  report.header.dst = kPeerId;
+  std::array<std::byte, proto::kReportSizeMax> payload;
+  const std::size_t size = proto::encode_report(report, payload);
+  std::vector<std::byte> bytes;
+  add_frame(bytes, from_peer(proto::Kind::report), {reinterpret_cast<const char*>(payload.data()), size});
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  ASSERT_EQ(receiving.host.items.size(), 1u);
+  EXPECT_EQ(receiving.host.items[0].count, 2u);
+  EXPECT_EQ(receiving.host.items[0].kind, static_cast<std::uint8_t>(proto::Kind::taken));
+}
+
 TEST(Inbound, AReportOfAFragmentSaysWhichMessageItWas) {
   Receiving receiving;
   proto::Report report;
