@@ -175,6 +175,9 @@ struct NodeState {
   std::int64_t hub_round_trip_ns = 0;    ///< 0: not measured yet
   std::int64_t hub_clock_offset_ns = 0;  ///< hub's clock minus this one
   std::string trouble;                   ///< why the connection broke last; "" if it never did
+  /// Messages published with `retain` that are not kept for a hub that is started again: larger than
+  /// NodeOptions::last_message_bytes or, with those of other services, than 64 MiB.
+  std::uint64_t last_messages_not_kept = 0;
 };
 
 /// What was on its way to a node and cannot be given out.

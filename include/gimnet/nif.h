@@ -35,6 +35,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "gimnet/nif_counters.h"
 #include "gimnet/nif_names.h"
 #include "gimnet/nif_status.h"
 #include "gimnet/nif_watch.h"
@@ -135,6 +136,11 @@ typedef struct nif_options {
   /** Not 0: join as an administrator, who may change the hub: over its Unix socket, as root or as the user that runs
    * it. Anybody else is refused, NIF_DENIED. */
   uint8_t administrator;
+  /** Bytes of the largest last message of an own service with `retain` that the library keeps to give it to a hub that
+   *  lost it, default 1 MiB: as much as a hub keeps itself. A hub that was told to keep more (`retained_bytes`) loses
+   *  larger ones when it is started again, unless this is as large. At most 64 MiB, which all services of the handle
+   * have together. What is not kept is counted (nif_counters.last_messages_not_kept). */
+  uint32_t last_message_bytes;
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.
@@ -364,33 +370,6 @@ int nif_event_fd(nif_node* node);
 
 /** After NIF_NOT_NOW: there is room again, the callback is called again with what waits. */
 nif_status nif_deliver(nif_node* node);
-
-/** What this library counted for one handle since nif_connect(). */
-typedef struct nif_counters {
-  size_t struct_size;         /**< sizeof(nif_counters), set by the caller. */
-  uint64_t messages_sent;     /**< nif_send() calls that answered NIF_OK. */
-  uint64_t messages_received; /**< NIF_MESSAGEs put into the receive queue. */
-  uint64_t frames_sent;       /**< Data frames written for the first time. */
-  uint64_t frames_resent;     /**< ... written again after a resume. */
-  uint64_t frames_received;
-  uint64_t bytes_sent; /**< All bytes given to the kernel. */
-  uint64_t bytes_received;
-  uint64_t write_calls; /**< System calls that wrote: how well bursts are gathered. */
-  uint64_t read_calls;
-  uint64_t frames_let_go;       /**< Left the resume buffer unconfirmed, to make room. */
-  uint64_t frames_replaced;     /**< LATEST frames replaced in the own send queue. */
-  uint64_t messages_lost;       /**< Fragmented messages that ended unfinished at this end. */
-  uint64_t pauses;              /**< PAUSEs of the hub. */
-  uint64_t gaps;                /**< NIF_GAPs delivered. */
-  uint64_t frames_ignored;      /**< Well-formed frames that this version does not know. */
-  uint64_t receive_queue_bytes; /**< Waiting for the program now. */
-  uint64_t send_queue_bytes;    /**< Waiting to be written now. */
-  uint64_t retained_bytes;      /**< Waiting to be confirmed now. */
-  uint64_t read_stops;          /**< How often the library stopped reading because the receive queue was full. */
-} nif_counters;
-
-/** Fills *counters. */
-nif_status nif_get_counters(nif_node* node, nif_counters* counters);
 
 #ifdef __cplusplus
 }

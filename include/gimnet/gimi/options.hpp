@@ -51,6 +51,10 @@ struct NodeOptions {
   std::size_t receive_bytes = std::size_t{16} << 20;   ///< may wait unread when a queue holds the reading back
   std::size_t queue_messages = kQueueMessagesDefault;  ///< size of queues that nobody asked for, 1..kQueueMessagesMax
   std::uint32_t socket_receive_bytes = 0;              ///< SO_RCVBUF, in bytes; 0: the system's
+  /// Bytes of the largest last message of an own service with `retain` that is kept for a hub that was started again:
+  /// as much as hubs keep themselves unless they are told otherwise (`retained_bytes`). 1..64 MiB, which all services
+  /// have together. NodeState::last_messages_not_kept counts what was not.
+  std::uint32_t last_message_bytes = std::uint32_t{1} << 20;
 };
 
 /// What a queue does when a message comes and it is full.

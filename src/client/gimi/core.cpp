@@ -130,6 +130,7 @@ nif_status Core::connect(const NodeOptions& options) {
   how.receive_queue_bytes = options.receive_bytes;
   how.message_bytes_max = nif_bytes_max(options.message_bytes_max);
   how.socket_receive_bytes = options.socket_receive_bytes;
+  how.last_message_bytes = options.last_message_bytes;
   how.callback = &Core::on_incoming;
   how.user = this;
   how.credit_by_program = 1;
@@ -189,6 +190,9 @@ NodeState Core::state_now() const {
     state.hub_round_trip_ns = info.round_trip_ns;
     state.hub_clock_offset_ns = info.clock_offset_ns;
   }
+  nif_counters counters{};
+  counters.struct_size = sizeof counters;
+  if (nif_get_counters(node(), &counters) == NIF_OK) state.last_messages_not_kept = counters.last_messages_not_kept;
   std::array<char, 512> trouble{};
   static_cast<void>(nif_last_error(node(), trouble.data(), trouble.size()));
   state.trouble = trouble.data();

@@ -48,27 +48,32 @@ void LastMessages::clear(Entry& entry) {
 }
 
 void LastMessages::keep(Outgoing& message) {
+  const auto found = by_group_.find(message.parts().header.dst);
+  if (found == by_group_.end() || keep(*found->second, message)) return;
+  clear(*found->second);
+  ++not_kept_;
+}
+
+bool LastMessages::keep(Entry& entry, Outgoing& message) {
   const proto::FrameParts& parts = message.parts();
-  const auto found = by_group_.find(parts.header.dst);
-  if (found == by_group_.end()) return;
-  Entry& entry = *found->second;
   LastMessage& last = entry.last;
   const std::size_t size = message.size();
   const std::size_t room = last.payload.capacity();
   if (size > room || (room > kRoomKept && size < room / 4)) clear(entry);
-  if (size > kMessageBytesMax || size > kBytesMax - bytes_ + last.payload.capacity()) return clear(entry);
+  if (size > message_bytes_max_ || size > kBytesMax - bytes_ + last.payload.capacity()) return false;
   try {
     last.extensions.assign(parts.extensions.begin(), parts.extensions.end());
     const std::size_t before = last.payload.capacity();
     last.payload.resize(size);
     bytes_ += last.payload.capacity() - before;
   } catch (const std::bad_alloc&) {
-    return clear(entry);  // the message itself is on its way
+    return false;  // the message itself is on its way
   }
   message.copy_to(last.payload);
   last.header = parts.header;
   last.key = parts.key;
   entry.there = true;
+  return true;
 }
 
 const LastMessage* LastMessages::find(const std::string& service) const {

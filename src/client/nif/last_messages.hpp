@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/check.hpp"
 #include "client/nif/outgoing.hpp"
 #include "proto/frame/frame_builder.hpp"
 
@@ -25,14 +26,19 @@ struct LastMessage {
 };
 
 /// What hubs keep of the own retained services, kept here too: a hub that was started again has it no more.
-/// Thread safety: guarded by its owner. Limits: below; what is beyond is not kept, nor an older message in its place,
-/// which would not be the last.
+/// Thread safety: guarded by its owner. Limits: below; what is beyond is not kept but counted, nor is an older message
+/// in its place, which would not be the last.
 class LastMessages {
  public:
   /// As much as a hub keeps of one service unless it is told otherwise (its `retained_bytes`).
-  static constexpr std::size_t kMessageBytesMax = std::size_t{1} << 20;
-  /// Of all services of a node.
+  static constexpr std::size_t kMessageBytesDefault = std::size_t{1} << 20;
+  /// Of all services of a node; as much as a hub can be told to keep of one.
   static constexpr std::size_t kBytesMax = std::size_t{64} << 20;
+
+  /// REQUIRES: message_bytes_max <= kBytesMax.
+  explicit LastMessages(std::size_t message_bytes_max = kMessageBytesDefault) : message_bytes_max_(message_bytes_max) {
+    GIMNET_ASSERT(message_bytes_max <= kBytesMax);
+  }
 
   /// The own service of that name is retained and has this group; 0: none at the moment, what is kept stays.
   void follow(const std::string& service, std::uint32_t group);
@@ -43,6 +49,8 @@ class LastMessages {
   [[nodiscard]] const LastMessage* find(const std::string& service) const;
   [[nodiscard]] bool empty() const { return by_group_.empty(); }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  /// Messages of services with retain that were not kept: too large, or no memory.
+  [[nodiscard]] std::uint64_t not_kept() const { return not_kept_; }
 
  private:
   struct Entry {
@@ -52,10 +60,13 @@ class LastMessages {
   };
   void leave_group(const Entry& entry);
   void clear(Entry& entry);
+  [[nodiscard]] bool keep(Entry& entry, Outgoing& message);
 
+  const std::size_t message_bytes_max_;
   std::map<std::string, Entry> by_service_;             ///< Limit: the own services
   std::unordered_map<std::uint32_t, Entry*> by_group_;  ///< those that have a group
   std::size_t bytes_ = 0;                               ///< memory of all payloads
+  std::uint64_t not_kept_ = 0;
 };
 
 }  // namespace gimnet::nif

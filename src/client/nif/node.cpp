@@ -32,7 +32,7 @@ bool may_come(nif_status status) { return status == NIF_NO_HUB || status == NIF_
 
 Node::Node(Options options)
     : options_(std::move(options)),
-      outbound_(options_.send, wake_),
+      outbound_(options_.send, wake_, options_.last_message_bytes),
       received_(options_.receive_queue_bytes, wake_),
       requests_(outbound_),
       credits_(outbound_),

@@ -45,6 +45,10 @@ std::optional<Failure> read_identity(const nif_options& given, Options& options)
 std::optional<Failure> read_limits(const nif_options& given, Options& options) {
   if (given.send_queue_bytes != 0) options.send.queue_bytes = given.send_queue_bytes;
   if (given.resume_bytes != 0) options.send.retained_bytes = given.resume_bytes;
+  if (given.last_message_bytes > LastMessages::kBytesMax) {
+    return bad("last_message_bytes is over 64 MiB, which all services of a handle have together");
+  }
+  if (given.last_message_bytes != 0) options.last_message_bytes = given.last_message_bytes;
   if (given.receive_queue_bytes != 0) options.receive_queue_bytes = given.receive_queue_bytes;
   if (given.message_bytes_max > NIF_MESSAGE_BYTES_MAX) return bad("message_bytes_max is over 1 GiB");
   if (given.message_bytes_max != 0) {

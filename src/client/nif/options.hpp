@@ -9,6 +9,7 @@
 #include "base/result.hpp"
 #include "client/nif/endpoint.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/last_messages.hpp"
 #include "client/nif/platform.hpp"
 #include "client/nif/send_queue.hpp"
 #include "gimnet/nif.h"
@@ -29,6 +30,7 @@ struct Options {
   bool administrator = false;
   std::optional<std::uint16_t> shard;
   SendQueue::Limits send;
+  std::size_t last_message_bytes = LastMessages::kMessageBytesDefault;
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;
   proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20};
   SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};

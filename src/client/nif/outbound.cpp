@@ -324,6 +324,7 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.pauses = pause_count_;
   counters.send_queue_bytes = queue_.unsent_bytes();
   counters.retained_bytes = queue_.retained_bytes();
+  counters.last_messages_not_kept = last_.not_kept();
 }
 
 }  // namespace gimnet::nif

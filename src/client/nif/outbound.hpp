@@ -35,7 +35,9 @@ namespace gimnet::nif {
 class Outbound {
  public:
   /// `wake` rouses the library's thread, which then calls write_pending().
-  Outbound(const SendQueue::Limits& limits, WakeSignal& wake) : wake_(wake), queue_(limits) {}
+  Outbound(const SendQueue::Limits& limits, WakeSignal& wake,
+           std::size_t last_message_bytes = LastMessages::kMessageBytesDefault)
+      : wake_(wake), queue_(limits), last_(last_message_bytes) {}
 
   // Any thread.
   [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);

@@ -107,6 +107,28 @@ TEST(Declarations, GiveAHubThatForgotThemTheLastMessagesBeforeNewerOnes) {
   }
 }
 
+TEST(Declarations, GiveALargerLastMessageThatTheProgramWantsKept) {
+  constexpr std::uint32_t kLarge = 2u << 20;
+  FakeHub hub;
+  nif_options options = default_options("robot");
+  options.last_message_bytes = kLarge;
+  Connected connected = connect_to(hub, options, make_welcome(kResumeBytes));
+  nif_node* const node = connected.node.get();
+  advertise(connected, "map", kGroup, true);
+  for (const std::uint32_t beyond : {0u, 1u}) {
+    const std::string last(kLarge + beyond, 'm');
+    std::thread publishing([&] { EXPECT_EQ(publish(node, kGroup, last), NIF_OK); });
+    expect_published(connected.hub, kGroup, last);
+    publishing.join();
+    EXPECT_EQ(counters_of(node).last_messages_not_kept, beyond);
+    come_back(hub, connected, false);
+    answer_advertise(connected.hub, "map", kGroup);
+    if (beyond == 0) expect_published(connected.hub, kGroup, last);
+    EXPECT_EQ(publish(node, kGroup, "newer"), NIF_OK);
+    expect_published(connected.hub, kGroup, "newer");
+  }
+}
+
 TEST(Declarations, GiveTheLastMessageToAnotherGroup) {
   FakeHub hub;
   Connected connected = with_map(hub, "map");

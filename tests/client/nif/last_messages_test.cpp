@@ -86,19 +86,31 @@ TEST(LastMessages, StaysWhileItsServiceHasNoGroup) {
 TEST(LastMessages, LeavesNoOlderOneInThePlaceOfOneThatIsTooLarge) {
   LastMessages messages;
   messages.follow("map", kGroup);
-  keep(messages, std::string(LastMessages::kMessageBytesMax, 'x'));
-  EXPECT_EQ(text_of(messages).size(), LastMessages::kMessageBytesMax);
-  EXPECT_EQ(messages.bytes(), LastMessages::kMessageBytesMax);
-  keep(messages, std::string(LastMessages::kMessageBytesMax + 1, 'x'));
+  keep(messages, std::string(LastMessages::kMessageBytesDefault, 'x'));
+  EXPECT_EQ(text_of(messages).size(), LastMessages::kMessageBytesDefault);
+  EXPECT_EQ(messages.bytes(), LastMessages::kMessageBytesDefault);
+  keep(messages, std::string(LastMessages::kMessageBytesDefault + 1, 'x'));
   EXPECT_EQ(messages.find("map"), nullptr);
   EXPECT_EQ(messages.bytes(), 0u);
   keep(messages, "small");
   EXPECT_EQ(text_of(messages), "small");
 }
 
+TEST(LastMessages, KeepsAsMuchOfOneAsItIsToldAndCountsTheRest) {
+  LastMessages messages(10);
+  messages.follow("map", kGroup);
+  keep(messages, std::string(10, 'x'));
+  EXPECT_EQ(text_of(messages), std::string(10, 'x'));
+  keep(messages, std::string(11, 'x'), 13);
+  EXPECT_EQ(messages.not_kept(), 0u) << "of no retained service";
+  keep(messages, std::string(11, 'x'));
+  EXPECT_EQ(text_of(messages), "nothing");
+  EXPECT_EQ(messages.not_kept(), 1u);
+}
+
 TEST(LastMessages, OfAllServicesKeepsWhatFitsIntoTheLimit) {
-  constexpr std::uint32_t kFull = LastMessages::kBytesMax / LastMessages::kMessageBytesMax;
-  const std::string largest(LastMessages::kMessageBytesMax, 'x');
+  constexpr std::uint32_t kFull = LastMessages::kBytesMax / LastMessages::kMessageBytesDefault;
+  const std::string largest(LastMessages::kMessageBytesDefault, 'x');
   LastMessages messages;
   for (std::uint32_t i = 1; i <= kFull; ++i) {
     messages.follow(std::to_string(i), i);
@@ -113,7 +125,7 @@ TEST(LastMessages, OfAllServicesKeepsWhatFitsIntoTheLimit) {
   keep(messages, "small", 1);
   keep(messages, "x", 1'000);
   EXPECT_EQ(text_of(messages), "x");
-  EXPECT_EQ(messages.bytes(), LastMessages::kBytesMax - LastMessages::kMessageBytesMax + 5 + 1);
+  EXPECT_EQ(messages.bytes(), LastMessages::kBytesMax - LastMessages::kMessageBytesDefault + 5 + 1);
 }
 
 }  // namespace

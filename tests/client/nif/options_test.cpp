@@ -23,6 +23,7 @@ TEST(Options, ZeroIsTheDefault) {
   EXPECT_EQ(options->reassembly.message_bytes_max, 64u << 20);
   EXPECT_EQ(options->send.queue_bytes, 256u << 10);
   EXPECT_EQ(options->send.retained_bytes, 512u << 10);
+  EXPECT_EQ(options->last_message_bytes, 1u << 20);
   EXPECT_EQ(options->connect_timeout_ms, 5'000);
   EXPECT_TRUE(options->reconnect);
   EXPECT_FALSE(options->resume) << "a node without a name";
@@ -89,6 +90,12 @@ TEST(Options, ChecksNamesAndLimits) {
   EXPECT_FALSE(read_options(&options));
   options.message_bytes_max = 1000;
   options.reassembly_bytes = 999;
+  EXPECT_FALSE(read_options(&options));
+  options = given();
+  options.last_message_bytes = 64u << 20;
+  ASSERT_TRUE(read_options(&options));
+  EXPECT_EQ(read_options(&options)->last_message_bytes, 64u << 20);
+  ++options.last_message_bytes;
   EXPECT_FALSE(read_options(&options));
   options = given();
   options.url = "nonsense";
