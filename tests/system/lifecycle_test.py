@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A hub's start and end: drain by SIGTERM, a port freed by kill -9, addresses in use; nodes that leave and come back."""
 
+import contextlib
 import os
 import select
 import signal
@@ -10,6 +11,16 @@ from support.processes import TCPHUB, Hub, Process, run_gimnet, start_gimnet, st
 from support.tap import Tap
 from support.waiting import PATIENCE_S, wait_until
 from support.wire import Client, Closed
+
+
+@contextlib.contextmanager
+def hangup(action):
+    """What a program that is started meanwhile does at SIGHUP, unless it says otherwise."""
+    before = signal.signal(signal.SIGHUP, action)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 class Ends(unittest.TestCase):
@@ -99,11 +110,20 @@ class Ends(unittest.TestCase):
 class Nodes(unittest.TestCase):
     def test_ctrl_c_leaves_at_once(self):
         hub = Hub(self, "--limit", "grace_ms=600000")
-        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
-            receiver = start_recv(self, hub, "B")
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)):
+            with hangup(signal.SIG_DFL):
+                receiver = start_recv(self, hub, "B")
             receiver.signal(number)
             self.assertEqual(receiver.wait(), code)
             wait_until(lambda: not any(node["name"] for node in hub.nodes()), "B, given back long before its grace time")
+
+    def test_a_terminal_that_goes_is_no_reason_to_end_where_that_was_ignored(self):
+        hub = Hub(self)
+        with hangup(signal.SIG_IGN):  # as nohup does
+            receiver = start_recv(self, hub, "B", "-n", "1")
+        receiver.signal(signal.SIGHUP)
+        self.assertEqual(run_gimnet(hub, "send", "B", data=b"still there\n").code, 0)
+        self.assertEqual((receiver.wait(), receiver.out), (0, b"still there\n"), receiver.err)
 
     def test_a_killed_node_keeps_its_name_for_the_grace_time(self):
         hub = Hub(self, "--limit", "grace_ms=500")

@@ -18,7 +18,7 @@ Examples:
   gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
 
 Data goes to standard output, words to standard error. Ends with 0 done, 1 failed, 2 wrong arguments, 3 cannot connect,
-4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 130 and 143 by signal.
+4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 129, 130 and 143 by signal.
 )";
 
 /// What each command's help ends with.

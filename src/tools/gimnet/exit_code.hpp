@@ -1,5 +1,6 @@
 #pragma once
 
+#include <csignal>
 #include <cstdint>
 #include <string>
 
@@ -17,6 +18,7 @@ enum class ExitCode : std::uint8_t {
   timeout = 5,
   denied = 6,
   bad_version = 7,
+  hung_up = 129,
   interrupted = 130,
   terminated = 143,
 };
@@ -42,6 +44,12 @@ enum class ExitCode : std::uint8_t {
     default:
       return ExitCode::failed;
   }
+}
+
+/// `signal`: one that asks the program to stop.
+[[nodiscard]] constexpr ExitCode exit_code_of_signal(int signal) {
+  if (signal == SIGHUP) return ExitCode::hung_up;
+  return signal == SIGTERM ? ExitCode::terminated : ExitCode::interrupted;
 }
 
 /// Whether a hub's limit forbids the terms of a request (window, depth, rate) and not the request: the hub names the

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -128,7 +127,7 @@ ExitCode Session::fail_unmatched(const std::string& kind) {
 }
 
 ExitCode Session::fail(const Failure& failure) {
-  if (stopped()) return stop_.signal() == SIGTERM ? ExitCode::terminated : ExitCode::interrupted;
+  if (stopped()) return exit_code_of_signal(stop_.signal());
   const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
   const bool known = !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);

@@ -17,11 +17,18 @@ namespace {
 constexpr int kEndWatcher = SIGUSR1;
 constexpr int kSignalExitBase = 128;
 
+bool is_ignored(int signal) {
+  struct sigaction action{};
+  return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
 sigset_t watched_signals() {
   sigset_t set;
   sigemptyset(&set);
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGTERM);
+  // A blocked signal waits for us even where it is ignored.
+  if (!is_ignored(SIGHUP)) sigaddset(&set, SIGHUP);
   sigaddset(&set, kEndWatcher);
   return set;
 }
@@ -46,6 +53,8 @@ void StopSignal::watch() {
   for (int signal = 0; sigwait(&set, &signal) == 0 && signal != kEndWatcher;) {
     {
       const MutexLock lock(mutex_);
+      // Of a terminal that goes one may hear twice, from the shell and from the kernel.
+      if (signal_ != 0 && signal == SIGHUP) continue;
       if (signal_ != 0) ::_exit(kSignalExitBase + signal);
       signal_ = signal;
       changed_.notify_all();
