@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: gimnet-sim [--seeds N] [--from SEED] [--seed SEED] [--nodes N] [--without FAULT,...]\n"
-    "                  [--trace] [--hashes] [--every-fault] [--expect CHECKER] [--checkers]\n"
+    "                  [--trace] [--hashes] [--hashes-to FILE] [--every-fault] [--expect CHECKER] [--checkers]\n"
     "  --seeds N         so many worlds (100), from seed 1 on\n"
     "  --from SEED       from that seed on\n"
     "  --seed SEED       that one world only\n"
@@ -24,6 +24,7 @@ constexpr const char* kUsage =
     "  --without FAULTS  leave these kinds of faults out, though a seed has them: crash,hang\n"
     "  --trace           print every event of the world as it happens\n"
     "  --hashes          print the hash of each world's trace, and nothing else\n"
+    "  --hashes-to FILE  write the hash of each world's trace there, if nothing was wrong\n"
     "  --every-fault     fail if a fault or collision never came\n"
     "  --expect CHECKER  succeed only if that checker finds something: for planted bugs\n"
     "  --checkers        the names of the checkers\n";
@@ -34,6 +35,7 @@ struct Arguments {
   World::Options world;
   bool hashes = false;
   bool every_fault = false;
+  std::string hashes_file;
   std::string_view expect;
 };
 
@@ -66,6 +68,10 @@ void read_value(Arguments& arguments, std::string_view flag, const char* value) 
   if (value == nullptr) usage(std::string{flag} + " wants a value");
   if (flag == "--expect") {
     arguments.expect = value;
+    return;
+  }
+  if (flag == "--hashes-to") {
+    arguments.hashes_file = value;
     return;
   }
   if (flag == "--without") {
@@ -106,7 +112,7 @@ Arguments read(int count, char** values) {
     } else if (flag == "--every-fault") {
       arguments.every_fault = true;
     } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" || flag == "--without" ||
-               flag == "--expect") {
+               flag == "--expect" || flag == "--hashes-to") {
       read_value(arguments, flag, i + 1 < count ? values[i + 1] : nullptr);
       ++i;
     } else {
@@ -134,30 +140,45 @@ void print_smallest(const World::Options& world, const Report& report) {
   std::printf("its line in tests/sim/regression_seeds.txt says `SEED NODES [--without FAULT,...]` of that\n");
 }
 
-int judge(const Arguments& arguments, const Census& census, std::uint64_t worlds, std::uint64_t steps) {
+int judge(const Arguments& arguments, const Census& census, std::uint64_t steps) {
   if (!arguments.expect.empty()) {
     std::printf("checker %.*s found nothing in %" PRIu64 " worlds\n", static_cast<int>(arguments.expect.size()),
-                arguments.expect.data(), worlds);
+                arguments.expect.data(), arguments.seeds);
     return 1;
   }
   if (arguments.hashes) return 0;
   std::printf("%s%" PRIu64 " worlds of %zu nodes, %" PRIu64 " steps of the conductor: nothing wrong\n",
-              census.table().c_str(), worlds, arguments.world.nodes, steps);
+              census.table().c_str(), arguments.seeds, arguments.world.nodes, steps);
   if (!arguments.every_fault) return 0;
   const std::vector<std::string> missing = census.missing();
   for (const std::string& name : missing) std::printf("never happened: %s\n", name.c_str());
   return missing.empty() ? 0 : 1;
 }
 
+/// Whole or not at all: who compares the hashes must not take those of some worlds for all.
+bool write_hashes(const std::string& path, const std::string& hashes) {
+  std::FILE* const file = std::fopen(path.c_str(), "w");
+  const bool written = file != nullptr && std::fputs(hashes.c_str(), file) >= 0;
+  const bool closed = file != nullptr && std::fclose(file) == 0;
+  if (written && closed) return true;
+  std::fprintf(stderr, "gimnet-sim: cannot write %s\n", path.c_str());
+  std::remove(path.c_str());
+  return false;
+}
+
 int run(const Arguments& arguments) {
   set_log_level(LogLevel::off);
   Census census;
   std::uint64_t steps = 0;
+  std::string hashes;
   for (std::uint64_t seed = arguments.from; seed - arguments.from < arguments.seeds; ++seed) {
     World::Options options = arguments.world;
     options.seed = seed;
     const Report report = World(options).run();
-    if (arguments.hashes) std::printf("%" PRIu64 " %016" PRIx64 "\n", seed, report.hash);
+    char line[64];
+    std::snprintf(line, sizeof line, "%" PRIu64 " %016" PRIx64 "\n", seed, report.hash);
+    if (arguments.hashes) std::printf("%s", line);
+    hashes += line;
     if (report.broken) {
       print_failure(options, report);
       if (arguments.expect == name_of(report.broken->checker)) return 0;
@@ -167,7 +188,8 @@ int run(const Arguments& arguments) {
     census.add(report.census);
     steps += report.steps;
   }
-  return judge(arguments, census, arguments.seeds, steps);
+  if (!arguments.hashes_file.empty() && !write_hashes(arguments.hashes_file, hashes)) return 1;
+  return judge(arguments, census, steps);
 }
 
 }  // namespace
