@@ -85,18 +85,35 @@ class CommandLine(unittest.TestCase):
                     self.skipTest("the default port is in use on this machine: " + hub.process.stderr.read())
                 self.assertEqual(hub.ready, f"ready tcp://127.0.0.1:7450 unix:{folder}/gimnet/tcphub.sock")
 
+    def expect_tcp_only(self, folder, why):
+        with Hub(XDG_RUNTIME_DIR=folder) as hub:
+            if not hub.ready:
+                said = hub.process.stderr.read()
+                self.assertIn("cannot listen on tcp://127.0.0.1:7450", said)
+                self.skipTest("the default port is in use on this machine: " + said)
+            self.assertEqual(hub.ready, "ready tcp://127.0.0.1:7450")
+            self.assertEqual(hub.end(signal.SIGTERM), 0)
+            said = hub.process.stderr.read()
+            for part in ("listening on TCP only", why, "--listen unix:/PATH"):
+                self.assertIn(part, said)
+
     def test_a_runtime_folder_that_is_gone_costs_the_socket_only(self):
         with tempfile.TemporaryDirectory() as folder:
-            with Hub(XDG_RUNTIME_DIR=f"{folder}/gone") as hub:
-                if not hub.ready:
-                    said = hub.process.stderr.read()
-                    self.assertIn("cannot listen on tcp://127.0.0.1:7450", said)
-                    self.skipTest("the default port is in use on this machine: " + said)
-                self.assertEqual(hub.ready, "ready tcp://127.0.0.1:7450")
-                self.assertEqual(hub.end(signal.SIGTERM), 0)
-                said = hub.process.stderr.read()
-                for part in ("listening on TCP only", f"make {folder}/gone first", "--listen unix:/PATH"):
-                    self.assertIn(part, said)
+            self.expect_tcp_only(f"{folder}/gone", f"make {folder}/gone first")
+
+    def test_a_runtime_folder_that_cannot_be_used_costs_the_socket_only(self):
+        for mode, owner, why in ((0o755, None, "other users have rights in it"),
+                                 (0o500, None, "nothing can be put into it"),
+                                 (0o700, 12_345, "it belongs to another user")):
+            with self.subTest(why=why), tempfile.TemporaryDirectory() as folder:
+                if (mode == 0o500 and os.geteuid() == 0) or (owner and os.geteuid() != 0):
+                    self.skipTest("not with the rights of this user")
+                os.mkdir(f"{folder}/gimnet")
+                os.chmod(f"{folder}/gimnet", mode)
+                if owner:
+                    os.chown(f"{folder}/gimnet", owner, owner)
+                self.expect_tcp_only(folder, why)
+                self.assertEqual(os.listdir(f"{folder}/gimnet"), [])
 
     def test_a_wrong_command_line_is_told_and_ends_with_2(self):
         for arguments, part in ((("--lisen", "x"), "did you mean --listen?"),

@@ -1,5 +1,6 @@
 #include "hub/config/folders.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -32,10 +33,15 @@ std::string prepare_private_folder(const std::string& path) {
   if (std::string error = make_folder(path, info); !error.empty()) return error;
   if (!S_ISDIR(info.st_mode)) return "cannot use " + path + ": it is not a folder; remove it";
   if (info.st_uid != ::geteuid()) {
-    return "cannot use the folder " + path + ": it belongs to another user; give the socket's place with --listen";
+    return "cannot use the folder " + path + ": it belongs to another user, who could put his own socket in its place";
   }
   if ((info.st_mode & 0077) != 0) {
     return "cannot use the folder " + path + ": other users have rights in it; chmod 700 " + path;
+  }
+  // As whoever the process acts for, like the bind() that follows. Root may anything, but where all is read-only.
+  if (::faccessat(AT_FDCWD, path.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
+    const std::string remedy = errno == EACCES ? "; chmod 700 " + path : "";
+    return "cannot use the folder " + path + ": nothing can be put into it: " + system_text(errno) + remedy;
   }
   return {};
 }

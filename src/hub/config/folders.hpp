@@ -7,8 +7,8 @@
 
 namespace gimnet::hub {
 
-/// Creates the folder with mode 0700 where there is none. "" or why it cannot be used: it belongs to another user, or
-/// others may write to it, or it is no folder.
+/// Creates the folder with mode 0700 where there is none. "" or why it cannot be used: it is no folder, belongs to
+/// another user, others have rights in it, or nothing can be put into it.
 [[nodiscard]] std::string prepare_private_folder(const std::string& path);
 
 /// The user's folder for sockets of this network, made ready: XDG_RUNTIME_DIR/gimnet, or, where that is not set, a

@@ -13,6 +13,7 @@
 namespace gimnet::hub {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 mode_t mode_of(const std::string& path) {
@@ -41,6 +42,28 @@ TEST(Folders, AnotherUsersFolderIsRefused) {
   ASSERT_EQ(::mkdir(folder.path("run").c_str(), 0700), 0);
   ASSERT_EQ(::chown(folder.path("run").c_str(), 12'345, 12'345), 0);
   EXPECT_THAT(prepare_private_folder(folder.path("run")), HasSubstr("another user"));
+}
+
+TEST(Folders, AFolderThatNothingCanBePutIntoIsRefused) {
+  constexpr uid_t kOther = 12'345;
+  const TestFolder folder;
+  ASSERT_EQ(::mkdir(folder.path("run").c_str(), 0700), 0);
+  const bool root = ::geteuid() == 0;
+  if (root) {  // who may write everywhere: it acts for another user, whose folder it is
+    ASSERT_EQ(::chmod(folder.path("").c_str(), 0755), 0);
+    ASSERT_EQ(::chown(folder.path("run").c_str(), kOther, kOther), 0);
+    ASSERT_EQ(::seteuid(kOther), 0);
+  }
+  EXPECT_EQ(prepare_private_folder(folder.path("run")), "");
+  for (const mode_t mode : {0500u, 0600u, 0000u}) {
+    ASSERT_EQ(::chmod(folder.path("run").c_str(), mode), 0);
+    EXPECT_THAT(prepare_private_folder(folder.path("run")),
+                AllOf(HasSubstr("Permission denied"), HasSubstr("chmod 700 " + folder.path("run"))));
+  }
+  ASSERT_EQ(::chmod(folder.path("run").c_str(), 0700), 0);
+  if (root) {
+    ASSERT_EQ(::seteuid(0), 0);
+  }
 }
 
 TEST(Folders, ALinkIsNoPrivateFolder) {
