@@ -35,12 +35,6 @@ LogSubject subject(std::string_view reason, const Session& session) {
   return {reason, log_peer(session.origin.transport, session.origin.address)};
 }
 
-/// Until when nodes that were here before this start may come back; nothing: there were none.
-std::optional<milliseconds> returns_until(const HubFacts& facts, const Limits& limits, const HubStart& start) {
-  if (start.state.boot <= 1) return std::nullopt;
-  return facts.started + milliseconds{limits.grace_ms};
-}
-
 Sessions::Options sessions_options(const HubFacts& facts, Placement placement, const Limits& limits,
                                    const HubStart& start) {
   Sessions::Options options;
@@ -52,7 +46,7 @@ Sessions::Options sessions_options(const HubFacts& facts, Placement placement, c
   options.nodes = start.nodes;
   options.groups = start.groups;
   options.kicked = start.state.kicked;
-  if (const auto until = returns_until(facts, limits, start)) options.returns_until = *until;
+  if (start.state.boot > 1) options.returns_until = facts.started + milliseconds{limits.grace_ms};
   return options;
 }
 
@@ -75,9 +69,9 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       publisher_(facts_.id, facts_.shards, wiring_.tables),
       keeper_(wiring_.start.state, wiring_.keep_state),
       runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}),
-      returns_until_(returns_until(facts_, limits, wiring_.start)) {
+      returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
-  if (returns_until_) wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
+  if (returns_published_) wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
@@ -250,16 +244,17 @@ void Conductor::tick(milliseconds now) {
   membership_.tick(now, effects);
   if (keeper_.again_at() && *keeper_.again_at() <= now) effects.emplace_back(StateDue{});
   runner_.carry_out(effects, now);
-  if (returns_until_ && *returns_until_ <= now) {
+  if (returns_published_ && membership_.sessions().returns_expected_for(now) <= milliseconds{0}) {
     wiring_.tables.nodes.expect_returns_below(0);
-    returns_until_.reset();
+    returns_published_ = false;
   }
   publisher_.collect();
 }
 
 std::optional<milliseconds> Conductor::next_deadline() const {
   std::optional<milliseconds> deadline = membership_.next_deadline();
-  for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until_}) {
+  const auto returns_until = returns_published_ ? membership_.sessions().returns_until() : std::nullopt;
+  for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
   return deadline;

@@ -106,9 +106,8 @@ class Conductor final : private Administration {
   TablePublisher publisher_;
   RequestCounters request_counters_;
   StateKeeper keeper_;
-  EffectRunner runner_;  ///< on all of these
-  /// After a restart: until then nodes that are not back yet count as away.
-  std::optional<std::chrono::milliseconds> returns_until_;
+  EffectRunner runner_;             ///< on all of these
+  bool returns_published_ = false;  ///< after a restart: to the shards nodes that are not back yet count as away
   bool drain_wanted_ = false;
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;

@@ -87,7 +87,8 @@ class Sessions {
     IndexRange groups{};                 ///< the same for services
     std::vector<SessionToken> kicked{};  ///< not honoured any more
     /// Until then nodes of before a restart may come back under their ids, which this start does not know.
-    std::chrono::milliseconds returns_until{};
+    /// Nothing: there were none.
+    std::optional<std::chrono::milliseconds> returns_until{};
   };
   Sessions(const Options& options, const Limits& limits);
 
@@ -131,11 +132,13 @@ class Sessions {
   /// The session goes on under another index; the former one rests, and leads here until somebody else has it.
   /// False: the index is held, rests, or is none.
   [[nodiscard]] bool renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
-  /// How long nodes that were here before a restart may still be on their way back, each under an index that is free:
-  /// what outlived the hub does not tell under which, those that an administrator gave least of all. Not above 0: no
-  /// longer.
+  /// Until when nodes that were here before a restart may still be on their way back, each under an index that is free:
+  /// what outlived the hub does not tell under which, those that an administrator gave least of all. Nothing: there
+  /// were none.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const { return returns_until_; }
+  /// How long that is still so. Not above 0: no longer.
   [[nodiscard]] std::chrono::milliseconds returns_expected_for(std::chrono::milliseconds now) const {
-    return returns_until_ - now;
+    return returns_until_ ? *returns_until_ - now : std::chrono::milliseconds{0};
   }
   /// Under which index a node goes on that had this one: the same, unless renumber() gave it another.
   [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
@@ -190,7 +193,7 @@ class Sessions {
   const HubId hub_;
   const Placement placement_;
   const Secret secret_;
-  const std::chrono::milliseconds returns_until_;
+  const std::optional<std::chrono::milliseconds> returns_until_;
   SessionNumber last_number_;
   IndexPool indices_;
   NumberFloor floor_;
