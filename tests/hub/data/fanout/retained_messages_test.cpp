@@ -254,6 +254,22 @@ TEST_F(RetainedMessagesTest, AfterABreakWithoutResumeTheLastComesAgain) {
   EXPECT_EQ(got(node), Texts{"four"});
 }
 
+// The ledger has it as a copy, made when it was handed to the subscriber's shard, and there it ends: once.
+TEST_F(RetainedMessagesTest, IsACopyThatIsDroppedWhereTheSubscriberIsGone) {
+  publish("one");
+  const std::uint64_t dropped = rig.dropped(proto::DropReason::no_subscriber);  // nobody had subscribed
+  for (const std::size_t shard : {1u, 0u}) {
+    FakeNode& node = rig.join(shard);
+    const std::uint64_t copies = rig.ledger().copies;
+    rig.pace(node, 1, {}, true);
+    rig.turn_shard(shard);  // asks the provider's shard
+    rig.command(shard, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, false});
+    EXPECT_EQ(got(node), shard == 0 ? Texts{"one"} : Texts{}) << "on the provider's own shard it waits for nothing";
+    EXPECT_EQ(rig.ledger().copies, copies + 1);
+  }
+  EXPECT_EQ(rig.dropped(proto::DropReason::no_subscriber), dropped + 1);
+}
+
 TEST_F(RetainedMessagesTest, CountsInTheWindowAndIsHeldLikeAnyOther) {
   publish("one");
   FakeNode& node = subscriber(1, {.window = 1});
