@@ -30,6 +30,8 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
   std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string_view candidate : candidates) {
     if (candidate == word) continue;  // it came in the meantime: what was meant is what was said
+    const std::size_t longer = std::max(word.size(), candidate.size());
+    if (longer - std::min(word.size(), candidate.size()) >= least) continue;  // so many letters differ at least
     const std::size_t distance = edit_distance(word, candidate);
     if (distance < least) {
       least = distance;

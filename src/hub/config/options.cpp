@@ -150,6 +150,7 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
+    if (read.more_faults) ending.text += "tcphub: there are more faults; mend these, then look again\n";
     return ending;
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a file went.

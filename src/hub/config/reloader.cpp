@@ -7,8 +7,9 @@ namespace gimnet::hub {
 
 Reloading Reloader::read_again() {
   Reloading reloading;
-  ReadConfiguration read = read_configuration(sources_);
+  ReadConfiguration read = read_configuration(sources_, kReloadFaultsMax);
   for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
+  if (read.more_faults) reloading.faults.emplace_back("there are more faults; tcphub --check-config tells all of them");
   if (!reloading.faults.empty()) return reloading;
   // A file that appeared in a default place is the hub's from now on, and must not go unnoticed.
   if (sources_.file.empty() && !read.files.empty()) sources_.file = read.files.front();

@@ -6,6 +6,9 @@
 
 namespace gimnet::hub {
 
+/// Faults of the files that are told, and logged, at a reload: a hub that runs has more to do.
+inline constexpr std::size_t kReloadFaultsMax = 100;
+
 /// Knows where a running hub's configuration came from and what of it is in force. Thread safety: one thread.
 class Reloader {
  public:

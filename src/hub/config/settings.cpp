@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "base/suggest.hpp"
 #include "hub/config/folders.hpp"
@@ -89,6 +90,7 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
   if (urls.empty()) {
     faults.push_back(fault(given, given.label + " names no address; leave it out for the default ones"));
   }
+  std::set<std::string> known;
   for (const Value& url : urls) {
     if (url.kind != Kind::text && url.kind != Kind::words) {
       faults.push_back({url.place, "an address of listen is a text, not " + std::string{kind_name(url.kind)} +
@@ -96,13 +98,12 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
       continue;
     }
     const Result<ListenUrl> parsed = parse_listen_url(url.text);
-    std::vector<ListenUrl>& all = configuration.options.listen;
     if (!parsed) {
       faults.push_back({url.place, parsed.error().sentence});
-    } else if (std::find(all.begin(), all.end(), *parsed) != all.end() && !any_free_port(*parsed)) {
+    } else if (!known.insert(parsed->text()).second && !any_free_port(*parsed)) {
       faults.push_back({url.place, given.label + " " + escaped(url.text, kQuotedMax) + " is given twice"});
     } else {
-      all.push_back(*parsed);
+      configuration.options.listen.push_back(*parsed);
       configuration.listen_places.push_back({url.place, given.label});
     }
   }
@@ -196,17 +197,21 @@ constexpr std::array kSettings{
     Setting{"log_level", "error, warning, info, debug or off", true, set_log_level, show_log_level},
 };
 
+/// Every key, of limits the full name. A wrong file asks for them once for each of its lines.
+const std::vector<std::string>& all_keys() {
+  static const std::vector<std::string> all = [] {
+    std::vector<std::string> keys;
+    for (const Setting& setting : kSettings) keys.emplace_back(setting.key);
+    keys.emplace_back("limits");
+    for (const LimitInfo& limit : limit_table()) keys.push_back(std::string{kLimits} + std::string{limit.name});
+    return keys;
+  }();
+  return all;
+}
+
 std::string nearest_key(std::string_view key) {
-  std::vector<std::string_view> keys;
-  std::vector<std::string> limits;
-  keys.reserve(kSettings.size() + limit_table().size() + 1);
-  for (const Setting& setting : kSettings) keys.push_back(setting.key);
-  for (const LimitInfo& limit : limit_table()) limits.push_back(std::string{kLimits} + std::string{limit.name});
-  keys.emplace_back("limits");
-  for (const std::string& limit : limits) {
-    if (limit.substr(kLimits.size()) == key) return "; it is a limit: write it below [limits]";
-    keys.emplace_back(limit);
-  }
+  if (find_limit(key) != nullptr) return "; it is a limit: write it below [limits]";
+  static const std::vector<std::string_view> keys(all_keys().begin(), all_keys().end());
   return did_you_mean(key, keys) + " (tcphub --print-config shows all)";
 }
 

@@ -7,8 +7,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string_view>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "base/log.hpp"
@@ -118,23 +120,38 @@ std::pair<std::size_t, std::size_t> position_in(const std::string& place) {
   return {std::strtoul(place.c_str() + line + 1, nullptr, 10), std::strtoul(place.c_str() + column + 1, nullptr, 10)};
 }
 
-void read_one(const std::string& path, ReadConfiguration& read) {
+/// By line and column.
+void sort(Faults& faults) {
+  using Placed = std::pair<std::pair<std::size_t, std::size_t>, Fault>;
+  std::vector<Placed> placed;
+  placed.reserve(faults.size());
+  for (Fault& fault : faults) placed.emplace_back(position_in(fault.place), std::move(fault));
+  std::ranges::sort(placed, [](const Placed& a, const Placed& b) {
+    return std::tie(a.first, a.second.sentence) < std::tie(b.first, b.second.sentence);
+  });
+  for (std::size_t i = 0; i < faults.size(); ++i) faults[i] = std::move(placed[i].second);
+}
+
+void read_one(const std::string& path, std::size_t faults_max, ReadConfiguration& read) {
+  if (read.more_faults) return;
   const FileText file = read_file(path);
   read.files.push_back(path);
   if (!file.error.empty()) {
     read.faults.push_back({path, "cannot read this file: " + file.error});
     return;
   }
-  TomlFile toml = read_toml(file.text, path);
+  // One more than is told, to know whether there are more.
+  const std::size_t most = faults_max - std::min(faults_max, read.faults.size());
+  TomlFile toml = read_toml(file.text, path, most + 1);
   Faults faults = std::move(toml.faults);
-  for (const Given& given : toml.keys) apply(read.configuration, given, faults);
-  std::ranges::sort(faults, {}, [](const Fault& fault) { return std::pair{position_in(fault.place), fault.sentence}; });
-  if (faults.size() >= kConfigFaultsMax) {
-    faults.resize(kConfigFaultsMax);
-    faults.push_back({path, "no more than " + std::to_string(kConfigFaultsMax) +
-                                " faults of a file are told; mend these, then look again"});
+  for (const Given& given : toml.keys) {
+    if (faults.size() > most) break;
+    apply(read.configuration, given, faults);
   }
-  read.faults.insert(read.faults.end(), faults.begin(), faults.end());
+  sort(faults);
+  read.more_faults = faults.size() > most;
+  if (read.more_faults) faults.resize(most);
+  read.faults.insert(read.faults.end(), std::move_iterator(faults.begin()), std::move_iterator(faults.end()));
 }
 
 /// The *.toml of the folder, by name.
@@ -209,13 +226,15 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   return warnings;
 }
 
-ReadConfiguration read_configuration(const ConfigSources& sources) {
+ReadConfiguration read_configuration(const ConfigSources& sources, std::size_t faults_max) {
   ReadConfiguration read;
   read.configuration.options.shards = default_shards();
   const std::string file = sources.file.empty() ? file_in_default_place() : sources.file;
   if (!file.empty()) {
-    read_one(file, read);
-    for (const std::string& part : files_in(fs::path{file}.parent_path() / "conf.d", read.faults)) read_one(part, read);
+    read_one(file, faults_max, read);
+    for (const std::string& part : files_in(fs::path{file}.parent_path() / "conf.d", read.faults)) {
+      read_one(part, faults_max, read);
+    }
   }
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
   for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hub/config/settings.hpp"
+#include "hub/config/toml_file.hpp"
 #include "hub/config/value.hpp"
 
 namespace gimnet::hub {
@@ -25,6 +26,7 @@ struct ConfigSources {
 struct ReadConfiguration {
   Configuration configuration;  ///< whole only where there are no faults
   Faults faults;
+  bool more_faults = false;        ///< there are more than were asked for
   std::vector<std::string> files;  ///< that were read, the one beside conf.d first
 };
 
@@ -35,8 +37,9 @@ struct ReadConfiguration {
 /// variables that are no key.
 [[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources, const char* const* environment);
 
-/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, is one.
-/// Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each.
-[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources);
+/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, is one. Of the files at
+/// most `faults_max` are told. Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each.
+[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources,
+                                                   std::size_t faults_max = kConfigFaultsMax);
 
 }  // namespace gimnet::hub

@@ -18,114 +18,39 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "base/log.hpp"
-#include "proto/bitestream/utf8.hpp"
+#include "hub/config/toml_lines.hpp"
 
 namespace gimnet::hub {
 namespace {
 
 constexpr std::size_t kQuotedMax = 120;
 constexpr std::string_view kOnlyTable = "limits";
-/// What a whole number of TOML may consist of.
-constexpr std::string_view kNumberCharacters = "0123456789abcdefABCDEFox_+-";
-/// Each try to read the rest leaves out one line more at least; a file that needs more of them is left alone.
-constexpr std::size_t kTriesMax = 2 * kConfigFaultsMax;
-/// Stands for a table whose header cannot be read: what is in it is nobody's.
-constexpr std::string_view kLostTable = "\\u0000lost";
+/// Bytes that may be parsed in vain to find where something begins of which the end was left out; a file that needs
+/// more is left alone from there.
+constexpr std::size_t kVainBytesMax = std::size_t{16} << 20;
+/// Dots in a key: the library makes a table within a table of each, and frees them one within the other.
+constexpr std::size_t kKeyDotsMax = 64;
 
-/// A text by lines, each of which can be left out without moving the others.
-class Lines {
- public:
-  explicit Lines(std::string_view text) {
-    for (std::size_t at = 0; at <= text.size();) {
-      const std::size_t end = std::min(text.find('\n', at), text.size());
-      lines_.emplace_back(text.substr(at, end - at));
-      at = end + 1;
-    }
-  }
-  [[nodiscard]] std::size_t size() const { return lines_.size(); }
+/// Where something stands in a file of which a part was parsed.
+struct Places {
+  const std::string& name;
+  std::size_t first = 1;  ///< the part's first line
 
-  /// The line, from `number` (counted from 1) upward, where a key or a table begins.
-  [[nodiscard]] std::size_t beginning(std::size_t number) const {
-    while (number > 1 && !begins(lines_[number - 1])) --number;
-    return number;
+  [[nodiscard]] std::size_t line(const toml::source_region& source) const { return first - 1 + source.begin.line; }
+  [[nodiscard]] std::string of(std::size_t line, std::size_t column) const {
+    return name + ":" + std::to_string(line) + ":" + std::to_string(column);
   }
-  /// Empties the lines first..last; a table's header becomes that of a lost one.
-  void leave_out(std::size_t first, std::size_t last) {
-    for (std::size_t number = first; number <= std::min(last, lines_.size()); ++number) {
-      std::string& line = lines_[number - 1];
-      const bool header = trimmed(line).starts_with('[');
-      line = header ? "[\"" + std::string{kLostTable} + std::to_string(number) + "\"]" : std::string{};
-    }
+  [[nodiscard]] std::string of(const toml::source_region& source) const {
+    return of(line(source), source.begin.column);
   }
-  /// The number that ends right before the column (from 1, in characters), and where it begins.
-  [[nodiscard]] std::pair<std::string_view, std::size_t> number_before(std::size_t number, std::size_t column) const {
-    const std::string_view line = lines_[number - 1];
-    std::size_t end = 0;
-    for (std::size_t at = 1; at < column && end < line.size(); ++at) {
-      end += std::max<std::size_t>(character_size(line.substr(end)), 1);
-    }
-    std::size_t begin = end;
-    while (begin > 0 && kNumberCharacters.find(line[begin - 1]) != std::string_view::npos) --begin;
-    return {line.substr(begin, end - begin), column - (end - begin)};
-  }
-  /// Column (from 1, in bytes) of the first character that is no blank.
-  [[nodiscard]] std::size_t first_column(std::size_t number) const {
-    const std::string_view line = lines_[number - 1];
-    return line.size() - trimmed(line).size() + 1;
-  }
-  /// Puts a `?` in place of each byte that is no UTF-8. Column (from 1, in characters) of the first; 0: there was none.
-  [[nodiscard]] std::size_t mend_text(std::size_t number) {
-    std::string& line = lines_[number - 1];
-    std::size_t first = 0;
-    for (std::size_t at = 0, column = 1; at < line.size(); ++column) {
-      const std::size_t size = character_size(std::string_view{line}.substr(at));
-      if (size == 0) line[at] = '?';
-      if (size == 0 && first == 0) first = column;
-      at += std::max<std::size_t>(size, 1);
-    }
-    return first;
-  }
-  [[nodiscard]] std::string text() const { return text(1, lines_.size()); }
-  /// The lines first..last, counted from 1.
-  [[nodiscard]] std::string text(std::size_t first, std::size_t last) const {
-    std::string some;
-    for (std::size_t number = first; number <= last; ++number) some += lines_[number - 1] + "\n";
-    return some;
-  }
-
- private:
-  /// Bytes of the first character; 0: it is none.
-  static std::size_t character_size(std::string_view text) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
-    for (std::size_t size = 1; size <= std::min<std::size_t>(4, text.size()); ++size) {
-      if (proto::bitestream::valid_utf8(bytes, size)) return size;
-    }
-    return 0;
-  }
-  static std::string_view trimmed(std::string_view line) {
-    const std::size_t first = line.find_first_not_of(" \t");
-    return first == std::string_view::npos ? std::string_view{} : line.substr(first);
-  }
-  static bool begins(std::string_view line) {
-    line = trimmed(line);
-    return line.starts_with('[') || (line.find('=') != std::string_view::npos && !line.starts_with('#'));
-  }
-  std::vector<std::string> lines_;
 };
-
-std::string place_of(const std::string& name, std::size_t line, std::size_t column) {
-  return name + ":" + std::to_string(line) + ":" + std::to_string(column);
-}
-
-std::string place_of(const std::string& name, const toml::source_region& source) {
-  return place_of(name, source.begin.line, source.begin.column);
-}
 
 /// The words between the first pair of quotes; "" if there is none.
 std::string_view quoted_part(std::string_view text) {
@@ -134,82 +59,31 @@ std::string_view quoted_part(std::string_view text) {
   return first >= last ? std::string_view{} : text.substr(first + 1, last - first - 1);
 }
 
-Fault fault_of(const toml::parse_error& error, const Lines& lines, const std::string& name) {
+std::string given_twice(std::string_view key) {
+  return "'" + escaped(key, kQuotedMax) + "' is given twice; leave one of them out";
+}
+
+Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines& lines, const Places& places) {
   std::string_view what = error.description();
   if (const std::size_t colon = what.find(": "); what.starts_with("Error while") && colon != std::string_view::npos) {
     what.remove_prefix(colon + 2);
   }
-  const std::size_t line = std::clamp<std::size_t>(error.source().begin.line, 1, lines.size());
+  const std::size_t column = error.source().begin.column;
   if (what.starts_with("cannot redefine")) {
-    return {place_of(name, line, lines.first_column(line)),
-            "'" + escaped(quoted_part(what), kQuotedMax) + "' is given twice; leave one of them out"};
+    return {places.of(line, lines.first_column(line)), given_twice(quoted_part(what))};
   }
   if (what.ends_with("is not representable in 64 bits")) {
     // It is told behind the number.
-    const auto [number, column] = lines.number_before(line, error.source().begin.column);
-    return {place_of(name, line, column), "no key can be '" + escaped(number, kQuotedMax) +
-                                              "': it does not fit in 64 bits; give a number that is nearer to 0"};
+    const auto [number, begin] = lines.number_before(line, column);
+    return {places.of(line, begin), "no key can be '" + escaped(number, kQuotedMax) +
+                                        "': it does not fit in 64 bits; give a number that is nearer to 0"};
   }
-  return {place_of(name, line, error.source().begin.column),
+  return {places.of(line, column),
           "this is not TOML: " + escaped(what, kQuotedMax) + "; write KEY = VALUE, texts in quotes"};
-}
-
-/// What is no UTF-8, by lines. The parser would say so at the character before, and get no further.
-std::set<std::size_t> mend_text(Lines& lines, const std::string& name, Faults& faults) {
-  std::set<std::size_t> mended;
-  for (std::size_t number = 1; number <= lines.size() && faults.size() < kConfigFaultsMax; ++number) {
-    const std::size_t column = lines.mend_text(number);
-    if (column == 0) continue;
-    mended.insert(number);
-    faults.push_back({place_of(name, number, column), "this is not UTF-8 text; save the file in that encoding"});
-  }
-  return mended;
 }
 
 bool is_at_end(const toml::parse_error& error) {
   return error.description().find("end-of-file") != std::string_view::npos;
-}
-
-/// A list that is not closed takes what follows for its values, so the parser complains of the next key, or of the end.
-/// The lines of such a list before the error; none: that is not what is wrong.
-std::optional<std::pair<std::size_t, std::size_t>> open_list_before(const Lines& lines, std::size_t line, bool at_end) {
-  const std::size_t last = at_end ? lines.size() : line - 1;
-  if (last == 0) return std::nullopt;
-  if (!at_end && !toml::parse(lines.text(line, line))) return std::nullopt;
-  const std::size_t first = lines.beginning(last);
-  const toml::parse_result part = toml::parse(lines.text(first, last));
-  const bool is_open =
-      !part && is_at_end(part.error()) && part.error().description().find("array") != std::string_view::npos;
-  return is_open ? std::optional(std::pair(first, last)) : std::nullopt;
-}
-
-/// Parses as much as can be made sense of. Nothing: too much is wrong.
-std::optional<toml::table> parse(std::string_view text, const std::string& name, Faults& faults) {
-  Lines lines(text);
-  const std::set<std::size_t> mended = mend_text(lines, name, faults);
-  std::size_t left_out_from = 0;  // the last lines that were left out; 0: none
-  std::size_t left_out_to = 0;
-  for (std::size_t tries = 0; tries < kTriesMax && faults.size() < kConfigFaultsMax; ++tries) {
-    toml::parse_result parsed = toml::parse(tries == 0 && mended.empty() ? std::string{text} : lines.text());
-    if (parsed) return std::move(parsed).table();
-    const toml::parse_error& error = parsed.error();
-    const std::size_t line = std::clamp<std::size_t>(error.source().begin.line, 1, lines.size());
-    const bool at_end = is_at_end(error);
-    if (const auto list = open_list_before(lines, line, at_end)) {
-      std::tie(left_out_from, left_out_to) = *list;
-      faults.push_back({place_of(name, left_out_from, lines.first_column(left_out_from)),
-                        "this is not TOML: the list that begins here is not closed; end it with ]"});
-    } else if (left_out_from != 0 && (at_end || line <= left_out_to)) {
-      // What was left out was the end of something that began further up.
-      if (left_out_from == 1) return std::nullopt;
-      left_out_from = lines.beginning(left_out_from - 1);
-    } else {
-      if (!mended.contains(line)) faults.push_back(fault_of(error, lines, name));
-      left_out_from = left_out_to = line;
-    }
-    lines.leave_out(left_out_from, left_out_to);
-  }
-  return std::nullopt;
 }
 
 template <class Node>
@@ -244,63 +118,216 @@ Value::Kind kind_of(const toml::node& node) {
   }
 }
 
-Value value_of(const toml::node& node, const std::string& name) {
+Value value_of(const toml::node& node, const Places& places) {
   Value value;
   value.kind = kind_of(node);
   value.text = text_of(node);
-  value.place = place_of(name, node.source());
+  value.place = places.of(node.source());
   // Nothing is a list of lists: deeper ones are wrong whatever is in them.
   if (const toml::array* list = node.as_array()) {
     for (const toml::node& item : *list) {
-      value.items.push_back({kind_of(item), text_of(item), {}, place_of(name, item.source())});
+      value.items.push_back({kind_of(item), text_of(item), {}, places.of(item.source())});
     }
   }
   return value;
 }
 
-struct Found {
-  toml::source_position at;
-  Given given;
-};
+/// Reads a file part by part: what stands before something that is no TOML is taken for itself, so that each byte is
+/// parsed a few times only, however much is wrong.
+class Reading {
+ public:
+  Reading(std::string_view text, const std::string& name, std::size_t faults_max)
+      : lines_(text), places_{name}, faults_max_(faults_max) {}
 
-Found found(const std::string& key, const toml::key& written, const toml::node& node, const std::string& name) {
-  const auto& at = written.source().begin;
-  return {at, Given{key, value_of(node, name), place_of(name, written.source()), key,
-                    name + ":" + std::to_string(at.line)}};
-}
+  TomlFile read() {
+    look_at_lines();
+    while (places_.first <= lines_.size() && file_.faults.size() < faults_max_) {
+      const toml::parse_result parsed = toml::parse(lines_.text(places_.first, lines_.size()));
+      if (parsed) {
+        take(parsed.table());
+        break;
+      }
+      leave_out(parsed.error());
+      if (!take_what_is_before() && vain_bytes_ > kVainBytesMax) {
+        file_.faults.push_back(
+            {places_.of(left_out_from_, lines_.first_column(left_out_from_)),
+             "what follows here cannot be made sense of; mend what stands above it, then look again"});
+        break;
+      }
+    }
+    // The table itself is worth telling only where nothing is in it.
+    if (any_limit_) std::erase_if(found_, [](const Found& each) { return each.given.key == kOnlyTable; });
+    std::ranges::stable_sort(found_, {}, &Found::at);
+    for (Found& each : found_) file_.keys.push_back(std::move(each.given));
+    return std::move(file_);
+  }
+
+ private:
+  /// In which table the next key stands.
+  enum class Inside : std::uint8_t { nothing, limits, unknown };
+  struct Found {
+    std::pair<std::size_t, std::size_t> at;  ///< line, column
+    Given given;
+  };
+  struct Known {
+    bool is_table = false;
+  };
+
+  /// What the parser is not to see. Of what is no UTF-8 it would say so at the character before, and get no further.
+  void look_at_lines() {
+    for (std::size_t number = 1; number <= lines_.size() && file_.faults.size() < faults_max_; ++number) {
+      if (const std::size_t column = lines_.mend_text(number); column != 0) {
+        mended_.insert(number);
+        file_.faults.push_back({places_.of(number, column), "this is not UTF-8 text; save the file in that encoding"});
+      }
+      if (lines_.key_dots(number) > kKeyDotsMax) {
+        file_.faults.push_back({places_.of(number, lines_.first_column(number)),
+                                "no key has so many parts; write KEY = VALUE, or LIMIT = VALUE below [limits]"});
+        lines_.blank(number, number);
+      }
+    }
+  }
+
+  /// Tells what is wrong and blanks it.
+  void leave_out(const toml::parse_error& error) {
+    const std::size_t line = std::clamp<std::size_t>(places_.line(error.source()), places_.first, lines_.size());
+    const bool at_end = is_at_end(error);
+    if (const auto list = open_list_before(line, at_end)) {
+      std::tie(left_out_from_, left_out_to_) = *list;
+      file_.faults.push_back({places_.of(left_out_from_, lines_.first_column(left_out_from_)),
+                              "this is not TOML: the list that begins here is not closed; end it with ]"});
+    } else if (left_out_from_ != 0 && (at_end || line <= left_out_to_)) {
+      // What was left out was the end of something that began further up.
+      left_out_from_ = lines_.beginning(left_out_from_ - 1, places_.first);
+    } else {
+      if (!mended_.contains(line)) file_.faults.push_back(fault_of(error, line, lines_, places_));
+      left_out_from_ = left_out_to_ = line;
+    }
+    header_left_out_ = lines_.is_header(left_out_from_);
+    lines_.blank(left_out_from_, left_out_to_);
+  }
+  /// A list that is not closed takes what follows for its values, so the parser complains of the next key, or of the
+  /// end. The lines of such a list before the error; none: that is not what is wrong.
+  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_list_before(std::size_t line,
+                                                                                    bool at_end) const {
+    const std::size_t last = at_end ? lines_.size() : line - 1;
+    if (last < places_.first) return std::nullopt;
+    if (!at_end && !toml::parse(lines_.text(line, line))) return std::nullopt;
+    const std::size_t first = lines_.beginning(last, places_.first);
+    const toml::parse_result part = toml::parse(lines_.text(first, last));
+    const bool is_open =
+        !part && is_at_end(part.error()) && part.error().description().find("array") != std::string_view::npos;
+    return is_open ? std::optional(std::pair(first, last)) : std::nullopt;
+  }
+  /// False: something that begins before what was left out does not end there.
+  [[nodiscard]] bool take_what_is_before() {
+    const toml::parse_result before = toml::parse(lines_.text(places_.first, left_out_from_ - 1));
+    if (!before) {
+      vain_bytes_ += lines_.text(places_.first, left_out_to_).size();
+      return false;
+    }
+    take(before.table());
+    if (header_left_out_) inside_ = Inside::unknown;  // what stands below it is nobody's
+    places_.first = left_out_to_ + 1;
+    left_out_from_ = left_out_to_ = 0;
+    return true;
+  }
+
+  /// The keys of a part. Those before its first header belong to the table of the part before.
+  void take(const toml::table& part) {
+    last_header_ = 0;
+    for (auto&& [key, node] : part) {
+      if (inside_ == Inside::nothing || lines_.is_header(places_.line(key.source()))) {
+        take_outer(key, node);
+      } else if (inside_ == Inside::limits) {
+        take_limit(key, node);
+      }
+      note_headers(node);
+    }
+    if (last_header_ != 0) inside_ = what_begins_at(last_header_);
+  }
+  void take_outer(const toml::key& key, const toml::node& node) {
+    const std::string outer{key.str()};
+    const toml::table* inner = node.as_table();
+    const auto [known, is_new] = known_.try_emplace(outer, Known{inner != nullptr});
+    const bool is_header = lines_.is_header(places_.line(key.source()));
+    if (!is_new) {
+      // A table may go on by dotted keys and with tables in it, and a list of tables with one table more.
+      const bool begins_again = is_header && inner != nullptr && begins_alone(places_.line(key.source()));
+      const bool goes_on = inner != nullptr ? known->second.is_table && !begins_again : is_header;
+      if (!goes_on) return tell_twice(key);
+    }
+    const bool is_limits = outer == kOnlyTable && inner != nullptr;
+    // Of a table that nobody knows only its name is told.
+    if (is_new && (!is_limits || inner->empty())) add(outer, key, node);
+    if (!is_limits) return;
+    for (auto&& [inner_key, inner_node] : *inner) take_limit(inner_key, inner_node);
+  }
+  void take_limit(const toml::key& key, const toml::node& node) {
+    const std::string name = std::string{kOnlyTable} + "." + std::string{key.str()};
+    if (!known_.try_emplace(name).second) return tell_twice(key);
+    any_limit_ = true;
+    add(name, key, node);
+  }
+  void tell_twice(const toml::key& key) {
+    const std::size_t line = places_.line(key.source());
+    file_.faults.push_back({places_.of(line, lines_.first_column(line)), given_twice(key.str())});
+  }
+  void add(const std::string& name, const toml::key& written, const toml::node& node) {
+    const std::size_t line = places_.line(written.source());
+    found_.push_back({{line, written.source().begin.column},
+                      Given{name, value_of(node, places_), places_.of(written.source()), name,
+                            places_.name + ":" + std::to_string(line)}});
+  }
+  /// Where the last table of the part begins.
+  void note_headers(const toml::node& node) {
+    const std::size_t line = places_.line(node.source());
+    if (node.is_table() && lines_.is_header(line)) last_header_ = std::max(last_header_, line);
+    if (const toml::table* table = node.as_table()) {
+      for (auto&& [key, inner] : *table) note_headers(inner);
+    } else if (const toml::array* list = node.as_array(); list != nullptr && list->is_array_of_tables()) {
+      for (const toml::node& inner : *list) note_headers(inner);
+    }
+  }
+  [[nodiscard]] Inside what_begins_at(std::size_t header) const {
+    const toml::parse_result alone = toml::parse(lines_.line(header));
+    const bool limits = alone && alone.table().size() == 1 && alone.table().begin()->first.str() == kOnlyTable;
+    return limits && begins_alone(header) ? Inside::limits : Inside::unknown;
+  }
+  /// Is it the header of a table that is in no other, and no list of them?
+  [[nodiscard]] bool begins_alone(std::size_t header) const {
+    const toml::parse_result alone = toml::parse(lines_.line(header));
+    if (!alone || alone.table().size() != 1) return false;
+    const toml::table* inner = alone.table().begin()->second.as_table();
+    return inner != nullptr && inner->empty();
+  }
+
+  TomlLines lines_;
+  Places places_;  ///< of the part that is read
+  const std::size_t faults_max_;
+  TomlFile file_;
+  std::vector<Found> found_;
+  std::map<std::string, Known, std::less<>> known_;  ///< keys, limits by their full names, and tables
+  std::set<std::size_t> mended_;                     ///< lines
+  Inside inside_ = Inside::nothing;
+  std::size_t last_header_ = 0;
+  std::size_t vain_bytes_ = 0;     ///< parsed so far
+  std::size_t left_out_from_ = 0;  ///< the last lines that were left out and not passed; 0: none
+  std::size_t left_out_to_ = 0;
+  bool header_left_out_ = false;
+  bool any_limit_ = false;
+};
 
 }  // namespace
 
-TomlFile read_toml(std::string_view text, const std::string& name) {
-  TomlFile file;
+TomlFile read_toml(std::string_view text, const std::string& name, std::size_t faults_max) {
   if (text.size() > kConfigBytesMax) {
-    file.faults.push_back({place_of(name, 1, 1), "the file is over " + std::to_string(kConfigBytesMax) +
-                                                     " bytes; is it a configuration of tcphub?"});
+    TomlFile file;
+    file.faults.push_back({Places{name}.of(1, 1), "the file is over " + std::to_string(kConfigBytesMax) +
+                                                      " bytes; is it a configuration of tcphub?"});
     return file;
   }
-  const std::optional<toml::table> table = parse(text, name, file.faults);
-  if (!table) return file;
-  std::vector<Found> all;
-  for (auto&& [key, node] : *table) {
-    if (!file.faults.empty() && key.str().starts_with('\0')) continue;
-    const std::string outer{key.str()};
-    const toml::table* inner = node.as_table();
-    if (inner == nullptr) {
-      all.push_back(found(outer, key, node, name));
-      continue;
-    }
-    // Of a table that nobody knows only its name is told.
-    if (inner->empty() || outer != kOnlyTable) all.push_back(found(outer, key, node, name));
-    if (outer != kOnlyTable) continue;
-    for (auto&& [inner_key, inner_node] : *inner) {
-      all.push_back(found(outer + "." + std::string{inner_key.str()}, inner_key, inner_node, name));
-    }
-  }
-  std::ranges::sort(all, [](const Found& a, const Found& b) {
-    return std::pair{a.at.line, a.at.column} < std::pair{b.at.line, b.at.column};
-  });
-  for (Found& each : all) file.keys.push_back(std::move(each.given));
-  return file;
+  return Reading(text, name, faults_max).read();
 }
 
 std::string toml_quoted(std::string_view text) {

@@ -69,6 +69,18 @@ TEST_F(ReloaderTest, ABadFileChangesNothing) {
   EXPECT_EQ(good.changes[0].from, "10");
 }
 
+TEST_F(ReloaderTest, OfManyFaultsSomeAreToldAndThatThereAreMore) {
+  Reloader reloader = started();
+  std::string text;
+  for (std::size_t i = 0; i < kReloadFaultsMax; ++i) text += "no TOML\n";
+  write(text);
+  EXPECT_THAT(reloader.read_again().faults, SizeIs(kReloadFaultsMax));
+  write(text + "no TOML\n");
+  const Reloading bad = reloader.read_again();
+  ASSERT_THAT(bad.faults, SizeIs(kReloadFaultsMax + 1));
+  EXPECT_THAT(bad.faults.back(), HasSubstr("tcphub --check-config tells all"));
+}
+
 TEST_F(ReloaderTest, AFileThatIsGoneIsAFaultAndNotTheDefaults) {
   Reloader reloader = started();
   std::filesystem::remove(path_);

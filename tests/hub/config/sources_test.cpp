@@ -101,15 +101,37 @@ TEST_F(SourcesTest, AWrongLimitOfTheEnvironmentNamesItsVariable) {
   EXPECT_THAT(all.faults[0].line(), HasSubstr("tcphub: TCPHUB_LIMITS_NODES: limit nodes cannot be 'x': "));
 }
 
-TEST_F(SourcesTest, WhereFaultsAreLeftOutThatIsSaid) {
+TEST_F(SourcesTest, EveryFaultIsToldUnlessSoManyAreEnough) {
+  constexpr std::size_t kLines = 500;
+  make_conf_d();
   std::string text;
-  for (std::size_t i = 0; i + 1 < kConfigFaultsMax; ++i) text += "unknown_" + std::to_string(i) + " = 1\n";
+  for (std::size_t i = 0; i < kLines; ++i) text += "unknown_" + std::to_string(i) + " = 1\nno TOML\n";
   write("hub.toml", text);
-  EXPECT_THAT(read().faults, SizeIs(kConfigFaultsMax - 1));
-  write("hub.toml", text + "one = 1\nanother = 2\n");
+  write("conf.d/a.toml", text);
   const ReadConfiguration all = read();
-  ASSERT_THAT(all.faults, SizeIs(kConfigFaultsMax + 1));
-  EXPECT_THAT(all.faults.back().line(), HasSubstr("no more than 100 faults of a file are told"));
+  EXPECT_THAT(all.faults, SizeIs(4 * kLines));
+  EXPECT_FALSE(all.more_faults);
+  for (std::size_t line = 1; line <= 2 * kLines; ++line) {
+    EXPECT_THAT(all.faults[line - 1].place, HasSubstr("hub.toml:" + std::to_string(line) + ":"));
+  }
+  EXPECT_FALSE(read_configuration(sources_, 4 * kLines).more_faults) << "at the limit";
+  for (const std::size_t most : {std::size_t{0}, std::size_t{7}, 3 * kLines, 4 * kLines - 1}) {
+    const ReadConfiguration some = read_configuration(sources_, most);
+    EXPECT_THAT(some.faults, SizeIs(most));
+    EXPECT_TRUE(some.more_faults) << most;
+  }
+}
+
+// A file as wrong as it can be takes no longer than one that is right.
+TEST_F(SourcesTest, AFileThatIsWrongAllOverIsReadToItsEnd) {
+  std::string lines;
+  while (lines.size() + 2 < kConfigBytesMax) lines += "x\n";
+  write("hub.toml", lines);
+  EXPECT_THAT(read().faults, SizeIs(lines.size() / 2));
+  std::string list = "listen = [1";
+  while (list.size() + 3 < kConfigBytesMax) list += ",1";
+  write("hub.toml", list + "]");
+  EXPECT_THAT(read().faults, SizeIs((list.size() - 9) / 2));
 }
 
 TEST_F(SourcesTest, TheVariableNamesTheFileUnlessAFlagDoes) {

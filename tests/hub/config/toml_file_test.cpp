@@ -14,6 +14,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 using ::testing::UnorderedElementsAre;
+using ::testing::UnorderedElementsAreArray;
 
 std::vector<std::string> places(const TomlFile& file) {
   std::vector<std::string> found;
@@ -137,10 +138,79 @@ TEST(TomlFile, OfAnUnknownTableItsNameIsEnough) {
   EXPECT_THAT(keys(read_toml("[limts]\nnodes = 2\n", "f")), ElementsAre("limts"));
 }
 
-TEST(TomlFile, FaultsAreBounded) {
-  std::string text;
-  for (std::size_t i = 0; i < 2 * kConfigFaultsMax; ++i) text += "bad line\n";
-  EXPECT_THAT(read_toml(text, "f").faults, SizeIs(kConfigFaultsMax));
+TEST(TomlFile, EveryFaultOfALongFileIsTold) {
+  constexpr std::size_t kLines = 3'000;
+  std::string text = "[limits]\n";
+  for (std::size_t i = 0; i < kLines; ++i) text += "bad line\nkey_" + std::to_string(i) + " = 1\nkey_0 = 2\n";
+  const TomlFile file = read_toml(text, "f");
+  ASSERT_THAT(file.faults, SizeIs(2 * kLines));
+  EXPECT_THAT(file.keys, SizeIs(kLines));
+  std::vector<std::string> expected;
+  for (std::size_t i = 0; i < kLines; ++i) {
+    expected.push_back("f:" + std::to_string(3 * i + 2) + ":5");
+    expected.push_back("f:" + std::to_string(3 * i + 4) + ":1");
+  }
+  EXPECT_THAT(places(file), UnorderedElementsAreArray(expected));
+  EXPECT_THAT(read_toml(text, "f", 5).faults, SizeIs(5));
+}
+
+// Parts are read one by one, and mean what they would in one.
+TEST(TomlFile, AfterAnErrorItIsStillTheSameTable) {
+  const auto rest = [](const std::string& text) { return keys(read_toml(text, "f")); };
+  EXPECT_THAT(rest("a = 1\nbad\nb = 2\n[limits]\nc = 3\nbad\nd = 4\n[limits.e]\nf = 5\nbad\ng = 6\n"),
+              ElementsAre("a", "b", "limits.c", "limits.d", "limits.e"));
+  EXPECT_THAT(rest("[x]\na = 1\nbad\nb = 2\n[x.y]\nbad\n[limits]\nc = 3\n"), ElementsAre("x", "limits.c"));
+  EXPECT_THAT(rest("[[x]]\na = 1\nbad\nb = 2\n[[x]]\nc = 3\nbad\nd = 4\n"), ElementsAre("x"));
+  EXPECT_THAT(rest("limits.a = 1\nbad\nlimits.b = 2\n"), ElementsAre("limits.a", "limits.b"));
+  EXPECT_THAT(rest("a = [\n  ['x'],\n]\nbad\nb = 1\n"), ElementsAre("a", "b"));
+}
+
+TEST(TomlFile, AfterAnErrorWhatIsGivenTwiceIsToldAsBeforeIt) {
+  const auto twice = [](const std::string& first, const std::string& second) {
+    const TomlFile file = read_toml(first + "bad\n" + second, "f");
+    EXPECT_THAT(file.faults, SizeIs(2)) << first << second;
+    return file.faults.back().line();
+  };
+  EXPECT_EQ(twice("a = 1\n", " a = 2\n"), "f:3:2: 'a' is given twice; leave one of them out");
+  EXPECT_EQ(twice("[limits]\na = 1\n", "a = 2\n"), "f:4:1: 'a' is given twice; leave one of them out");
+  EXPECT_EQ(twice("[limits]\na = 1\n", "[limits]\nb = 2\n"), "f:4:1: 'limits' is given twice; leave one of them out");
+  EXPECT_EQ(twice("a = 1\n", "[a]\n"), "f:3:1: 'a' is given twice; leave one of them out");
+  EXPECT_EQ(twice("[a]\n[b]\n", "[a]\n"), "f:4:1: 'a' is given twice; leave one of them out");
+}
+
+// What begins so far above that it is not found costs what is below it.
+TEST(TomlFile, AnErrorWhoseBeginningIsNotFoundIsTold) {
+  const auto with = [](std::size_t bytes) {
+    std::string text = "shards = 1\nname = \"\"\"\n";
+    while (text.size() < bytes) text += "hub_id = 1\n";
+    return read_toml(text, "f");
+  };
+  const TomlFile shorter = with(3'000);
+  EXPECT_THAT(shorter.faults, SizeIs(1));
+  EXPECT_THAT(keys(shorter), ElementsAre("shards"));
+  const TomlFile longer = with(kConfigBytesMax - 20);
+  ASSERT_THAT(longer.faults, SizeIs(2));
+  EXPECT_THAT(longer.faults[1].sentence, HasSubstr("what follows here cannot be made sense of"));
+}
+
+TEST(TomlFile, AKeyOfMorePartsThanAnyHasIsNotLookedAt) {
+  const auto chain = [](std::size_t dots) {
+    std::string key = "a";
+    for (std::size_t i = 0; i < dots; ++i) key += ".a";
+    return key;
+  };
+  EXPECT_THAT(read_toml(chain(64) + " = 1\n", "f").faults, IsEmpty());
+  EXPECT_THAT(read_toml("[" + chain(64) + "]\n", "f").faults, IsEmpty());
+  EXPECT_THAT(read_toml("x = [" + std::string(999, ' ') + "'" + chain(999) + "']\n# " + chain(999) + " =", "f").faults,
+              IsEmpty());
+  for (const std::size_t dots : {std::size_t{65}, kConfigBytesMax / 2 - 100}) {
+    for (const std::string& line : {chain(dots) + " = 1", "[" + chain(dots) + "]", "x = {" + chain(dots) + "=1}"}) {
+      const TomlFile file = read_toml("\n " + line + "\nshards = 1\n", "f");
+      ASSERT_THAT(places(file), ElementsAre("f:2:2")) << dots;
+      EXPECT_THAT(file.faults[0].sentence, HasSubstr("no key has so many parts"));
+      EXPECT_THAT(keys(file), ElementsAre("shards"));
+    }
+  }
 }
 
 TEST(TomlFile, TakesItsMostBytesAndNotOneMore) {
