@@ -155,6 +155,7 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a file went.
   if (line.sources.file.empty() && !read.files.empty()) line.sources.file = read.files.front();
+  for (const Fault& warning : read.warnings) line.warnings.push_back(warning.text());
   line.configuration = std::move(read.configuration);
   line.files = std::move(read.files);
   if (raw.check_config) return CommandLineEnding{0, checked(line)};

@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "base/log.hpp"
+
 namespace gimnet::hub {
 
 Reloading Reloader::read_again() {
@@ -11,6 +13,7 @@ Reloading Reloader::read_again() {
   for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
   if (read.more_faults) reloading.faults.emplace_back("there are more faults; tcphub --check-config tells all of them");
   if (!reloading.faults.empty()) return reloading;
+  for (const Fault& warning : read.warnings) log_warning(warning.text());
   // A file that appeared in a default place is the hub's from now on, and must not go unnoticed.
   if (sources_.file.empty() && !read.files.empty()) sources_.file = read.files.front();
   const HubOptions& wanted = read.configuration.options;

@@ -44,6 +44,10 @@ void apply(Configuration& configuration, const Given& given, Faults& faults);
 /// Fills in what follows from other values, and looks at what must agree. To be called last.
 void complete(Configuration& configuration, Faults& faults);
 
+/// What a hub of that configuration runs with, but may not do what it is told to: with numbers, and what to do.
+/// REQUIRES: complete() was called.
+[[nodiscard]] Faults warnings_about(const Configuration& configuration);
+
 /// The whole configuration as TOML, each value with where it came from.
 [[nodiscard]] std::string print(const Configuration& configuration);
 

@@ -239,6 +239,7 @@ ReadConfiguration read_configuration(const ConfigSources& sources, std::size_t f
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
   for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);
   complete(read.configuration, read.faults);
+  if (read.faults.empty()) read.warnings = warnings_about(read.configuration);
   return read;
 }
 

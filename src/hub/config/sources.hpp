@@ -27,6 +27,7 @@ struct ReadConfiguration {
   Configuration configuration;  ///< whole only where there are no faults
   Faults faults;
   bool more_faults = false;        ///< there are more than were asked for
+  Faults warnings;                 ///< none where there are faults
   std::vector<std::string> files;  ///< that were read, the one beside conf.d first
 };
 

@@ -32,7 +32,9 @@ struct Fault {
   std::string sentence;  ///< what is wrong, and what to do
 
   /// As it is printed: "FILE:LINE:COLUMN: sentence", or "tcphub: sentence".
-  [[nodiscard]] std::string line() const { return (place.empty() ? "tcphub" : place) + ": " + sentence; }
+  [[nodiscard]] std::string line() const { return (place.empty() ? "tcphub: " : "") + text(); }
+  /// The same without the program's name.
+  [[nodiscard]] std::string text() const { return (place.empty() ? "" : place + ": ") + sentence; }
   friend bool operator==(const Fault&, const Fault&) = default;
 };
 
