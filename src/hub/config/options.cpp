@@ -3,8 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string_view>
 
+#include "base/option_words.hpp"
 #include "base/suggest.hpp"
 #include "hub/version.hpp"
 
@@ -29,6 +31,7 @@ struct Raw {
   std::string config;
   bool insecure = false;
   bool spin = false;
+  bool help = false;
   bool help_limits = false;
   bool version = false;
   bool check_config = false;
@@ -39,6 +42,8 @@ CommandLineEnding wrong(const std::string& sentence) { return {2, "tcphub: " + s
 
 void declare(CLI::App& app, Raw& raw) {
   app.allow_extras();
+  app.set_help_flag();  // it knows no --help=false
+  app.add_flag("-h,--help", raw.help, "Says this and ends");
   app.add_option("--listen", raw.listen,
                  "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free port),\n"
                  "unix:/path. Default: tcp://127.0.0.1:7450 and a Unix socket in the user's runtime folder")
@@ -96,6 +101,15 @@ std::string syntax_error(const CLI::ParseError& error) {
   return what + "; tcphub --help shows what there is";
 }
 
+/// A word `--NAME=VALUE` that cannot be, or "".
+std::string wrong_word(const CLI::App& app, std::span<const char* const> words) {
+  return wrong_option_word(words, [&app](std::string_view name) {
+    const CLI::Option* option = app.get_option_no_throw(std::string{name});
+    if (option == nullptr) return Takes::unknown;
+    return option->get_items_expected_max() == 0 ? Takes::boolean : Takes::value;
+  });
+}
+
 Given flag(const std::string& key, const std::string& label, std::string text) {
   Given given;
   given.key = key;
@@ -124,8 +138,11 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
     std::ranges::replace(key, '-', '_');
     sources.flags.push_back(flag(key, name, *text));
   }
-  if (raw.spin) sources.flags.push_back(flag("spin", "--spin", "true"));
-  if (raw.insecure) sources.flags.push_back(flag("insecure", "--insecure", "true"));
+  for (const auto& [key, value] : {std::pair{"spin", raw.spin}, std::pair{"insecure", raw.insecure}}) {
+    const std::string name = "--" + std::string{key};
+    // Also --spin=false, which is stronger than what a file says.
+    if (app.count(name) != 0) sources.flags.push_back(flag(key, name, value ? "true" : "false"));
+  }
   for (const std::string& assignment : raw.limits) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos) {
@@ -170,13 +187,14 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
   CLI::App app{"tcphub carries messages between the nodes of a GIMnet.", "tcphub"};
   Raw raw;
   declare(app, raw);
+  const std::span words(argv, static_cast<std::size_t>(argc));
+  if (const std::string word = wrong_word(app, words.subspan(words.empty() ? 0 : 1)); !word.empty()) return wrong(word);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    return CommandLineEnding{0, app.help()};
   } catch (const CLI::ParseError& error) {
     return wrong(syntax_error(error));
   }
+  if (raw.help) return CommandLineEnding{0, app.help()};
   if (const std::vector<std::string> extras = app.remaining(); !extras.empty()) {
     const std::string word = extras.front().substr(0, extras.front().find('='));
     return wrong("there is no argument '" + escaped(word, 60) + "'" + did_you_mean(word, kOptionNames) +

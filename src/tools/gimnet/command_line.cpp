@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/option_words.hpp"
 #include "base/suggest.hpp"
 #include "tools/gimnet/command_help.hpp"
 #include "tools/gimnet/command_options.hpp"
@@ -159,6 +160,17 @@ std::string unexpected(const std::string& word, const std::vector<const CLI::Opt
   return "there is no option " + given + " for " + called.text() + did_you_mean(given, views);
 }
 
+/// What CLI11 would take for something else; "": nothing.
+std::string wrong_word(std::span<const char* const> words, const std::vector<const CLI::Option*>& options) {
+  return wrong_option_word(words, [&options](std::string_view name) {
+    const auto found =
+        std::ranges::find_if(options, [&](const CLI::Option* option) { return option->check_name(std::string(name)); });
+    if (found == options.end()) return Takes::unknown;
+    if ((*found)->get_items_expected_max() != 0) return Takes::value;
+    return name == "--help" || name == "--version" ? Takes::nothing : Takes::boolean;
+  });
+}
+
 /// What CLI11 says, in words that name the option, what was given and what it takes.
 std::string explained(const CLI::ParseError& error, const std::vector<const CLI::Option*>& options) {
   const std::string said = error.what();
@@ -197,7 +209,8 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   }
   const bool acts = std::ranges::find(kCtlActions, called.action) != kCtlActions.end();
   if (!called.action.empty() && !acts) return unknown_action(called.action);
-  std::string sentence;
+  std::string sentence = wrong_word(arguments, options_of(app, called));
+  if (!sentence.empty()) return wrong(sentence, called);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -129,6 +129,42 @@ TEST(Options, FlagsAreStrongerThanTheEnvironment) {
   EXPECT_EQ(line.configuration.options.id, HubId{5});
 }
 
+TEST(Options, AFlagMaySayFalseAndIsStrongerThanAFile) {
+  const TestFolder folder;
+  const std::string path = folder.path("hub.toml");
+  std::ofstream(path) << "insecure = true\nspin = true\nlisten = 'tcp://0.0.0.0:0'\n";
+  EXPECT_TRUE(options({"--config", path.c_str()}).insecure);
+  EXPECT_EQ(ending({"--check-config", "--config", path.c_str(), "--insecure=false"}).exit_code, 2);
+  const auto parsed = parse({"--config", path.c_str(), "--insecure=false", "--spin=false", "--listen", "unix:/s"},
+                            {"TCPHUB_INSECURE=true"});
+  const auto& line = std::get<CommandLine>(parsed);
+  EXPECT_FALSE(line.configuration.options.insecure);
+  EXPECT_FALSE(line.configuration.options.spin);
+  EXPECT_EQ(line.configuration.origins.at("spin"), "flag --spin");
+  EXPECT_FALSE(line.sources.flags.empty());
+  EXPECT_TRUE(options({"--insecure=true", "--spin=true", "--listen", "tcp://0.0.0.0:0"}).insecure);
+  EXPECT_FALSE(options({"--spin=false"}).spin);
+}
+
+TEST(Options, EveryFlagIsTrueOrFalse) {
+  for (const std::string flag :
+       {"--insecure", "--spin", "--help", "--help-limits", "--check-config", "--print-config", "--version"}) {
+    for (const std::string value : {"", "2", "no", "False"}) {
+      const std::string word = flag + "=" + value;
+      EXPECT_EQ(error({word.c_str()}), "tcphub: " + flag + " cannot be '" + value + "': write " + flag + " alone, " +
+                                           flag + "=true or " + flag + "=false\n");
+    }
+    EXPECT_EQ(options({(flag + "=false").c_str()}).shards, default_shards()) << flag << " asks for nothing";
+  }
+  EXPECT_EQ(ending({"--help=true"}).exit_code, 0);
+  EXPECT_THAT(ending({"-h"}).text, HasSubstr("--listen"));
+}
+
+TEST(Options, AnEmptyValueIsNotTheNextWord) {
+  EXPECT_EQ(error({"--state-dir=", "--check-config"}),
+            "tcphub: --state-dir is empty: give it a value, or leave it out\n");
+}
+
 TEST(Options, ChecksTheConfigurationAndEnds) {
   const TestFolder folder;
   const std::string path = folder.path("hub.toml");

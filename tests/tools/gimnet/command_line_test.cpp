@@ -67,6 +67,26 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"status"}).command, Command::status);
 }
 
+TEST(CommandLine, AFlagIsTrueOrFalse) {
+  EXPECT_FALSE(options({"--json=false", "nodes"}).json);
+  EXPECT_TRUE(options({"nodes", "--json=true"}).json);
+  EXPECT_FALSE(options({"pub", "a/b", "--retain=false", "--stay"}).retain);
+  EXPECT_EQ(refusal({"nodes", "--json=2"}),
+            "gimnet: --json cannot be '2': write --json alone, --json=true or --json=false\n"
+            "`gimnet nodes --help` shows how it is called.\n");
+  EXPECT_NE(refusal({"--json=", "nodes"}).find("--json cannot be ''"), std::string::npos);
+  EXPECT_NE(refusal({"pub", "a/b", "--retain=no"}).find("--retain cannot be 'no'"), std::string::npos);
+  EXPECT_NE(refusal({"ctl", "kick", "a", "--json=1"}).find("--json cannot be '1'"), std::string::npos);
+  EXPECT_NE(refusal({"--help=false"}).find("--help takes no value"), std::string::npos);
+  EXPECT_NE(refusal({"nodes", "--version=false"}).find("--version takes no value"), std::string::npos);
+}
+
+TEST(CommandLine, AnEmptyValueIsNotTheNextWord) {
+  EXPECT_NE(refusal({"recv", "--name=", "--json"}).find("--name is empty: give it a value"), std::string::npos);
+  EXPECT_NE(refusal({"--hub=", "nodes"}).find("--hub is empty"), std::string::npos);
+  EXPECT_EQ(options({"ctl", "kick", "a", "--reason", "--json=1"}).ctl.reason, "--json=1");
+}
+
 TEST(CommandLine, SuggestsWhatANewcomerMeant) {
   const auto said = [](std::initializer_list<const char*> words, const char* part) {
     const std::string text = refusal(words);

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace gimnet {
+
+/// What may follow the name of an option.
+enum class Takes : std::uint8_t {
+  unknown,  ///< there is no such option
+  nothing,  ///< `--NAME` alone
+  boolean,  ///< `--NAME` alone, or `--NAME=true` or `--NAME=false`
+  value,    ///< `--NAME VALUE` or `--NAME=VALUE`
+};
+
+/// Why a command line cannot be: the first word `--NAME=VALUE` whose value its option does not take; "": there is none.
+/// The library that reads command lines takes `--FLAG=` and `--FLAG=2` for true, and for `--NAME=` (of a shell variable
+/// that is not set, say) the next word. What follows `--` is not looked at. Thread safety: that of `takes`.
+[[nodiscard]] std::string wrong_option_word(std::span<const char* const> words,
+                                            const std::function<Takes(std::string_view)>& takes);
+
+}  // namespace gimnet
