@@ -150,6 +150,9 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
     }
     sources.flags.push_back(flag("limits." + assignment.substr(0, equals), "--limit", assignment.substr(equals + 1)));
   }
+  if (app.count("--config") != 0 && raw.config.empty()) {
+    return "--config is empty: give it the path of a TOML file, or leave it out";
+  }
   sources.file = raw.config;
   return {};
 }

@@ -131,6 +131,11 @@ void set_hub_name(Configuration& configuration, const Given& given, Faults& faul
 
 void set_state_dir(Configuration& configuration, const Given& given, Faults& faults) {
   if (!has_kind(given, Kind::text, "state_dir = \"/var/lib/tcphub\"", faults)) return;
+  if (given.value.kind == Kind::words && given.value.text.empty()) {
+    // Mostly a shell variable that is not set; a hub that kept its state elsewhere would begin anew.
+    faults.push_back(fault(given, given.label + " is empty: give it a folder, or leave it out"));
+    return;
+  }
   if (given.value.text.find('\0') != std::string::npos) {
     faults.push_back(fault(given, given.label + " cannot be a path: there is a zero byte in it"));
     return;

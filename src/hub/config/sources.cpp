@@ -214,7 +214,10 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
     const std::string variable{entry.substr(0, equals)};
     const std::string_view value = entry.substr(equals + 1);
     if (variable == kFileVariable) {
-      if (sources.file.empty()) sources.file = value;
+      if (!sources.file.empty()) continue;
+      sources.file = value;
+      if (value.empty())
+        sources.faults.push_back({{}, variable + " is empty: give it a TOML file's path, or unset it"});
     } else if (const std::string key = key_of(variable); !key.empty()) {
       sources.environment.push_back(from_environment(variable, key, value));
     } else {
@@ -228,6 +231,7 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
 
 ReadConfiguration read_configuration(const ConfigSources& sources, std::size_t faults_max) {
   ReadConfiguration read;
+  read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
   const std::string file = sources.file.empty() ? file_in_default_place() : sources.file;
   if (!file.empty()) {

@@ -20,6 +20,7 @@ struct ConfigSources {
   std::string file;                ///< of --config or TCPHUB_CONFIG; "": the first of the default places that is there
   std::vector<Given> environment;  ///< TCPHUB_...
   std::vector<Given> flags;
+  Faults faults{};  ///< of how the file is named
 };
 
 /// What was read.

@@ -165,6 +165,11 @@ TEST(Options, AnEmptyValueIsNotTheNextWord) {
             "tcphub: --state-dir is empty: give it a value, or leave it out\n");
 }
 
+TEST(Options, AnEmptyPlaceIsNotTheDefaultOne) {
+  EXPECT_EQ(error({"--config", ""}), "tcphub: --config is empty: give it the path of a TOML file, or leave it out\n");
+  EXPECT_EQ(error({"--state-dir", ""}), "tcphub: --state-dir is empty: give it a folder, or leave it out\n");
+}
+
 TEST(Options, ChecksTheConfigurationAndEnds) {
   const TestFolder folder;
   const std::string path = folder.path("hub.toml");

@@ -142,6 +142,18 @@ TEST_F(SourcesTest, TheVariableNamesTheFileUnlessAFlagDoes) {
   EXPECT_EQ(sources_.file, "/some/file");
 }
 
+TEST_F(SourcesTest, AVariableThatIsEmptyIsNoPlace) {
+  write("hub.toml", "state_dir = ''\n");
+  environment({"TCPHUB_CONFIG="});
+  EXPECT_THAT(read().faults, IsEmpty()) << "a flag named the file";
+  sources_.file.clear();
+  environment({"TCPHUB_STATE_DIR=", "TCPHUB_CONFIG="});
+  std::vector<std::string> lines;
+  for (const Fault& fault : read().faults) lines.push_back(fault.line());
+  EXPECT_THAT(lines, ElementsAre("tcphub: TCPHUB_CONFIG is empty: give it a TOML file's path, or unset it",
+                                 "tcphub: TCPHUB_STATE_DIR is empty: give it a folder, or leave it out"));
+}
+
 TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
   ASSERT_THAT(read().faults, SizeIs(1));
   EXPECT_THAT(read().faults[0].line(), HasSubstr("hub.toml: cannot read this file: No such file or directory"));
