@@ -16,6 +16,7 @@ namespace gimnet::hub {
 class TomlLines {
  public:
   explicit TomlLines(std::string_view text) : text_(text) {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.erase(0, 3);  // a mark of the encoding is no part of the first line
     for (std::size_t at = 0; at <= text_.size();) {
       begins_.push_back(at);
       at = std::min(text_.find('\n', at), text_.size()) + 1;
@@ -34,6 +35,7 @@ class TomlLines {
   [[nodiscard]] std::string_view line(std::size_t number) const {
     std::string_view line = text(number, number);
     if (line.ends_with('\n')) line.remove_suffix(1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
     return line;
   }
   /// The line, from `number` upward and not above `first`, where a key or a table begins.

@@ -162,6 +162,8 @@ TEST(TomlFile, AfterAnErrorItIsStillTheSameTable) {
   EXPECT_THAT(rest("[x]\na = 1\nbad\nb = 2\n[x.y]\nbad\n[limits]\nc = 3\n"), ElementsAre("x", "limits.c"));
   EXPECT_THAT(rest("[[x]]\na = 1\nbad\nb = 2\n[[x]]\nc = 3\nbad\nd = 4\n"), ElementsAre("x"));
   EXPECT_THAT(rest("limits.a = 1\nbad\nlimits.b = 2\n"), ElementsAre("limits.a", "limits.b"));
+  EXPECT_THAT(rest("[limits]\r\na = 1\r\nbad\r\nb = 2\r\n"), ElementsAre("limits.a", "limits.b"));
+  EXPECT_THAT(rest("\xEF\xBB\xBF[limits] # all\nbad\nb = 2\n"), ElementsAre("limits.b"));
   EXPECT_THAT(rest("a = [\n  ['x'],\n]\nbad\nb = 1\n"), ElementsAre("a", "b"));
 }
 
