@@ -11,6 +11,7 @@
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/line_input.hpp"
 #include "tools/gimnet/progress.hpp"
+#include "tools/gimnet/unheard_lines.hpp"
 
 namespace gimnet::tool {
 namespace {
@@ -80,7 +81,7 @@ class Retaining {
   bool told_;
 };
 
-Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing) {
+Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing, UnheardLines& unheard) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
@@ -96,9 +97,11 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
         if (!standing.stands_until(next_ns)) return standing.outcome();
         next_ns += period_ns;
         retaining.look_at(line);
+        unheard.before_line(publisher.subscribers());
         if (auto sent = publisher.publish(line, period_ns == 0 && input.has_line() ? More::yes : More::no); !sent) {
           return sent;
         }
+        unheard.after_line(publisher.subscribers());
         break;
       case LineInput::State::failed:
         return Failure{Status::system, std::string("cannot read standard input: ") + std::strerror(input.error())};
@@ -161,8 +164,12 @@ ExitCode run_pub(Session& session) {
   }
   Standing standing(session);
   auto sent = wait_for_subscribers(session, *publisher, standing);
-  if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing);
+  UnheardLines unheard;
+  if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing, unheard);
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
+  // What is retained is for those who come later.
+  const std::string unheard_words = unheard.sentence(options.target);
+  if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
   write_counts(session, *publisher);
   if (sent && options.stay && !session.stopped()) sent = stay(session, standing);
   if (!sent) return session.fail(sent.failure());
