@@ -65,6 +65,9 @@ Examples:
   gimnet echo robot/odom -n 10 --raw
   gimnet echo robot/odom --rate 2           the newest, twice a second
   gimnet echo robot/odom --json | jq .age_us
+
+By full name nothing is missed of a service that begins later; by pattern what is published before the hub has told of
+it: `gimnet pub --wait 1` waits for that.
 )";
 
 inline constexpr const char* kHzAbout = R"(Measure how often services send, and how evenly.

@@ -13,9 +13,11 @@ ExitCode run_echo(Session& session) {
     return code_of_terms(session.fail(opened.failure()), opened.failure(), !all);
   }
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
-  MissedMessages missed;
-  return print_messages(
-      session, [&](Timeout timeout) { return subscriptions.receive(timeout); }, all ? &missed : nullptr);
+  MissedMessages missed([&](std::string_view service) { return subscriptions.take_lateness(service); });
+  const ExitCode code =
+      print_messages(session, [&](Timeout timeout) { return subscriptions.receive(timeout); }, all ? &missed : nullptr);
+  subscriptions.say_rest();
+  return code;
 }
 
 }  // namespace gimnet::tool

@@ -57,6 +57,7 @@ class Meters {
     session_.output().flush();
   }
 
+  void say_rest() { subscriptions_.say_rest(); }
   [[nodiscard]] std::uint64_t messages() const { return messages_; }
 
  private:
@@ -67,9 +68,9 @@ class Meters {
 
   /// Services that are there count from now on, also those that send nothing.
   void look() {
-    for (const auto& [name, subscription] : subscriptions_.all()) {
+    for (const auto& [name, missed] : subscriptions_.missed()) {
       auto& counted = counted_.try_emplace(name, Counted{Meter(wall_now_ns(), window_ns_), 0}).first->second;
-      counted.missed = subscription.missed();
+      counted.missed = missed;
     }
   }
 
@@ -103,6 +104,7 @@ ExitCode measure(Session& session, Measure measure) {
   }
   watch.look_at_end();
   meters.print(Span::whole);
+  meters.say_rest();
   if (!failure.sentence.empty() && !session.stopped()) return session.fail(failure);
   return session.finish_stream(bounds, meters.messages());
 }

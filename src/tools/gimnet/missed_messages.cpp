@@ -17,7 +17,14 @@ std::uint64_t MissedMessages::take(const Message& message) {
   auto& service = found != services_.end() ? found->second : services_[std::string(message.service())];
   const auto step = static_cast<std::int32_t>(message.sequence() - service.sequence);
   // The first of a provider says where it stands; a provider that began again counts from 1.
-  if (message.from().id == service.provider && step > 1) count(service, static_cast<std::uint32_t>(step - 1), message);
+  if (message.from().id == service.provider && step > 0) {
+    if (step > 1) count(service, static_cast<std::uint32_t>(step - 1), message);
+  } else if (take_lateness_ && take_lateness_(message.service()) && message.sequence() > 1) {
+    const std::uint32_t early = message.sequence() - 1;
+    service.missed += early;
+    service.early.missed += early;
+    untold_ = true;
+  }
   service.provider = message.from().id;
   service.sequence = message.sequence();
   service.reconnects = message.reconnects();
@@ -52,6 +59,8 @@ std::vector<std::string> MissedMessages::news(std::int64_t now_ns) {
 std::vector<std::string> MissedMessages::rest() {
   std::vector<std::string> sentences;
   for (auto& [name, service] : services_) {
+    add_sentence(sentences, service.early, name,
+                 "published before this node had heard of the service and subscribed to it");
     add_sentence(sentences, service.broken, name, "the connection to the hub was broken");
     // Nobody tells a reader whether it or the sender was in the way.
     add_sentence(

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "gimnet/gimi.hpp"
@@ -15,6 +17,11 @@ namespace gimnet::tool {
 /// those of steady_now_ns(). Thread safety: one thread.
 class MissedMessages {
  public:
+  /// Was the service subscribed to later than it began? As MatchingServices::take_lateness().
+  using TakeLateness = std::function<bool(std::string_view)>;
+
+  explicit MissedMessages(TakeLateness take_lateness = {}) : take_lateness_(std::move(take_lateness)) {}
+
   /// Returns how many of its service did not come up to this one. REQUIRES: it is of a service.
   std::uint64_t take(const Message& message);
   /// As the node counts now what it cannot give out. So many of what did not come since the last time count as missed,
@@ -35,6 +42,7 @@ class MissedMessages {
     std::uint32_t sequence = 0;
     std::uint32_t reconnects = 0;
     std::uint64_t missed = 0;
+    Count early;    ///< before it was subscribed to
     Count broken;   ///< while the connection to the hub was
     Count unknown;  ///< by all that happens elsewhere
   };
@@ -42,6 +50,7 @@ class MissedMessages {
                            std::string_view why);
   void count(Service& service, std::uint64_t missed, const Message& message);
 
+  const TakeLateness take_lateness_;
   std::map<std::string, Service, std::less<>> services_;
   NewsPace pace_;
   std::uint64_t lost_ = 0;          ///< as take_lost() was told last

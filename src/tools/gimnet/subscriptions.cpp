@@ -1,30 +1,26 @@
 #include "tools/gimnet/subscriptions.hpp"
 
 #include <algorithm>
-#include <set>
 
 #include "base/clock.hpp"
+#include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {
-namespace {
-
-/// Messages of one service that wait in this process; then it stops reading from the hub.
-constexpr std::size_t kQueueMessages = 4096;
-/// How long subscribing may take.
-constexpr Timeout kSubscribe{5'000};
-/// How often the hub is asked for services that are new.
-constexpr Timeout kLookAgain{1'000};
-
-}  // namespace
 
 bool wants_less(const PaceOptions& pace) {
   return pace.window != 0 || pace.depth != PaceOptions{}.depth || pace.rate_hz > 0.0;
 }
 
 Outcome<void> Subscriptions::open() {
-  if (!is_pattern(word_)) return subscribe(word_);
-  if (auto done = look_again(); !done) return done;
-  return all_.empty() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
+  if (!is_pattern(word_)) {
+    auto subscription = node_.subscribe(word_, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
+    if (!subscription) return subscription.failure();
+    one_ = std::move(*subscription);
+    return {};
+  }
+  follower_.emplace(node_, word_, pace_);
+  if (auto done = follower_->open(); !done) return done;
+  return !follower_->any() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
 }
 
 /// Whether the hub takes the pace, before there is a service to which it could say no: by a subscription that ends at
@@ -34,53 +30,37 @@ Outcome<void> Subscriptions::ask_terms() {
   return subscription ? Outcome<void>{} : subscription.failure();
 }
 
-Outcome<void> Subscriptions::subscribe(const std::string& service) {
-  auto subscription = node_.subscribe(service, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
-  if (!subscription) return subscription.failure();
-  all_.insert_or_assign(service, std::move(*subscription));
-  return {};
-}
-
-Outcome<void> Subscriptions::look_again() {
-  looked_ns_ = steady_now_ns();
-  const auto services = node_.services(word_);
-  if (!services) return services.failure();
-  std::set<std::string_view> there;
-  for (const ServiceRecord& service : *services) {
-    if (service.direction != Direction::provides) continue;
-    there.insert(service.name);
-    if (all_.contains(service.name)) continue;
-    if (auto done = subscribe(service.name); !done) return done;
-  }
-  // What still waits of a service that is gone is taken before its subscription ends.
-  std::erase_if(all_, [&](const auto& one) { return !there.contains(one.first) && one.second.queue().size() == 0; });
-  return {};
-}
-
 Outcome<Message> Subscriptions::receive(Timeout timeout) {
-  const std::int64_t end_ns = steady_now_ns() + timeout.count() * 1'000'000;
+  const std::int64_t end_ns = steady_now_ns() + std::chrono::nanoseconds(timeout).count();
   for (;;) {
-    Timeout wait = timeout;
-    if (is_pattern(word_)) {
-      const std::int64_t next_ns = looked_ns_ + kLookAgain.count() * 1'000'000;
-      if (steady_now_ns() >= next_ns) {
-        // Without a connection what waits here still comes; if none will come any more, the end comes behind it.
-        const auto done = look_again();
-        if (!done && !done.is(Status::not_connected) && !done.is(Status::refused)) return done.failure();
-      }
-      wait = std::min(timeout, kLookAgain);
-    }
-    auto message = node_.receive(wait);
+    const std::int64_t now_ns = steady_now_ns();
+    const Timeout left{std::max<std::int64_t>((end_ns - now_ns) / 1'000'000, 0)};
+    auto message = node_.receive(std::min(timeout, left));
     if (message && message->service().empty()) continue;  // sent to this node by somebody who guessed its id
+    if (!follower_) return message;
+    for (const std::string& sentence : follower_->news(now_ns)) say(sentence);
     if (message || !message.is(Status::timeout)) return message;
-    if (steady_now_ns() >= end_ns) return message;
+    // What waited here came before.
+    if (const auto failure = follower_->failure()) return *failure;
+    return message;
   }
 }
+
+void Subscriptions::say_rest() {
+  if (!follower_) return;
+  for (const std::string& sentence : follower_->rest()) say(sentence);
+}
+
+std::map<std::string, std::uint64_t> Subscriptions::missed() const {
+  if (follower_) return follower_->missed();
+  return one_ ? std::map<std::string, std::uint64_t>{{word_, one_->missed()}} : std::map<std::string, std::uint64_t>{};
+}
+
+bool Subscriptions::take_lateness(std::string_view service) { return follower_ && follower_->take_lateness(service); }
 
 std::string Subscriptions::waits_for() const {
-  if (is_pattern(word_)) return all_.empty() ? "no service matches " + word_ + " yet; waiting for one" : "";
-  const auto found = all_.find(word_);
-  return found == all_.end() || found->second.exists() ? "" : "nobody provides " + word_ + " yet; waiting for it";
+  if (follower_) return follower_->any() ? "" : "no service matches " + word_ + " yet; waiting for one";
+  return !one_ || one_->exists() ? "" : "nobody provides " + word_ + " yet; waiting for it";
 }
 
 }  // namespace gimnet::tool

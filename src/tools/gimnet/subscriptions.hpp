@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "gimnet/gimi.hpp"
+#include "tools/gimnet/service_follower.hpp"
 
 namespace gimnet::tool {
 
@@ -19,31 +21,34 @@ namespace gimnet::tool {
 /// match a pattern, those that come later too. Thread safety: one thread.
 class Subscriptions {
  public:
-  /// `node` must outlive it.
+  /// `node` must outlive it; with a pattern it is closed with it.
   Subscriptions(Node& node, std::string word, const PaceOptions& pace = {})
       : node_(node), word_(std::move(word)), pace_(pace) {}
 
-  /// Subscribes to what is there. Errors: as Node::subscribe() and Node::services().
+  /// Subscribes to what is there; of a pattern to the first, and to the others meanwhile. Errors: as Node::subscribe()
+  /// and Node::watch().
   [[nodiscard]] Outcome<void> open();
-  /// The next message of any of them. Errors: timeout, closed; for a pattern also those of open().
+  /// The next message of any of them. Says on standard error, now and then, which services of a pattern came and went
+  /// without one. Errors: timeout, closed; for a pattern also refused: it takes in no more services.
   [[nodiscard]] Outcome<Message> receive(Timeout timeout);
+  /// What receive() would still have said.
+  void say_rest();
 
-  /// By full name.
-  [[nodiscard]] const std::map<std::string, Subscription, std::less<>>& all() const { return all_; }
+  /// By full name: how many messages were missed.
+  [[nodiscard]] std::map<std::string, std::uint64_t> missed() const;
+  /// As MatchingServices::take_lateness(); never of one that was called by its full name.
+  [[nodiscard]] bool take_lateness(std::string_view service);
   /// What to tell the user while there is nothing to subscribe to; "" when there is.
   [[nodiscard]] std::string waits_for() const;
 
  private:
-  [[nodiscard]] Outcome<void> subscribe(const std::string& service);
-  /// Takes what is new, and lets go of what is gone.
-  [[nodiscard]] Outcome<void> look_again();
   [[nodiscard]] Outcome<void> ask_terms();
 
   Node& node_;
   std::string word_;
   PaceOptions pace_;
-  std::map<std::string, Subscription, std::less<>> all_;
-  std::int64_t looked_ns_ = 0;
+  std::optional<Subscription> one_;          ///< by its full name
+  std::optional<ServiceFollower> follower_;  ///< of a pattern
 };
 
 }  // namespace gimnet::tool

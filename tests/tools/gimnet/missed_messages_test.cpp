@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/client/gimi/support/made_message.hpp"
 
 namespace gimnet::tool {
@@ -57,6 +59,30 @@ TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
   missed_.take_lost({.incomplete = 2, .too_large = 1, .frames_broken_off = 50});
   EXPECT_EQ(take(7), 4u);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
+}
+
+TEST_F(MissedMessagesTest, WhatWasBeforeALateSubscriptionCounts) {
+  std::vector<std::string> asked;
+  bool late = true;
+  MissedMessages missed([&](std::string_view service) {
+    asked.emplace_back(service);
+    return std::exchange(late, false);
+  });
+  EXPECT_EQ(missed.take(make_message("x", 4, {}, "r/s")), 3u);
+  EXPECT_EQ(missed.take(make_message("x", 5, {}, "r/s")), 3u);
+  EXPECT_EQ(missed.take(make_message("x", 7, {}, "r/s")), 4u);
+  EXPECT_EQ(missed.rest(),
+            (Sentences{"3 messages of r/s did not come: published before this node had heard of the service and "
+                       "subscribed to it",
+                       std::string("1 message") + kUnknown}));
+  EXPECT_EQ(missed.take(make_message("x", 1000, {}, "r/t")), 0u) << "is not late";
+  EXPECT_EQ(asked, (Sentences{"r/s", "r/t"})) << "once each";
+}
+
+TEST_F(MissedMessagesTest, WhoseFirstComesHasMissedNothing) {
+  MissedMessages missed([](std::string_view) { return true; });
+  EXPECT_EQ(missed.take(make_message("x", 1, {}, "r/s")), 0u);
+  EXPECT_EQ(missed.rest(), Sentences{});
 }
 
 TEST_F(MissedMessagesTest, NumbersWrapAround) {

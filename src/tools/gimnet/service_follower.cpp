@@ -1,0 +1,174 @@
+#include "tools/gimnet/service_follower.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/clock.hpp"
+#include "tools/gimnet/session.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+/// How long it waits before it asks again for what the hub has refused.
+constexpr std::int64_t kRetryNs = 1'000'000'000;
+
+}  // namespace
+
+ServiceFollower::~ServiceFollower() {
+  if (!thread_.joinable()) return;
+  node_.close();  // nothing else ends its waiting
+  thread_.join();
+}
+
+Outcome<void> ServiceFollower::open() {
+  auto watch = node_.watch(pattern_, {.nodes = false, .services = true}, kSubscribe);
+  if (!watch) return watch.failure();
+  watch_ = std::move(*watch);
+  const std::int64_t end_ns = steady_now_ns() + std::chrono::nanoseconds(kSubscribe).count();
+  for (bool complete = false; !complete;) {
+    const std::int64_t left_ns = std::max<std::int64_t>(end_ns - steady_now_ns(), 0);
+    const auto event = watch_->receive(Timeout{left_ns / 1'000'000});
+    if (!event) return event.failure();
+    complete = event->change == Change::snapshot_ends;
+    take(*event);
+  }
+  // Whether the hub takes the terms shows at the first; as long as messages of it wait here, others may wait, too.
+  if (auto done = subscribe_next(kSubscribe); !done) return done;
+  thread_ = std::thread([this] { run(); });
+  return {};
+}
+
+void ServiceFollower::run() {
+  for (;;) {
+    const auto event = watch_->receive(patience());
+    if (event && event->change == Change::ended) {
+      return fail({Status::refused, "the hub ended the watch: " + event->why});
+    }
+    if (event) {
+      take(*event);
+    } else if (!event.is(Status::timeout)) {
+      return fail(event.failure());
+    } else if (const auto done = subscribe_next(kForever); !done) {
+      on_refusal(done.failure());
+    }
+  }
+}
+
+Timeout ServiceFollower::patience() const {
+  const MutexLock lock(mutex_);
+  const bool wants = matching_.wanted() != nullptr;
+  if (!wants && !matching_.remembers_too_many()) return kForever;
+  const std::int64_t left_ns = std::max<std::int64_t>((wants ? retry_ns_ : tidy_ns_) - steady_now_ns(), 0);
+  return Timeout{(left_ns + 999'999) / 1'000'000};
+}
+
+void ServiceFollower::take(const WatchEvent& event) {
+  const MutexLock lock(mutex_);
+  if (event.service && event.change == Change::advertised) vanished_.on_there(event.service->name);
+  auto gone = matching_.take(event);
+  if (!gone) return;
+  VanishedServices::IsSilent is_silent = [] { return true; };
+  if (const auto found = subscriptions_.find(*gone); found != subscriptions_.end()) {
+    is_silent = [queue = found->second.queue()] { return queue.received() == 0; };
+  }
+  vanished_.on_gone(std::move(*gone), std::move(is_silent), steady_now_ns());
+}
+
+Outcome<void> ServiceFollower::subscribe_next(Timeout timeout) {
+  std::string name;
+  {
+    const MutexLock lock(mutex_);
+    if (const std::string* wanted = matching_.wanted()) name = *wanted;
+  }
+  if (!name.empty()) {
+    auto subscription = node_.subscribe(name, {kQueueMessages, AtFullQueue::stop_reading}, timeout, pace_);
+    if (!subscription) return subscription.failure();
+    told_ = false;
+    const MutexLock lock(mutex_);
+    subscriptions_.insert_or_assign(name, std::move(*subscription));
+    matching_.settle(name);
+  }
+  if (steady_now_ns() >= tidy_ns_ && remembers_too_many() && !let_one_go()) tidy_ns_ = steady_now_ns() + kRetryNs;
+  return {};
+}
+
+bool ServiceFollower::remembers_too_many() const {
+  const MutexLock lock(mutex_);
+  return matching_.remembers_too_many();
+}
+
+bool ServiceFollower::let_one_go() {
+  std::optional<Subscription> ended;  // by its end, which the hub is told without the lock
+  const MutexLock lock(mutex_);
+  const std::string* oldest = matching_.oldest_gone();
+  if (oldest == nullptr) return false;
+  const auto found = subscriptions_.find(*oldest);
+  if (found != subscriptions_.end()) {
+    if (found->second.queue().size() != 0) return false;
+    ended = std::move(found->second);
+    subscriptions_.erase(found);
+  }
+  matching_.forget(std::string(*oldest));
+  return true;
+}
+
+void ServiceFollower::on_refusal(const Failure& failure) {
+  // Those that say that the node is closed or ended come from the watch as well.
+  if (failure.status == Status::closed || node_.state().ended) {
+    retry_ns_ = steady_now_ns() + kRetryNs;
+    return;
+  }
+  if (failure.status == Status::limit && let_one_go()) return;
+  const bool passes =
+      failure.status == Status::limit || failure.status == Status::timeout || failure.status == Status::not_connected;
+  if (passes) {
+    retry_ns_ = steady_now_ns() + kRetryNs;
+    if (failure.status == Status::limit && !std::exchange(told_, true)) {
+      say(failure.sentence + "; without it and others that match, trying again once a second");
+    }
+    return;
+  }
+  say(failure.sentence + "; going on without it");
+  const MutexLock lock(mutex_);
+  if (const std::string* wanted = matching_.wanted()) matching_.settle(std::string(*wanted));
+}
+
+bool ServiceFollower::any() const {
+  const MutexLock lock(mutex_);
+  return matching_.any();
+}
+
+void ServiceFollower::fail(Failure failure) {
+  const MutexLock lock(mutex_);
+  failure_ = std::move(failure);
+}
+
+std::optional<Failure> ServiceFollower::failure() const {
+  const MutexLock lock(mutex_);
+  return failure_;
+}
+
+std::map<std::string, std::uint64_t> ServiceFollower::missed() const {
+  const MutexLock lock(mutex_);
+  std::map<std::string, std::uint64_t> counts;
+  for (const auto& [name, subscription] : subscriptions_) counts.emplace(name, subscription.missed());
+  return counts;
+}
+
+bool ServiceFollower::take_lateness(std::string_view name) {
+  const MutexLock lock(mutex_);
+  return matching_.take_lateness(name);
+}
+
+std::vector<std::string> ServiceFollower::news(std::int64_t now_ns) {
+  const MutexLock lock(mutex_);
+  if (vanished_.empty()) return {};
+  return vanished_.news(now_ns);
+}
+
+std::vector<std::string> ServiceFollower::rest() {
+  const MutexLock lock(mutex_);
+  return vanished_.rest();
+}
+
+}  // namespace gimnet::tool
