@@ -25,7 +25,7 @@ IoShard::IoShard(ShardIndex index, const HubShared& shared, Options options)
       flusher_(state_, closer_),
       reader_(state_, closer_),
       attacher_(state_, closer_),
-      keeper_(state_, closer_, flusher_),
+      keeper_(state_, closer_, flusher_, reader_),
       commands_(1),
       options_(options) {
   Waker& waker = *shared.wakers[index.value()];

@@ -5,17 +5,37 @@
 #include <bit>
 
 #include "base/clock.hpp"
-#include "hub/shard/reader.hpp"
 
 namespace gimnet::hub {
 
 void Keeper::tick() {
   if (state_.now_ms < next_tick_at_ms_) return;
+  const std::uint64_t late_ms = state_.now_ms - next_tick_at_ms_;
   next_tick_at_ms_ = state_.now_ms + kTickMs;
   state_.pool.take_back_lent();
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
-    if (connection != nullptr && connection->connected) look_at(*connection);
+    if (connection == nullptr || !connection->connected) continue;
+    if (late_ms > kTickMs) forgive(*connection, late_ms);
+    look_at(*connection);
   }
+}
+
+void Keeper::forgive(Connection& connection, std::uint64_t late_ms) const {
+  // Nothing began later than now, so what began after the tick was due has all its time, and no more.
+  const auto move = [&](std::uint64_t& since_ms) { since_ms = std::min(since_ms + late_ms, state_.now_ms); };
+  if (connection.tail_since_ms != 0) move(connection.tail_since_ms);
+  if (!connection.progress) return;
+  move(connection.progress->since_ms);
+  move(connection.progress->block_since_ms);
+}
+
+bool Keeper::is_silent(Connection& connection) {
+  const auto over = [&] { return state_.now_ms - connection.last_heard_ms >= state_.limits.silent_ms; };
+  if (!over()) return false;
+  // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or more were ready
+  // than are told at a time.
+  reader_.read(connection);
+  return connection.connected && !connection.waits_for_room && over();
 }
 
 int Keeper::next_tick_ms() const {
@@ -41,12 +61,13 @@ void Keeper::look_at(Connection& connection) {
     return closer_.on_broken(connection);
   }
   const bool heard = connection.holds == 0 && !connection.waits_for_room && !connection.draining;
-  if (heard && state_.now_ms - connection.last_heard_ms >= limits.silent_ms) {
+  if (heard && is_silent(connection)) {
     if (connection.write_failed) return closer_.on_broken(connection);
     state_.counters.silent.add(1);
     return closer_.close(connection, proto::GoodbyeCode::silent,
                          "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");
   }
+  if (!connection.connected) return;
   if (heard && connection.tail_since_ms != 0 && state_.now_ms - connection.tail_since_ms >= limits.stalled_frame_ms) {
     state_.counters.stalled_frames.add(1);
     return closer_.close(connection, proto::GoodbyeCode::stalled_frame,
@@ -76,7 +97,7 @@ void Keeper::say_ping(Connection& connection) {
 void Keeper::drain(std::uint64_t deadline_ms) {
   draining_ = true;
   drain_deadline_ms_ = state_.now_ms + deadline_ms;
-  next_tick_at_ms_ = 0;
+  next_tick_at_ms_ = state_.now_ms;
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
     if (connection == nullptr || !connection->connected) continue;
     if (connection->write_failed) {

@@ -2,15 +2,18 @@
 
 #include "hub/shard/closer.hpp"
 #include "hub/shard/flusher.hpp"
+#include "hub/shard/reader.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
 
-/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that waited too long.
+/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that waited too long. Time
+/// in which the shard itself stood still counts against nobody.
 /// Thread safety: one shard.
 class Keeper {
  public:
-  Keeper(ShardState& state, Closer& closer, Flusher& flusher) : state_(state), closer_(closer), flusher_(flusher) {}
+  Keeper(ShardState& state, Closer& closer, Flusher& flusher, Reader& reader)
+      : state_(state), closer_(closer), flusher_(flusher), reader_(reader) {}
 
   /// Between two looks at all connections.
   static constexpr std::uint64_t kTickMs = 100;
@@ -30,11 +33,16 @@ class Keeper {
 
  private:
   void look_at(Connection& connection);
+  /// This shard did nothing for so long: what is asked of the peer within a time began as much later.
+  void forgive(Connection& connection, std::uint64_t late_ms) const;
+  /// Was nothing heard for silent_ms, nor is anything there to read? The connection may be closed by what is.
+  [[nodiscard]] bool is_silent(Connection& connection);
   void say_ping(Connection& connection);
 
   ShardState& state_;
   Closer& closer_;
   Flusher& flusher_;
+  Reader& reader_;
   std::uint64_t next_tick_at_ms_ = 0;
   std::uint64_t drain_deadline_ms_ = 0;
   bool draining_ = false;
