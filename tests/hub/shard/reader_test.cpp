@@ -354,7 +354,7 @@ std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t 
 // A message that goes on in another lane than it began in could not be put together.
 TEST(Reader, MovesARealTimeMessageToLane1WholeOrNotAtAll) {
   Limits limits;
-  limits.lane0_bytes_per_s = 10'000;  // 1,000 in 100 ms
+  limits.lane0_bytes_per_s = 20'280;  // 2,028 in 100 ms: one of the messages
   HubRig rig(1, limits);
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);

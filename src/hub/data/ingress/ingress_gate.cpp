@@ -1,6 +1,7 @@
 #include "hub/data/ingress/ingress_gate.hpp"
 
 #include <algorithm>
+#include <memory>
 
 namespace gimnet::hub {
 namespace {
@@ -8,6 +9,9 @@ namespace {
 /// A node that used up its share of lane 0 gets it back after so long below it.
 constexpr std::uint64_t kDemotionMs = 1'000;
 constexpr std::uint64_t kLane0WindowMs = 100;
+/// A message that was counted when it began may be so much longer with the headers of its fragments. Sent in smaller
+/// ones yet, the rest of it counts once more.
+constexpr std::uint64_t kFrameBytesPerByte = 2;
 
 Admission refuse(IngressState& state, proto::FrameError error) {
   state.error = error;
@@ -79,40 +83,54 @@ Admission IngressGate::check(IngressState& state, const proto::FrameHeader& head
   return frame ? Admission::data : refuse(state, frame.error());
 }
 
-/// A message is moved whole or not at all: its recipient puts together what came in one lane.
-bool IngressGate::follows_to_lane1(IngressState& state, const proto::RunView& view, bool demoting) {
-  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
-  if (!frame || !frame->fragment) return demoting;
-  const proto::FragmentHeader& fragment = *frame->fragment;
-  const auto begin = state.demoted_messages.begin();
-  const auto end = begin + state.demoted_message_count;
-  const auto known = std::find(begin, end, fragment.message);
-  const bool last = fragment.offset + frame->payload.size() == fragment.total;
-  if (fragment.offset == 0) {
-    const bool demote = demoting && state.demoted_message_count < state.demoted_messages.size();
-    if (demote && !last && known == end) state.demoted_messages[state.demoted_message_count++] = fragment.message;
-    return demote;
-  }
-  if (known == end) return false;
-  if (last) {
-    *known = *(end - 1);
-    --state.demoted_message_count;
-  }
-  return true;
-}
+std::uint64_t IngressGate::lane0_window_bytes() const { return limits_.lane0_bytes_per_s * kLane0WindowMs / 1'000; }
 
-void IngressGate::limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms) {
+bool IngressGate::spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms) {
   if (now_ms >= state.lane0_since_ms + kLane0WindowMs) {
     state.lane0_since_ms = now_ms;
     state.lane0_bytes = 0;
   }
-  state.lane0_bytes += view.size;
-  if (state.lane0_bytes > limits_.lane0_bytes_per_s * kLane0WindowMs / 1'000) {
-    state.demoted_until_ms = now_ms + kDemotionMs;
+  state.lane0_bytes += bytes;
+  if (state.lane0_bytes > lane0_window_bytes()) state.demoted_until_ms = now_ms + kDemotionMs;
+  return now_ms < state.demoted_until_ms;
+}
+
+/// A message is moved whole or not at all: its recipient puts together what came in one lane. So all of it counts when
+/// it begins, and what comes of it then has been counted; of a message of which no beginning is known each frame counts
+/// like any other. One that is too much by itself is moved, and counts for nothing.
+bool IngressGate::moves_fragment(IngressState& state, const proto::RunView& view, std::uint64_t now_ms) {
+  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+  if (!frame || !frame->fragment) return spend_lane0(state, view.size, now_ms);
+  const proto::FragmentHeader& fragment = *frame->fragment;
+  const bool last = fragment.offset + frame->payload.size() == fragment.total;
+  if (fragment.offset == 0) {
+    const std::uint64_t all = fragment.total + (view.size - frame->payload.size());
+    const bool moved = all > lane0_window_bytes() || spend_lane0(state, all, now_ms);
+    if (last) return moved;
+    if (!state.real_time_messages) state.real_time_messages = std::make_unique<RealTimeMessages>();
+    state.real_time_messages->begin({.number = fragment.message,
+                                     .known = true,
+                                     .moved = moved,
+                                     .left_bytes = kFrameBytesPerByte * all - view.size});
+    return moved;
   }
-  bool demote = now_ms < state.demoted_until_ms;
-  if (proto::load_header(view.bytes).has(proto::kFlagFragment)) demote = follows_to_lane1(state, view, demote);
-  if (!demote) return;
+  RealTimeMessages::Message* message =
+      state.real_time_messages ? state.real_time_messages->find(fragment.message) : nullptr;
+  if (message == nullptr) return spend_lane0(state, view.size, now_ms);
+  if (message->moved) {
+    message->known = !last;
+    return true;
+  }
+  const bool counted = view.size <= message->left_bytes;
+  if (counted) message->left_bytes -= view.size;
+  message->known = counted && !last;
+  return !counted && spend_lane0(state, view.size, now_ms);
+}
+
+void IngressGate::limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms) {
+  const bool fragment = proto::load_header(view.bytes).has(proto::kFlagFragment);
+  const bool moves = fragment ? moves_fragment(state, view, now_ms) : spend_lane0(state, view.size, now_ms);
+  if (!moves) return;
   for (std::uint32_t done = 0; done < view.size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
     run[done + kLaneOffset] = static_cast<std::byte>(proto::Lane::normal);

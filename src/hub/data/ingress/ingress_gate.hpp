@@ -1,11 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "base/endian.hpp"
 #include "base/ids.hpp"
+#include "hub/data/ingress/real_time_messages.hpp"
 #include "hub/data/tally.hpp"
 #include "hub/limits.hpp"
 #include "proto/frame/frame_error.hpp"
@@ -35,10 +36,8 @@ struct IngressState {
   std::uint64_t lane0_bytes = 0;                      ///< since lane0_since_ms
   std::uint64_t lane0_since_ms = 0;
   std::uint64_t demoted_until_ms = 0;
-  /// Fragmented messages whose first fragment was moved to lane 1: the rest follows it, whatever the rate is by then.
-  std::array<std::uint32_t, 4> demoted_messages{};
-  std::uint8_t demoted_message_count = 0;
-  proto::FrameError error = proto::FrameError::none;  ///< why the last frame was malformed
+  std::unique_ptr<RealTimeMessages> real_time_messages;  ///< nullptr: it has not begun any
+  proto::FrameError error = proto::FrameError::none;     ///< why the last frame was malformed
 };
 
 /// The one gate that every frame from a connection passes, whatever the connection is: is it legal, and does its sender
@@ -73,7 +72,10 @@ class IngressGate {
  private:
   [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms);
   [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header, proto::RunView& view);
-  [[nodiscard]] static bool follows_to_lane1(IngressState& state, const proto::RunView& view, bool demoting);
+  /// Are the frames to be moved to lane 1?
+  [[nodiscard]] bool spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms);
+  [[nodiscard]] bool moves_fragment(IngressState& state, const proto::RunView& view, std::uint64_t now_ms);
+  [[nodiscard]] std::uint64_t lane0_window_bytes() const;
   void limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms);
 
   const Limits& limits_;

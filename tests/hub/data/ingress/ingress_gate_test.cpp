@@ -120,5 +120,79 @@ TEST_F(IngressGateTest, MovesTooMuchRealTimeToTheNormalLane) {
   EXPECT_EQ(lane(), 2);
 }
 
+/// Fragments in lane 0, with 1,000 bytes in 100 ms.
+class RealTimeFragmentTest : public IngressGateTest {
+ protected:
+  RealTimeFragmentTest() { limits.lane0_bytes_per_s = 10'000; }
+  /// The lane of a fragment of so many payload bytes.
+  int lane(std::uint32_t message, std::uint32_t offset, std::uint32_t total, std::uint32_t size) {
+    std::vector<std::byte> header(proto::kFragmentHeaderSize);
+    proto::store_fragment_header(header.data(), {message, offset, total});
+    const std::string text(reinterpret_cast<const char*>(header.data()), header.size());
+    EXPECT_EQ(admit(text + std::string(size, 'x'), {.flags = proto::kFlagFragment, .lane = 0}), Admission::data);
+    return static_cast<int>(last[15]);
+  }
+  void spend_all() {
+    EXPECT_EQ(admit(std::string(1'001 - proto::kHeaderSize, 'x'), {.lane = 0}), Admission::data);
+    EXPECT_EQ(static_cast<int>(last[15]), 1);
+  }
+  static constexpr std::uint32_t kHeaders = proto::kHeaderSize + proto::kFragmentHeaderSize;
+};
+
+TEST_F(RealTimeFragmentTest, AMessageCountsWholeWhenItBegins) {
+  const std::uint32_t total = 1'000 - kHeaders;
+  EXPECT_EQ(lane(1, 0, total, 100), 0) << "exactly the limit";
+  EXPECT_EQ(lane(2, 0, 10, 5), 1) << "beyond it";
+  EXPECT_EQ(lane(1, 100, total, 500), 0) << "was counted";
+  now_ms += 2'000;
+  EXPECT_EQ(lane(2, 5, 10, 5), 1) << "a message is moved whole";
+  EXPECT_EQ(lane(1, 600, total, total - 600), 0);
+  EXPECT_EQ(admit("", {.lane = 0}), Admission::data);
+  EXPECT_EQ(static_cast<int>(last[15]), 0) << "its rest counted for nothing";
+}
+
+TEST_F(RealTimeFragmentTest, AMessageThatIsTooMuchByItselfIsMovedAlone) {
+  const std::uint32_t total = 1'001 - kHeaders;
+  EXPECT_EQ(lane(1, 0, total, 100), 1);
+  EXPECT_EQ(lane(2, 0, 100, 50), 0);
+  EXPECT_EQ(lane(1, 100, total, total - 100), 1);
+  EXPECT_EQ(lane(2, 50, 100, 50), 0);
+}
+
+TEST_F(RealTimeFragmentTest, FragmentsWithoutABeginningCountLikeOtherFrames) {
+  const std::uint32_t size = 500 - kHeaders;
+  EXPECT_EQ(lane(1, 1'000, 1 << 30, size), 0);
+  EXPECT_EQ(lane(1, 2'000, 1 << 30, size), 0) << "exactly the limit";
+  EXPECT_EQ(lane(1, 3'000, 1 << 30, 1), 1) << "beyond it";
+  EXPECT_EQ(tally.lane0_demoted, 1u);
+}
+
+TEST_F(RealTimeFragmentTest, MessagesThatNeverEndKeepNobodysPlace) {
+  spend_all();
+  for (std::uint32_t i = 0; i < 2 * RealTimeMessages::kMessagesMax; ++i) EXPECT_EQ(lane(i, 0, 900, 100), 1);
+  for (std::uint32_t i = 100; i < 110; ++i) {
+    EXPECT_EQ(lane(i, 0, 200, 100), 1);
+    EXPECT_EQ(lane(i, 100, 200, 100), 1);
+  }
+}
+
+TEST_F(RealTimeFragmentTest, NeitherRepeatsNorTinyFragmentsGoForWhatWasCounted) {
+  EXPECT_EQ(lane(1, 0, 200, 100), 0);
+  spend_all();
+  EXPECT_EQ(lane(1, 100, 200, 50), 0);
+  // 2 x 228 bytes may go in all, of which 128 and 78 have.
+  EXPECT_EQ(lane(1, 100, 200, 50), 0);
+  EXPECT_EQ(lane(1, 100, 200, 50), 0);
+  EXPECT_EQ(lane(1, 100, 200, 50), 0);
+  EXPECT_EQ(lane(1, 100, 200, 50), 1);
+  EXPECT_EQ(lane(1, 150, 200, 50), 1);
+}
+
+TEST_F(RealTimeFragmentTest, AMessageOfOneFragmentIsAFrame) {
+  EXPECT_EQ(lane(1, 0, 500 - kHeaders, 500 - kHeaders), 0);
+  EXPECT_EQ(lane(2, 0, 500 - kHeaders, 500 - kHeaders), 0) << "exactly the limit";
+  EXPECT_EQ(lane(3, 0, 1, 1), 1) << "beyond it";
+}
+
 }  // namespace
 }  // namespace gimnet::hub
