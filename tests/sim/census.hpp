@@ -111,6 +111,8 @@ enum class Happening : std::uint8_t {
   group_of_another,
   service_frame_delivered,
   service_frame_refused,
+  frame_stalled,
+  connection_clogged,
   shard_paused,
   conductor_paused,
   slow_reader,

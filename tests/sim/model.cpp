@@ -122,7 +122,10 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   const Verdict verdict = judge(hello);
   const std::uint32_t index = index_of(attach.node);
   if (verdict.refusal) {
-    broken(checker_of(*verdict.refusal, verdict.refusal),
+    // Its own name stands in nobody's way whose token counts: the hub took one that does not.
+    const bool by_token =
+        *verdict.refusal == GoodbyeCode::name_taken && !attach.new_session && verdict.session != index;
+    broken(by_token ? Checker::tokens : checker_of(*verdict.refusal, verdict.refusal),
            "a HELLO for the name " + quoted(hello.hello.name) + " is let in as node " + std::to_string(index) +
                ", where " + proto::goodbye_name(*verdict.refusal) + " is due");
   }

@@ -3,6 +3,13 @@
 #include <algorithm>
 
 namespace gimnet::sim {
+namespace {
+
+/// The kernel's least time until it sends again what was lost (Linux, TCP_RTO_MIN). What comes after it waits for it.
+constexpr Time kResendAfter = std::chrono::milliseconds{200};
+constexpr Time kClogMost = std::chrono::seconds{5};
+
+}  // namespace
 
 WirePointer Network::dial(std::uint32_t node) {
   auto wire = std::make_shared<Wire>();
@@ -12,9 +19,24 @@ WirePointer Network::dial(std::uint32_t node) {
 }
 
 Time Network::arrival(Time& next) {
-  const Time delay{setting_.random.between(20, static_cast<std::uint64_t>(setting_.plan.latency_most.count()))};
-  next = std::max(next, setting_.agenda.now() + delay);
+  next = std::max(next, setting_.agenda.now() + time_under_way());
   return next;
+}
+
+Time Network::time_under_way() {
+  const Time delay{setting_.random.between(20, static_cast<std::uint64_t>(setting_.plan.latency_most.count()))};
+  const Time now = setting_.agenda.now();
+  if (now >= setting_.plan.faults_until) return delay;
+  if (setting_.random.chance(setting_.plan.clog)) {
+    setting_.census.add(Happening::connection_clogged);
+    const Time clogged{setting_.random.between(0, static_cast<std::uint64_t>(kClogMost.count()))};
+    return delay + std::min(clogged, setting_.plan.faults_until - now);
+  }
+  if (setting_.random.chance(setting_.plan.stall)) {
+    setting_.census.add(Happening::frame_stalled);
+    return delay + kResendAfter;
+  }
+  return delay;
 }
 
 void Network::to_hub(const WirePointer& wire, Bytes frame) {

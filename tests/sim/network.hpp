@@ -75,6 +75,8 @@ class Network {
   void close_by_hub(const WirePointer& wire);
 
  private:
+  /// How long a frame is under way; what the faults of the network add to that.
+  [[nodiscard]] Time time_under_way();
   Setting& setting_;
   Ends ends_;
   std::uint64_t last_ = 0;

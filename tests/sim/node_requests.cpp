@@ -178,7 +178,8 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
 
 void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload) {
   if (operation == ns::WatchEvents::kOperation) {
-    on_watch_events(payload);
+    // Its watch ended with the connection; what that one still brings is older than what the next one told.
+    if (wire_ != nullptr && &from == &link()) on_watch_events(payload);
   } else if (operation == ns::ServiceMoved::kOperation) {
     const auto event = proto::decode<ns::ServiceMoved>(payload);
     require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");

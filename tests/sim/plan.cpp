@@ -65,7 +65,7 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.acts_ms = static_cast<std::uint32_t>(random.between(400, 1'500));
   plan.faults_until = 6s;
   plan.end = plan.faults_until + std::chrono::milliseconds{3 * plan.limits.grace_ms + plan.limits.silent_ms} + 5s;
-  plan.latency_most = Time{random.between(200, 30'000)};
+  plan.latency_most = Time{random.between(200, 100'000)};
   plan.crash = sometimes(random, 40);
   plan.vanish = sometimes(random, 30);
   plan.hang = sometimes(random, 30);
@@ -85,6 +85,8 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.terms = sometimes(random, 500);
   plan.late_credit = sometimes(random, 900);
   plan.queue_messages = random.between(2, 64);
+  plan.stall = sometimes(random, 300);
+  plan.clog = sometimes(random, 20);
   plan.shard_pause = sometimes(random, 5);
   plan.conductor_pause = sometimes(random, 5);
   plan.disk_full = sometimes(random, 500);

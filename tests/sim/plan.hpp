@@ -46,6 +46,8 @@ struct Plan {
   std::uint64_t terms = 0;              ///< of subscriptions: they want less than all
   std::uint64_t late_credit = 0;        ///< of messages of sync services
   std::uint64_t queue_messages = 0;     ///< of services, that wait for a node at most
+  std::uint64_t stall = 0;              ///< of frames: they were lost and sent again
+  std::uint64_t clog = 0;               ///< of frames: nothing passes the connection for a while
   std::uint64_t shard_pause = 0;        ///< of turns
   std::uint64_t conductor_pause = 0;
   std::uint64_t disk_full = 0;   ///< of times that the hub keeps its state
@@ -60,7 +62,7 @@ struct Fault {
   std::string_view name;
   std::uint64_t Plan::* likelihood;
 };
-inline constexpr std::array<Fault, 25> kFaults = {{
+inline constexpr std::array<Fault, 27> kFaults = {{
     {"hub_kills", &Plan::hub_kills},
     {"hub_drains", &Plan::hub_drains},
     {"crash", &Plan::crash},
@@ -81,6 +83,8 @@ inline constexpr std::array<Fault, 25> kFaults = {{
     {"retain", &Plan::retain},
     {"terms", &Plan::terms},
     {"late_credit", &Plan::late_credit},
+    {"stall", &Plan::stall},
+    {"clog", &Plan::clog},
     {"shard_pause", &Plan::shard_pause},
     {"conductor_pause", &Plan::conductor_pause},
     {"disk_full", &Plan::disk_full},
