@@ -252,7 +252,7 @@ typedef struct nif_outgoing {
  *  NIF_TIMEOUT: nothing was sent; if the message is over 8 KiB and had begun, its receiver counts it as lost (the
  * sentence says so). NIF_NOT_CONNECTED: broken, and not dialing again or no resume. NIF_REPLACED. NIF_TOO_LARGE: over 1
  * GiB, or refused by the receiver. NIF_NOT_DELIVERED: a fragmented message that the hub reported undeliverable.
- *  NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */
+ *  NIF_REFUSED: to the group of a service that the hub did not take again. NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */
 nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms);
 
 /** nif_send() of one piece to one node in the normal lane, with the default policy, without a time limit. */
@@ -284,7 +284,8 @@ typedef enum nif_incoming_type {
   /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so many messages].
    * `cut_message`: a part did not come, or the connection broke before it. `too_large`. With `link_lost` the count is
    * of frames, of which a large message has many, or NIF_COUNT_UNKNOWN: they had left a resume buffer unconfirmed when
-   * the connection broke, that of the hub or, from the own id, of this node. */
+   * the connection broke, that of the hub or, from the own id, of this node. `no_such_group`, from the own id: so many
+   * frames to own services had waited over a break, and the hub did not take their services again. */
   NIF_GAP = 2,
   /** Connected again after a break [from: own node id; flags: NIF_CONNECTED_*]. The library declares services and
    * subscriptions again by itself. Not delivered for the first connection, which nif_connect() made. */
@@ -303,7 +304,8 @@ typedef enum nif_incoming_type {
    * group. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
-   *  it; reason: nif_status)]. Send to the new id from now on. */
+   *  it; reason: nif_status)]. Send to the new id from now on; what waited for the connection goes there, and what is
+   * still sent to the former id, unless another own service has that. */
   NIF_OWN_SERVICE_MOVED = 9,
   /** Something that a watch of this node is about [watched; text and reason: why the hub ended it, if
    * NIF_WATCH_ENDED]. */

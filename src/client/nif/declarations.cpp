@@ -21,6 +21,13 @@ Declarations::~Declarations() {
   for (const Item& item : events_) item.storage->release();
 }
 
+void Declarations::enter_group(Service& service, GroupId group) {
+  for (auto& [name, other] : services_) {
+    if (other.group == GroupId{} && other.last_group == group) other.last_group = GroupId{};
+  }
+  service.group = service.last_group = group;
+}
+
 void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
   const MutexLock lock(mutex_);
   Service& own = services_[service.service];
@@ -29,7 +36,8 @@ void Declarations::add_service(const proto::ns::Advertise& service, GroupId grou
     own.last_due = false;
   }
   own.request = service;
-  own.group = group;
+  enter_group(own, group);
+  outbound_.move_group({.former = 0, .now = group.value()});
   own.ended = false;
   if (service.retain) {
     outbound_.follow_retained(service.service, group.value());
@@ -43,6 +51,7 @@ void Declarations::remove_service(GroupId group) {
   std::erase_if(services_, [&](const auto& entry) {
     const bool ends = entry.second.group == group;
     if (ends) outbound_.forget_retained(entry.first);
+    if (ends) outbound_.forget_group(group.value());
     return ends;
   });
 }
@@ -58,6 +67,7 @@ std::optional<GroupId> Declarations::end_service(const std::string& service) {
   const auto found = services_.find(service);
   if (found == services_.end() || found->second.ended) return std::nullopt;
   outbound_.forget_retained(service);
+  outbound_.forget_group(found->second.last_group.value());
   const GroupId group = found->second.group;
   found->second.ended = true;
   if (group == GroupId{} && !found->second.asked) services_.erase(found);
@@ -101,8 +111,9 @@ void Declarations::declare_again(bool forgotten) {
     }
     for (const auto& [name, subscription] : subscriptions_) subscriptions_due_.push_back(name);
   }
-  declaring_ = !services_due_.empty();
-  outbound_.set_declaring(declaring_);
+  declaring_ = true;
+  outbound_.set_declaring(true);
+  if (services_due_.empty()) end_declaring();
   go_on();
 }
 
@@ -115,10 +126,19 @@ void Declarations::go_on() {
     if (!declare_subscription(subscriptions_due_.front())) return;
     subscriptions_due_.pop_front();
   }
-  if (declaring_ && under_way_ == 0) {
-    declaring_ = false;
-    outbound_.set_declaring(false);
-  }
+  if (declaring_ && under_way_ == 0) end_declaring();
+}
+
+void Declarations::end_declaring() {
+  declaring_ = false;
+  const std::uint64_t lost = outbound_.set_declaring(false);
+  if (lost == 0) return;
+  const std::string reason = proto::drop_reason_name(proto::DropReason::no_such_group);
+  Record* record = make_event(NIF_GAP, reason);
+  record->incoming.from = outbound_.id();
+  record->incoming.count = lost;
+  record->incoming.reason = static_cast<std::uint32_t>(proto::DropReason::no_such_group);
+  events_.push_back(item_of(record, reason.size()));
 }
 
 void Declarations::answered() {
@@ -175,6 +195,15 @@ bool Declarations::declare_subscription(const std::string& full_name) {
   return true;
 }
 
+/// What waits for the service goes where it is now.
+void Declarations::follow_group(Service& service) {
+  const GroupId former = service.last_group;
+  const bool reused = std::ranges::any_of(
+      services_, [&](const auto& entry) { return &entry.second != &service && entry.second.group == former; });
+  outbound_.move_group({former.value(), service.group.value(), reused});
+  if (service.group != GroupId{}) enter_group(service, service.group);
+}
+
 /// Before answered(), which lets newer messages go: they are behind it in the queue.
 void Declarations::bring_last(const std::string& name, Service& service, bool moved) {
   outbound_.follow_retained(name, service.group.value());
@@ -199,8 +228,9 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
         services_.erase(found);
       } else if (found->second.ended) {
         services_due_.push_back(service);
-      } else if (found->second.request.retain) {
-        bring_last(service, found->second, changed);
+      } else {
+        follow_group(found->second);
+        if (found->second.request.retain) bring_last(service, found->second, changed);
       }
     }
   }

@@ -56,6 +56,7 @@ class Declarations {
   struct Service {
     proto::ns::Advertise request;
     GroupId group;
+    GroupId last_group;     ///< while the hub refuses it: the one that it had before, unless another one has that
     bool last_due = false;  ///< retained, and the hub may not have the last message
     bool asked = false;     ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
     bool ended = false;     ///< for the program, and the hub may still have it
@@ -70,6 +71,9 @@ class Declarations {
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  void enter_group(Service& service, GroupId group) GIMNET_REQUIRES(mutex_);
+  void follow_group(Service& service) GIMNET_REQUIRES(mutex_);
+  void end_declaring();
   void bring_last(const std::string& name, Service& service, bool moved) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_subscribed(GroupId group) const GIMNET_REQUIRES(mutex_);
   void answered();

@@ -32,6 +32,16 @@ struct FrameRun {
   [[nodiscard]] proto::FrameHeader first_header() const { return proto::load_header(bytes()); }
   [[nodiscard]] std::size_t first_size() const { return first_header().frame_size(); }
 
+  template <class Change>
+  void change_headers(Change change) {
+    for (std::size_t at = 0; at < size();) {
+      proto::FrameHeader header = proto::load_header(bytes() + at);
+      change(header);
+      proto::store_header(bytes() + at, header);
+      at += header.frame_size();
+    }
+  }
+
   /// Takes `count` frames of `size` bytes together from the front into a run of their own.
   /// REQUIRES: they are there.
   FrameRun split(std::size_t size, std::uint32_t count) {

@@ -138,6 +138,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   std::copy(admitted.rest.begin(), admitted.rest.end(), space.begin());
   if (!first) {
     declarations_.declare_again(!session_.resumed || *let_go > 0);
+    received_.push(declarations_.take_events());
     watches_.declare_again();
   }
   const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), {wall_now_ns(), steady_now_ns()});

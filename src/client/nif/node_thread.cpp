@@ -73,6 +73,7 @@ void Node::turn() {
     take_new_name();
     declarations_.go_on();
     watches_.go_on();
+    received_.push(declarations_.take_events());
   }
   call_back();
 }

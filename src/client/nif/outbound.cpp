@@ -155,7 +155,7 @@ void Outbound::detach(bool again) {
   queue_.disconnect();
   pauses_.clear();
   if (!again || !queue_.resume()) {
-    lost_ |= !queue_.all_written() || queue_.retained_bytes() > 0;
+    lost_ |= !queue_.all_written() || queue_.parked_bytes() > 0 || queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
   }
   changed_.notify_all();
@@ -221,10 +221,33 @@ void Outbound::send_last_again(const std::string& service) {
   write_or_leave(false);
 }
 
-void Outbound::set_declaring(bool declaring) {
+std::uint64_t Outbound::set_declaring(bool declaring) {
   const MutexLock lock(mutex_);
   declaring_ = declaring;
-  if (!declaring) notify_waiting();
+  if (declaring) {
+    moves_.begin();
+    return 0;
+  }
+  const std::uint64_t lost = queue_.drop_parked();
+  lost_ |= lost > 0;
+  notify_waiting();
+  return lost;
+}
+
+void Outbound::move_group(const GroupMoves::Move& move) {
+  const MutexLock lock(mutex_);
+  moves_.add(move);
+  if (move.former != 0 && move.now != 0 && queue_.release_group(move.former, move.now)) write_or_leave(false);
+}
+
+void Outbound::forget_group(std::uint32_t group) {
+  const MutexLock lock(mutex_);
+  moves_.forget(group);
+}
+
+std::uint32_t Outbound::id() {
+  const MutexLock lock(mutex_);
+  return id_;
 }
 
 void Outbound::on_pause(const proto::flow::Target& target) {
@@ -322,7 +345,7 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.bytes_sent = bytes_sent_;
   counters.write_calls = write_calls_;
   counters.pauses = pause_count_;
-  counters.send_queue_bytes = queue_.unsent_bytes();
+  counters.send_queue_bytes = queue_.unsent_bytes() + queue_.parked_bytes();
   counters.retained_bytes = queue_.retained_bytes();
   counters.last_messages_not_kept = last_.not_kept();
 }

@@ -11,6 +11,7 @@
 
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/group_moves.hpp"
 #include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
@@ -84,8 +85,15 @@ class Outbound {
   /// Sends the last message of a retained service, of which the hub may know nothing, behind what waits in its lane,
   /// unless a newer one goes on that had begun. Does not wait for room.
   void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
-  /// GROUP messages wait until the services are declared again.
-  void set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
+  /// GROUP messages wait until the services are declared again. Returns how many frames that had been accepted before a
+  /// break have no service any more, and are lost.
+  std::uint64_t set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
+  /// An own service has another group, or (`now` 0) none: what waits for it goes there, and so does what a program
+  /// still sends to the former one.
+  void move_group(const GroupMoves::Move& move) GIMNET_EXCLUDES(mutex_);
+  /// The own service that has the group ended.
+  void forget_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::uint32_t id() GIMNET_EXCLUDES(mutex_);
 
   void on_pause(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
@@ -120,8 +128,10 @@ class Outbound {
   [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_pieces(Outgoing& message, InProgress& progress, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status wait_for_turn(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+  [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size, const InProgress* own,
                                          Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+                                                Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
@@ -167,6 +177,7 @@ class Outbound {
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
+  GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);
 
   bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered

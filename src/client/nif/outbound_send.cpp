@@ -141,13 +141,29 @@ void Outbound::probe(const InProgress& own) {
 }
 
 /// Waits until a frame of the message may enter the queue. `own`: the message is under way already.
-nif_status Outbound::wait_for_turn(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size, const InProgress* own,
                                    Deadline deadline) {
+  if (own != nullptr) return wait_until_it_may_go(message, frame_size, own, deadline);
+  if (!message.is_group()) return wait_until_it_may_go(message, frame_size, own, deadline);
+  moves_.redirect(message);
+  if (!moves_.refuses(message.parts().header.dst) && may_go(message, frame_size, own)) return NIF_OK;
+  moves_.enter(message);
+  const nif_status status = wait_until_it_may_go(message, frame_size, own, deadline);
+  moves_.leave(message);
+  return status;
+}
+
+nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own,
+                                          Deadline deadline) {
   std::int64_t probe_at = 0;
   for (;;) {
     if (state_ == State::ended || (state_ == State::away && !queue_.resume())) return not_connected();
     if (own != nullptr) {
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
+    }
+    const bool settled = state_ == State::connected && !declaring_;
+    if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
+      return fail(NIF_REFUSED, "the hub did not take the service again, after a break or another name");
     }
     if (may_go(message, frame_size, own)) return NIF_OK;
     // What NIF_FLAG_MORE held back, or was left to the library's thread, goes before anybody waits for room.
@@ -277,7 +293,8 @@ nif_status Outbound::drain(Deadline deadline) {
       return fail(NIF_NOT_CONNECTED,
                   "the connection was lost before everything was confirmed; some of it may not have arrived");
     }
-    if (queue_.all_written() && !writing_ && queue_.retained_bytes() == 0) return NIF_OK;
+    const bool nothing_waits = queue_.all_written() && queue_.parked_bytes() == 0 && !writing_;
+    if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
     if (write_here() || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {
       return fail(NIF_TIMEOUT, "not everything was written and confirmed within the time given");

@@ -94,6 +94,11 @@ std::optional<Failure> Outgoing::read(const nif_outgoing& message) {
   return std::nullopt;
 }
 
+void Outgoing::redirect(std::uint32_t dst) {
+  parts_.header.dst = dst;
+  stream_ = stream_code(parts_.header.kind, parts_.header.lane, dst);
+}
+
 bool Outgoing::replaceable() const {
   return parts_.header.policy() == proto::Policy::latest && parts_.header.kind != proto::Kind::list &&
          size_ <= proto::kUncutMessageMax;

@@ -30,6 +30,9 @@ class Outgoing {
   /// LATEST, and small enough to be replaced whole in the send queue.
   [[nodiscard]] bool replaceable() const;
   [[nodiscard]] bool more() const { return more_; }
+  [[nodiscard]] bool is_group() const { return parts_.header.kind == proto::Kind::group; }
+  /// It is for that destination now.
+  void redirect(std::uint32_t dst);
   [[nodiscard]] bool reported() const { return parts_.header.has(proto::kFlagReport); }
 
   /// Writes one frame with the payload bytes from `offset` on; `frame` has exactly its size.

@@ -235,15 +235,11 @@ std::optional<std::uint64_t> SendQueue::resume_from(std::uint64_t peer_taken) {
 
 void SendQueue::set_source(std::uint32_t src) {
   const auto change = [src](FrameRun& run) {
-    for (std::size_t at = 0; at < run.size();) {
-      proto::FrameHeader header = proto::load_header(run.bytes() + at);
-      header.src = src;
-      proto::store_header(run.bytes() + at, header);
-      at += header.frame_size();
-    }
+    run.change_headers([src](proto::FrameHeader& header) { header.src = src; });
   };
   std::for_each(resend_.begin(), resend_.end(), change);
   for (Runs& runs : lanes_) std::for_each(runs.begin(), runs.end(), change);
+  parked_.set_source(src);
 }
 
 void SendQueue::restart(std::uint32_t src) {
@@ -255,12 +251,26 @@ void SendQueue::restart(std::uint32_t src) {
     resend_.pop_back();
     lanes_[run.lane].push_front(std::move(run));
   }
+  // Runs change their places: what was to be replaced goes as it is.
+  latest_.clear();
+  for (Runs& runs : lanes_) {
+    for (FrameRun& run : runs) run.sort = FrameRun::Sort::data;
+  }
+  const std::size_t parked_before = parked_.bytes();
+  parked_.take_from(lanes_);
+  unsent_bytes_ -= parked_.bytes() - parked_before;
   set_source(src);
+}
+
+bool SendQueue::release_group(std::uint32_t former, std::uint32_t now) {
+  const std::size_t bytes = parked_.give_back(former, now, lanes_);
+  unsent_bytes_ += bytes;
+  return bytes > 0;
 }
 
 std::uint64_t SendQueue::drop_all() {
   disconnect();
-  std::uint64_t frames = 0;
+  std::uint64_t frames = parked_.drop();
   for (const FrameRun& run : resend_) frames += run.frames;
   resend_.clear();
   for (Runs& runs : lanes_) {

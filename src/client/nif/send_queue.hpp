@@ -10,6 +10,7 @@
 
 #include "client/nif/chunk_pool.hpp"
 #include "client/nif/frame_run.hpp"
+#include "client/nif/parked_frames.hpp"
 #include "client/nif/retained_frames.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -65,6 +66,8 @@ class SendQueue {
 
   /// Bytes that wait to be written.
   [[nodiscard]] std::size_t unsent_bytes() const { return unsent_bytes_; }
+  /// Bytes that wait for their services to be declared again.
+  [[nodiscard]] std::size_t parked_bytes() const { return parked_.bytes(); }
   [[nodiscard]] std::size_t retained_bytes() const { return retained_.bytes(); }
   [[nodiscard]] bool all_written() const { return unsent_bytes_ == 0; }
   [[nodiscard]] std::uint64_t frames_written() const { return frames_written_; }
@@ -80,8 +83,14 @@ class SendQueue {
   /// The peer took `peer_taken` frames of this epoch: what came after goes out again, first. Returns how many frames
   /// were let go and are to be announced by SKIP; nothing: the count is impossible.
   [[nodiscard]] std::optional<std::uint64_t> resume_from(std::uint64_t peer_taken);
-  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait stay.
+  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait stay; GROUP frames are
+  /// parked until their services are declared again.
   void restart(std::uint32_t src);
+  /// The service that had the group `former` has `now`: what is parked for it goes, before what waits in its lane.
+  /// False: there is nothing.
+  bool release_group(std::uint32_t former, std::uint32_t now);
+  /// What is parked has no service any more. Returns how many frames.
+  std::uint64_t drop_parked() { return parked_.drop(); }
   /// All that goes out from now on, again or for the first time, is from this node id. After resume_from().
   void set_source(std::uint32_t src);
   /// Everything that waits and everything unconfirmed goes. Returns frames that waited.
@@ -97,7 +106,7 @@ class SendQueue {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  using Runs = std::deque<FrameRun>;  ///< Limit: has_room(), and what LastMessages keeps
+  using Runs = ParkedFrames::Runs;  ///< Limit: has_room(), what LastMessages keeps, and what was parked
 
   [[nodiscard]] Place allocate(std::size_t size);
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;
@@ -114,9 +123,11 @@ class SendQueue {
   std::shared_ptr<Chunk> open_chunk_;
   Runs control_;
   Runs resend_;  ///< written on an earlier connection, or cut by a break: in the order of their counts
-  std::array<Runs, proto::kLaneCount> lanes_;
+  ParkedFrames::Lanes lanes_;
   std::array<std::size_t, proto::kLaneCount> passed_over_{};  ///< bytes that went while the lane waited
   std::unordered_map<LatestStream, FrameRun*, StreamHash> latest_;
+
+  ParkedFrames parked_;
 
   Runs staged_;                    ///< gathered; outside a write at most the rest of one frame
   std::size_t staged_bytes_ = 0;   ///< without what was written of the first
