@@ -190,6 +190,17 @@ class Reload(Case):
         self.assertEqual(self.ctl("reload").code, 1)
         self.assertEqual(run_gimnet(hub, "pub", "robot/odom", data=b"x\n").code, 1)
 
+    def test_of_many_faults_whole_ones_are_told_and_how_many_there_are(self):
+        hub = self.configured("")
+        self.file.write_text("".join(f"k{i} = 1\n" for i in range(60)))
+        refused = self.ctl("reload")
+        self.assertEqual(refused.code, 1)
+        lines = refused.err.rstrip("\n").split("\n")
+        self.assertTrue(all(line.startswith(f"{self.file}:") and line.endswith("shows all)") for line in lines[1:-1]))
+        self.assertEqual(lines[-1], f"and {62 - len(lines)} more faults: the hub's log tells all of them, and so does "
+                                    "tcphub --check-config")
+        wait_until(lambda: hub.process.err.count("there is no key 'k") == 60, "each of them in the log")
+
     def test_without_descriptors_it_says_so_and_changes_nothing(self):
         hub = self.configured("[limits]\nservices_per_node = 10\n")
         more = self.file.parent / "conf.d"

@@ -11,7 +11,7 @@ Reloading Reloader::read_again() {
   Reloading reloading;
   ReadConfiguration read = read_configuration(sources_, kReloadFaultsMax);
   for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
-  if (read.more_faults) reloading.faults.emplace_back("there are more faults; tcphub --check-config tells all of them");
+  reloading.more_faults = read.more_faults;
   if (!reloading.faults.empty()) return reloading;
   for (const Fault& warning : read.warnings) log_warning(warning.text());
   // A file that appeared in a default place is the hub's from now on, and must not go unnoticed.

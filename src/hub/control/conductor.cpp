@@ -277,6 +277,7 @@ Reloading Conductor::reload() {
   if (wiring_.read_again) reloading = wiring_.read_again();
   if (!wiring_.read_again) reloading.faults.emplace_back("this hub has no configuration that could be read again");
   for (const std::string& fault : reloading.faults) log_error(fault);
+  if (reloading.more_faults) log_error("there are more faults; tcphub --check-config tells all of them");
 #ifdef GIMNET_BUG_BAD_CONFIGURATION_TAKEN
   if (!reloading.faults.empty()) limits_ = reloading.limits;
 #endif

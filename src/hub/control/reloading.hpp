@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ struct Reloading {
   };
 
   std::vector<std::string> faults;  ///< a line each; where there is one, nothing changes
+  bool more_faults = false;         ///< there are others beside `faults`
   std::vector<Change> changes;
   Limits limits;  ///< to be in force: those that need a restart are as before
   LogLevel log_level = LogLevel::info;
@@ -30,5 +32,9 @@ using ReadAgain = std::function<Reloading()>;
 
 /// One line for the log: the keys that changed, and those that need a restart.
 [[nodiscard]] std::string reload_summary(const Reloading& reloading);
+
+/// What an administrator is told of a configuration that was not taken: as many whole faults as `bytes_max` have room
+/// for, a line each, and how many more there are and where. REQUIRES: there are faults; bytes_max >= 256.
+[[nodiscard]] std::string reload_refusal(const Reloading& reloading, std::size_t bytes_max);
 
 }  // namespace gimnet::hub

@@ -5,6 +5,7 @@
 #include "base/id_text.hpp"
 #include "base/suggest.hpp"
 #include "proto/control/ctrl.hpp"
+#include "proto/control/fields.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -78,9 +79,7 @@ Result<ctrl::ReloadAnswer, Refusal> reload(HandlerContext& context) {
   }
   const Reloading reloading = context.administration->reload();
   if (!reloading.faults.empty()) {
-    std::string sentence = "nothing was changed, the former configuration stays in force";
-    for (const std::string& fault : reloading.faults) sentence += "\n" + fault;
-    return Refusal{Status::bad_request, std::move(sentence)};
+    return Refusal{Status::bad_request, reload_refusal(reloading, proto::kSentenceBytesMax)};
   }
   ctrl::ReloadAnswer answer;
   PageBudget budget(context.limits, ctrl::kPageRecordsDefault);

@@ -369,6 +369,19 @@ TEST_F(AdministerTest, ABadConfigurationChangesNothing) {
   EXPECT_THAT(shards.all<LimitsCommand>(), SizeIs(0));
 }
 
+TEST_F(AdministerTest, OfAConfigurationWithManyFaultsWholeOnesAreTold) {
+  read_again = [] {
+    Reloading reloading;
+    reloading.faults.assign(100, "hub.toml:3:10: shards cannot be '99': give a whole number from 1 to 16");
+    reloading.more_faults = true;
+    return reloading;
+  };
+  const std::string said = refused(admin_, ctrl::Reload{}).sentence;
+  EXPECT_THAT(said, ::testing::MatchesRegex(
+                        ".* stays in force(\nhub.toml:3:10: shards cannot be '99': give a whole number from 1 to 16)+"
+                        "\nand at least [0-9]+ more faults: tcphub --check-config tells all of them"));
+}
+
 TEST_F(AdministerTest, SetsTheLogLevelAndTellsTheOneBefore) {
   EXPECT_EQ(request(admin_, ctrl::SetLogLevel{"error"})->before, "off");
   EXPECT_EQ(log_level(), LogLevel::error);
