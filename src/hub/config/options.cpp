@@ -8,6 +8,7 @@
 
 #include "base/option_words.hpp"
 #include "base/suggest.hpp"
+#include "hub/config/config_text.hpp"
 #include "hub/version.hpp"
 
 namespace gimnet::hub {
@@ -166,7 +167,7 @@ std::string checked(const CommandLine& line) {
 }
 
 std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLine line) {
-  ReadConfiguration read = read_configuration(line.sources);
+  ReadConfiguration read = read_configuration(line.sources, {.pipe_patience = kPipePatience});
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
@@ -174,7 +175,8 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
     return ending;
   }
   // Read again it is the same file, or an error: a hub does not lose its configuration because a file went.
-  if (line.sources.file.empty() && !read.files.empty()) line.sources.file = read.files.front();
+  line.sources.file = read.place.file;
+  line.sources.parts_alone = read.place.parts_alone;
   for (const Fault& warning : read.warnings) line.warnings.push_back(warning.text());
   line.configuration = std::move(read.configuration);
   line.files = std::move(read.files);

@@ -9,13 +9,14 @@ namespace gimnet::hub {
 
 Reloading Reloader::read_again() {
   Reloading reloading;
-  ReadConfiguration read = read_configuration(sources_, kReloadFaultsMax);
+  ReadConfiguration read = read_configuration(sources_, {.faults_max = kReloadFaultsMax});
   for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
   reloading.more_faults = read.more_faults;
   if (!reloading.faults.empty()) return reloading;
   for (const Fault& warning : read.warnings) log_warning(warning.text());
-  // A file that appeared in a default place is the hub's from now on, and must not go unnoticed.
-  if (sources_.file.empty() && !read.files.empty()) sources_.file = read.files.front();
+  // A file that appeared in a default place is the hub's from now on, and must not go unnoticed when it goes.
+  sources_.file = read.place.file;
+  sources_.parts_alone = read.place.parts_alone;
   const HubOptions& wanted = read.configuration.options;
   for (const Setting& setting : settings()) {
     std::string from = setting.show(in_force_);

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <string_view>
 #include <system_error>
@@ -15,6 +13,7 @@
 
 #include "base/log.hpp"
 #include "base/suggest.hpp"
+#include "hub/config/config_text.hpp"
 #include "hub/config/toml_file.hpp"
 
 namespace gimnet::hub {
@@ -77,41 +76,6 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   return given;
 }
 
-/// What to do about it; `otherwise` where it is not that the process has no descriptor left.
-std::string remedy(const std::error_code& error, const std::string& otherwise) {
-  const bool shortage = error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system;
-  if (!shortage) return "; " + otherwise;
-  return "; there is no descriptor left to read it with: raise the limit (ulimit -n) or let a node go, then try again";
-}
-
-/// The whole file, or why it cannot be had.
-struct FileText {
-  std::string text;
-  std::string error;
-};
-
-FileText no_text(const std::error_code& error) {
-  return {{}, error.message() + remedy(error, "give the path of a TOML file with --config")};
-}
-
-FileText read_file(const std::string& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (error || !fs::exists(status)) {
-    return no_text(error ? error : std::error_code{ENOENT, std::generic_category()});
-  }
-  if (fs::is_directory(status)) return {{}, "it is a folder; give the path of a TOML file with --config"};
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return no_text({errno != 0 ? errno : EIO, std::generic_category()});
-  FileText file;
-  file.text.resize(kConfigBytesMax + 1);
-  stream.read(file.text.data(), static_cast<std::streamsize>(file.text.size()));
-  if (stream.bad()) return no_text({EIO, std::generic_category()});
-  file.text.resize(static_cast<std::size_t>(stream.gcount()));
-  return file;
-}
-
 /// Line and column of a place.
 std::pair<std::size_t, std::size_t> position_in(const std::string& place) {
   const std::size_t column = place.rfind(':');
@@ -132,16 +96,16 @@ void sort(Faults& faults) {
   for (std::size_t i = 0; i < faults.size(); ++i) faults[i] = std::move(placed[i].second);
 }
 
-void read_one(const std::string& path, std::size_t faults_max, ReadConfiguration& read) {
+void read_one(const std::string& path, const ReadOptions& how, ReadConfiguration& read) {
   if (read.more_faults) return;
-  const FileText file = read_file(path);
+  const ConfigText file = read_config_text(path, how.pipe_patience);
   read.files.push_back(path);
   if (!file.error.empty()) {
     read.faults.push_back({path, "cannot read this file: " + file.error});
     return;
   }
   // One more than is told, to know whether there are more.
-  const std::size_t most = faults_max - std::min(faults_max, read.faults.size());
+  const std::size_t most = how.faults_max - std::min(how.faults_max, read.faults.size());
   TomlFile toml = read_toml(file.text, path, most + 1);
   Faults faults = std::move(toml.faults);
   for (const Given& given : toml.keys) {
@@ -166,11 +130,13 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
     return files;
   }
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().extension() == ".toml") files.push_back(entry->path().string());
+    // Hidden ones are no members: editors put their locks and copies beside a file.
+    const bool hidden = entry->path().filename().native().starts_with('.');
+    if (entry->path().extension() == ".toml" && !hidden) files.push_back(entry->path().string());
   }
   if (error) {
     faults.push_back(
-        {folder.string(), "cannot read this folder: " + error.message() + remedy(error, "give it rights")});
+        {folder.string(), "cannot read this folder: " + error.message() + remedy_of(error, "give it rights")});
   }
   std::ranges::sort(files);
   if (files.size() > kConfigFilesMax) {
@@ -181,11 +147,19 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
   return files;
 }
 
-/// The first of the default places where there is a file; "": none.
-std::string file_in_default_place() {
+std::vector<std::string> parts_beside(const ConfigPlace& place, Faults& faults) {
+  return files_in(fs::path{place.file}.parent_path() / "conf.d", faults);
+}
+
+/// The first of the default places where there is a file, or parts of one.
+ConfigPlace default_place() {
   std::error_code ignored;
   for (const std::string& file : default_config_files()) {
-    if (fs::exists(file, ignored)) return file;
+    if (fs::exists(file, ignored)) return {file, false};
+    if (!fs::is_directory(fs::path{file}.parent_path() / "conf.d", ignored)) continue;
+    ConfigPlace parts{file, true};
+    Faults faults;
+    if (!parts_beside(parts, faults).empty() || !faults.empty()) return parts;
   }
   return {};
 }
@@ -229,16 +203,23 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
   return warnings;
 }
 
-ReadConfiguration read_configuration(const ConfigSources& sources, std::size_t faults_max) {
+ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOptions& how) {
   ReadConfiguration read;
   read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
-  const std::string file = sources.file.empty() ? file_in_default_place() : sources.file;
-  if (!file.empty()) {
-    read_one(file, faults_max, read);
-    for (const std::string& part : files_in(fs::path{file}.parent_path() / "conf.d", read.faults)) {
-      read_one(part, faults_max, read);
-    }
+  read.place = sources.file.empty() ? default_place() : ConfigPlace{sources.file, sources.parts_alone};
+  if (!read.place.file.empty()) {
+    Faults of_folder;
+    const std::vector<std::string> parts = parts_beside(read.place, of_folder);
+    std::error_code ignored;
+    // Where parts were enough they are so as long as there are any: a hub does not lose its configuration unnoticed.
+    const bool any_parts = !parts.empty() || !of_folder.empty();
+    read.place.parts_alone = read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);
+    if (!read.place.parts_alone) read_one(read.place.file, how, read);
+    read.faults.insert(read.faults.end(), of_folder.begin(), of_folder.end());
+    ReadOptions only_files = how;
+    only_files.pipe_patience = {};
+    for (const std::string& part : parts) read_one(part, only_files, read);
   }
   for (const Given& given : sources.environment) apply(read.configuration, given, read.faults);
   for (const Given& given : sources.flags) apply(read.configuration, given, read.faults);

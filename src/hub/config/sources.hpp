@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -20,7 +21,21 @@ struct ConfigSources {
   std::string file;                ///< of --config or TCPHUB_CONFIG; "": the first of the default places that is there
   std::vector<Given> environment;  ///< TCPHUB_...
   std::vector<Given> flags;
-  Faults faults{};  ///< of how the file is named
+  Faults faults{};           ///< of how the file is named
+  bool parts_alone = false;  ///< `file` was not there, only the conf.d beside it
+};
+
+/// Where the files were found.
+struct ConfigPlace {
+  std::string file;          ///< "": there is none
+  bool parts_alone = false;  ///< as ConfigSources::parts_alone
+};
+
+/// How to read.
+struct ReadOptions {
+  std::size_t faults_max = kConfigFaultsMax;  ///< told of the files
+  /// How long to wait for the end of a pipe in place of the file; 0: a pipe is a fault. It can be read once.
+  std::chrono::milliseconds pipe_patience{};
 };
 
 /// What was read.
@@ -30,6 +45,7 @@ struct ReadConfiguration {
   bool more_faults = false;        ///< there are more than were asked for
   Faults warnings;                 ///< none where there are faults
   std::vector<std::string> files;  ///< that were read, the one beside conf.d first
+  ConfigPlace place;               ///< to be read again
 };
 
 /// The places of the file if nobody says: the user's and the system's.
@@ -39,9 +55,9 @@ struct ReadConfiguration {
 /// variables that are no key.
 [[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources, const char* const* environment);
 
-/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, is one. Of the files at
-/// most `faults_max` are told. Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each.
-[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources,
-                                                   std::size_t faults_max = kConfigFaultsMax);
+/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, or is no regular file,
+/// is one. Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each. Blocks no longer than the
+/// disk does, and `pipe_patience`.
+[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOptions& how = {});
 
 }  // namespace gimnet::hub

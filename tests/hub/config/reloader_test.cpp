@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -86,6 +87,37 @@ TEST_F(ReloaderTest, AFileThatIsGoneIsAFaultAndNotTheDefaults) {
   Reloader reloader = started();
   std::filesystem::remove(path_);
   ASSERT_THAT(reloader.read_again().faults, SizeIs(1));
+}
+
+TEST_F(ReloaderTest, WhatIsNoRegularFileIsAFaultAndNothingIsWaitedFor) {
+  Reloader reloader = started();
+  std::filesystem::remove(path_);
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  const Reloading pipe = reloader.read_again();
+  ASSERT_THAT(pipe.faults, SizeIs(1));
+  EXPECT_THAT(pipe.faults[0], HasSubstr("hub.toml: cannot read this file: it is a pipe"));
+  std::filesystem::remove(path_);
+  write("[limits]\nnodes = 30\n");
+  EXPECT_THAT(reloader.read_again().changes, SizeIs(1)) << "a file again";
+}
+
+TEST_F(ReloaderTest, PartsThatWereEnoughMustNotGoUnnoticed) {
+  std::filesystem::remove(path_);
+  const std::string parts = folder_.path("conf.d");
+  const std::string part = parts + "/a.toml";
+  std::filesystem::create_directory(parts);
+  std::ofstream(part) << "[limits]\nnodes = 10\n";
+  sources_.parts_alone = true;
+  Reloader reloader = started();
+  EXPECT_THAT(reloader.read_again().changes, IsEmpty());
+  std::filesystem::remove(part);
+  EXPECT_THAT(reloader.read_again().faults, SizeIs(1));
+  std::ofstream(part) << "[limits]\nnodes = 20\n";
+  EXPECT_THAT(reloader.read_again().changes, SizeIs(1));
+  write("[limits]\nservices_per_node = 3\n");
+  EXPECT_THAT(reloader.read_again().changes, SizeIs(1));
+  std::filesystem::remove(path_);
+  EXPECT_THAT(reloader.read_again().faults, SizeIs(1)) << "from now on it is needed";
 }
 
 TEST_F(ReloaderTest, ALevelThatWasSetByRequestIsSetBack) {

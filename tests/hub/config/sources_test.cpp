@@ -1,12 +1,17 @@
 #include "hub/config/sources.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include "hub/config/toml_file.hpp"
 #include "tests/hub/control/support/folder.hpp"
@@ -114,9 +119,9 @@ TEST_F(SourcesTest, EveryFaultIsToldUnlessSoManyAreEnough) {
   for (std::size_t line = 1; line <= 2 * kLines; ++line) {
     EXPECT_THAT(all.faults[line - 1].place, HasSubstr("hub.toml:" + std::to_string(line) + ":"));
   }
-  EXPECT_FALSE(read_configuration(sources_, 4 * kLines).more_faults) << "at the limit";
+  EXPECT_FALSE(read_configuration(sources_, {.faults_max = 4 * kLines}).more_faults) << "at the limit";
   for (const std::size_t most : {std::size_t{0}, std::size_t{7}, 3 * kLines, 4 * kLines - 1}) {
-    const ReadConfiguration some = read_configuration(sources_, most);
+    const ReadConfiguration some = read_configuration(sources_, {.faults_max = most});
     EXPECT_THAT(some.faults, SizeIs(most));
     EXPECT_TRUE(some.more_faults) << most;
   }
@@ -200,6 +205,62 @@ TEST_F(SourcesTest, TheUsersFileIsFoundAndNoneIsNeeded) {
   write("gimnet/tcphub.toml", "hub_id = 9\n");
   EXPECT_EQ(read().configuration.options.id, HubId{9});
   ::unsetenv("XDG_CONFIG_HOME");
+}
+
+TEST_F(SourcesTest, PartsInADefaultPlaceNeedNoFile) {
+  sources_.file.clear();
+  ::setenv("XDG_CONFIG_HOME", folder_.path("").c_str(), 1);
+  ASSERT_EQ(::mkdir(folder_.path("gimnet").c_str(), 0700), 0);
+  ASSERT_EQ(::mkdir(folder_.path("gimnet/conf.d").c_str(), 0700), 0);
+  EXPECT_THAT(read().faults, IsEmpty());
+  EXPECT_FALSE(read().place.parts_alone) << "there are no parts yet";
+  write("gimnet/conf.d/a.toml", "hub_id = 77\n");
+  const ReadConfiguration parts = read();
+  EXPECT_THAT(parts.faults, IsEmpty());
+  EXPECT_EQ(parts.configuration.options.id, HubId{77});
+  EXPECT_THAT(parts.files, ElementsAre(folder_.path("/gimnet/conf.d/a.toml")));
+  EXPECT_EQ(parts.place.file, folder_.path("/gimnet/tcphub.toml"));
+  EXPECT_TRUE(parts.place.parts_alone);
+  write("gimnet/tcphub.toml", "hub_id = 9\nshards = 3\n");
+  EXPECT_EQ(read().configuration.options.shards, 3u);
+  EXPECT_EQ(read().configuration.options.id, HubId{77});
+  EXPECT_FALSE(read().place.parts_alone);
+  ::unsetenv("XDG_CONFIG_HOME");
+}
+
+TEST_F(SourcesTest, HiddenFilesAreNoParts) {
+  make_conf_d();
+  write("hub.toml", "");
+  ASSERT_EQ(::symlink("somebody@here.4711", folder_.path("conf.d/.#20.toml").c_str()), 0);
+  write("conf.d/.10.toml", "no TOML");
+  write("conf.d/10.toml", "shards = 3\n");
+  EXPECT_THAT(read().faults, IsEmpty());
+  EXPECT_THAT(read().files, SizeIs(2));
+  ASSERT_EQ(::symlink("nowhere", folder_.path("conf.d/20.toml").c_str()), 0);
+  EXPECT_THAT(read().faults, SizeIs(1)) << "who is not hidden must be there";
+}
+
+TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
+  ASSERT_EQ(::mkfifo(folder_.path("hub.toml").c_str(), 0600), 0);
+  EXPECT_THAT(read().faults, SizeIs(1));
+  const int writer = ::open(folder_.path("hub.toml").c_str(), O_RDWR);
+  ASSERT_GE(writer, 0);
+  ASSERT_EQ(::write(writer, "hub_id = 9\n", 11), 11);
+  ReadConfiguration started;
+  std::thread reader([&] { started = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}}); });
+  int queued = 1;
+  while (queued != 0) ASSERT_EQ(::ioctl(writer, FIONREAD, &queued), 0);
+  ::close(writer);
+  reader.join();
+  EXPECT_THAT(started.faults, IsEmpty());
+  EXPECT_EQ(started.configuration.options.id, HubId{9});
+  ASSERT_EQ(::unlink(folder_.path("hub.toml").c_str()), 0);
+  write("hub.toml", "");
+  make_conf_d();
+  ASSERT_EQ(::mkfifo(folder_.path("conf.d/a.toml").c_str(), 0600), 0);
+  const ReadConfiguration part = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
+  ASSERT_THAT(part.faults, SizeIs(1));
+  EXPECT_THAT(part.faults[0].line(), HasSubstr("conf.d/a.toml: cannot read this file: it is a pipe"));
 }
 
 TEST_F(SourcesTest, FaultsComeInTheOrderOfTheFile) {
