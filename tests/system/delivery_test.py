@@ -279,5 +279,24 @@ class Losses(unittest.TestCase):
         self.assertTrue(sender.err)
 
 
+class Types(unittest.TestCase):
+    def test_types_are_the_applications_matter(self):
+        hub = Hub(self)
+        types = {"a/first": (0, 0xFFFFFFFF), "b/second": (0xDEADBEEF, 7)}
+        for service, (kind, instance) in types.items():
+            echo = start_gimnet(self, hub, "echo", service, "-n", "1", "--json")
+            pub = start_gimnet(self, hub, "pub", service, "--wait", "1", "--type", str(kind), "--instance",
+                               str(instance), stdin=subprocess.PIPE)
+            listed = wait_until(lambda: json.loads(run_gimnet(hub, "--json", "services", service).out or "[]"),
+                                "the service")
+            self.assertEqual([(s["type"], s["instance"]) for s in listed], [(kind, instance)])
+            pub.feed(b"of a type that no hub knows\n")
+            self.assertEqual((pub.wait(), echo.wait()), (0, 0), pub.err + echo.err)
+            message = json.loads(echo.out)
+            self.assertEqual((message["type"], message["instance"], message["text"]),
+                             (kind, instance, "of a type that no hub knows"))
+        hub.expect_ledger(self, accepted=2, delivered=2)
+
+
 if __name__ == "__main__":
     unittest.main()
