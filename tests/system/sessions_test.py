@@ -213,6 +213,38 @@ class Tokens(unittest.TestCase):
         self.assertNotEqual(Client(self, hub).join(token=over_unix.welcome[2]).id, over_unix.id)
         self.assertEqual(Client(self, hub, local=True).join(token=over_unix.welcome[2]).id, over_unix.id)
 
+    def test_a_replayed_hello_takes_the_session_only_while_its_token_is_good(self):
+        hub = Hub(self)
+        first = Client(self, hub).join("B")
+        recorded = OPENING + hello("B", token=first.welcome[2])
+
+        def replay(local=False):
+            thief = Client(self, hub, local=local)
+            thief.send(recorded)
+            return thief.first_answer()
+        owner = Client(self, hub).join("B", token=first.welcome[2])
+        self.assertEqual(first.goodbye(), "replaced")
+        # What a token proves is that the hub gave it to that identity: on TCP everybody is the same one.
+        self.assertEqual(replay(local=True).goodbye, "name_taken")
+        taken = replay()
+        self.assertEqual((taken.operation, taken.dst), (WELCOME, owner.id))
+        self.assertEqual(owner.goodbye(), "replaced", "the owner is told")
+        # Each WELCOME has a token of its own, but those before it stay good.
+        owner = Client(self, hub).join("B", token=owner.welcome[2])
+        self.assertEqual(owner.id, first.id)
+        owner.send(frame(0, owner.id, control(GOODBYE, number(1, 3, 0)), kind=LINK))
+        owner.until_closed()
+        late = replay()
+        self.assertEqual(late.operation, WELCOME)
+        self.assertNotEqual(late.dst, first.id, "after the owner's GOODBYE it is a HELLO as any")
+
+    def test_a_replayed_hello_without_a_token_gets_no_name_that_is_held(self):
+        hub = Hub(self)
+        Client(self, hub).join("B")
+        replayed = Client(self, hub)
+        replayed.send(OPENING + hello("B"))
+        self.assertEqual(replayed.first_answer().goodbye, "name_taken")
+
     def test_goodbye_frees_id_and_name_at_once(self):
         hub = Hub(self)
         first = Client(self, hub).join("B")
