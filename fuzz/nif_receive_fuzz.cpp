@@ -45,7 +45,10 @@ class Witness final : public InboundHost {
     FUZZ_MUST(!requests_.on_answer(kind, answer));
     return {};
   }
-  void on_service_moved(const proto::ns::ServiceMoved& event) override { note("moved " + event.name); }
+  [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) override {
+    note("moved " + event.name);
+    return !event.again;
+  }
   bool on_watch_events(const proto::ns::WatchEvents& events) override {
     note("watched " + std::to_string(events.watch));
     return true;

@@ -301,7 +301,7 @@ typedef enum nif_incoming_type {
   NIF_SUBSCRIBER_LEFT = 7,
   /** A service that this node subscribed appeared, came under another group id, or went [text: full name, former_group
    * (0: none), group (0: withdrawn), message_type, instance, delivery]. Comes before the first message of the new
-   * group. */
+   * group, also after a break; messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
    *  it; reason: nif_status)]. Send to the new id from now on; what waited for the connection goes there, and what is

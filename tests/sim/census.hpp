@@ -97,6 +97,7 @@ enum class Happening : std::uint8_t {
   paced_message_lost,
   paced_message_missed,
   counted_anew,
+  moves_told_again,
   credited,
   credit_delayed,
   credit_too_late,

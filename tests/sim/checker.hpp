@@ -19,6 +19,7 @@ enum class Checker : std::uint8_t {
   order,          ///< tables are published before the answer leaves
   answers,        ///< each request is answered, once, with what is true, or its connection ended
   events,         ///< subscribers and providers are told what changed, in time, with the right counts
+  told,           ///< a subscriber knows of a group before anything of it comes, also where a connection broke
   limits,         ///< the limits hold, and nothing is refused below them
   grace,          ///< a session lasts while it is connected and through its grace time, and no longer
   seam,           ///< the commands to a shard make sense to it
@@ -28,9 +29,9 @@ enum class Checker : std::uint8_t {
   drain,          ///< a hub that drains lets nobody in, has everybody told to go, and ends when they have gone
   convergence,    ///< when the faults stop everybody is served
 };
-inline constexpr std::array<std::string_view, 17> kCheckerNames = {
-    "names",  "ids",   "tokens", "right_session", "node_table", "group_table", "order", "answers",    "events",
-    "limits", "grace", "seam",   "pace",          "credit",     "retained",    "drain", "convergence"};
+inline constexpr std::array<std::string_view, 18> kCheckerNames = {
+    "names", "ids",    "tokens", "right_session", "node_table", "group_table", "order",    "answers", "events",
+    "told",  "limits", "grace",  "seam",          "pace",       "credit",      "retained", "drain",   "convergence"};
 [[nodiscard]] inline std::string_view name_of(Checker checker) {
   return kCheckerNames[static_cast<std::size_t>(checker)];
 }

@@ -186,7 +186,7 @@ void SimNode::misbehave() {
 void SimNode::lose_connection() {
   if (wire_ != nullptr) {
     // It may have subscribed to something and does not know it.
-    forgot_ = forgot_ || !link().open.empty();
+    forgot_ = forgot_ || subscribes_now(link());
     links_.erase(wire_->number);
     watches_ = false;
     untaken_ = 0;
@@ -210,11 +210,13 @@ void SimNode::forget_life() {
 }
 
 void SimNode::dial() {
-  forgot_ = forgot_ || waits_for_answers();
+  forgot_ = forgot_ || (wire_ != nullptr && subscribes_now(link()));
   watches_ = false;
   untaken_ = 0;
   wire_ = around_.network.dial(number_);
   links_[wire_->number].wire = wire_;
+  links_[wire_->number].dialled = around_.setting.agenda.now();
+  ++dials_;
   std::string identity = identity_;
   const proto::Hello said = hello(identity);
   around_.setting.trace.note("node {a} dials, wire {b}, {c} bytes of token, as: {t}", number_, wire_->number,
@@ -270,6 +272,7 @@ void SimNode::hears(const WirePointer& wire, const Bytes& frame) {
     require(header.dst == from.id.value(), Checker::right_session, "a node gets a control frame for another one");
     return on_control(from, payload);
   }
+  if (header.kind == Kind::flow) return on_ping(from, frame);
   on_data(from, header, frame);
 }
 
@@ -332,8 +335,9 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
     // With a token it may be the same session under another id, with all that it had subscribed to.
     if (token_.empty()) forgot_ = false;
   }
-  // What waited for it may be of a group that began and ended while it was away.
-  forgot_ = forgot_ || (resumes_ && !token_.empty());
+  // What was not declared on a connection between, of which the node knows nothing, may have ended.
+  link().same_session = std::exchange(session_, wire->session) == wire->session && dials_ == 1;
+  dials_ = 0;
   token_ = welcome.token;
   id_ = welcome.node;
   registered_ = welcome.name;
@@ -355,8 +359,10 @@ void SimNode::declare_again() {
       forgot_ = true;
       continue;
     }
+    if (link().same_session && !unsubscribing_.contains(full_name)) link().before[full_name] = before.group;
     subscribe(before.wanted);
   }
+  unsubscribing_.clear();
   if (wants_watch_) watch();
 }
 

@@ -86,9 +86,13 @@ class SimNode {
     bool welcomed = false;
     std::optional<proto::GoodbyeCode> told;  ///< how the hub ended it
     NodeId id;
-    std::map<std::uint16_t, Open> open;    ///< by request number
-    std::map<std::uint32_t, Taken> taken;  ///< by group
-    std::set<std::uint32_t> gone;          ///< groups that ended: what still comes of them counts no more
+    std::map<std::uint16_t, Open> open;     ///< by request number
+    std::map<std::uint32_t, Taken> taken;   ///< by group
+    std::set<std::uint32_t> gone;           ///< groups that ended: what still comes of them counts no more
+    std::map<std::string, GroupId> moved;   ///< where services are, by events of this connection
+    std::map<std::string, GroupId> before;  ///< of those that it declares again: where it knew them to be
+    bool same_session = false;              ///< as its last connection, and no other was dialled in vain between
+    Time dialled{};
     std::uint16_t last_request = 0;
   };
   [[nodiscard]] Link& link() { return links_.at(wire_->number); }
@@ -145,6 +149,12 @@ class SimNode {
   void on_answer(const Open& asked, std::span<const std::byte> payload);
   void on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload);
   void on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame);
+  /// What the hub asks to be told: that it was read.
+  void on_ping(Link& from, const Bytes& frame);
+  void on_service_moved(Link& from, std::span<const std::byte> payload);
+  void require_told(const Link& from, const std::string& full_name, GroupId group) const;
+  /// It may have subscribed to something on that connection and not know it.
+  [[nodiscard]] static bool subscribes_now(const Link& link);
   void on_subscribed(const Open& asked, const proto::ns::SubscribeAnswer& answer);
   void know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window, bool retained);
   void take_message(Link& from, GroupId group, std::uint64_t message);
@@ -170,7 +180,10 @@ class SimNode {
   std::string registered_;  ///< the name that it has
   std::map<std::string, Provided> provides_;
   std::map<std::string, Subscribed> subscribes_;
+  std::set<std::string> unsubscribing_;                           ///< asked to, not answered: the hub may have ended it
   std::map<std::string, std::set<std::uint32_t>> windows_asked_;  ///< ever, by full name
+  std::uint64_t session_ = 0;                                     ///< the latest, by the reference model
+  std::uint64_t dials_ = 0;                                       ///< since its last WELCOME
   // Of its connection
   WirePointer wire_;
   std::map<std::uint64_t, Link> links_;  ///< by wire; those that it replaced itself, too

@@ -107,7 +107,54 @@ void SimNode::subscribe(const ns::Subscribe& wanted) {
   ask(wanted, std::move(open));
 }
 
+void SimNode::on_ping(Link& from, const Bytes& frame) {
+  const auto message = proto::flow::decode(std::span{frame}.subspan(proto::kHeaderSize));
+  const auto* ping = message ? std::get_if<proto::flow::Ping>(&*message) : nullptr;
+  require(ping != nullptr, Checker::seam, "a shard said something of FLOW that is no PING");
+  if (from.wire != wire_) return;  // it has replaced this one itself
+  std::array<std::byte, proto::flow::kSizeMax> bytes{};
+  const std::size_t size = proto::flow::encode(proto::flow::Pong{ping->sequence, 0, 0}, bytes);
+  send(proto::Kind::flow, 0, std::span{bytes}.first(size));
+}
+
+void SimNode::on_service_moved(Link& from, std::span<const std::byte> payload) {
+  const auto event = proto::decode<ns::ServiceMoved>(payload);
+  require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
+  for (const GroupId group : event->between) {
+    known_groups_.insert(group.value());
+    from.gone.insert(group.value());
+  }
+  known_groups_.insert(event->new_group.value());
+  from.moved[event->name] = event->new_group;
+  const auto subscribed = subscribes_.find(event->name);
+  if (subscribed != subscribes_.end()) subscribed->second.group = event->new_group;
+  if (event->old_group != event->new_group) {
+    from.taken.erase(event->old_group.value());
+    from.gone.insert(event->old_group.value());
+  }
+  if (event->new_group != GroupId{}) know_window(from, event->name, event->new_group, event->window, event->retain);
+}
+
+/// What an answer says of a service, an event said before: on this connection, or, where nothing changed, on the last.
+void SimNode::require_told(const Link& from, const std::string& full_name, GroupId group) const {
+  const auto before = from.before.find(full_name);
+  if (before == from.before.end()) return;
+  // Declared so late that it may have ended as undeclared, and begun anew.
+  const std::chrono::milliseconds grace{around_.setting.plan.limits.grace_ms};
+  if (around_.setting.agenda.now() - from.dialled >= grace) return;
+  const auto moved = from.moved.find(full_name);
+  if (group == (moved != from.moved.end() ? moved->second : before->second)) return;
+  broken(Checker::told, "program " + std::to_string(number_) + " came back, and was not told where '" + full_name +
+                            "' is now before it asked");
+}
+
+bool SimNode::subscribes_now(const Link& link) {
+  return std::any_of(link.open.begin(), link.open.end(),
+                     [](const auto& entry) { return entry.second.operation == ns::Subscribe::kOperation; });
+}
+
 void SimNode::on_subscribed(const Open& asked, const ns::SubscribeAnswer& answer) {
+  require_told(link(), asked.subject, answer.group);
   subscribes_[asked.subject] = {asked.wanted, answer.group};
   known_groups_.insert(answer.group.value());
   if (answer.group != GroupId{}) know_window(link(), asked.subject, answer.group, answer.window, answer.retain);

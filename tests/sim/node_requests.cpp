@@ -92,6 +92,7 @@ void SimNode::change_services(std::uint64_t choice) {
   if (choice < 63 && !subscribes_.empty()) {
     auto entry = subscribes_.begin();
     std::advance(entry, static_cast<std::ptrdiff_t>(random.below(subscribes_.size())));
+    unsubscribing_.insert(entry->first);
     return ask(ns::Unsubscribe{entry->first}, about(entry->first));
   }
   if (choice == 63) {
@@ -166,9 +167,11 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
       break;
     case ns::Subscribe::kOperation:
       if (done) on_subscribed(asked, *proto::decode_answer<ns::SubscribeAnswer>(payload));
+      link().before.erase(asked.subject);
       break;
     case ns::Unsubscribe::kOperation:
       if (done) subscribes_.erase(asked.subject);
+      unsubscribing_.erase(asked.subject);
       break;
     default:
       if (done) on_own_name(asked, payload);
@@ -181,16 +184,7 @@ void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std:
     // Its watch ended with the connection; what that one still brings is older than what the next one told.
     if (wire_ != nullptr && &from == &link()) on_watch_events(payload);
   } else if (operation == ns::ServiceMoved::kOperation) {
-    const auto event = proto::decode<ns::ServiceMoved>(payload);
-    require(event.has_value(), Checker::events, "SERVICE_MOVED cannot be read");
-    known_groups_.insert(event->new_group.value());
-    // It may not have heard of the former one: what told it was lost with a connection, and what came of it waits.
-    known_groups_.insert(event->old_group.value());
-    const auto subscribed = subscribes_.find(event->name);
-    if (subscribed != subscribes_.end()) subscribed->second.group = event->new_group;
-    from.taken.erase(event->old_group.value());
-    from.gone.insert(event->old_group.value());
-    if (event->new_group != GroupId{}) know_window(from, event->name, event->new_group, event->window, event->retain);
+    on_service_moved(from, payload);
   } else if (operation == ns::SubscriberJoined::kOperation) {
     const auto event = proto::decode<ns::SubscriberJoined>(payload);
     require(event.has_value(), Checker::events, "SUBSCRIBER_JOINED cannot be read");
@@ -206,13 +200,10 @@ void SimNode::on_data(Link& from, const proto::FrameHeader& header, const Bytes&
     census.add(Happening::unicast_delivered);
   } else if (header.kind == Kind::group) {
     // A subscriber is in the table before its answer leaves, so that frames may come before the answer.
-    const bool subscribing = std::any_of(from.open.begin(), from.open.end(), [](const auto& entry) {
-      return entry.second.operation == ns::Subscribe::kOperation;
-    });
-    const bool told = known_groups_.contains(header.dst) || subscribing || forgot_;
+    const bool told = known_groups_.contains(header.dst) || subscribes_now(from) || forgot_;
     if (!told) {
-      broken(Checker::events, "program " + std::to_string(number_) + " gets a frame of group " +
-                                  std::to_string(index_of(GroupId{header.dst})) + ", of which it was not told");
+      broken(Checker::told, "program " + std::to_string(number_) + " gets a frame of group " +
+                                std::to_string(index_of(GroupId{header.dst})) + ", of which it was not told");
     }
     census.add(Happening::group_delivered);
     take_message(from, GroupId{header.dst}, message_of(frame));

@@ -108,13 +108,10 @@ void SimShards::wait_until_due(std::size_t index, Seat& seat, Pace& pace) {
   });
 }
 
-void SimShards::on_credit(std::size_t index, Seat& seat, const Bytes& frame) {
-  const auto message = proto::flow::decode(std::span{frame}.subspan(proto::kHeaderSize));
-  const auto* credit = message ? std::get_if<proto::flow::Credit>(&*message) : nullptr;
-  require(credit != nullptr, Checker::seam, "a simulated node said something of FLOW that is no CREDIT");
-  Pace* pace = find_pace(seat, credit->group);
+void SimShards::on_credit(std::size_t index, Seat& seat, const proto::flow::Credit& credit) {
+  Pace* pace = find_pace(seat, credit.group);
   if (pace == nullptr) return setting_.census.add(Happening::credit_too_late);
-  require(pace->counts.on_credit(credit->taken), Checker::credit,
+  require(pace->counts.on_credit(credit.taken), Checker::credit,
           "hub and subscriber count the messages of a service differently");
   setting_.census.add(Happening::credited);
   release_held(index, seat, *pace);

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "proto/frame/flow.hpp"
 #include "tests/sim/shards.hpp"
 
 // How simulated shards read their connections, and bring frames to others.
@@ -68,13 +69,25 @@ bool SimShards::handle(std::size_t index, Seat& seat, Bytes frame) {
     return false;
   }
   if (header.kind == Kind::flow) {
-    on_credit(index, seat, frame);
+    on_flow(index, seat, frame);
     return true;
   }
   if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
     return handle_control(index, seat, std::move(frame));
   route(index, frame, false);
   return true;
+}
+
+void SimShards::on_flow(std::size_t index, Seat& seat, const Bytes& frame) {
+  const auto message = proto::flow::decode(std::span{frame}.subspan(proto::kHeaderSize));
+  require(message.has_value(), Checker::seam, "a simulated node said something of FLOW that cannot be read");
+  if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) return on_credit(index, seat, *credit);
+  const auto* pong = std::get_if<proto::flow::Pong>(&*message);
+  require(pong != nullptr, Checker::seam, "a simulated node said something of FLOW that is no CREDIT and no PONG");
+  const auto asked = seat.reading.extract(pong->sequence);
+  if (!asked) return;  // of an earlier connection
+  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                     hub::MovesReadEvent{seat.session, seat.attachment, seat.node, asked.mapped()}});
 }
 
 bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {

@@ -1,8 +1,10 @@
 #include "tests/sim/shards.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "base/endian.hpp"
+#include "proto/frame/flow.hpp"
 
 namespace gimnet::sim {
 
@@ -180,6 +182,15 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   wire->shard = index;
   wire->slot = command.session.slot.value();
   parts_.network.to_node(wire, link_frame(command.node, parts_.hub, proto::encode(command.welcome)));
+  for (std::size_t at = 0; at < command.told.size();) {
+    const std::size_t size = proto::load_header(command.told.data() + at).frame_size();
+    seat.control.emplace_back(command.told.data() + at, command.told.data() + at + size);
+    at += size;
+  }
+  if (!command.told.empty()) {
+    setting_.census.add(Happening::moves_told_again);
+    ask_whether_read(seat, command.told_move);
+  }
   count_anew(index, seat);
   if (!wire->at_hub.empty() || wire->end_arrived) has_something(*wire);
   if (!wire->node_open) setting_.census.add(Happening::hello_of_the_dead);
@@ -194,7 +205,17 @@ void SimShards::say(std::size_t index, const hub::SendControlCommand& command) {
   require(seat->requests >= command.answers, Checker::answers, "more answers than requests on a connection");
   seat->requests -= command.answers;
   seat->control.push_back(command.frame);
+  if (command.move != 0) ask_whether_read(*seat, command.move);
   want_flush(index, *seat);
+}
+
+void SimShards::ask_whether_read(Seat& seat, std::uint64_t move) {
+  seat.reading[++seat.pings] = move;
+  std::array<std::byte, proto::flow::kSizeMax> bytes{};
+  const std::size_t size = proto::flow::encode(proto::flow::Ping{seat.pings, 0}, bytes);
+  proto::FrameHeader header;
+  header.kind = proto::Kind::flow;
+  seat.control.push_back(frame_of(header, std::span{bytes}.first(size)));
 }
 
 void SimShards::release(std::size_t index, hub::SessionRef session) {
@@ -247,6 +268,7 @@ void SimShards::detach(Seat& seat, std::optional<proto::Goodbye> told) {
   parts_.network.close_by_hub(wire);
   seat.requests = 0;
   seat.control.clear();
+  seat.reading.clear();
   if (seat.waits_when_away) return;
   if (!seat.data.empty()) setting_.census.add(Happening::frames_lost_with_connection);
   for (auto& [group, pace] : seat.paces) pace->held.clear();

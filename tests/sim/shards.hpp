@@ -106,6 +106,8 @@ class SimShards final : public hub::ShardProxy {
     bool tell_heard = false;
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
+    std::uint32_t pings = 0;
+    std::map<std::uint32_t, std::uint64_t> reading;  ///< moves that the conductor wants to know read, by PING
     std::deque<Data> data;
     std::map<std::uint32_t, std::unique_ptr<Pace>> paces;  ///< by group
     bool ready = false;
@@ -144,6 +146,8 @@ class SimShards final : public hub::ShardProxy {
   void attach(std::size_t shard, hub::AttachCommand& command);
   Seat& seat_for(std::size_t shard, const hub::AttachCommand& command);
   void say(std::size_t shard, const hub::SendControlCommand& command);
+  void ask_whether_read(Seat& seat, std::uint64_t move);
+  void on_flow(std::size_t shard, Seat& seat, const Bytes& frame);
   void release(std::size_t shard, hub::SessionRef session);
   void drain(std::size_t shard);
   /// When each other shard has handed over its last.
@@ -181,7 +185,7 @@ class SimShards final : public hub::ShardProxy {
   void pass(std::size_t shard, Seat& seat, Pace& pace, Data data);
   void release_held(std::size_t shard, Seat& seat, Pace& pace);
   void wait_until_due(std::size_t shard, Seat& seat, Pace& pace);
-  void on_credit(std::size_t shard, Seat& seat, const Bytes& frame);
+  void on_credit(std::size_t shard, Seat& seat, const proto::flow::Credit& credit);
   /// The counts of its connection begin at 0.
   void count_anew(std::size_t shard, Seat& seat);
   void keep_last(std::size_t shard, const Bytes& frame);

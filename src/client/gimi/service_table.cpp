@@ -117,14 +117,15 @@ SubscribedService& ServiceTable::entry(const std::string& full_name, const Queue
 /// A former group leads to the service until as many younger ones came: the event that a provider left may overtake
 /// what it published.
 void ServiceTable::set_place(SubscribedService& service, const ServicePlace& place) {
-  constexpr std::size_t kFormerGroups = 4;
+  // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8), and the present one.
+  constexpr std::size_t kGroups = 8;
   service.place = place;
   service.on_group(place.group);
   if (place.group == 0) return;
   subscribed_by_group_[place.group] = &service;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
   service.groups.push_back(place.group);
-  if (service.groups.size() <= kFormerGroups) return;
+  if (service.groups.size() <= kGroups) return;
   forget_group(service, service.groups.front());
   service.groups.erase(service.groups.begin());
 }

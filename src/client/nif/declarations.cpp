@@ -92,10 +92,19 @@ void Declarations::remove_subscription(const std::string& full_name) {
   subscriptions_.erase(full_name);
 }
 
-void Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
+bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   const MutexLock lock(mutex_);
-  const auto found = subscriptions_.find(event.name);
-  if (found != subscriptions_.end()) found->second.group = event.new_group;
+  GroupId former = event.old_group;
+  if (const auto found = subscriptions_.find(event.name); found != subscriptions_.end()) {
+    former = std::exchange(found->second.group, event.new_group);
+    const bool news = former != event.new_group || (former == GroupId{} && !event.between.empty());
+    // What was counted since it came first must not be forgotten.
+    if (event.again && !news) return false;
+  }
+  for (const GroupId gone : {event.old_group, former}) {
+    if (gone != event.new_group && !is_subscribed(gone)) credits_.forget(gone);
+  }
+  return true;
 }
 
 void Declarations::declare_again(bool forgotten) {

@@ -44,7 +44,8 @@ class Declarations {
   void declare_again(bool forgotten) GIMNET_EXCLUDES(mutex_);
   /// Goes on declaring where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
-  void on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
+  /// False: nothing new, as the event was told again at a return, and had come before.
+  [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved& event) GIMNET_EXCLUDES(mutex_);
   /// What the last answer brought that the program should know. Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
   ~Declarations();

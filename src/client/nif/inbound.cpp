@@ -257,6 +257,16 @@ Inbound::Verdict Inbound::take_names(const proto::FrameView& view) {
   return Verdict::going;
 }
 
+void Inbound::add_moved(const proto::ns::ServiceMoved& event, GroupId from, GroupId to) {
+  Record* record = make_event(NIF_SERVICE_MOVED, event.name);
+  record->incoming.former_group = from.value();
+  record->incoming.group = to.value();
+  record->incoming.message_type = event.message_type;
+  record->incoming.instance = event.instance;
+  record->incoming.delivery = static_cast<std::uint32_t>(event.delivery);
+  add_record(record, event.name.size());
+}
+
 void Inbound::add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change) {
   Record* record = make_event(type, "");
   record->incoming.group = change.group.value();
@@ -270,14 +280,10 @@ Inbound::Verdict Inbound::take_event(const proto::ControlView& event, std::span<
     case proto::ns::Operation::service_moved: {
       const auto moved = proto::decode<proto::ns::ServiceMoved>(payload);
       if (!moved) return malformed(moved.error().sentence);
-      host_.on_service_moved(*moved);
-      Record* record = make_event(NIF_SERVICE_MOVED, moved->name);
-      record->incoming.former_group = moved->old_group.value();
-      record->incoming.group = moved->new_group.value();
-      record->incoming.message_type = moved->message_type;
-      record->incoming.instance = moved->instance;
-      record->incoming.delivery = static_cast<std::uint32_t>(moved->delivery);
-      add_record(record, moved->name.size());
+      if (!host_.on_service_moved(*moved)) return Verdict::going;
+      GroupId from = moved->old_group;
+      for (const GroupId between : moved->between) add_moved(*moved, std::exchange(from, between), between);
+      add_moved(*moved, from, moved->new_group);
       return Verdict::going;
     }
     case proto::ns::Operation::subscriber_joined: {

@@ -30,7 +30,8 @@ class InboundHost {
   [[nodiscard]] virtual bool on_flow(const proto::flow::Message& message) = 0;
   /// Returns the events that it leads to, which the program gets in its place; passes their references on.
   [[nodiscard]] virtual std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
-  virtual void on_service_moved(const proto::ns::ServiceMoved& event) = 0;
+  /// False: it is nothing new to the program.
+  [[nodiscard]] virtual bool on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
   [[nodiscard]] virtual bool on_watch_events(const proto::ns::WatchEvents& events) = 0;
   /// The own name is final, or (`lost`) a rival's.
@@ -121,6 +122,7 @@ class Inbound {
   void add_events(std::span<const Item> events);
   [[nodiscard]] std::uint32_t epoch_of(const proto::FrameHeader& header);
   void add_gap(std::uint32_t from, std::uint64_t count, proto::DropReason reason);
+  void add_moved(const proto::ns::ServiceMoved& event, GroupId from, GroupId to);
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
   void deliver();
 

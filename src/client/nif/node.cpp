@@ -192,10 +192,10 @@ std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& an
   return events;
 }
 
-void Node::on_service_moved(const proto::ns::ServiceMoved& event) {
-  credits_.forget(event.old_group);
+bool Node::on_service_moved(const proto::ns::ServiceMoved& event) {
+  if (!declarations_.on_service_moved(event)) return false;
   credits_.open(event.new_group, event.window);
-  declarations_.on_service_moved(event);
+  return true;
 }
 
 bool Node::on_watch_events(const proto::ns::WatchEvents& events) { return watches_.on_events(events); }

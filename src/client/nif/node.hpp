@@ -76,7 +76,7 @@ class Node final : private InboundHost {
   // InboundHost, on the library's thread.
   [[nodiscard]] bool on_flow(const proto::flow::Message& message) override;
   [[nodiscard]] std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) override;
-  void on_service_moved(const proto::ns::ServiceMoved& event) override;
+  bool on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
   void on_name_decided(const std::string& name, bool lost) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;

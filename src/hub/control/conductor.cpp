@@ -113,6 +113,7 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
   command.tell_heard = session.renumbered;
+  runner_.tell_again(session, command);
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
@@ -149,6 +150,8 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
     on_frame(*frame, now);
   } else if (const auto* heard = std::get_if<HeardEvent>(&event.what)) {
     on_heard(*heard);
+  } else if (const auto* read = std::get_if<MovesReadEvent>(&event.what)) {
+    on_moves_read(*read);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
     on_detached(*detached, now);
   } else if (const auto* passed = std::get_if<FencePassedEvent>(&event.what)) {
@@ -212,6 +215,12 @@ void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
 void Conductor::on_heard(const HeardEvent& event) {
   Session* session = find(event.session, event.node);
   if (session != nullptr && event.attachment == session->attachment) session->renumbered = false;
+}
+
+void Conductor::on_moves_read(const MovesReadEvent& event) {
+  const Session* session = find(event.session, event.node);
+  if (session == nullptr || event.attachment != session->attachment) return;
+  membership_.services().moves_read(session->index, event.move);
 }
 
 void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {

@@ -1,5 +1,7 @@
 #include "hub/control/effect_runner.hpp"
 
+#include <algorithm>
+
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 
@@ -83,8 +85,21 @@ void EffectRunner::run(const RenumberDue& effect) {
 }
 
 void EffectRunner::run(const ServiceMovedDue& effect) {
-  const Session* session = find(effect.subscriber);
-  if (session == nullptr) return;
+  if (const Session* session = find(effect.subscriber)) send_event(*session, payload_of(effect), effect.move);
+}
+
+void EffectRunner::tell_again(const Session& session, AttachCommand& command) const {
+  for (const ServiceMovedDue& untold : parts_.membership.services().untold_moves(session.index)) {
+#ifdef GIMNET_BUG_MOVES_NOT_TOLD_AGAIN
+    continue;
+#endif
+    const auto frame = control_frame(proto::Kind::ns, command.node, parts_.facts.id, payload_of(untold));
+    command.told.insert(command.told.end(), frame.begin(), frame.end());
+    command.told_move = std::max(command.told_move, untold.move);
+  }
+}
+
+proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
   ns::ServiceMoved event;
   event.name = effect.full_name;
   event.old_group = group_id(effect.old_group);
@@ -94,7 +109,9 @@ void EffectRunner::run(const ServiceMovedDue& effect) {
   event.delivery = static_cast<ns::Delivery>(effect.delivery);
   event.window = effect.window;
   event.retain = effect.retain;
-  send_event(*session, proto::encode(event));
+  event.again = effect.again;
+  for (const std::uint32_t group : effect.between) event.between.push_back(group_id(group));
+  return proto::encode(event);
 }
 
 void EffectRunner::run(const PaceDue& effect) {
@@ -147,11 +164,15 @@ void EffectRunner::run(const NameDecided& effect) {
                                         : proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
 }
 
-void EffectRunner::send_event(const Session& session, const proto::Payload& payload) {
-  if (!session.connected) return;  // it declares again when it is back, and learns what is true then
-  auto frame = control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session), parts_.facts.id, payload);
-  parts_.shards.send(session.place.shard,
-                     SendControlCommand{.session = ref_of(session.place), .frame = std::move(frame)});
+void EffectRunner::send_event(const Session& session, const proto::Payload& payload, std::uint64_t move) {
+  // When it is back it is told how services moved, and learns the rest from the answers to what it declares again.
+  if (!session.connected) return;
+  SendControlCommand command;
+  command.session = ref_of(session.place);
+  command.frame =
+      control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session), parts_.facts.id, payload);
+  command.move = move;
+  parts_.shards.send(session.place.shard, std::move(command));
 }
 
 }  // namespace gimnet::hub

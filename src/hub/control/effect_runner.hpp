@@ -32,8 +32,11 @@ class EffectRunner {
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
   /// A shard has taken what another one had handed over to it.
   void fence_passed(const FencePassedEvent& event);
-  /// Sends an event of kind NS; nothing to a node that is away.
-  void send_event(const Session& session, const proto::Payload& payload);
+  /// Sends an event of kind NS; nothing to a node that is away. `move`, if not 0: the conductor wants to hear when the
+  /// node has read what it was told of the services' moves up to that one (Services::moves_read()).
+  void send_event(const Session& session, const proto::Payload& payload, std::uint64_t move = 0);
+  /// Adds what the node has to be told ahead of all else, since it came back: how services moved meanwhile.
+  void tell_again(const Session& session, AttachCommand& command) const;
 
  private:
   void run(const NodeChanged& effect);
@@ -51,6 +54,7 @@ class EffectRunner {
   void run(const NameDecided& effect);
   [[nodiscard]] const Session* find(std::uint32_t node) const { return parts_.membership.sessions().find(node); }
   [[nodiscard]] GroupId group_id(std::uint32_t group) const;
+  [[nodiscard]] proto::Payload payload_of(const ServiceMovedDue& effect) const;
 
   const Parts parts_;
   GroupEndings endings_;

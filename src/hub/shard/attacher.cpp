@@ -53,6 +53,13 @@ void Attacher::attach(AttachCommand command) {
     return;
   }
   welcome(connection, command.welcome, gap);
+  if (connection.connected) tell_again(connection, command);
+}
+
+void Attacher::tell_again(Connection& connection, const AttachCommand& command) {
+  if (command.told.empty()) return;
+  connection.outbox.push_first_control(command.told, state_.egress);
+  ask_whether_read(state_, connection, command.told_move);
 }
 
 void Attacher::renumber(Connection& connection, NodeId node) {

@@ -23,6 +23,8 @@ class Attacher {
   void begin_anew(Connection& connection, const AttachCommand& command, const Run& partial);
   void count_anew(Connection& connection);
   void welcome(Connection& connection, const proto::Welcome& welcome, std::uint64_t gap);
+  /// Behind WELCOME, before all that waits: control frames go before a replay and before the lanes.
+  void tell_again(Connection& connection, const AttachCommand& command);
 
   ShardState& state_;
   Closer& closer_;

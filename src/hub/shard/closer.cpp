@@ -65,6 +65,7 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   connection.armed = Interest{};
   connection.requests = 0;
   connection.progress.reset();
+  state_.readings.erase(connection.slot.value());
   state_.receive_buffer.forget(connection.tail);
   if (connection.waits_for_room) {
     connection.waits_for_room = false;

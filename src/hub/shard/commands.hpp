@@ -18,10 +18,10 @@
 // between the two threads, but for the tables that control publishes.
 //
 // Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and sends AttachCommand
-// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send; it
-// publishes a group before it sends the PaceCommand of a member, and that before any answer. So commands that wait are
-// carried out before mail that came after them: a frame neither finds its recipient unattached nor overtakes the event
-// about it.
+// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send, and
+// once more with the AttachCommand of a node that may not have read it; it publishes a group before it sends the
+// PaceCommand of a member, and that before any answer. So commands that wait are carried out before mail that came
+// after them: a frame neither finds its recipient unattached nor overtakes the event about it.
 //
 // The other way round a shard's mail to other shards and its events to the conductor may overtake each other. Where the
 // conductor takes something away that such mail needs, a group, it fences first (hub/control/group_endings.hpp).
@@ -56,16 +56,22 @@ struct AttachCommand {
   std::uint32_t peer_frame_bytes = 0;
   /// Whether the shard says so, with HeardEvent, when it first hears of the node on this connection.
   bool tell_heard = false;
+  /// Control frames that the node gets ahead of all that waits for it, whatever their size: events that it may have
+  /// missed. `told_move`: as SendControlCommand::move.
+  std::vector<std::byte> told;
+  std::uint64_t told_move = 0;
 };
 
 /// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how many of the
 /// session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer is for the connection that
 /// asked: it is dropped if `attachment` is not the present one. 0 is whichever there is; without one it is dropped.
+/// `move`, if not 0: the shard says so, with MovesReadEvent, when the node has read the frame.
 struct SendControlCommand {
   SessionRef session;
   std::uint32_t attachment = 0;
   std::vector<std::byte> frame;
   std::uint32_t answers = 0;
+  std::uint64_t move = 0;
 };
 
 /// Say GOODBYE and close the session's connection. The session itself stays until ReleaseCommand.
@@ -150,6 +156,14 @@ struct HeardEvent {
   NodeId node;
 };
 
+/// The node has read the frame that came with that `move`, and all that was sent before it by this connection.
+struct MovesReadEvent {
+  SessionRef session;
+  std::uint32_t attachment = 0;
+  NodeId node;
+  std::uint64_t move = 0;
+};
+
 /// A session has no connection any more. `code` is `done` only if the node said so itself: then the session is over,
 /// otherwise its grace time begins. `said_by_peer` tells who said GOODBYE; `sentence` is for the record. A connection
 /// that broke without a GOODBYE has code `done` and `said_by_peer` false. None is sent for a connection that was fenced
@@ -179,7 +193,9 @@ struct FencePassedEvent {
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, HeardEvent, DetachedEvent, FarewellEvent, DrainedEvent, FencePassedEvent> what;
+  std::variant<ControlFrameEvent, HeardEvent, MovesReadEvent, DetachedEvent, FarewellEvent, DrainedEvent,
+               FencePassedEvent>
+      what;
 };
 
 }  // namespace gimnet::hub

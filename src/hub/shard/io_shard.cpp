@@ -195,6 +195,7 @@ void IoShard::execute(ShardCommand& command) {
                    connection->requests -= std::min(control.answers, connection->requests);
                    if (connection->outbox.push_control(control.frame, state_.egress)) {
                      state_.recipients.mark_dirty(*connection);
+                     if (control.move != 0) ask_whether_read(state_, *connection, control.move);
                      return;
                    }
                    closer_.close(*connection, proto::GoodbyeCode::too_many_requests,

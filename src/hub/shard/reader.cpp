@@ -35,6 +35,21 @@ void send_confirm(ShardState& state, Connection& connection) {
   send_flow(state, connection, proto::flow::Confirm{resume.taken});
 }
 
+/// One PING is under way at a time, so that a service that moves all the time costs one a round trip.
+void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t move) {
+  Reading& reading = state.readings[connection.slot.value()];
+  reading.wanted = move;
+  if (reading.sequence != 0) return;
+  std::byte frame[proto::flow::kFrameSizeMax];
+  if (++connection.ping_sequence == 0) ++connection.ping_sequence;
+  const proto::flow::Ping ping{connection.ping_sequence, wall_now_ns()};
+  // Without room it is asked behind the next one, or not at all: then the node is told again at its next return.
+  if (!connection.outbox.push_control({frame, proto::flow::encode_frame(ping, NodeId{}, frame)}, state.egress)) return;
+  reading.sequence = connection.ping_sequence;
+  reading.asked = move;
+  state.recipients.mark_dirty(connection);
+}
+
 void Reader::read(Connection& connection) {
   state_.egress.owner.check_here();
   std::uint64_t most = state_.limits.turn_bytes;
@@ -219,6 +234,7 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
                   "malformed FLOW frame: unknown operation, or too short for it");
   }
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
+  if (const auto* pong = std::get_if<proto::flow::Pong>(&*message)) on_pong(connection, *pong);
   if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
   if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) on_skip(connection, *skip);
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
@@ -241,6 +257,18 @@ bool Reader::take_bad_credit(Connection& connection) {
 void Reader::on_ping(Connection& connection, const proto::flow::Ping& ping) {
   send_flow(state_, connection, proto::flow::Pong{ping.sequence, ping.sent_ns, wall_now_ns()});
   if (connection.resume) send_confirm(state_, connection);
+}
+
+void Reader::on_pong(Connection& connection, const proto::flow::Pong& pong) {
+  const auto found = state_.readings.find(connection.slot.value());
+  if (found == state_.readings.end()) return;
+  Reading& reading = found->second;
+  if (reading.sequence == 0 || pong.sequence != reading.sequence) return;
+  state_.tell_conductor(
+      {state_.self, MovesReadEvent{connection.session(), connection.attachment, connection.node, reading.asked}});
+  reading.sequence = 0;
+  if (reading.wanted != reading.asked) return ask_whether_read(state_, connection, reading.wanted);
+  state_.readings.erase(found);
 }
 
 void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& confirm) {

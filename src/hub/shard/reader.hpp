@@ -36,6 +36,7 @@ class Reader {
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_control(Connection& connection, const proto::RunView& view);
   void on_ping(Connection& connection, const proto::flow::Ping& ping);
+  void on_pong(Connection& connection, const proto::flow::Pong& pong);
   /// False: it was one too many, and the connection was closed.
   [[nodiscard]] bool take_bad_credit(Connection& connection);
   void on_confirm(Connection& connection, const proto::flow::Confirm& confirm);
@@ -53,6 +54,8 @@ class Reader {
 
 /// Tells the peer how many data frames were taken from it.
 void send_confirm(ShardState& state, Connection& connection);
+/// The conductor wants to know when the node has read all that it was sent so far; `move` is its name for that.
+void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t move);
 /// A FLOW frame to the peer of this connection.
 void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message);
 

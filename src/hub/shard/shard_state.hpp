@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "base/ids.hpp"
@@ -23,6 +24,14 @@
 #include "hub/shard/signals.hpp"
 
 namespace gimnet::hub {
+
+/// What the conductor wants to know to be read by the node: asked with a PING behind it, and known by its PONG, as both
+/// ends read in order.
+struct Reading {
+  std::uint32_t sequence = 0;  ///< of the PING under way; 0: none
+  std::uint64_t asked = 0;     ///< the move behind which it stands
+  std::uint64_t wanted = 0;    ///< the latest
+};
 
 /// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime: longer than any
 /// shard.
@@ -67,6 +76,7 @@ struct ShardState {
   Poller poller;
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
+  std::unordered_map<std::uint32_t, Reading> readings;  ///< by slot, while the conductor waits for them
   std::uint64_t now_ms = 0;
   std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
   bool nothing_follows = false;   ///< this shard drains, and so do all others: what waits is all that is to be written

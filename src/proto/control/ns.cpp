@@ -10,6 +10,8 @@ namespace {
 
 /// Heads, keys, lengths and numbers of any record.
 constexpr std::size_t kRecordOverhead = 160;
+/// Of SERVICE_MOVED: a group in between, repeated.
+constexpr std::uint32_t kBetweenKey = 12;
 
 std::string read_name(Fields& fields, std::uint32_t key, const char* name) {
   return fields.required_text(key, name, kNameBytesMax);
@@ -305,6 +307,26 @@ SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
 void Unsubscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
 Unsubscribe Unsubscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
 
+namespace {
+
+std::vector<GroupId> read_between(Fields& fields) {
+  std::vector<GroupId> between;
+  bitestream::Reader reader = fields.reader();
+  while (const auto next = reader.next()) {
+    if (!(next->key() == bitestream::Key(kBetweenKey))) continue;
+    const auto group = next->as<std::uint32_t>();
+    if (!group) fields.fail("has a group in between that is not a number that fits");
+    if (between.size() == kGroupsBetweenMax) {
+      fields.fail("has more than " + std::to_string(kGroupsBetweenMax) + " groups in between");
+    }
+    if (fields.failed()) return {};
+    between.emplace_back(*group);
+  }
+  return between;
+}
+
+}  // namespace
+
 void ServiceMoved::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kSentenceBytesMax);
   writer.put_u32(4, old_group.value());
@@ -314,6 +336,8 @@ void ServiceMoved::write(bitestream::Writer& writer) const {
   put_choice(writer, 8, delivery);
   if (window != 0) writer.put_u32(9, window);
   if (retain) writer.put_bool(10, retain);
+  if (again) writer.put_bool(11, again);
+  for (const GroupId group : between) writer.put_u32(kBetweenKey, group.value());
 }
 ServiceMoved ServiceMoved::read(Fields& fields) {
   ServiceMoved moved;
@@ -325,6 +349,8 @@ ServiceMoved ServiceMoved::read(Fields& fields) {
   moved.delivery = read_choice<Delivery>(fields, 8, "delivery");
   moved.window = fields.number<std::uint32_t>(9, "window", 0);
   moved.retain = fields.flag(10, "retain", false);
+  moved.again = fields.flag(11, "told again", false);
+  moved.between = read_between(fields);
   return moved;
 }
 

@@ -274,6 +274,9 @@ struct UnsubscribeAnswer {
 
 // Events
 
+/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells, at most.
+inline constexpr std::size_t kGroupsBetweenMax = 6;
+
 /// To subscribers, before the first frame under a new group id.
 struct ServiceMoved {
   static constexpr std::uint16_t kOperation = request_of(Operation::service_moved);
@@ -286,6 +289,8 @@ struct ServiceMoved {
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
   std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
   bool retain = false;
+  bool again = false;              ///< told at a return: the node may have heard of it before its connection ended
+  std::vector<GroupId> between{};  ///< that the service had meanwhile, in order; messages of them may still come
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServiceMoved read(Fields& fields);
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "client/gimi/service_table.hpp"
+#include "proto/control/link.hpp"
 #include "proto/control/ns.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
@@ -81,6 +82,16 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
 
   /// A message that comes for the group.
   void expect_received(const Subscription& subscription, std::uint32_t group) {
+    send_to(group, subscription.name());
+    const auto message = subscription.try_receive();
+    ASSERT_TRUE(message) << subscription.name();
+    EXPECT_EQ(message->text(), subscription.name());
+  }
+  void expect_ignored(const Subscription& subscription, std::uint32_t group) {
+    send_to(group, subscription.name());
+    EXPECT_FALSE(subscription.try_receive());
+  }
+  void send_to(std::uint32_t group, const std::string& text) {
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::group;
     parts.header.dst = group;
@@ -88,11 +99,8 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
     std::string header(8, '\0');
     header[0] = static_cast<char>(++sequence_);
-    hub_.send(parts, header + subscription.name());
+    hub_.send(parts, header + text);
     settle_down();
-    const auto message = subscription.try_receive();
-    ASSERT_TRUE(message) << subscription.name();
-    EXPECT_EQ(message->text(), subscription.name());
   }
 
   std::uint32_t sequence_ = 0;
@@ -224,6 +232,32 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustAdvertised) {
   EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::found);
   EXPECT_EQ(odometry->group(), kSecond);
   connected.hub.close();
+}
+
+/// As many groups as a hub tells of at a return: the one that was known, those between, the present one.
+TEST_P(MovedSubscriptions, TakeWhatWaitedOfFormerGroups) {
+  const Subscription odometry = subscribe("robot/odom", kFirst);
+  const Subscription map = subscribe("robot/map", kSecond);
+  ns::ServiceMoved moved;
+  moved.name = "robot/odom";
+  moved.old_group = GroupId{kFirst};
+  for (std::uint32_t i = 0; i < ns::kGroupsBetweenMax; ++i) moved.between.emplace_back((7u << 20) | (100 + i));
+  moved.new_group = GroupId{(7u << 20) | 200};
+  moved.again = true;
+  hub_.send_control(proto::Kind::ns, proto::encode(moved));
+  settle_down();
+  expect_received(odometry, kFirst);
+  for (const GroupId group : moved.between) expect_received(odometry, group.value());
+  expect_received(odometry, moved.new_group.value());
+  moved.old_group = moved.new_group;
+  moved.new_group = GroupId{(7u << 20) | 201};
+  moved.between.clear();
+  hub_.send_control(proto::Kind::ns, proto::encode(moved));
+  settle_down();
+  expect_received(odometry, (7u << 20) | 100);
+  expect_received(map, kSecond);
+  expect_ignored(odometry, kFirst);
+  close_node();
 }
 
 INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedOwnServices, testing::Values("map", "odom"),

@@ -225,6 +225,17 @@ TEST(Inbound, DeliversEventsInOrderWithMessages) {
   EXPECT_EQ(receiving.host.items[2].count, 4u);
 }
 
+TEST(Inbound, DeliversNothingOfAnEventThatTheHostKnew) {
+  Receiving receiving;
+  receiving.host.moved_is_news = false;
+  std::vector<std::byte> bytes;
+  proto::ns::ServiceMoved moved;
+  moved.name = "robot/odom";
+  add_control(bytes, proto::Kind::ns, proto::encode(moved));
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_TRUE(receiving.host.items.empty());
+}
+
 TEST(Inbound, ReportsSayWhatBecameOfWhichFrame) {
   Receiving receiving;
   proto::Report report;

@@ -63,6 +63,10 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
 TEST(NsMessages, EventsAreAsTheVectorsSay) {
   expect_request("ns/service_moved", 0,
                  ServiceMoved{"robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest});
+  expect_request(
+      "ns/service_moved_again", 0,
+      ServiceMoved{
+          "robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest, 0, false, true, {GroupId{0x00700008}}});
   SubscriberJoined joined;
   joined.group = kGroup;
   joined.node = kNode;

@@ -57,6 +57,10 @@ struct ServiceMovedDue {
   std::uint8_t delivery = 0;
   std::uint32_t window = 0;
   bool retain = false;
+  std::uint64_t move = 0;  ///< numbers the moves of a hub's services: that one and those before it
+  // Told once more, to a node that came back
+  bool again = false;
+  std::vector<std::uint32_t> between;  ///< groups that the service had since `old_group`, in order
 };
 /// What a subscriber asked for. 0: not.
 struct SubscriberTerms {

@@ -23,31 +23,6 @@ auto find_topic(List& list, const Topic& topic) {
   return std::find_if(list.begin(), list.end(), [&topic](const auto& entry) { return entry.topic == &topic; });
 }
 
-ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t old_group, std::uint32_t new_group) {
-  ServiceMovedDue event;
-  event.full_name = std::string{topic.full_name};
-  event.old_group = old_group;
-  event.new_group = new_group;
-  event.message_type = service.terms.message_type;
-  event.instance = service.terms.instance;
-  event.delivery = service.terms.delivery;
-  event.retain = service.terms.retain;
-  return event;
-}
-
-void tell_subscribers(const Topic& topic, ServiceMovedDue event, Effects& effects) {
-  for (const std::uint32_t subscriber : topic.subscribers) {
-    event.subscriber = subscriber;
-    const std::optional<SubscriberTerms> pace = event.new_group != 0 ? topic.pace_of(subscriber) : std::nullopt;
-    event.window = pace ? pace->window : 0;
-    effects.emplace_back(event);
-  }
-}
-
-void note(ChangeKind kind, std::string_view full_name, const Service& service, Effects& effects) {
-  effects.emplace_back(ServiceNoted{kind, service.group, service.provider, std::string{full_name}});
-}
-
 /// Do subscribers that know the one understand the other?
 bool same_stream(const ServiceTerms& a, const ServiceTerms& b) {
   return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
@@ -123,7 +98,7 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
   }
   if (entry.service->terms.metadata != terms.metadata) {
     entry.service->terms.metadata = terms.metadata;
-    note(ChangeKind::changed, full_name, *entry.service, effects);
+    effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
   return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
 }
@@ -237,7 +212,7 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
   for (const Declared& declared : moved.provides) {
     declared.topic->service->provider = new_index;
     effects.emplace_back(GroupChanged{declared.topic->service->group});
-    note(ChangeKind::changed, declared.topic->full_name, *declared.topic->service, effects);
+    effects.emplace_back(service_noted(ChangeKind::changed, *declared.topic));
   }
   for (const Declared& declared : moved.subscribes) {
     Topic& entry = *declared.topic;
@@ -251,6 +226,7 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
     for (auto* changed : {&entry.once_plain, &entry.once_paced}) {
       if (changed->erase(node_index) != 0) changed->insert(new_index);
     }
+    entry.untold.renumber(node_index, new_index);
     // Its own provider does not know its new id yet, and asks how many there are when it does.
     if (!entry.service || entry.service->provider == new_index) continue;
     // First the one that comes: a provider that hears of no subscribers stops.
@@ -310,39 +286,6 @@ void Services::forget_if_idle(std::uint32_t node) {
   if (found->second.provides.empty() && found->second.subscribes.empty()) nodes_.erase(found);
 }
 
-void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects) {
-  topic.service = service;
-  topic.once_plain.clear();
-  topic.once_paced.clear();
-  groups_[service.group] = &topic;
-  if (old_group != 0) {
-    effects.emplace_back(
-        ServiceNoted{ChangeKind::withdrawn, old_group, service.provider, std::string{topic.full_name}});
-  }
-  tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
-  effects.emplace_back(GroupChanged{service.group});
-  for (const std::uint32_t subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
-  note(ChangeKind::advertised, topic.full_name, service, effects);
-}
-
-void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects) {
-  const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
-  if (!pace) return;
-  effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain,
-                               topic.once_plain.contains(subscriber)});
-}
-
-/// The topic's group is gone. First from the table: a frame that is read before the provider's shard forgets the last
-/// message would make it anew, for ever.
-void Services::end_group(const Topic& topic, Effects& effects) {
-  const Service& service = *topic.service;
-  effects.emplace_back(GroupChanged{service.group});
-  for (const std::uint32_t subscriber : topic.subscribers) {
-    if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, service.group, true});
-  }
-  if (service.terms.retain) effects.emplace_back(RetainedDropped{service.provider, service.group});
-}
-
 void Services::change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects) {
   const std::optional<SubscriberTerms> before = topic.pace_of(subscriber);
   topic.terms.erase(subscriber);
@@ -361,16 +304,7 @@ void Services::forget_subscriber(Topic& topic, std::uint32_t subscriber) {
   topic.terms.erase(subscriber);
   topic.once_plain.erase(subscriber);
   topic.once_paced.erase(subscriber);
-}
-
-void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
-  const Service service = *topic.service;
-  end_group(topic, effects);
-  topic.service.reset();
-  groups_.erase(service.group);
-  group_indices_.give_back(service.group, now);
-  tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
-  note(ChangeKind::withdrawn, topic.full_name, service, effects);
+  topic.untold.forget(subscriber);
 }
 
 void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects) {

@@ -14,6 +14,7 @@
 #include "base/result.hpp"
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/index_pool.hpp"
+#include "hub/control/state/untold_moves.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/control_message.hpp"
 
@@ -50,6 +51,7 @@ struct Topic {
   /// pace and do not any more. Those stay paced, without bounds: what is held for them goes before what comes.
   std::unordered_set<std::uint32_t> once_plain;
   std::unordered_set<std::uint32_t> once_paced;
+  UntoldMoves untold;
 
   /// What the shards hold that subscriber to; nothing if it simply gets everything.
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(std::uint32_t subscriber) const;
@@ -101,6 +103,12 @@ class Services {
   /// The node's session is over.
   void node_left(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
 
+  /// What the node is to be told, since it came back: each service whose moves it may not know of, once, and where it
+  /// is now. To be told again at its next return unless moves_read() came.
+  [[nodiscard]] std::vector<ServiceMovedDue> untold_moves(std::uint32_t node) const;
+  /// The node has read what it was told of that move (ServiceMovedDue), and of those before it.
+  void moves_read(std::uint32_t node, std::uint64_t move);
+
   /// nullptr: no such group.
   [[nodiscard]] const Topic* find_group(std::uint32_t group) const;
   /// Topics with a service, by ascending group index.
@@ -136,6 +144,10 @@ class Services {
   static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
   static void forget_subscriber(Topic& topic, std::uint32_t subscriber);
   void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects);
+  [[nodiscard]] static ServiceNoted service_noted(proto::ns::ChangeKind kind, const Topic& topic);
+  void tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects);
+  /// In force; 0: the subscriber's messages are not counted.
+  [[nodiscard]] static std::uint32_t window_of(const Topic& topic, std::uint32_t subscriber);
   void close_group(Topic& topic, std::chrono::milliseconds now, Effects& effects);
   void remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects);
 
@@ -145,6 +157,7 @@ class Services {
   Topics topics_;
   std::map<std::uint32_t, Topic*> groups_;
   std::unordered_map<std::uint32_t, Node> nodes_;
+  std::uint64_t moves_ = 0;
 };
 
 }  // namespace gimnet::hub

@@ -130,13 +130,27 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
 
 bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context) {
   context.owner.check_here();
-  if (control_bytes_ + frame.size() > context.limits.control_bytes) return false;
+  if (control_bytes_ - first_control_bytes() + frame.size() > context.limits.control_bytes) return false;
+  put_control(frame, context);
+  return true;
+}
+
+void Outbox::push_first_control(std::span<const std::byte> frames, EgressContext& context) {
+  context.owner.check_here();
+  while (!frames.empty()) {
+    const std::size_t size = proto::load_header(frames.data()).frame_size();
+    put_control(frames.first(size), context);
+    lanes().first_control_bytes += static_cast<std::uint32_t>(size);
+    frames = frames.subspan(size);
+  }
+}
+
+void Outbox::put_control(std::span<const std::byte> frame, EgressContext& context) {
   Run run{BufferRef{}, frame.data(), static_cast<std::uint32_t>(frame.size()), 1};
   Run copied = copy(run, context);
   context.tally.copied_bytes -= run.size;  // that counter is about data
   control_bytes_ += run.size;
   if (control_.empty() || !control_.back().extend(copied)) control_.push_back(std::move(copied));
-  return true;
 }
 
 void Outbox::settle(EgressContext& context) {
@@ -292,7 +306,7 @@ void Outbox::trim() {
   control_.trim();
   if (!lanes_) return;
   const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) && lanes_->replay.empty() &&
-                    lanes_->pauses.empty() && lanes_->cut.empty() && !backlog_;
+                    lanes_->pauses.empty() && lanes_->cut.empty() && lanes_->first_control_bytes == 0 && !backlog_;
   if (idle) return lanes_.reset();
   lanes_->replay.trim();
   for (LaneQueue& queue : lanes_->queues) queue.trim();
@@ -301,6 +315,7 @@ void Outbox::trim() {
 void Outbox::clear_control() {
   control_.clear();
   control_bytes_ = 0;
+  if (lanes_) lanes_->first_control_bytes = 0;
 }
 
 }  // namespace gimnet::hub

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -47,6 +48,9 @@ class Outbox {
   /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that waits: the peer asks
   /// and does not listen.
   [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context);
+  /// What a new connection is to get ahead of all else, whatever its size: frames as push_control() takes them. They do
+  /// not count against the limit on those, or a peer that came back to much could ask for nothing.
+  void push_first_control(std::span<const std::byte> frames, EgressContext& context);
 
   /// Who is told of messages of counted groups that are dropped here; nullptr: nobody.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
@@ -105,7 +109,10 @@ class Outbox {
     return lanes_->queues[lane];
   }
   [[nodiscard]] std::array<std::uint64_t, proto::kLaneCount>& owed() { return lanes().owed; }
-  void on_control_left(std::uint32_t bytes) { control_bytes_ -= bytes; }
+  void on_control_left(std::uint32_t bytes) {
+    control_bytes_ -= bytes;
+    if (lanes_) lanes_->first_control_bytes -= std::min(bytes, lanes_->first_control_bytes);
+  }
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
  private:
@@ -123,6 +130,8 @@ class Outbox {
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
     std::vector<CutMessage> cut;
+    std::uint32_t first_control_bytes =
+        0;  ///< of push_first_control() that have not left; here, since few ever have any
   };
   /// Messages of which the rest is still refused; beyond it the rest of the oldest is let through, and the recipient
   /// finds the gap.
@@ -157,6 +166,8 @@ class Outbox {
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   void forget_cut(NodeId src, std::uint32_t number);
+  void put_control(std::span<const std::byte> frame, EgressContext& context);
+  [[nodiscard]] std::uint32_t first_control_bytes() const { return lanes_ ? lanes_->first_control_bytes : 0; }
   void tell_lost(const Entry& entry) const;
   void replace_latest(EgressContext& context);
   /// Many small messages that cannot form runs take more memory for their entries than for their bytes.

@@ -33,7 +33,7 @@ class RecordingHost final : public InboundHost {
     answers.push_back(answer.header.request);
     return {};
   }
-  void on_service_moved(const proto::ns::ServiceMoved&) override {}
+  [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved&) override { return moved_is_news; }
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
   void on_name_decided(const std::string& name, bool lost) override { decided = (lost ? "lost " : "kept ") + name; }
   void on_taken(std::uint32_t, const proto::Taken& taken) override { taken_received.push_back(taken); }
@@ -63,6 +63,7 @@ class RecordingHost final : public InboundHost {
   std::vector<proto::flow::Message> flows;
   std::vector<std::uint16_t> answers;
   std::vector<std::uint32_t> lost_groups;
+  bool moved_is_news = true;
   std::uint32_t counted_group = 0;  ///< its messages count in a window
   std::string decided;
   std::optional<ReportedMessages::Start> start;  ///< of the message that reports are about

@@ -338,23 +338,6 @@ TEST(Outbox, FanOutKeepsAReferenceHoweverSmall) {
   EXPECT_EQ(rig.tally.copied_bytes, copied + 21);
 }
 
-TEST(Outbox, ControlGoesFirstAndIsBounded) {
-  Limits limits;
-  limits.control_bytes = 16 * kKiB;
-  EgressRig rig(limits);
-  TestConnection connection(rig);
-  rig.push(connection.outbox, "data", {.lane = 0});
-  const auto control = EgressRig::bytes(sized(kKiB, 'c'), {.kind = Kind::ns});
-  for (int i = 0; i < 16; ++i) EXPECT_TRUE(connection.outbox.push_control(control, rig.context));
-  EXPECT_FALSE(connection.outbox.push_control(control, rig.context));
-  connection.flush();
-  const auto texts = connection.take();
-  ASSERT_THAT(texts, SizeIs(17));
-  EXPECT_EQ(texts[0][0], 'c');
-  EXPECT_EQ(texts[16], "data");
-  EXPECT_TRUE(connection.outbox.push_control(control, rig.context)) << "there is room again";
-}
-
 TEST(Outbox, DropAllLeavesNothing) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);

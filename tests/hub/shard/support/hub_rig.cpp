@@ -8,6 +8,7 @@
 namespace gimnet::hub::testing {
 
 void FakeNode::on_frame(const GotFrame& frame) {
+  kinds.push_back(frame.header.kind);
   const bool is_data = static_cast<std::uint8_t>(frame.header.kind) < proto::kFirstControlKind &&
                        frame.header.kind != proto::Kind::flow && frame.header.kind != proto::Kind::report;
   if (is_data) {
@@ -141,6 +142,8 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
   command.tell_heard = spec.tell_heard;
+  command.told.assign(spec.told.begin(), spec.told.end());
+  command.told_move = spec.told_move;
   node.welcome.reset();
   node.goodbye.reset();
   this->command(node.shard.value(), std::move(command));

@@ -39,6 +39,8 @@ struct JoinSpec {
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
   bool tell_heard = false;
+  std::span<const std::byte> told{};  ///< control frames that it gets first
+  std::uint64_t told_move = 0;
 };
 
 /// A node played by a test: the far end of its connection, and what came out of it.
@@ -48,11 +50,12 @@ struct FakeNode {
   SessionRef session;
   std::uint32_t attachment = 0;
   MemoryPeer pipe;
-  std::vector<std::byte> stream;  ///< read and not taken apart yet
-  bool opened = false;            ///< the 8 opening bytes came
-  std::vector<GotFrame> frames;   ///< data frames
-  std::vector<GotFrame> control;  ///< FLOW, LINK, NS, CTRL and REPORT
-  std::uint64_t data_frames = 0;  ///< of this epoch, SKIP included
+  std::vector<std::byte> stream;   ///< read and not taken apart yet
+  bool opened = false;             ///< the 8 opening bytes came
+  std::vector<GotFrame> frames;    ///< data frames
+  std::vector<GotFrame> control;   ///< FLOW, LINK, NS, CTRL and REPORT
+  std::vector<proto::Kind> kinds;  ///< of both, as they came
+  std::uint64_t data_frames = 0;   ///< of this epoch, SKIP included
   std::uint64_t skipped = 0;
   std::optional<proto::Welcome> welcome;
   std::optional<proto::Goodbye> goodbye;
