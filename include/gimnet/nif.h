@@ -295,7 +295,8 @@ typedef enum nif_incoming_type {
   NIF_DISCONNECTED = 4,
   /** Another connection took the session over; nothing follows [text]. */
   NIF_SESSION_REPLACED = 5,
-  /** A node subscribed to a service of this one [group, from: the node, count: subscribers now]. */
+  /** A node subscribed to a service of this one [group, from: the node, count: subscribers now]. Once for each service,
+   * with from 0, when it was declared again after a break: some may have come or gone meanwhile. */
   NIF_SUBSCRIBER_JOINED = 6,
   /** ... and left again [same]. */
   NIF_SUBSCRIBER_LEFT = 7,

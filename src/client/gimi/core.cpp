@@ -372,8 +372,8 @@ void Core::on_gap(const nif_incoming& in) {
 void Core::on_connected(const nif_incoming& in) {
   ++reconnects_;
   streams_.on_interrupted(0);
-  if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
   services_.on_reconnected();
+  if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
   streams_.on_broken("the connection to the hub broke, and what was on its way is lost");
 }
 

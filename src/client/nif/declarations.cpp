@@ -226,10 +226,12 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
   const GroupId group = answer ? answer->group : GroupId{};
   GroupId former;
   bool changed = false;
+  bool provides = false;
   {
     const MutexLock lock(mutex_);
     const auto found = services_.find(service);
     if (found != services_.end()) {
+      provides = found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
       former = std::exchange(found->second.group, group);
       found->second.asked = false;
       changed = former != group && !found->second.ended;
@@ -249,6 +251,13 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     record->incoming.group = group.value();
     record->incoming.reason = static_cast<std::uint32_t>(answer ? NIF_OK : status_of(answer.error().status));
     events_.push_back(item_of(record, service.size()));
+  }
+  // Who came or went while this node was away, nobody told it.
+  if (answer && provides) {
+    Record* record = make_event(NIF_SUBSCRIBER_JOINED, "");
+    record->incoming.group = group.value();
+    record->incoming.count = answer->subscribers;
+    events_.push_back(item_of(record, 0));
   }
   answered();
 }

@@ -62,7 +62,9 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
   template <class Request>
   void come_back(const Groups& groups) {
     hub_.close();
-    hub_ = fake_.admit(nif::test::make_welcome());
+    proto::Welcome welcome = nif::test::make_welcome(resume_bytes_);
+    welcome.resumed = resumes_;
+    hub_ = fake_.admit(welcome);
     answer_all<Request>(groups);
     settle_down();
   }
@@ -104,6 +106,8 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
   }
 
   std::uint32_t sequence_ = 0;
+  std::uint32_t resume_bytes_ = 0;
+  bool resumes_ = false;
 
  private:
   static const std::string& name_of(const ns::Advertise& request) { return request.service; }
@@ -162,6 +166,26 @@ TEST_P(MovedOwnServices, CountTheirOwnSubscribers) {
   settle_down();
   EXPECT_EQ(map.subscribers(), 5u);
   EXPECT_EQ(odometry.subscribers(), 6u);
+  close_node();
+}
+
+TEST_P(MovedOwnServices, LearnHowManySubscribersThereAreAfterABreak) {
+  const Publisher odometry = advertise("odom", kFirst);
+  const Publisher map = advertise("map", kSecond);
+  resume_bytes_ = 1 << 20;
+  come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
+  ns::SubscriberLeft left;
+  for (const std::uint32_t group : {kFirst, kSecond}) {
+    left.group = GroupId{group};
+    hub_.send_control(proto::Kind::ns, proto::encode(left));
+  }
+  settle_down();
+  EXPECT_EQ(odometry.subscribers(), 0u);
+  resumes_ = true;
+  come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
+  EXPECT_EQ(odometry.subscribers(), 1u) << "who came meanwhile would get nothing";
+  expect_published(odometry, kFirst);
+  expect_published(map, kSecond);
   close_node();
 }
 

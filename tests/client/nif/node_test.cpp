@@ -352,6 +352,7 @@ TEST(Node, DeclaresServicesAndSubscriptionsAgain) {
   const nif_incoming own = expect(node, NIF_OWN_SERVICE_MOVED);
   EXPECT_EQ(own.former_group, 11u);
   EXPECT_EQ(own.group, 12u);
+  EXPECT_EQ(expect(node, NIF_SUBSCRIBER_JOINED).group, 12u) << "how many there are now";
   const nif_incoming peer = expect(node, NIF_SERVICE_MOVED);
   EXPECT_EQ(peer.former_group, 21u);
   EXPECT_EQ(peer.group, 22u);

@@ -9,7 +9,7 @@
 #include "tests/client/nif/support/fake_hub.hpp"
 
 // Through the whole library, with a hub that a test plays: what a program is told after a break of services that moved
-// meanwhile.
+// meanwhile, and of subscribers that came.
 
 namespace gimnet::nif {
 namespace {
@@ -145,6 +145,40 @@ TEST_F(ToldAgain, OfAServiceThatIsGone) {
 TEST_F(ToldAgain, AnEventThatIsNotRepeatedIsAlwaysNews) {
   tell(kKnown, kKnown, false);
   expect_moved(kKnown, kKnown);
+}
+
+TEST_F(ToldAgain, HowManySubscribersThereAre) {
+  const auto answer_advertise = [&](std::uint32_t subscribers) {
+    std::uint16_t number = 0;
+    const auto request = connected_.hub.next_request<ns::Advertise>(number);
+    ASSERT_TRUE(request);
+    connected_.hub.send_control(proto::Kind::ns,
+                                proto::encode_answer(ns::AdvertiseAnswer{GroupId{kPresent}, subscribers}, number));
+  };
+  for (const nif_direction direction : {NIF_PROVIDES, NIF_ACCEPTS}) {
+    std::thread asking([&] {
+      nif_service service{};
+      service.struct_size = sizeof service;
+      service.name = "odom";
+      service.direction = static_cast<std::uint8_t>(direction);
+      std::uint32_t group = 0;
+      EXPECT_EQ(nif_advertise(connected_.node.get(), &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+    });
+    answer_advertise(0);
+    asking.join();
+    come_back();
+    answer_advertise(3);
+    answer_subscribe(kKnown);
+    if (direction == NIF_PROVIDES) {
+      const nif_incoming in = next();
+      EXPECT_EQ(in.type, NIF_SUBSCRIBER_JOINED);
+      EXPECT_EQ(in.group, kPresent);
+      EXPECT_EQ(in.from, 0u);
+      EXPECT_EQ(in.count, 3u);
+    }
+    publish(kKnown);
+    expect_message(kKnown);
+  }
 }
 
 }  // namespace
