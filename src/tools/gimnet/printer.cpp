@@ -17,7 +17,8 @@ void print(Session& session, const Message& message, const Absent& absent) {
     output.write(message.data());
     output.write("\n");
   } else {
-    output.write(session.options().json ? json_line(message, absent) : text_line(message));
+    output.write(session.options().json ? json_line(message, absent)
+                                        : text_line(message, is_pattern(session.options().target)));
   }
 }
 
@@ -27,8 +28,9 @@ void say_all(const std::vector<std::string>& sentences) {
 
 }  // namespace
 
-std::string text_line(const Message& message) {
-  std::string line = message.from().text() + " ";
+std::string text_line(const Message& message, bool named) {
+  std::string line = named ? std::string(message.service()) + " " : "";
+  line += message.from().text() + " ";
   if (message.key() != MessageKey{}) {
     line += std::to_string(message.key().type) + "/" + std::to_string(message.key().instance) + " ";
   }

@@ -18,8 +18,9 @@ struct Absent {
   std::optional<std::uint64_t> missed;  ///< of the message's service, where somebody counted
 };
 
-/// A message as a line, for people and as an object.
-[[nodiscard]] std::string text_line(const Message& message);
+/// A message as a line for people; `named`: with its service.
+[[nodiscard]] std::string text_line(const Message& message, bool named = false);
+/// As an object.
 [[nodiscard]] std::string json_line(const Message& message, const Absent& absent = {});
 
 /// Takes the next message; waits for it at most so long.

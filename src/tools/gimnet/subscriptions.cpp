@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/clock.hpp"
+#include "tools/gimnet/options.hpp"
 #include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {

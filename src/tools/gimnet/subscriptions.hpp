@@ -11,9 +11,6 @@
 
 namespace gimnet::tool {
 
-/// Are several names meant?
-[[nodiscard]] inline bool is_pattern(std::string_view word) { return word.find('*') != std::string_view::npos; }
-
 /// Not all messages are wanted, and the hub has to take the terms.
 [[nodiscard]] bool wants_less(const PaceOptions& pace);
 
