@@ -94,7 +94,6 @@ WITH_A_HUB = [
     (USAGE, ["'no spaces'", NAME_RULE], ["recv", "--name", "no spaces"], b""),
     (USAGE, ["it has more than 255 bytes"], ["recv", "--name", "x" * 256], b""),
     (USAGE, ["it has an empty part: between two parts stands one /"], ["pub", "a//b"], b"x\n"),
-    (USAGE, ["'*'", NAME_RULE], ["send", "*"], b"x\n"),
     (USAGE, ["cannot look for 'a//b'", PATTERN_RULE], ["nodes", "a//b"], b""),
     (USAGE, ["cannot look for '***'", PATTERN_RULE], ["services", "***"], b""),
     (USAGE, ["cannot look for '*/'", PATTERN_RULE], ["echo", "*/"], b""),

@@ -223,6 +223,41 @@ class Patterns(unittest.TestCase):
                     self.assertEqual((tool.code, tool.out), (2, b""), tool.err)
                     self.assertIn(pattern, tool.err)
 
+    def test_where_one_node_is_meant_they_are_wrong_arguments(self):
+        for words in (["send", "*"], ["ping", "a/*"], ["ctl", "kick", "a*"], ["ctl", "reassign", "**", "7.1"]):
+            tool = run_gimnet("tcp://127.0.0.1:1", *words)
+            self.assertEqual((tool.code, tool.out), (2, b""), tool.err)
+            command = " ".join(words[:2] if words[0] == "ctl" else words[:1])
+            pattern = words[2 if words[0] == "ctl" else 1]
+            self.assertIn(f"'{pattern}' is a pattern, and gimnet {command} takes one node: `gimnet nodes '{pattern}'` "
+                          "lists those that match", tool.err)
+
+    def test_what_matches_nothing_is_said(self):
+        hub = Hub(self, *PATIENT)
+        Provider(self, hub).advertise()
+        for words, code, said in ((["nodes", "r/s"], 4, "no node matches 'r/s': that is a service of the node r"),
+                                  (["nodes", "7.999"], 4, "no node matches '7.999'; `gimnet nodes` lists"),
+                                  (["services", "nobody/*"], 4, "no service matches 'nobody/*'; `gimnet services` lists"),
+                                  (["services", "r"], 4, "no service matches 'r'; did you mean 'r/**'?"),
+                                  (["watch", "x/*", "--seconds", "0.05"], 5, "nothing matches x/* yet; waiting"),
+                                  (["echo", "x/*", "--seconds", "0.05"], 5, "no service matches x/* yet; waiting")):
+            tool = run_gimnet(hub, *words)
+            self.assertEqual(tool.code, code, tool.err)
+            self.assertIn("gimnet: " + said, tool.err)
+        quiet = run_gimnet(hub, "watch", "x/*", "--changes", "--seconds", "0.05")
+        self.assertEqual((quiet.code, quiet.err),
+                         (5, "gimnet: waited 0.05 s for an event of x/*: none came\n"))
+
+    def test_of_several_services_lines_name_their_own(self):
+        hub = Hub(self, *PATIENT)
+        provider = Provider(self, hub).advertise()
+        tools = [self.start(hub, "echo", word, "-n", "1", waits=False) for word in ("r/*", "r/s")]
+        self.wait_for_subscribers(hub, "r/s", 2)
+        provider.publish(9)
+        self.assertEqual([tool.wait() for tool in tools], [0, 0])
+        self.assertRegex(tools[0].out, rb"^r/s 7\.[0-9]+ #9: x\n$")
+        self.assertRegex(tools[1].out, rb"^7\.[0-9]+ #9: x\n$")
+
 
 if __name__ == "__main__":
     unittest.main()

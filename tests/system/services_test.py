@@ -257,6 +257,8 @@ class Lists(unittest.TestCase):
         self.assertEqual((tool.code, json.loads(tool.out)), (4, []))
         self.assertIn("did you mean robot?", tool.err)
         self.assertEqual(run_gimnet(hub, "services", "robot/*").code, 4)
+        robot = hub.wait_for_node("robot")["id"]
+        self.assertEqual([node["name"] for node in json.loads(run_gimnet(hub, "nodes", robot, "--json").out)], ["robot"])
         self.assertEqual(run_gimnet(hub, "services").code, 0)
 
     def test_looks_of_the_tool_are_listed_only_when_asked_for(self):

@@ -102,6 +102,16 @@ CommandLineEnding unknown_action(std::string_view word) {
 
 CommandLineEnding missing_action() { return wrong("action is missing: " + all_actions(), {"ctl", ""}); }
 
+/// A pattern where one node is meant.
+std::string too_many(const Options& options, const Called& called) {
+  const bool acts = options.command == Command::ctl;
+  const std::string& word = acts ? options.ctl.node : options.target;
+  const bool names_node = acts || options.command == Command::ping || options.command == Command::send;
+  if (!names_node || !is_pattern(word)) return {};
+  return "'" + word + "' is a pattern, and " + called.text() + " takes one node: `gimnet nodes '" + word +
+         "'` lists those that match";
+}
+
 /// What CLI11 cannot know.
 std::string contradiction(const Options& options) {
   if (options.json && options.raw) return "--json and --raw contradict each other: give one of them";
@@ -227,6 +237,7 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   if (!sentence.empty()) return wrong(sentence, called);
   if (called.command.empty()) return missing_command(app);
   options.command = known->second;
+  if (sentence = too_many(options, called); !sentence.empty()) return wrong(sentence, called);
   if (sentence = contradiction(options); !sentence.empty()) return wrong(sentence, called);
   return options;
 }

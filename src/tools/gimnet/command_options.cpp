@@ -149,7 +149,7 @@ void add_ping(CLI::App& app, Options& options) {
 
 void add_lists(CLI::App& app, Options& options) {
   CLI::App& nodes = *app.add_subcommand("nodes", help::kNodesAbout);
-  nodes.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
+  nodes.add_option("pattern", options.target, "`*` is one part of a name, `**` any number; or an id, 7.17");
   nodes.add_flag("--all", options.all, "those of gimnet itself, too");
   CLI::App& services = *app.add_subcommand("services", help::kServicesAbout);
   services.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");

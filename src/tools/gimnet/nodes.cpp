@@ -29,8 +29,11 @@ std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
 ExitCode run_nodes(Session& session) {
   if (const auto ending = session.join_to_look()) return *ending;
   const Options& options = session.options();
-  auto nodes = session.node().nodes(options.target);
+  // No name reads as an id does, so that nothing else can be meant.
+  const auto id = Peer::parse(options.target);
+  auto nodes = session.node().nodes(id ? std::string() : options.target);
   if (!nodes) return session.fail(nodes.failure());
+  if (id) std::erase_if(*nodes, [&](const NodeRecord& node) { return node.node.id != id->id; });
   if (!options.all) std::erase_if(*nodes, is_tool);
   session.output().write(options.json ? json_of(*nodes) : table_of(*nodes, session.paint()));
   if (nodes->empty() && !options.target.empty()) return session.fail_unmatched("node");

@@ -67,9 +67,7 @@ std::optional<Peer> Session::find(std::string_view name) {
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
     failure.sentence = "there is no node '" + std::string(name) + "'";
-    failure.sentence += is_service(name)
-                            ? ": that is a service of the node " + std::string(name.substr(0, name.rfind('/')))
-                            : nearest_name("node", name);
+    failure.sentence += is_service(name) ? service_words(name) : nearest_name("node", name);
   }
   code_ = fail(failure);
   return std::nullopt;
@@ -84,6 +82,10 @@ bool Session::is_service(std::string_view name) {
   if (name.find('/') == std::string_view::npos) return false;
   const auto services = node_->services(name);
   return services && std::ranges::any_of(*services, [&](const ServiceRecord& service) { return service.name == name; });
+}
+
+std::string Session::service_words(std::string_view name) {
+  return ": that is a service of the node " + std::string(name.substr(0, name.rfind('/')));
 }
 
 std::string Session::wider_pattern(const std::string& kind, const std::string& word) {
@@ -121,9 +123,12 @@ std::string Session::nearest_name(const std::string& kind, std::string_view word
 ExitCode Session::fail_unmatched(const std::string& kind) {
   output_.flush();
   const std::string& target = options_.target;
+  const std::string sentence = "no " + kind + " matches '" + target + "'";
+  if (kind == "node" && !is_pattern(target) && is_service(target)) {
+    return fail({Status::not_found, sentence + service_words(target)});
+  }
   const std::string wider = wider_pattern(kind, target);
-  return fail({Status::not_found,
-               "no " + kind + " matches '" + target + "'" + (wider.empty() ? nearest_name(kind, target) : wider)});
+  return fail({Status::not_found, sentence + (wider.empty() ? nearest_name(kind, target) : wider)});
 }
 
 ExitCode Session::fail(const Failure& failure) {

@@ -69,6 +69,8 @@ class Session {
   /// A suggestion where names of nodes or services begin with the word; "" if none do.
   [[nodiscard]] std::string wider_pattern(const std::string& kind, const std::string& word);
   [[nodiscard]] bool is_service(std::string_view name);
+  /// That a service was called where a node was meant.
+  [[nodiscard]] static std::string service_words(std::string_view name);
 
   const Options& options_;
   StopSignal& stop_;

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "base/clock.hpp"
 #include "tools/gimnet/bounds.hpp"
 #include "tools/gimnet/commands.hpp"
@@ -6,6 +8,11 @@
 
 namespace gimnet::tool {
 namespace {
+
+/// There is nothing to print, and there may not be for long.
+void say_that_it_waits(const Options& options) {
+  say("nothing " + (options.target.empty() ? "is there" : "matches " + options.target) + " yet; waiting");
+}
 
 /// Prints what is to be seen. True: it was an event that the user asked for.
 bool print(Session& session, ToolFilter& filter, const WatchEvent& event) {
@@ -26,7 +33,9 @@ ExitCode run_watch(Session& session) {
   const Bounds bounds(session.options());
   ConnectionWatch connection(session.node());
   ToolFilter filter;
+  const Options& options = session.options();
   std::uint64_t events = 0;
+  bool told = false;
   while (!bounds.enough(events) && !bounds.late() && session.output().ok()) {
     auto event = watch->receive(kNoWait);
     if (!event && event.is(Status::timeout)) {
@@ -40,6 +49,9 @@ ExitCode run_watch(Session& session) {
       return session.fail(event.failure());
     }
     if (print(session, filter, *event)) ++events;
+    if (event->change == Change::snapshot_ends && events == 0 && !options.changes && !std::exchange(told, true)) {
+      say_that_it_waits(options);
+    }
     if (event->change != Change::ended) continue;
     session.output().flush();
     return session.fail({Status::refused, "the hub ended the watch: " + event->why});
