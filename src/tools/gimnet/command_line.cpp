@@ -50,7 +50,29 @@ CommandLineEnding wrong(const std::string& sentence, const Called& called) {
   return {ExitCode::usage, "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
 }
 
+/// What the tools of other networks call their commands, and ours that does it; "" if none is known.
+std::string_view command_meant(std::string_view word) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kWords{{
+      {"sub", "echo"},
+      {"subscribe", "echo"},
+      {"publish", "pub"},
+      {"topic", "services"},
+      {"topics", "services"},
+      {"list", "services"},
+      {"node", "nodes"},
+      {"info", "services"},
+      {"monitor", "watch"},
+  }};
+  for (const auto& [theirs, ours] : kWords) {
+    if (word == theirs) return ours;
+  }
+  return {};
+}
+
 CommandLineEnding unknown_command(std::string_view word) {
+  if (const std::string_view meant = command_meant(word); !meant.empty()) {
+    return wrong("there is no command '" + std::string(word) + "'; did you mean " + std::string(meant) + "?", {});
+  }
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
   // What other tools have as commands.
@@ -115,6 +137,9 @@ std::string too_many(const Options& options, const Called& called) {
 /// What CLI11 cannot know.
 std::string contradiction(const Options& options) {
   if (options.json && options.raw) return "--json and --raw contradict each other: give one of them";
+  if (options.command != Command::ctl && options.target.find_first_of("#+>") != std::string::npos) {
+    return "'" + options.target + "' has a character that no name has; in patterns `*` is one part, `**` any number";
+  }
   const bool names_service = options.command == Command::pub || options.command == Command::echo ||
                              options.command == Command::hz || options.command == Command::bw;
   if (names_service && options.target.find_first_of("/*") == std::string::npos) {
@@ -157,9 +182,11 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, const Called& ca
 /// A word that nothing takes.
 std::string unexpected(const std::string& word, const std::vector<const CLI::Option*>& options, const Called& called) {
   if (!word.starts_with('-')) {
-    const bool may_be_name = called.command == "recv";
-    return "'" + word + "' is one word too many for " + called.text() +
-           (may_be_name ? "; did you mean --name " + word + "?" : "");
+    const bool reads_lines = called.command == "send" || called.command == "pub";
+    const std::string advice = called.command == "recv" ? "; did you mean --name " + word + "?"
+                               : reads_lines            ? ": messages are lines of its standard input"
+                                                        : "";
+    return "'" + word + "' is one word too many for " + called.text() + advice;
   }
   const std::string given = word.substr(0, word.find('='));
   std::vector<std::string> names;

@@ -102,6 +102,18 @@ TEST(CommandLine, SuggestsWhatANewcomerMeant) {
   said({"hz", "*"}, "'*' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all");
   said({"echo", "robot*"}, "'robot*' matches no service");
   said({"pub", "*"}, "'*' is no full name of a service: write NODE/SERVICE");
+  said({"sub", "a/b"}, "there is no command 'sub'; did you mean echo?");
+  said({"topic", "list"}, "there is no command 'topic'; did you mean services?");
+  said({"monitor"}, "there is no command 'monitor'; did you mean watch?");
+  said({"pub", "a/b", "hello"},
+       "'hello' is one word too many for gimnet pub: messages are lines of its standard input");
+  said({"send", "B", "hello"},
+       "'hello' is one word too many for gimnet send: messages are lines of its standard input");
+  for (const char* const pattern : {"a/#", "a/+/b", "a.>"}) {
+    for (const char* const command : {"echo", "hz", "bw", "watch", "nodes", "services"}) {
+      said({command, pattern}, "has a character that no name has; in patterns `*` is one part, `**` any number");
+    }
+  }
   said({"ctl", "list"}, ": give connections, routes, kick, reassign, drain, reload or log");
   EXPECT_EQ(options({"hz", "**"}).target, "**");
 }
