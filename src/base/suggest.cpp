@@ -4,8 +4,13 @@
 #include <vector>
 
 namespace gimnet {
+namespace {
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+/// `Same`: are two letters one?
+template <class Same>
+std::size_t distance_between(std::string_view a, std::string_view b, Same same) {
   // Three rows of the usual table: a swap of neighbours looks two rows back.
   std::vector<std::size_t> before(b.size() + 1);
   std::vector<std::size_t> previous(b.size() + 1);
@@ -14,15 +19,21 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   for (std::size_t i = 1; i <= a.size(); ++i) {
     current[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t exchange = previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      const std::size_t exchange = previous[j - 1] + (same(a[i - 1], b[j - 1]) ? 0 : 1);
       current[j] = std::min({previous[j] + 1, current[j - 1] + 1, exchange});
-      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      const bool swapped = i > 1 && j > 1 && same(a[i - 1], b[j - 2]) && same(a[i - 2], b[j - 1]);
       if (swapped) current[j] = std::min(current[j], before[j - 2] + 1);
     }
     before.swap(previous);
     previous.swap(current);
   }
   return previous[b.size()];
+}
+
+}  // namespace
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  return distance_between(a, b, [](char one, char other) { return one == other; });
 }
 
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates) {
@@ -32,7 +43,8 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
     if (candidate == word) continue;  // it came in the meantime: what was meant is what was said
     const std::size_t longer = std::max(word.size(), candidate.size());
     if (longer - std::min(word.size(), candidate.size()) >= least) continue;  // so many letters differ at least
-    const std::size_t distance = edit_distance(word, candidate);
+    const std::size_t distance =
+        distance_between(word, candidate, [](char one, char other) { return lower(one) == lower(other); });
     if (distance < least) {
       least = distance;
       best = candidate;

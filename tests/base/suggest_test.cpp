@@ -24,6 +24,14 @@ TEST(DidYouMean, NamesTheNearest) {
   EXPECT_EQ(did_you_mean("--shrads", kWords), "; did you mean --shards?");
 }
 
+TEST(DidYouMean, CapitalsAreNoDifference) {
+  constexpr std::array<std::string_view, 3> kWords{"hub_id", "hub_name", "Robot"};
+  EXPECT_EQ(did_you_mean("HUB_ID", kWords), "; did you mean hub_id?");
+  EXPECT_EQ(did_you_mean("HBU_NAME", kWords), "; did you mean hub_name?");
+  EXPECT_EQ(did_you_mean("robot", kWords), "; did you mean Robot?");
+  EXPECT_EQ(edit_distance("HUB", "hub"), 3u);
+}
+
 TEST(DidYouMean, NeverNamesTheWordItself) {
   constexpr std::array<std::string_view, 2> kWords{"robot", "robot2"};
   EXPECT_EQ(did_you_mean("robot", kWords), "; did you mean robot2?");
