@@ -192,7 +192,14 @@ class Reading {
   void leave_out(const toml::parse_error& error) {
     const std::size_t line = std::clamp<std::size_t>(places_.line(error.source()), places_.first, lines_.size());
     const bool at_end = is_at_end(error);
-    if (const auto list = open_list_before(line, at_end)) {
+    const bool nothing_left_out = left_out_from_ == 0;
+    if (const auto text = at_end && nothing_left_out ? lines_.open_text(places_.first) : std::nullopt) {
+      left_out_from_ = lines_.beginning(text->first, places_.first);
+      left_out_to_ = last_of_open_text(text->first);
+      file_.faults.push_back(
+          {places_.of(text->first, text->second),
+           "this is not TOML: the text that begins here is not closed; end it with its three quotes"});
+    } else if (const auto list = open_list_before(line, at_end)) {
       std::tie(left_out_from_, left_out_to_) = *list;
       file_.faults.push_back({places_.of(left_out_from_, lines_.first_column(left_out_from_)),
                               "this is not TOML: the list that begins here is not closed; end it with ]"});
@@ -205,6 +212,13 @@ class Reading {
     }
     header_left_out_ = lines_.is_header(left_out_from_);
     lines_.blank(left_out_from_, left_out_to_);
+  }
+  /// A text that is not closed takes all that follows. Its last line, as far as can be guessed: before the next one
+  /// that is a key or a header for itself.
+  [[nodiscard]] std::size_t last_of_open_text(std::size_t first) const {
+    std::size_t last = first;
+    while (last < lines_.size() && !(lines_.begins(last + 1) && toml::parse(lines_.line(last + 1)))) ++last;
+    return last;
   }
   /// A list that is not closed takes what follows for its values, so the parser complains of the next key, or of the
   /// end. The lines of such a list before the error; none: that is not what is wrong.

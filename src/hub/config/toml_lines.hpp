@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -52,6 +53,28 @@ class TomlLines {
     if (end == std::string_view::npos || trimmed(all).starts_with('#')) return 0;
     return static_cast<std::size_t>(std::count(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(end), '.'));
   }
+  /// Where the text over several lines begins in which the lines from `first` on end, as its end is missing: line, and
+  /// column (from 1, in characters). REQUIRES: `first` begins outside of any text.
+  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_text(std::size_t first) const {
+    const std::string_view all = text(first, size());
+    for (std::size_t at = 0; at < all.size();) {
+      const std::string_view rest = all.substr(at);
+      if (rest.starts_with("\"\"\"") || rest.starts_with("'''")) {
+        const std::size_t bytes = text_bytes(rest);
+        if (bytes == std::string_view::npos) return place_in(first, all.substr(0, at));
+        at += bytes;
+      } else if (rest.front() == '#') {
+        at += std::min(rest.find('\n'), rest.size());
+      } else if (rest.front() == '"' || rest.front() == '\'') {
+        at += one_line_text_bytes(rest);
+      } else {
+        ++at;
+      }
+    }
+    return std::nullopt;
+  }
+  /// Does a key or the header of a table begin there?
+  [[nodiscard]] bool begins(std::size_t number) const { return begins(line(number)); }
   /// Blanks the lines first..last.
   void blank(std::size_t first, std::size_t last) {
     for (std::size_t at = begins_[first - 1]; at < begins_[last]; ++at) {
@@ -89,6 +112,39 @@ class TomlLines {
   }
 
  private:
+  /// Of a text over several lines with its quotes; npos: its end is missing.
+  static std::size_t text_bytes(std::string_view text) {
+    const char quote = text.front();
+    for (std::size_t at = 3; at + 2 < text.size(); ++at) {
+      if (quote == '"' && text[at] == '\\') {
+        ++at;
+      } else if (text[at] == quote && text[at + 1] == quote && text[at + 2] == quote) {
+        // Two more may be the last of its letters.
+        at += 3;
+        for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) ++at;
+        return at;
+      }
+    }
+    return std::string_view::npos;
+  }
+  /// Of a text on one line with its quotes, or of what is left of the line where its end is missing.
+  static std::size_t one_line_text_bytes(std::string_view text) {
+    const char quote = text.front();
+    std::size_t at = 1;
+    for (; at < text.size() && text[at] != '\n'; ++at) {
+      if (text[at] == quote) return at + 1;
+      if (quote == '"' && text[at] == '\\' && at + 1 < text.size() && text[at + 1] != '\n') ++at;
+    }
+    return at;
+  }
+  /// Line and column behind `text`, which begins with the line `first`.
+  static std::pair<std::size_t, std::size_t> place_in(std::size_t first, std::string_view text) {
+    const auto line = first + static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+    const std::size_t begin = text.rfind('\n') + 1;  // 0 where there is none
+    const auto characters = std::count_if(text.begin() + static_cast<std::ptrdiff_t>(begin), text.end(),
+                                          [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
+    return {line, static_cast<std::size_t>(characters) + 1};
+  }
   /// Bytes of the first character; 0: it is none.
   static std::size_t character_size(std::string_view text) {
     const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());

@@ -128,6 +128,32 @@ TEST(TomlFile, AListThatIsNotClosedHidesNothing) {
   EXPECT_THAT(keys(twice), ElementsAre("limits.nodes"));
 }
 
+TEST(TomlFile, ATextThatIsNotClosedIsToldWhereItBeginsAndHidesNothing) {
+  for (const std::string quotes : {"\"\"\"", "'''"}) {
+    for (const std::string content : {"", "a", "a\nb", "a\n# b\n\n[ c\nd = \n", "\n]\n", "a'b\"c"}) {
+      const TomlFile file = read_toml(
+          "hub_id = 1\nhub_name = " + quotes + content + "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+      ASSERT_THAT(file.faults, SizeIs(2)) << quotes << content;
+      EXPECT_EQ(file.faults[0].line(),
+                "f:2:12: this is not TOML: the text that begins here is not closed; end it with its three quotes");
+      EXPECT_THAT(file.faults[1].place, HasSubstr(":10")) << "the value of nodes";
+      EXPECT_THAT(keys(file), ElementsAre("hub_id", "shards", "limits.grace_ms")) << quotes << content;
+    }
+  }
+  const TomlFile last = read_toml("shards = 2\n\"\u00e4\" = [1, '''", "f");
+  EXPECT_THAT(places(last), ElementsAre("f:2:11"));
+  EXPECT_THAT(keys(last), ElementsAre("shards"));
+}
+
+TEST(TomlFile, ATextThatIsClosedIsNotTakenForAnOpenOne) {
+  for (const std::string closed : {"\"\"\"\"\"\"", "\"\"\"a\\\"\"\"\"", "\"\"\"a\"\"\"\"\"", "'''a\\'''", "'''a''''",
+                                   "\"a '''\" # '''", "'\"\"\"'", "\"\\\"\" # \"\"\""}) {
+    const TomlFile file = read_toml("hub_name = " + closed + "\nlisten = [", "f");
+    EXPECT_THAT(places(file), ElementsAre("f:2:1")) << closed;
+    EXPECT_THAT(keys(file), ElementsAre("hub_name")) << closed;
+  }
+}
+
 TEST(TomlFile, WhatStandsBelowABrokenHeaderIsNobodys) {
   const TomlFile file = read_toml("shards = 1\n[limits\nnodes = 2\n", "f");
   EXPECT_THAT(places(file), ElementsAre("f:2:8"));
@@ -185,7 +211,7 @@ TEST(TomlFile, AnErrorWhoseBeginningIsNotFoundIsTold) {
   const auto with = [](std::size_t bytes) {
     std::string text = "shards = 1\nname = \"\"\"\n";
     while (text.size() < bytes) text += "hub_id = 1\n";
-    return read_toml(text, "f");
+    return read_toml(text + "\\q\n", "f");
   };
   const TomlFile shorter = with(3'000);
   EXPECT_THAT(shorter.faults, SizeIs(1));
