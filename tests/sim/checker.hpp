@@ -23,7 +23,7 @@ enum class Checker : std::uint8_t {
   limits,         ///< the limits hold, and nothing is refused below them
   grace,          ///< a session lasts while it is connected and through its grace time, and no longer
   seam,           ///< the commands to a shard make sense to it
-  pace,           ///< each subscriber gets no more than its terms allow, in order, and the shards know these
+  pace,           ///< each subscriber gets what its terms allow, no more and no later, in order; the shards know these
   credit,         ///< a window is never exceeded, and nothing that is lost narrows it for good
   retained,       ///< a new subscriber begins with the last message of a retained service
   drain,          ///< a hub that drains lets nobody in, has everybody told to go, and ends when they have gone

@@ -28,6 +28,10 @@ void SimShards::begin_pace(std::size_t index, const hub::PaceCommand& command) {
   const bool begins = pace == nullptr || !pace->counts.active;
   if (pace == nullptr) pace = std::make_unique<Pace>(nobody_, command.group, command.terms);
   pace->counts.active = true;
+  if (begins) {
+    pace->counts.restart_clock();
+    pace->last.reset();
+  }
   if (!(pace->counts.terms() == command.terms)) {
     pace->counts.set_terms(command.terms);
     pace->begun = 0;
@@ -77,6 +81,7 @@ void SimShards::pass(std::size_t index, Seat& seat, Pace& pace, Data data) {
   // One may be late, and the next one in time all the same.
   require(pace.begun < 3 || (pace.begun - 2) * interval <= in_us(now - pace.first), Checker::pace,
           "a subscriber gets more messages than its maximal rate allows");
+  pace.last = now;
   pace.counts.on_begun(in_us(now));
   pace.counts.on_sent(1);
   push(index, seat, std::move(data));
@@ -94,16 +99,25 @@ void SimShards::release_held(std::size_t index, Seat& seat, Pace& pace) {
   wait_until_due(index, seat, pace);
 }
 
+/// By the terms alone: one interval behind the message before, at once without one.
+Time SimShards::latest_due(const Pace& pace) {
+  const Time interval{static_cast<std::int64_t>(pace.counts.terms().interval_us)};
+  return pace.last && interval != Time{} ? *pace.last + interval : Time{};
+}
+
 void SimShards::wait_until_due(std::size_t index, Seat& seat, Pace& pace) {
-  const std::uint64_t now = in_us(setting_.agenda.now());
-  if (pace.counts.scheduled || pace.held.empty() || pace.counts.is_due(now) || pace.counts.space() == 0) return;
-  pace.counts.scheduled = true;
-  const Time due{static_cast<std::int64_t>(pace.counts.due_us())};
-  setting_.agenda.at(due, [this, index, session = seat.session, group = pace.counts.group()] {
+  if (pace.held.empty() || pace.counts.space() == 0) return;
+  const Time now = setting_.agenda.now();
+  require(now < latest_due(pace), Checker::pace,
+          "a subscriber waits longer for a message than its maximal rate demands");
+  const Time due = std::min(latest_due(pace), Time{static_cast<std::int64_t>(pace.counts.due_us())});
+  if (pace.wakes && *pace.wakes <= due) return;
+  pace.wakes = due;
+  setting_.agenda.at(due, [this, index, due, session = seat.session, group = pace.counts.group()] {
     Seat* found = dead_ ? nullptr : find(index, session.slot, session.generation);
     Pace* waiting = found == nullptr ? nullptr : find_pace(*found, group);
     if (waiting == nullptr) return;
-    waiting->counts.scheduled = false;
+    if (waiting->wakes == due) waiting->wakes.reset();
     release_held(index, *found, *waiting);
   });
 }

@@ -91,9 +91,11 @@ class SimShards final : public hub::ShardProxy {
     Pace(hub::Recipient& nobody, GroupId group, const hub::PaceTerms& terms) : counts(nobody, group, terms) {}
     hub::PacedSubscription counts;
     std::deque<Data> held;
-    // For the checker of rates, since its terms changed
-    std::uint64_t begun = 0;
-    Time first{};
+    std::optional<Time> wakes;  ///< when it is looked at next
+    // For the checker of rates, which does not ask the counts
+    std::uint64_t begun = 0;   ///< since its terms changed
+    Time first{};              ///< of those
+    std::optional<Time> last;  ///< since it began: the next one waits for an interval at most
   };
   /// A session on its shard, and its connection while it has one.
   struct Seat {
@@ -185,6 +187,7 @@ class SimShards final : public hub::ShardProxy {
   void pass(std::size_t shard, Seat& seat, Pace& pace, Data data);
   void release_held(std::size_t shard, Seat& seat, Pace& pace);
   void wait_until_due(std::size_t shard, Seat& seat, Pace& pace);
+  [[nodiscard]] static Time latest_due(const Pace& pace);
   void on_credit(std::size_t shard, Seat& seat, const proto::flow::Credit& credit);
   /// The counts of its connection begin at 0.
   void count_anew(std::size_t shard, Seat& seat);

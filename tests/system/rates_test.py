@@ -2,7 +2,7 @@
 """A provider at 200 messages a second, and three subscribers whose ways carry 10, 1 and 0.1 Mbit/s: each gets the newest at its
 own rate. The clock is what the ways let through: with each message the proxies are granted what those rates carry in a
 200th of a second, and the next message comes when all of it was used, or nothing newer is there. So nothing here depends on
-how fast the machine is."""
+how fast the machine is. And subscribers that change their maximal rate."""
 
 import bisect
 import os
@@ -15,10 +15,10 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
 from rate_proxy import Allowance, RateProxy
-from support.delivery import LATEST_DELIVERY, SYNC_DELIVERY, Provider, subscribe
+from support.delivery import LATEST_DELIVERY, STREAM_DELIVERY, SYNC_DELIVERY, Provider, subscribe, subscription
 from support.processes import Hub
 from support.waiting import PATIENCE_S
-from support.wire import CREDIT, FLOW, GROUP, HEADER, Client, Closed
+from support.wire import CREDIT, FLOW, GROUP, HEADER, NS, PONG, Client, Closed, control, text
 
 FULL = os.environ.get("GIMNET_STRESS") == "full"
 MESSAGES_PER_S = 200
@@ -161,6 +161,42 @@ class Rates(unittest.TestCase):
                     self.assertGreater(len(judged), 20, "what the buffers hold is not judged")
                     stale = [(sequence, oldest) for sequence, oldest in judged if sequence < oldest]
                     self.assertEqual(stale, [], "it got what was older than the newest when the way had room for it")
+
+
+class ChangedRates(unittest.TestCase):
+    SELDOM_HZ, OFTEN_HZ = 0.001, 1000.0
+
+    def setUp(self):
+        hub = Hub(self, *ARGUMENTS, shards=1)
+        self.provider = Provider(self, hub, STREAM_DELIVERY)
+        self.client = Client(self, hub).join("C", shard=0)
+
+    def publish(self):
+        """The hub has handled it when this returns."""
+        sequence = self.provider.publish()
+        self.provider.client.ping(sequence)
+        self.provider.client.next_where(lambda got: got.kind == FLOW and got.payload[0] == PONG)
+        return sequence
+
+    def expect(self, sequence):
+        self.assertEqual(struct.unpack_from("<I", self.client.next_data().payload, 8)[0], sequence)
+
+    def test_a_higher_rate_is_in_force_at_once(self):
+        subscribe(self.client, "A/B", rate_hz=self.SELDOM_HZ)
+        self.expect(self.publish())
+        held = self.publish()
+        # It may come before the answer.
+        self.client.send(self.client.frame(0, control(10, subscription("A/B", rate_hz=self.OFTEN_HZ), 2), kind=NS))
+        self.expect(held)
+        self.expect(self.publish())
+
+    def test_a_subscription_that_begins_again_begins_at_once(self):
+        subscribe(self.client, "A/B", rate_hz=self.SELDOM_HZ)
+        self.expect(self.publish())
+        self.publish()
+        self.client.ask(NS, 11, text(3, "A/B"))
+        subscribe(self.client, "A/B", rate_hz=self.SELDOM_HZ)
+        self.expect(self.publish())
 
 
 if __name__ == "__main__":

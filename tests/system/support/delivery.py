@@ -17,7 +17,7 @@ def advertise(client, name, delivery, window=None, retain=False):
     return client.ask(NS, 7, body)
 
 
-def subscribe(client, name, **pace):
+def subscription(name, **pace):
     body = text(3, name)
     if "window" in pace:
         body += number(4, 4, pace["window"])
@@ -25,7 +25,11 @@ def subscribe(client, name, **pace):
         body += number(5, 4, pace["depth"])
     if "rate_hz" in pace:
         body += value(6, 11, struct.pack("<d", pace["rate_hz"]))
-    return client.ask(NS, 10, body)
+    return body
+
+
+def subscribe(client, name, **pace):
+    return client.ask(NS, 10, subscription(name, **pace))
 
 
 def message(sequence, content=b""):

@@ -8,6 +8,10 @@
 namespace gimnet::hub {
 
 void PacedSubscription::set_terms(const PaceTerms& terms) {
+#ifndef GIMNET_BUG_HIGHER_RATE_WAITS
+  // Without an interval this is when the last one that had one began.
+  if (due_us_ != 0) due_us_ = due_us_ - terms_.interval_us + terms.interval_us;
+#endif
   terms_ = terms;
   terms_.depth = std::max(1u, terms.depth);
   std::vector<KeptMessage> ring(std::max<std::size_t>(terms_.depth, held_));
@@ -27,7 +31,7 @@ std::uint64_t PacedSubscription::space() const {
 void PacedSubscription::on_begun(std::uint64_t now_us) {
   if (terms_.interval_us == 0) return;
   // A little late, the next one is due as if this one had been in time: the rate holds on average.
-  const bool in_time = now_us - due_us_ < terms_.interval_us;
+  const bool in_time = due_us_ != 0 && now_us - due_us_ < terms_.interval_us;
   due_us_ = (in_time ? due_us_ : now_us) + terms_.interval_us;
 }
 

@@ -35,7 +35,7 @@ class PacedSubscription {
   [[nodiscard]] Recipient& recipient() const { return recipient_; }
   [[nodiscard]] GroupId group() const { return group_; }
   [[nodiscard]] const PaceTerms& terms() const { return terms_; }
-  /// What is held stays, even if it is more than the new depth.
+  /// What is held stays, even if it is more than the new depth. A new interval counts from the message that began last.
   void set_terms(const PaceTerms& terms);
 
   // ---- the window and the clock
@@ -46,6 +46,8 @@ class PacedSubscription {
   [[nodiscard]] bool may_begin(std::uint64_t now_us) const { return space() != 0 && is_due(now_us); }
   /// A message begins to go to the subscriber.
   void on_begun(std::uint64_t now_us);
+  /// The next message is due whenever it comes, as if none had begun.
+  void restart_clock() { due_us_ = 0; }
   /// So many messages ended on their way to the subscriber.
   void on_sent(std::uint64_t messages) { sent_ += messages; }
   /// Of them, so many were dropped before they left.
@@ -94,7 +96,7 @@ class PacedSubscription {
   bool awaits_start = false;
   bool retained = false;   ///< of a service whose last message is kept
   bool ripe = false;       ///< is in the pacer's list of those that may have room
-  bool scheduled = false;  ///< is in the pacer's list of those that wait for their time
+  bool scheduled = false;  ///< is in the pacer's list of those that wait for their time, once
 
  private:
   Recipient& recipient_;
@@ -103,7 +105,7 @@ class PacedSubscription {
   std::uint64_t sent_ = 0;
   std::uint64_t lost_ = 0;
   std::uint64_t credited_ = 0;
-  std::uint64_t due_us_ = 0;
+  std::uint64_t due_us_ = 0;  ///< of the next message; 0: none has begun
   std::vector<KeptMessage> ring_;
   std::size_t first_ = 0;
   std::size_t held_ = 0;

@@ -11,9 +11,6 @@ namespace {
 using proto::DropReason;
 using State = PacedSubscription::Open::State;
 
-/// The heap has the subscription first that is due first.
-bool later(const PacedSubscription* a, const PacedSubscription* b) { return a->due_us() > b->due_us(); }
-
 /// The first frame of `run`, which loses it.
 Run take_frame(Run& run) {
   Run frame = run.share();
@@ -34,7 +31,11 @@ PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const P
   if (known == nullptr) known = &recipient.paced->add(group, terms);
   known->active = true;
   if (begins && was_plain) begin_plain(*known);
-  if (!(known->terms() == terms)) known->set_terms(terms);
+  if (begins) known->restart_clock();
+  if (!(known->terms() == terms)) {
+    unschedule(*known);  // it may be due earlier now
+    known->set_terms(terms);
+  }
   // What may go now is not too much, however little may be held from now on.
   release(*known);
   while (known->held() > known->terms().depth) drop_oldest(*known, DropReason::replaced);
@@ -283,8 +284,8 @@ void Pacer::on_away(Recipient& recipient) {
   });
   // At once for all of them: the schedule is that of the whole shard.
   if (!any) return;
-  std::erase_if(scheduled_, [](const PacedSubscription* each) { return !each->scheduled; });
-  std::make_heap(scheduled_.begin(), scheduled_.end(), later);
+  std::erase_if(scheduled_, [](const Scheduled& each) { return !each.subscription->scheduled; });
+  std::make_heap(scheduled_.begin(), scheduled_.end(), is_later);
 }
 
 void Pacer::forget(Recipient& recipient) {
@@ -302,9 +303,9 @@ void Pacer::release_due() {
     for (PacedSubscription* each : ripe_now_) release(*each);
     ripe_now_.clear();
   }
-  while (!scheduled_.empty() && scheduled_.front()->due_us() <= now_us()) {
-    PacedSubscription& due = *scheduled_.front();
-    std::pop_heap(scheduled_.begin(), scheduled_.end(), later);
+  while (!scheduled_.empty() && scheduled_.front().due_us <= now_us()) {
+    PacedSubscription& due = *scheduled_.front().subscription;
+    std::pop_heap(scheduled_.begin(), scheduled_.end(), is_later);
     scheduled_.pop_back();
     due.scheduled = false;
     release(due);
@@ -314,7 +315,7 @@ void Pacer::release_due() {
 std::uint64_t Pacer::next_due_ms() const {
   if (!ripe_.empty()) return 0;
   // Rounded up: a moment early there would be nothing to do.
-  return scheduled_.empty() ? kNever : (scheduled_.front()->due_us() + 999) / 1000;
+  return scheduled_.empty() ? kNever : (scheduled_.front().due_us + 999) / 1000;
 }
 
 void Pacer::schedule(PacedSubscription& subscription) {
@@ -323,14 +324,14 @@ void Pacer::schedule(PacedSubscription& subscription) {
                                     [](const Open& open) { return open.state == State::arriving; });
   if (subscription.space() == 0 || (subscription.held() == 0 && !arriving)) return;
   subscription.scheduled = true;
-  scheduled_.push_back(&subscription);
-  std::push_heap(scheduled_.begin(), scheduled_.end(), later);
+  scheduled_.push_back({subscription.due_us(), &subscription});
+  std::push_heap(scheduled_.begin(), scheduled_.end(), is_later);
 }
 
 void Pacer::unschedule(PacedSubscription& subscription) {
   if (!std::exchange(subscription.scheduled, false)) return;
-  std::erase(scheduled_, &subscription);
-  std::make_heap(scheduled_.begin(), scheduled_.end(), later);
+  std::erase_if(scheduled_, [&](const Scheduled& each) { return each.subscription == &subscription; });
+  std::make_heap(scheduled_.begin(), scheduled_.end(), is_later);
 }
 
 }  // namespace gimnet::hub

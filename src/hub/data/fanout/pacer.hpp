@@ -73,6 +73,13 @@ class Pacer {
   void release_oldest(PacedSubscription& subscription);
   [[nodiscard]] bool release_open(PacedSubscription& subscription);
   void write_kept(PacedSubscription& subscription, const KeptMessage& message);
+  /// A subscription that something is held for, and when that was due as it was put here. It may have gone since, with
+  /// a message that came at that time; then the next is due later, which is found out here at the time.
+  struct Scheduled {
+    std::uint64_t due_us = 0;
+    PacedSubscription* subscription = nullptr;
+  };
+  [[nodiscard]] static bool is_later(const Scheduled& a, const Scheduled& b) { return a.due_us > b.due_us; }
   void schedule(PacedSubscription& subscription);
   void unschedule(PacedSubscription& subscription);
 
@@ -80,7 +87,7 @@ class Pacer {
   EgressContext& context_;
   std::vector<PacedSubscription*> ripe_;
   std::vector<PacedSubscription*> ripe_now_;
-  std::vector<PacedSubscription*> scheduled_;  ///< a heap, the next one first
+  std::vector<Scheduled> scheduled_;  ///< a heap, the next one first
   KeptMessage scratch_;
 };
 

@@ -77,6 +77,23 @@ TEST_F(PacedSubscriptionTest, IsDueByItsRate) {
   EXPECT_FALSE(subscription.is_due(5'099)) << "a pause is not made up for";
 }
 
+TEST_F(PacedSubscriptionTest, AnotherRateHoldsFromTheMessageBefore) {
+  PacedSubscription subscription(recipient, kGroup, {.interval_us = 1'000'000});
+  EXPECT_TRUE(subscription.is_due(0));
+  subscription.set_terms({.interval_us = 500'000});
+  EXPECT_TRUE(subscription.is_due(0)) << "none has begun";
+  subscription.on_begun(1'000);
+  EXPECT_EQ(subscription.due_us(), 501'000u);
+  subscription.set_terms({.interval_us = 100});
+  EXPECT_EQ(subscription.due_us(), 1'100u);
+  subscription.set_terms({});
+  EXPECT_TRUE(subscription.is_due(1'000));
+  subscription.set_terms({.interval_us = 1'000});
+  EXPECT_EQ(subscription.due_us(), 2'000u);
+  subscription.restart_clock();
+  EXPECT_TRUE(subscription.is_due(0));
+}
+
 TEST_F(PacedSubscriptionTest, HoldsTheNewestInOrder) {
   PacedSubscription subscription(recipient, kGroup, {.depth = 2});
   for (const char* text : {"one", "two"}) {

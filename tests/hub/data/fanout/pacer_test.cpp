@@ -127,6 +127,77 @@ TEST_F(PacerTest, ARateNeverLetsMoreThrough) {
   EXPECT_EQ(got, 101u) << "the first, and one each 10 ms";
 }
 
+TEST_F(PacerTest, AHigherRateHoldsFromTheMessageBefore) {
+  PacedSubscription& one = subscribe({.interval_us = 1'000'000'000});
+  offer(one, {"1", "2"});
+  EXPECT_THAT(sent(), ElementsAre("1"));
+  pass_ms(6);
+  subscribe({.interval_us = 10'000});
+  EXPECT_THAT(sent(), IsEmpty()) << "6 ms after the first";
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 10);
+  pass_ms(4);
+  EXPECT_THAT(sent(), ElementsAre("2"));
+  offer(one, {"3"});
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 20);
+  pass_ms(3);
+  subscribe({.interval_us = 2'000});
+  EXPECT_THAT(sent(), ElementsAre("3")) << "what may go by the new terms goes first";
+  EXPECT_EQ(rig.pacer.next_due_ms(), Pacer::kNever);
+}
+
+TEST_F(PacerTest, ALowerRateHoldsFromTheMessageBefore) {
+  PacedSubscription& one = subscribe({.interval_us = 10'000});
+  offer(one, {"1", "2"});
+  subscribe({.interval_us = 50'000});
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 50);
+  pass_ms(49);
+  EXPECT_THAT(sent(), ElementsAre("1"));
+  pass_ms(1);
+  EXPECT_THAT(sent(), ElementsAre("2"));
+}
+
+TEST_F(PacerTest, ARateBehindNoneDoesNotRememberTheOneBefore) {
+  PacedSubscription& one = subscribe({.interval_us = 1'000'000'000});
+  offer(one, {"1", "2"});
+  subscribe({});
+  EXPECT_THAT(sent(), ElementsAre("1", "2"));
+  EXPECT_EQ(rig.pacer.next_due_ms(), Pacer::kNever);
+  offer(one, {"3", "4"});
+  pass_ms(10);
+  subscribe({.interval_us = 10'000});
+  offer(one, {"5"});
+  EXPECT_THAT(sent(), ElementsAre("3", "4", "5"));
+}
+
+TEST_F(PacerTest, ASubscriptionThatBeginsAgainIsDueAtOnce) {
+  offer(subscribe({.interval_us = 1'000'000'000}), {"1", "2"});
+  rig.pacer.unsubscribe(recipient, kGroup, false);
+  EXPECT_EQ(rig.pacer.next_due_ms(), Pacer::kNever);
+  PacedSubscription& again = subscribe({.interval_us = 1'000'000'000});
+  offer(again, {"3", "4"});
+  EXPECT_THAT(sent(), ElementsAre("1", "3"));
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 1'000'000);
+}
+
+// It was its time, and the message that came then went before the pacer had looked.
+TEST_F(PacerTest, OneThatHasJustGoneHoldsUpNoOther) {
+  constexpr GroupId kOther{7u << 20 | 6};
+  PacedSubscription& slow = subscribe({.interval_us = 100'000});
+  PacedSubscription& other = rig.pacer.subscribe(recipient, kOther, {.interval_us = 101'000});
+  offer(slow, {"1", "2"});
+  offer(other, {"a", "b"});
+  EXPECT_THAT(sent(), ElementsAre("1", "a"));
+  rig.egress.context.now_ms += 100;
+  offer(slow, {"3"});
+  EXPECT_THAT(sent(), ElementsAre("3"));
+  offer(slow, {"4"});
+  pass_ms(1);
+  EXPECT_THAT(sent(), ElementsAre("b"));
+  EXPECT_EQ(rig.pacer.next_due_ms(), kStartMs + 200);
+  pass_ms(99);
+  EXPECT_THAT(sent(), ElementsAre("4"));
+}
+
 TEST_F(PacerTest, WholeMessagesOfManyFragmentsCountOnce) {
   PacedSubscription& one = subscribe({.window = 1});
   offer_fragment(one, 1, 0, 4, "ab");
