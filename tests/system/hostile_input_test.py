@@ -8,9 +8,9 @@ import unittest
 
 from support.bad_input import STATUSES, HostileInput
 from support.processes import run_gimnet
-from support.wire import (BLOCK, BROADCAST, CTRL, FLAG_EXT, FLAG_FRAGMENT, FLAG_KEYED, FLAG_REPORT, FLOW, GROUP, LATEST,
-                          LINK, LIST, NS, OPENING, REPORT, ROUTE, SERVICE, UNICAST, Client, Closed, control, frame,
-                          hello, number, text, value)
+from support.wire import (BLOCK, BROADCAST, CTRL, DROP, FLAG_EXT, FLAG_FRAGMENT, FLAG_KEYED, FLAG_REPORT, FLOW, GOODBYE,
+                          GROUP, LATEST, LINK, LIST, NS, OPENING, PING, REPORT, ROUTE, SERVICE, UNICAST, Client, Closed,
+                          control, frame, hello, number, text, value)
 
 
 class Frames(HostileInput):
@@ -94,6 +94,31 @@ class Frames(HostileInput):
         self.malformed(kind=LIST, dst=1, flags=BLOCK, payload=struct.pack("<I", 7 << 20 | 1))
         for kind in (UNICAST, SERVICE):
             self.malformed(kind=kind, flags=LATEST)
+
+    def test_flags_with_which_a_request_would_be_misread(self):
+        request = control(1, request=1)
+        ping = bytes([PING, 0, 0, 0]) + bytes(12)
+        before = {FLAG_FRAGMENT: struct.pack("<III", 1, 0, len(request)), FLAG_KEYED: bytes(8), FLAG_EXT: bytes(2)}
+        for kind, payload in ((FLOW, ping), (LINK, control(GOODBYE)), (NS, request), (CTRL, request)):
+            for flag, what in before.items():
+                if flag == FLAG_EXT and kind in (NS, CTRL):
+                    continue
+                self.malformed(kind=kind, dst=0, flags=flag, payload=what + payload)
+        for extensions in (bytes([1, 0, 5]), bytes([200, 0]), b"\1"):
+            self.malformed(kind=NS, dst=0, flags=FLAG_EXT, payload=extensions)
+
+    def test_extensions_of_a_request_are_skipped_and_its_policy_says_nothing(self):
+        client = Client(self, self.hub).join("robot")
+        extensions = bytes([0, 3]) + bytes(3) + bytes([77, 1, 1])
+        for kind, operation in ((NS, 3), (CTRL, 1)):
+            for flags in (0, BLOCK, DROP, LATEST, FLAG_REPORT):
+                with self.subTest(kind=kind, flags=flags):
+                    before = struct.pack("<H", len(extensions)) + extensions
+                    client.send(client.frame(0, before + control(operation, text(3, "robot"), request=9), kind=kind,
+                                             flags=flags | FLAG_EXT))
+                    answer = client.next_where(lambda got: got.kind == kind)
+                    self.assertEqual(struct.unpack_from("<HH", answer.payload), (operation | 0x8000, 9))
+                    self.assertEqual(answer.fields[1], 0)
 
     def test_lists(self):
         def ids(*numbers):

@@ -9,6 +9,7 @@
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
+#include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -165,8 +166,14 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Session* session = find(event.session, event.node);
   // What a replaced connection had asked would count as declared on the new one, by which the node never asks for it.
   if (session == nullptr || event.attachment != session->attachment || event.frame.size() < proto::kHeaderSize) return;
-  const proto::Kind kind = proto::load_header(event.frame.data()).kind;
-  const std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
+  const proto::FrameHeader header = proto::load_header(event.frame.data());
+  const proto::Kind kind = header.kind;
+  std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
+  if (header.has(proto::kFlagExt)) {
+    const auto frame = proto::parse_frame(event.frame, proto::Origin::node);
+    if (!frame) return close(*session, GoodbyeCode::malformed, proto::frame_error_text(frame.error()));
+    payload = frame->payload;
+  }
   const auto view = proto::split_control(payload);
   if (!view) return close(*session, GoodbyeCode::malformed, "a control frame without operation and request number");
   if (kind != proto::Kind::ns && kind != proto::Kind::ctrl) {
@@ -177,7 +184,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
                          now,    effects, wiring_.sessions, wiring_.refusals, &request_counters_,
                          this};
   const Request request{*session, view->header, payload};
-  const NodeId dst{proto::load_header(event.frame.data()).dst};
+  const NodeId dst{header.dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
   const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
   const ShardIndex shard = session->place.shard;

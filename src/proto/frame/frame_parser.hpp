@@ -99,20 +99,26 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
 /// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0 and without ids.
 enum class Origin : std::uint8_t { node, hub };
 
-/// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind, policy, n of LIST.
+/// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind, which flags that may
+/// carry, policy, n of LIST.
 [[nodiscard]] constexpr FrameError check_header_from_node(const FrameHeader& header) {
   const auto kind = static_cast<std::uint8_t>(header.kind);
   if ((header.lane & ~kLaneMask) != 0) return FrameError::reserved_lane_bits;
   if (header.has(kFlagReservedMask)) return FrameError::reserved_flag_bits;
   if (header.hops != 0) return FrameError::hops_not_zero;
   if (kind > static_cast<std::uint8_t>(Kind::route)) return FrameError::unknown_kind;
-  // Four kinds in one test: it is made for every frame that is not like the one before it.
+  // Six kinds in one test: it is made for every frame that is not like the one before it.
   constexpr auto bit = [](Kind each) { return std::uint32_t{1} << static_cast<std::uint8_t>(each); };
   constexpr std::uint32_t kNotForNodes = bit(Kind::report) | bit(Kind::route);
   constexpr std::uint32_t kForThisConnection = bit(Kind::flow) | bit(Kind::link);
-  if (((kNotForNodes | kForThisConnection) >> kind & 1) != 0) {
+  constexpr std::uint32_t kRequests = bit(Kind::ns) | bit(Kind::ctrl);
+  if (((kNotForNodes | kForThisConnection | kRequests) >> kind & 1) != 0) {
     if ((kNotForNodes >> kind & 1) != 0) return FrameError::kind_not_allowed;
-    if (header.dst != 0) return FrameError::dst_not_zero;
+    const bool for_this_connection = (kForThisConnection >> kind & 1) != 0;
+    if (for_this_connection && header.dst != 0) return FrameError::dst_not_zero;
+    const std::uint8_t forbidden =
+        for_this_connection ? kFlagFragment | kFlagKeyed | kFlagExt : kFlagFragment | kFlagKeyed;
+    if (header.has(forbidden)) return FrameError::flag_not_allowed;
   }
   const bool to_many = header.kind == Kind::group || header.kind == Kind::list || header.kind == Kind::broadcast;
   if (header.policy() == Policy::block && to_many) return FrameError::block_not_allowed;

@@ -44,6 +44,26 @@ TEST(Dispatch, EveryUnknownOperationIsAnsweredNotSupported) {
   set_log_level(LogLevel::info);
 }
 
+TEST(Dispatch, SkipsTheExtensionsOfARequest) {
+  set_log_level(LogLevel::off);
+  TestConductor hub;
+  const TestConductor::Node robot = hub.join("robot");
+  for (const std::uint8_t size : {std::uint8_t{3}, std::uint8_t{4}}) {
+    std::vector<std::byte> payload{std::byte{size}, std::byte{}, std::byte{200}, std::byte{1}, std::byte{}};
+    const proto::Payload request = proto::encode(proto::ns::Resolve{"robot"}, 9);
+    payload.insert(payload.end(), request.begin(), request.end());
+    std::vector<std::byte> frame = control_frame(Kind::ns, NodeId{}, HubId{7}, payload);
+    frame[13] = std::byte{proto::kFlagExt};
+    hub.conductor.on_event(
+        {robot.shard, ControlFrameEvent{robot.session, robot.attachment, robot.id, std::move(frame)}}, hub.now);
+    const auto* answer = std::get_if<SendControlCommand>(&hub.shards.sent.back().command);
+    ASSERT_EQ(answer != nullptr, size == 3) << "a length that does not fit closes";
+    if (answer == nullptr) continue;
+    EXPECT_EQ(proto::decode_answer<proto::ns::ResolveAnswer>(TestConductor::payload_of(*answer))->node, robot.id);
+  }
+  set_log_level(LogLevel::info);
+}
+
 /// Each role against each operation: who reads may be anybody, who changes the hub an administrator alone.
 TEST(Dispatch, GrantsEachRoleExactlyWhatItMay) {
   namespace ctrl = proto::ctrl;

@@ -207,6 +207,23 @@ TEST(CheckHeader, NamesEachCause) {
   }
 }
 
+// What stands before the payload by these flags would be read as the payload.
+TEST(CheckHeader, KnowsWhichFlagsAKindMayCarry) {
+  for (const Kind kind : {Kind::flow, Kind::link, Kind::ns, Kind::ctrl}) {
+    const bool for_this_connection = kind == Kind::flow || kind == Kind::link;
+    for (unsigned flags = 0; flags < 0x40; ++flags) {
+      const unsigned forbidden = kFlagFragment | kFlagKeyed | (for_this_connection ? kFlagExt : 0u);
+      EXPECT_EQ(check_header_from_node(header_to(0, kind, static_cast<std::uint8_t>(flags))),
+                (flags & forbidden) != 0 ? FrameError::flag_not_allowed : FrameError::none)
+          << static_cast<unsigned>(kind) << " with " << flags;
+    }
+  }
+  for (const Kind kind : {Kind::unicast, Kind::group, Kind::list, Kind::broadcast, Kind::service, Kind::taken,
+                          static_cast<Kind>(8), static_cast<Kind>(15)}) {
+    EXPECT_EQ(check_header_from_node(header_to(1, kind, 0x3C)), FrameError::none) << static_cast<unsigned>(kind);
+  }
+}
+
 TEST(CheckHeader, BoundsTheRecipientsOfAList) {
   EXPECT_EQ(check_header_from_node(header_to(0, Kind::list)), FrameError::list_count);
   EXPECT_EQ(check_header_from_node(header_to(1, Kind::list)), FrameError::none);

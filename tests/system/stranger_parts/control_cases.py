@@ -4,7 +4,8 @@ import struct
 
 from stranger_parts.bitestream import F64, TEXT, U16, U8, every, fields, put
 from stranger_parts.case import Case
-from stranger_parts.client import CTRL, NS, Denied, Refused, u32
+from stranger_parts.client import (CTRL, F_EXT, F_FRAGMENT, F_KEYED, F_REPORT, FLOW, LATEST, LINK, NS, Denied, Refused,
+                                   u32)
 
 
 class Names(Case):
@@ -51,6 +52,19 @@ class Names(Case):
                 who.ask(NS, operation, body)
             self.assertEqual(denied.exception.args[0], status, denied.exception)
             self.assertTrue(denied.exception.args[1])
+
+    def test_flags_of_a_request(self):
+        hub = self.hub()
+        robot = self.stranger(hub, "robot")
+        request = struct.pack("<HH", 3, 99) + put(3, TEXT, "robot")
+        robot.write(NS, 0, struct.pack("<HBBB", 3, 0, 1, 0) + request, flags=F_EXT | F_REPORT | LATEST)
+        answer = robot.wait(lambda got: got.kind == NS and got.body[:4] == struct.pack("<HH", 0x8003, 99))
+        self.assertEqual(fields(answer.body[4:])[3], robot.id)
+        for kind, flag, before in ((NS, F_KEYED, bytes(8)), (CTRL, F_FRAGMENT, struct.pack("<III", 1, 0, len(request))),
+                                   (FLOW, F_EXT, bytes(2)), (LINK, F_EXT, bytes(2))):
+            refused = self.stranger(hub)
+            refused.write(kind, 0, before + request, flags=flag)
+            self.assertEqual(self.goodbye(refused), 2)
 
     def test_limits(self):
         hub = self.hub("--limit", "services_per_node=1", "--limit", "subscriptions_per_node=1", "--limit", "watches_per_node=1")

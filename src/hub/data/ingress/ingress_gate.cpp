@@ -73,7 +73,7 @@ Admission IngressGate::check(IngressState& state, const proto::FrameHeader& head
   const bool unnamed_allowed = header.kind == proto::Kind::flow || header.kind == proto::Kind::link;
   if (!own && !(unnamed_allowed && header.src == 0)) return Admission::wrong_source;
   if (header.kind == proto::Kind::link) return Admission::link;
-  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind) return Admission::control;
+  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind) return check_request(state, header, view);
   if (header.kind == proto::Kind::flow) return Admission::flow;
   if (proto::may_form_run(header)) {
     if (header.has(proto::kFlagKeyed)) keep_frames_with_key(view);
@@ -81,6 +81,13 @@ Admission IngressGate::check(IngressState& state, const proto::FrameHeader& head
   }
   const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
   return frame ? Admission::data : refuse(state, frame.error());
+}
+
+Admission IngressGate::check_request(IngressState& state, const proto::FrameHeader& header,
+                                     const proto::RunView& view) {
+  if (!header.has(proto::kFlagExt)) return Admission::control;
+  const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
+  return frame ? Admission::control : refuse(state, frame.error());
 }
 
 std::uint64_t IngressGate::lane0_window_bytes() const { return limits_.lane0_bytes_per_s * kLane0WindowMs / 1'000; }

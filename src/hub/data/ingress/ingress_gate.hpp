@@ -72,6 +72,8 @@ class IngressGate {
  private:
   [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms);
   [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header, proto::RunView& view);
+  [[nodiscard]] static Admission check_request(IngressState& state, const proto::FrameHeader& header,
+                                               const proto::RunView& view);
   /// Are the frames to be moved to lane 1?
   [[nodiscard]] bool spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms);
   [[nodiscard]] bool moves_fragment(IngressState& state, const proto::RunView& view, std::uint64_t now_ms);

@@ -45,6 +45,21 @@ TEST_F(IngressGateTest, SendsEachKindItsWay) {
   EXPECT_EQ(admit("x", {.kind = static_cast<Kind>(20)}), Admission::malformed);
 }
 
+TEST_F(IngressGateTest, RefusesFlagsWithWhichARequestWouldBeMisread) {
+  for (const Kind kind : {Kind::flow, Kind::link, Kind::ns, Kind::ctrl}) {
+    for (const std::uint8_t flags : {proto::kFlagFragment, proto::kFlagKeyed}) {
+      EXPECT_EQ(admit("0123456789abcdef", {.kind = kind, .flags = flags}), Admission::malformed);
+      EXPECT_EQ(state.error, proto::FrameError::flag_not_allowed);
+    }
+  }
+  const std::string nothing("\0\0", 2);
+  EXPECT_EQ(admit(nothing + "x", {.kind = Kind::ns, .flags = proto::kFlagExt}), Admission::control);
+  EXPECT_EQ(admit("\x05", {.kind = Kind::ns, .flags = proto::kFlagExt}), Admission::malformed);
+  EXPECT_EQ(state.error, proto::FrameError::ext_too_short);
+  EXPECT_EQ(admit(nothing + "x", {.kind = Kind::flow, .flags = proto::kFlagExt}), Admission::malformed);
+  EXPECT_EQ(admit("x", {.kind = Kind::ctrl, .flags = 3 | proto::kFlagReport}), Admission::control);
+}
+
 TEST_F(IngressGateTest, LooksAtTheSourceOfEveryFrame) {
   EXPECT_EQ(admit("x", {}), Admission::data);
   EXPECT_EQ(admit("x", {.src = 2}), Admission::wrong_source) << "also where all else is as before";
