@@ -70,7 +70,12 @@ HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& st
                                         {nodes_, groups_, quiescence_},
                                         readable_,
                                         start,
-                                        around.keep_state,
+                                        [this, keep = around.keep_state](const hub::HubState& state) {
+                                          std::string error = keep(state);
+                                          kept_ = error.empty();
+                                          if (kept_) model_.kept(state, setting_.agenda.now_ms());
+                                          return error;
+                                        },
                                         {},
                                         nullptr,
                                         [this] { return read_again(); },
@@ -95,6 +100,11 @@ hub::Reloading HubLife::read_again() {
   reloading.limits.declarations_burst = random.between(1, 40);
   model_.configuration(reloading.limits);
   return reloading;
+}
+
+void HubLife::after_step() {
+  model_.step_over(kept_);
+  checks_.after_step(setting_.agenda.now_ms());
 }
 
 void HubLife::trace_sent() {
@@ -129,7 +139,7 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
     model_.admitted(hello, *attach, now);
     newcomer.wire->session = model_.session_of(index_of(attach->node));
   }
-  checks_.after_step(setting_.agenda.now_ms());
+  after_step();
   return refusal;
 }
 
@@ -174,7 +184,7 @@ void HubLife::take_event(std::size_t shard) {
   } else if (first) {
     model_.heard(*first);
   }
-  checks_.after_step(setting_.agenda.now_ms());
+  after_step();
 }
 
 void HubLife::tick() {
@@ -185,7 +195,7 @@ void HubLife::tick() {
   conductor_.tick(now);
   trace_sent();
   model_.ticked(now);
-  checks_.after_step(setting_.agenda.now_ms());
+  after_step();
   if (garbage && !conductor_.has_garbage()) setting_.census.add(Happening::garbage_freed);
 }
 
@@ -193,7 +203,7 @@ bool HubLife::serve_watches() {
   shards_.forget_sent();
   const bool more = conductor_.serve_watches(setting_.agenda.now_ms());
   trace_sent();
-  checks_.after_step(setting_.agenda.now_ms());
+  after_step();
   return more;
 }
 
@@ -204,7 +214,7 @@ void HubLife::drain() {
   conductor_.drain();
   trace_sent();
   checks_.after_drain();
-  checks_.after_step(setting_.agenda.now_ms());
+  after_step();
 }
 
 }  // namespace gimnet::sim

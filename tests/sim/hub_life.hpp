@@ -52,6 +52,7 @@ class HubLife {
  private:
   static constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
   void trace_sent();
+  void after_step();
   /// What the hub reads when it is asked to read its configuration again.
   [[nodiscard]] hub::Reloading read_again();
 
@@ -66,6 +67,7 @@ class HubLife {
   Checks checks_;
   hub::Limits limits_;
   hub::Conductor conductor_;
+  bool kept_ = true;  ///< the hub could keep what it wanted to keep last
   bool drains_ = false;
 };
 

@@ -23,6 +23,7 @@ Checker checker_of(GoodbyeCode said, std::optional<GoodbyeCode> due) {
 
 Model::Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
     : limits_(limits), census_(census), hub_(hub), past_(std::move(past)) {
+  step_over(true);
   for (const Kicked& kicked : past_.kicked) {
     std::uint64_t& least = least_[kicked.index];
     least = std::max(least, kicked.number + 1);
@@ -60,7 +61,7 @@ void Model::count_token(const Hello& hello, const Verdict& verdict) {
   const auto found = past_.tokens.find(hello.hello.token);
   if (found == past_.tokens.end() || verdict.session != 0) return;
   if (verdict.former) {
-    const bool earlier_life = past_.nodes.contains(found->second.index);
+    const bool earlier_life = past_.nodes.given.contains(found->second.index);
     return census_.add(earlier_life ? Happening::restored_after_restart : Happening::restored_after_grace);
   }
   if (found->second.expiry <= hello.wall) return census_.add(Happening::token_expired);
@@ -70,15 +71,6 @@ void Model::count_token(const Hello& hello, const Verdict& verdict) {
   };
   if (std::any_of(past_.kicked.begin(), past_.kicked.end(), kicked)) census_.add(Happening::kicked_token_refused);
   census_.add(Happening::token_of_the_past);
-}
-
-Past Model::past() const {
-  Past past = past_;
-  for (const std::uint32_t index : nodes_given_) {
-    if (!assigned_.contains(index)) past.nodes.insert(index);
-  }
-  past.groups.insert(groups_given_.begin(), groups_given_.end());
-  return past;
 }
 
 Model::Verdict Model::judge(const Hello& hello) const {
@@ -111,6 +103,10 @@ void Model::refused(const Hello& hello, const proto::Goodbye& goodbye, milliseco
     if (goodbye.code == GoodbyeCode::hub_full) census_.add(Happening::hub_full);
     if (goodbye.code == GoodbyeCode::draining) census_.add(Happening::refused_draining);
     return;
+  }
+  const bool newcomer = !verdict.refusal && verdict.session == 0 && !verdict.former;
+  if (newcomer && goodbye.code == GoodbyeCode::hub_full && few_nodes_left_) {
+    return census_.add(Happening::waits_for_returns);
   }
   broken(checker_of(goodbye.code, verdict.refusal),
          std::string{"a HELLO for the name "} + quoted(hello.hello.name) + " is refused with " +
@@ -165,8 +161,7 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
 void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now) {
   if (verdict.session == 0) {
     if (!verdict.former) take_new_index(index, now);
-    nodes_given_.push_back(index);
-    assigned_.erase(index);
+    give_node(index, !verdict.former);
     moved_.erase(index);
     Session& session = sessions_[index];
     session.number = hello.new_session;
@@ -216,21 +211,6 @@ std::optional<std::uint32_t> Model::longest_away_nameless() const {
     if (!found || session.away_order < sessions_.at(*found).away_order) found = index;
   }
   return found;
-}
-
-void Model::take_new_index(std::uint32_t index, milliseconds now) {
-  if (sessions_.contains(index)) {
-    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", which is still a member");
-  }
-  const auto resting = resting_ids_.find(index);
-  if (resting != resting_ids_.end() && resting->second > now) {
-    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", which rests");
-  }
-  require(index != kHubIndex && index < kEveryIndex, Checker::ids, "a newcomer gets an id that is no node's");
-  if (past_.nodes.contains(index)) {
-    broken(Checker::ids, "a newcomer gets the id of node " + std::to_string(index) + ", given out before the restart");
-  }
-  if (index > kEveryIndex - 64) census_.add(Happening::index_near_the_end);
 }
 
 void Model::take_name(std::uint32_t index, const std::string& name, milliseconds now) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "hub/control/acceptor.hpp"
+#include "hub/control/state/hub_state.hpp"
 #include "hub/limits.hpp"
 #include "hub/shard/commands.hpp"
 #include "proto/control/link.hpp"
@@ -55,11 +56,23 @@ struct Kicked {
   milliseconds expiry{};
 };
 
+/// Indices that were given out in earlier lives, and that a hub must not give to newcomers as long as it has others,
+/// nor while those who had them may come back.
+struct GivenIds {
+  std::set<std::uint32_t> given;
+  std::uint32_t old = 0;  ///< all up to this one were given before the world began
+  hub::IndexSet used;     ///< what this life began with: those, and what was granted and not given
+
+  [[nodiscard]] bool contains(std::uint32_t index) const { return index <= old || given.contains(index); }
+  /// So few others that the hub may run out of them.
+  [[nodiscard]] bool few_left() const { return kEveryIndex - 1 - old < 1'000; }
+};
+
 /// What outlives the hub: tokens that nodes hold, and the indices that it must not give to newcomers any more.
 struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
-  std::set<std::uint32_t> nodes;
-  std::set<std::uint32_t> groups;
+  GivenIds nodes;
+  GivenIds groups;
   std::vector<Kicked> kicked;
   std::uint64_t token_numbers = 0;  ///< given so far
   milliseconds returns_until{};     ///< nodes of the past may come back under their ids
@@ -148,6 +161,10 @@ class Model final : public Witness {
   void ticked(milliseconds now);
   /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.
   void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
+  /// The hub keeps that on its disk, in the midst of a step.
+  void kept(const hub::HubState& state, milliseconds now);
+  /// The step is over; `kept`: so is what it brought.
+  void step_over(bool kept);
   /// The hub drains from now on: nobody is let in.
   void draining() { draining_ = true; }
   /// An administrator asked for it.
@@ -207,6 +224,10 @@ class Model final : public Witness {
   void make_room(proto::Role role, milliseconds now);
   [[nodiscard]] std::optional<std::uint32_t> longest_away_nameless() const;
   void take_new_index(std::uint32_t index, milliseconds now);
+  /// `granted`: that was kept before.
+  void give_node(std::uint32_t index, bool granted);
+  [[nodiscard]] bool rests(const std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
+                           milliseconds now) const;
   void take_name(std::uint32_t index, const std::string& name, milliseconds now);
   void end(std::uint32_t index, milliseconds now);
   void rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index, milliseconds now);
@@ -292,7 +313,12 @@ class Model final : public Witness {
   std::map<std::uint32_t, milliseconds> resting_ids_;  ///< index: until when
   std::map<std::uint32_t, milliseconds> resting_groups_;
   std::map<std::uint32_t, Moved> moved_;  ///< by former index
-  std::set<std::uint32_t> assigned_;      ///< indices that an administrator gave: newcomers may get them, too
+  std::set<std::uint32_t> unkept_;        ///< indices that were not granted, given while nothing can be kept
+  std::set<std::uint32_t> unkept_groups_;
+  bool few_nodes_left_ = false;  ///< when the last step was over: newcomers may be refused
+  bool few_groups_left_ = false;
+  std::set<std::uint32_t> forgotten_nodes_;  ///< given in this life, and not kept as used any more
+  std::set<std::uint32_t> forgotten_groups_;
   Renumbered renumbered_;
   std::optional<hub::Limits> configuration_;
   std::vector<DueEvent> due_;

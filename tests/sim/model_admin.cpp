@@ -73,15 +73,16 @@ void Model::judge_reassign(const Asked& asked) {
   const std::uint32_t to = index_of(wanted->new_node);
   const bool legal = (owner == hub_ || owner == kOwnHub) && to != kHubIndex && to < kEveryIndex;
   if (index == asked.index || !legal) return require_status(asked, Status::bad_request, Checker::answers);
-  const auto resting = resting_ids_.find(to);
-  const bool rests = resting != resting_ids_.end() && resting->second > asked.now;
-  const bool awaited = asked.now < past_.returns_until;
+  const bool rests = this->rests(resting_ids_, to, asked.now);
+  const bool awaiting = asked.now < past_.returns_until;
+  const bool awaited = awaiting && past_.nodes.used.contains(to);
   if (sessions_.contains(to) || rests || awaited || sessions_.at(index).renumbered) {
     if (awaited && !rests && !sessions_.contains(to)) census_.add(Happening::renumbered_to_awaited);
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);
   }
   require_status(asked, Status::done, Checker::ids);
+  if (awaiting) census_.add(Happening::renumbered_while_awaiting);
   census_.add(sessions_.at(index).connected ? Happening::renumbered : Happening::renumbered_away);
   renumber(index, to, asked.now);
 }
@@ -113,8 +114,7 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
     tell_provider(full_name, index, false);
   }
   rest(resting_ids_, index, now);
-  nodes_given_.push_back(to);
-  assigned_.insert(to);
+  give_node(to, false);
   renumbered_.emplace_back(index, to);
 }
 

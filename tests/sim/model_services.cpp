@@ -133,12 +133,18 @@ void Model::judge_advertise(const Asked& asked) {
     census_.add(Happening::services_limit);
     return require_status(asked, Status::limit, Checker::limits);
   }
+  const bool needs_group = known == nullptr || !same_stream(known->terms, *offer);
+  const bool refused = proto::read_status(proto::split_control(asked.answer)->body).status == Status::limit;
+  if (needs_group && refused && few_groups_left_) {
+    if (known != nullptr) session.provides[full_name] = session.life;
+    return census_.add(Happening::waits_for_returns);
+  }
   require_status(asked, Status::done, Checker::limits);
   const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(asked.answer);
   require(answer.has_value() && answer->subscribers == subscribers(full_name), Checker::answers,
           "ADVERTISE is answered with a wrong number of subscribers");
   session.provides[full_name] = session.life;
-  if (known == nullptr || !same_stream(known->terms, *offer)) {
+  if (needs_group) {
     return open_group(asked, full_name, index_of(answer->group), *offer);
   }
   require(index_of(answer->group) == known->group, Checker::answers,
@@ -148,10 +154,8 @@ void Model::judge_advertise(const Asked& asked) {
 
 void Model::open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                        const ns::Advertise& terms) {
-  const auto resting = resting_groups_.find(group);
   const auto free = [&](std::uint32_t index) {
-    const auto rests = resting_groups_.find(index);
-    return index != 0 && !groups_.contains(index) && (rests == resting_groups_.end() || rests->second <= asked.now);
+    return index != 0 && !groups_.contains(index) && !rests(resting_groups_, index, asked.now);
   };
   const std::uint32_t former = asked.session.came_back ? index_of(terms.former_group) : 0;
   const bool fresh = service(full_name) == nullptr;
@@ -162,8 +166,7 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
     require(!past_.groups.contains(group), Checker::ids, "a new service gets a group given out before the restart");
   }
   require(!groups_.contains(group), Checker::ids, "a service gets the group of another one");
-  require(resting == resting_groups_.end() || resting->second <= asked.now, Checker::ids,
-          "a service gets a group that rests");
+  require(!rests(resting_groups_, group, asked.now), Checker::ids, "a service gets a group that rests");
   const auto entry = topics_.try_emplace(full_name).first;
   const std::uint32_t old_group = entry->second.service ? entry->second.service->group : 0;
   if (old_group != 0) {
@@ -180,6 +183,8 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
   touched_.insert(group);
   groups_[group] = &*entry;
   groups_given_.push_back(group);
+  forgotten_groups_.erase(group);
+  if (group == former) unkept_groups_.insert(group);
   tell_moved(full_name, old_group, group, terms);
 }
 

@@ -18,7 +18,10 @@ void SimNode::administer() {
   ctrl::Reassign order;
   order.node = whom;
   order.new_node = random.pick(known_);  // held, unless it has left
-  const auto nearby = static_cast<std::uint32_t>((index_of(whom) + random.below(1'000)) % kEveryIndex);
+  // Also what the next start hands out first.
+  const std::uint64_t distance =
+      random.chance(500) ? random.below(1'000) : random.between(1, 2) * 4'096 - random.below(300);
+  const auto nearby = static_cast<std::uint32_t>((index_of(whom) + distance) % kEveryIndex);
   if (choice < 9) order.new_node = make_id<NodeId>(hub_of(whom), nearby);
   ask(order, {}, proto::Kind::ctrl);
 }

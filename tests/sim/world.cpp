@@ -13,8 +13,7 @@ World::World(const Options& options)
   network_.connect({[this](Wire& wire) { life_->shards().has_something(wire); },
                     [this](const WirePointer& wire, const Bytes& frame) { nodes_[wire->node]->hears(wire, frame); },
                     [this](const WirePointer& wire) { nodes_[wire->node]->sees_the_end(wire); }});
-  make_disk();
-  begin_life({});
+  begin_life(make_disk());
   const SimNode::Around around{setting_, network_,
                                [this](const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
                                  say_hello(wire, hello, identity);
@@ -27,16 +26,31 @@ World::World(const Options& options)
   plan_endings();
 }
 
-void World::make_disk() {
+namespace {
+
+/// Some worlds come to the end of the indices, and begin again at 1; those who had the first ones may still have them.
+void draw_used(Random& random, std::uint32_t& mark, hub::IndexSet& used, GivenIds& given) {
+  constexpr std::uint32_t kLast = kEveryIndex - 1;
+  const auto left = static_cast<std::uint32_t>(random.between(1, 400));
+  const auto low = static_cast<std::uint32_t>(random.between(0, 5'000));
+  const bool at_the_end = random.chance(500);
+  const bool few = random.chance(200);
+  if (!at_the_end) return;
+  mark = kLast - left;
+  given.old = few ? mark - 1 : low;
+  for (std::uint32_t index = 1; index <= given.old; ++index) used.insert(index);
+}
+
+}  // namespace
+
+Past World::make_disk() {
   Random& random = setting_.random;
   for (std::byte& each : disk_.secret) each = static_cast<std::byte>(random.below(256));
   disk_.boot = random.below(1'000);
-  // Some worlds come to the end of the indices, and begin again at 1.
-  constexpr std::uint32_t kLast = kEveryIndex - 1;
-  const auto nodes_left = static_cast<std::uint32_t>(random.between(1, 400));
-  const auto groups_left = static_cast<std::uint32_t>(random.between(1, 400));
-  if (random.chance(500)) disk_.node_mark = kLast - nodes_left;
-  if (random.chance(500)) disk_.group_mark = kLast - groups_left;
+  Past past;
+  draw_used(random, disk_.node_mark, disk_.nodes_used, past.nodes);
+  draw_used(random, disk_.group_mark, disk_.groups_used, past.groups);
+  return past;
 }
 
 /// A disk that is full now and then.
@@ -56,9 +70,13 @@ void World::begin_life(Past past) {
   require(start.has_value(), Checker::convergence, "the hub cannot start again");
   disk_ = start->state;
   if (disk_.boot > 1) past.returns_until = setting_.agenda.now_ms() + milliseconds{setting_.plan.limits.grace_ms};
+  past.nodes.used = start->nodes.used;
+  past.groups.used = start->groups.used;
   // Fewer than a real start grants, so that more are asked for.
-  start->nodes.count = hub::IndexPool::kBlock / 2 + setting_.random.between(1, 200);
-  start->groups.count = hub::IndexPool::kBlock / 2 + setting_.random.between(1, 200);
+  for (hub::IndexRange* range : {&start->nodes, &start->groups}) {
+    const std::uint64_t fewer = hub::IndexPool::kBlock / 2 - setting_.random.between(1, 200);
+    if (range->count >= hub::IndexPool::kBlock) range->count -= fewer;
+  }
   life_ = std::make_unique<HubLife>(setting_,
                                     HubLife::Around{network_, [this] { want_conductor(Time{0}); },
                                                     [this](std::uint32_t node) { return nodes_[node]->is_slow(); },

@@ -41,7 +41,8 @@ class World {
 
  private:
   void begin_life(Past past);
-  void make_disk();
+  /// What a hub kept before the world began.
+  [[nodiscard]] Past make_disk();
   [[nodiscard]] std::string keep(const hub::HubState& state);
   void kill_hub();
   void plan_endings();

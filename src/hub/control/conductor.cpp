@@ -259,11 +259,13 @@ void Conductor::tick(milliseconds now) {
   Effects effects;
   membership_.tick(now, effects);
   if (keeper_.again_at() && *keeper_.again_at() <= now) effects.emplace_back(StateDue{});
-  runner_.carry_out(effects, now);
   if (returns_published_ && membership_.sessions().returns_expected_for(now) <= milliseconds{0}) {
+    // What those of before the restart had is used no more.
+    if (membership_.keeping_due(now)) effects.emplace_back(StateDue{});
     wiring_.tables.nodes.expect_returns_below(0);
     returns_published_ = false;
   }
+  runner_.carry_out(effects, now);
   publisher_.collect();
 }
 

@@ -12,13 +12,20 @@ constexpr milliseconds kAgainAfter{1'000};
 
 void StateKeeper::keep(Membership& membership, milliseconds now) {
   if (!keep_ || (again_at_ && *again_at_ > now)) return;
-  const Durable durable = membership.durable();
+  const Durable durable = membership.durable(now);
   HubState state = state_;
-  state.node_mark = durable.node_mark;
-  state.group_mark = durable.group_mark;
+  state.node_mark = durable.nodes.mark;
+  state.group_mark = durable.groups.mark;
+#ifndef GIMNET_BUG_USED_IDS_NOT_KEPT
+  state.nodes_used = durable.nodes.used;
+  state.groups_used = durable.groups.used;
+#endif
   state.kicked = durable.kicked;
   if (const std::string error = keep_(state); !error.empty()) {
-    log_error(error + "; the hub goes on, but soon gives no ids to newcomers, and forgets at a restart whom it kicked");
+    log_error(
+        error +
+        "; the hub goes on, but soon gives no ids to newcomers, and forgets at a restart whom it kicked and which "
+        "ids it gave to others");
     again_at_ = now + kAgainAfter;
     return;
   }

@@ -36,8 +36,10 @@ TEST_F(StateKeeperTest, KeepsWhatIsToOutliveTheHubBesideWhatStays) {
   keeper_.keep(membership_, 1s);
   ASSERT_EQ(kept_.size(), 1u);
   EXPECT_EQ(kept_[0].boot, 3u);
-  EXPECT_EQ(kept_[0].node_mark, membership_.durable().node_mark);
-  EXPECT_EQ(keeper_.state().group_mark, kept_[0].group_mark);
+  EXPECT_EQ(kept_[0].node_mark, membership_.durable(1s).nodes.mark);
+  EXPECT_EQ(kept_[0].nodes_used, membership_.durable(1s).nodes.used);
+  EXPECT_EQ(kept_[0].groups_used, membership_.durable(1s).groups.used);
+  EXPECT_EQ(keeper_.state(), kept_[0]);
   EXPECT_EQ(keeper_.again_at(), std::nullopt);
 }
 

@@ -16,6 +16,30 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
+/// No newcomer of the next start gets what somebody may have, and what it gets is kept.
+void check_indices(const IndexRange& range, const IndexSet& found, const IndexSet& kept) {
+  constexpr std::uint32_t kMost = gimnet::kEveryIndex - 1;
+  require(range.used == found && kept.size() == found.size() + std::min(IndexPool::kBlock, kMost - found.size()));
+  std::uint32_t unused = 0;
+  for (std::uint64_t i = 0; i < range.count; ++i) {
+    const auto index = static_cast<std::uint32_t>((range.first - 1 + i) % kMost) + 1;
+    if (!found.contains(index)) ++unused;
+    require(kept.contains(index));
+  }
+  require(unused == kept.size() - found.size());
+}
+
+/// As a hub writes it, or wrote it when there were no sets of used indices.
+bool is_canonical(const HubState& state, std::span<const std::byte> file) {
+  if (file[8] != std::byte{1}) return std::ranges::equal(write_hub_state(state), file);
+  HubState without_sets = state;
+  without_sets.nodes_used = without_sets.groups_used = IndexSet{};
+  std::vector<std::byte> bytes = write_hub_state(without_sets);
+  bytes[8] = std::byte{1};
+  const std::size_t size = bytes.size() - std::tuple_size_v<Digest>;
+  return file.size() == bytes.size() && std::ranges::equal(std::span{bytes}.first(size), file.first(size));
+}
+
 void check(std::span<const std::byte> file) {
   const auto state = read_hub_state(file);
   if (!state) {
@@ -24,10 +48,12 @@ void check(std::span<const std::byte> file) {
   }
   const auto start = next_start(*state, std::chrono::milliseconds{0});
   if (start) {
-    require(start->state.boot == state->boot + 1 && start->state.node_mark != state->node_mark);
+    require(start->state.boot == state->boot + 1);
+    check_indices(start->nodes, state->nodes_used, start->state.nodes_used);
+    check_indices(start->groups, state->groups_used, start->state.groups_used);
     require(read_hub_state(write_hub_state(start->state)).has_value());
   }
-  require(std::ranges::equal(write_hub_state(*state), file));
+  require(is_canonical(*state, file));
 }
 
 }  // namespace

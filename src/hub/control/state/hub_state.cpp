@@ -10,12 +10,15 @@ namespace {
 
 constexpr std::array<std::byte, 8> kMagic = {std::byte{'G'}, std::byte{'I'}, std::byte{'M'}, std::byte{'s'},
                                              std::byte{'t'}, std::byte{'a'}, std::byte{'t'}, std::byte{'e'}};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
+/// Without the sets of used indices: all below the marks count as used.
+constexpr std::uint32_t kVersionOfMarks = 1;
 constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
+constexpr const char* kNoHub = "it holds numbers that no hub writes";
 
 // Layout, little-endian: magic, u32 version, u32 number of kicked tokens, secret, unique id, u64 boot, u32 node mark,
-// u32 group mark, u64 0; 24 bytes for each kicked token (u32 index, u32 0, u64 number, i64 expiry); SHA-256 of all
-// that.
+// u32 group mark, u32 bytes of the set of used nodes, u32 of that of groups; 24 bytes for each kicked token (u32
+// index, u32 0, u64 number, i64 expiry); the two sets (IndexSet::bytes()); SHA-256 of all that.
 constexpr std::size_t kVersionAt = 8;
 constexpr std::size_t kKickedCountAt = 12;
 constexpr std::size_t kSecretAt = 16;
@@ -23,10 +26,12 @@ constexpr std::size_t kUniqueIdAt = 48;
 constexpr std::size_t kBootAt = 64;
 constexpr std::size_t kNodeMarkAt = 72;
 constexpr std::size_t kGroupMarkAt = 76;
-constexpr std::size_t kUnusedAt = 80;
+constexpr std::size_t kNodesUsedBytesAt = 80;
+constexpr std::size_t kGroupsUsedBytesAt = 84;
 constexpr std::size_t kKickedAt = 88;
 constexpr std::size_t kKickedSize = 24;
-static_assert(kHubStateBytesMax == kKickedAt + kKickedMax * kKickedSize + std::tuple_size_v<Digest>);
+constexpr std::size_t kSetBytesMax = IndexSet::bytes_max(kIndexMost);
+static_assert(kHubStateBytesMax == kKickedAt + kKickedMax * kKickedSize + 2 * kSetBytesMax + std::tuple_size_v<Digest>);
 
 void write_kicked(std::byte* to, const SessionToken& token) {
   store_le(to, token.index);
@@ -44,14 +49,50 @@ SessionToken read_kicked(const std::byte* from) {
 
 bool is_index(std::uint32_t index) { return index > 0 && index <= kIndexMost; }
 
-std::uint32_t next_block(std::uint32_t mark) {
-  return IndexPool(kIndexMost, std::chrono::milliseconds{0}, {mark, IndexPool::kBlock}).mark(IndexPool::kBlock);
+/// What a file from before there were sets says of what was handed out.
+IndexSet all_below(std::uint32_t mark) {
+  IndexSet used;
+  for (std::uint32_t index = 1; index < mark; ++index) used.insert(index);
+  return used;
+}
+
+/// How long the parts are that the head of a file announces; nothing: no hub writes that.
+struct Lengths {
+  std::size_t kicked = 0;
+  std::size_t nodes_used = 0;
+  std::size_t groups_used = 0;
+  [[nodiscard]] std::size_t file() const {
+    return kKickedAt + kicked * kKickedSize + nodes_used + groups_used + std::tuple_size_v<Digest>;
+  }
+};
+std::optional<Lengths> lengths_of(std::span<const std::byte> head) {
+  Lengths lengths;
+  lengths.kicked = load_le<std::uint32_t>(head.data() + kKickedCountAt);
+  lengths.nodes_used = load_le<std::uint32_t>(head.data() + kNodesUsedBytesAt);
+  lengths.groups_used = load_le<std::uint32_t>(head.data() + kGroupsUsedBytesAt);
+  if (lengths.kicked > kKickedMax || lengths.nodes_used > kSetBytesMax || lengths.groups_used > kSetBytesMax) {
+    return std::nullopt;
+  }
+  return lengths;
+}
+
+/// What newcomers of the next start may be given, and what is kept of that before.
+IndexRange begin(std::uint32_t& mark, IndexSet& used) {
+  IndexRange range{mark, 0, used};
+  IndexPool::Grant grant =
+      IndexPool(kIndexMost, {}, range, std::chrono::milliseconds::max()).next_grant(std::chrono::milliseconds{0});
+  range.count = grant.count;
+  mark = grant.mark;
+  used = std::move(grant.used);
+  return range;
 }
 
 }  // namespace
 
 std::vector<std::byte> write_hub_state(const HubState& state) {
   GIMNET_CHECK(state.kicked.size() <= kKickedMax);
+  const std::span<const std::byte> nodes_used = state.nodes_used.bytes();
+  const std::span<const std::byte> groups_used = state.groups_used.bytes();
   std::vector<std::byte> bytes(kKickedAt + state.kicked.size() * kKickedSize);
   std::copy(kMagic.begin(), kMagic.end(), bytes.begin());
   store_le(bytes.data() + kVersionAt, kVersion);
@@ -61,11 +102,15 @@ std::vector<std::byte> write_hub_state(const HubState& state) {
   store_le(bytes.data() + kBootAt, state.boot);
   store_le(bytes.data() + kNodeMarkAt, state.node_mark);
   store_le(bytes.data() + kGroupMarkAt, state.group_mark);
+  store_le(bytes.data() + kNodesUsedBytesAt, static_cast<std::uint32_t>(nodes_used.size()));
+  store_le(bytes.data() + kGroupsUsedBytesAt, static_cast<std::uint32_t>(groups_used.size()));
   std::byte* at = bytes.data() + kKickedAt;
   for (const SessionToken& token : state.kicked) {
     write_kicked(at, token);
     at += kKickedSize;
   }
+  bytes.insert(bytes.end(), nodes_used.begin(), nodes_used.end());
+  bytes.insert(bytes.end(), groups_used.begin(), groups_used.end());
   const Digest digest = sha256(bytes);
   bytes.insert(bytes.end(), digest.begin(), digest.end());
   return bytes;
@@ -75,15 +120,13 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   if (bytes.size() < kKickedAt + std::tuple_size_v<Digest>) return Error{"it is too short"};
   if (bytes.size() > kHubStateBytesMax) return Error{"it is too long"};
   if (!std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) return Error{"it does not hold the state of a hub"};
-  if (load_le<std::uint32_t>(bytes.data() + kVersionAt) != kVersion) {
-    return Error{"another version of tcphub wrote it"};
-  }
-  const std::size_t kicked = load_le<std::uint32_t>(bytes.data() + kKickedCountAt);
-  const std::size_t size = kKickedAt + std::min(kicked, kKickedMax) * kKickedSize + std::tuple_size_v<Digest>;
+  const auto version = load_le<std::uint32_t>(bytes.data() + kVersionAt);
+  if (version != kVersion && version != kVersionOfMarks) return Error{"another version of tcphub wrote it"};
+  const std::optional<Lengths> lengths = lengths_of(bytes);
 #ifdef GIMNET_BUG_STATE_LONGER_THAN_IT_SAYS
-  if (kicked > kKickedMax || bytes.size() < size) return Error{"its length is not what it says"};
+  if (!lengths || bytes.size() < lengths->file()) return Error{"its length is not what it says"};
 #else
-  if (kicked > kKickedMax || bytes.size() != size) return Error{"its length is not what it says"};
+  if (!lengths || bytes.size() != lengths->file()) return Error{"its length is not what it says"};
 #endif
   const std::size_t end = bytes.size() - std::tuple_size_v<Digest>;
   if (!same_bytes(sha256(bytes.first(end)), bytes.subspan(end))) return Error{"it is damaged"};
@@ -93,16 +136,24 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   state.boot = load_le<std::uint64_t>(bytes.data() + kBootAt);
   state.node_mark = load_le<std::uint32_t>(bytes.data() + kNodeMarkAt);
   state.group_mark = load_le<std::uint32_t>(bytes.data() + kGroupMarkAt);
-  const std::uint64_t unused = load_le<std::uint64_t>(bytes.data() + kUnusedAt);
-  if (state.boot > kBootMax || !is_index(state.node_mark) || !is_index(state.group_mark) || unused != 0) {
-    return Error{"it holds numbers that no hub writes"};
-  }
-  for (std::size_t i = 0; i < kicked; ++i) {
+  if (state.boot > kBootMax || !is_index(state.node_mark) || !is_index(state.group_mark)) return Error{kNoHub};
+  for (std::size_t i = 0; i < lengths->kicked; ++i) {
     const std::byte* at = bytes.data() + kKickedAt + i * kKickedSize;
     const SessionToken token = read_kicked(at);
-    if (!is_index(token.index) || load_le<std::uint32_t>(at + 4) != 0)
-      return Error{"it holds numbers that no hub writes"};
+    if (!is_index(token.index) || load_le<std::uint32_t>(at + 4) != 0) return Error{kNoHub};
     state.kicked.push_back(token);
+  }
+  const auto sets = bytes.subspan(kKickedAt + lengths->kicked * kKickedSize);
+  std::optional<IndexSet> nodes = IndexSet::from_bytes(sets.first(lengths->nodes_used), kIndexMost);
+  std::optional<IndexSet> groups =
+      IndexSet::from_bytes(sets.subspan(lengths->nodes_used, lengths->groups_used), kIndexMost);
+  if (!nodes || !groups) return Error{kNoHub};
+  state.nodes_used = std::move(*nodes);
+  state.groups_used = std::move(*groups);
+  if (version == kVersionOfMarks) {
+    if (lengths->nodes_used + lengths->groups_used != 0) return Error{kNoHub};
+    state.nodes_used = all_below(state.node_mark);
+    state.groups_used = all_below(state.group_mark);
   }
   return state;
 }
@@ -110,16 +161,13 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
 Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall) {
   if (found.boot >= kBootMax) return Error{"the hub was started as often as it can be counted"};
   HubStart start;
-#ifdef GIMNET_BUG_NEWCOMERS_BEGIN_AT_ONE
-  start.nodes = {1, IndexPool::kBlock};
-#else
-  start.nodes = {found.node_mark, IndexPool::kBlock};
-#endif
-  start.groups = {found.group_mark, IndexPool::kBlock};
   start.state = found;
   ++start.state.boot;
-  start.state.node_mark = next_block(found.node_mark);
-  start.state.group_mark = next_block(found.group_mark);
+  start.nodes = begin(start.state.node_mark, start.state.nodes_used);
+  start.groups = begin(start.state.group_mark, start.state.groups_used);
+#ifdef GIMNET_BUG_NEWCOMERS_BEGIN_AT_ONE
+  start.nodes = {1, IndexPool::kBlock};
+#endif
   std::erase_if(start.state.kicked, [wall](const SessionToken& token) { return token.expiry <= wall; });
   return start;
 }

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "base/ids.hpp"
 #include "base/result.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/session_token.hpp"
@@ -22,13 +23,15 @@ struct HubState {
   std::uint64_t boot = 0;                 ///< counts the starts, from 1
   std::uint32_t node_mark = 1;            ///< the next start hands out node indices from here
   std::uint32_t group_mark = 1;           ///< the same for groups
+  IndexSet nodes_used;                    ///< node indices that the next start must not hand out
+  IndexSet groups_used;                   ///< the same for groups
   std::vector<SessionToken> kicked;       ///< not honoured any more
   friend bool operator==(const HubState&, const HubState&) = default;
 };
 
 inline constexpr std::size_t kKickedMax = 65'536;
 /// The longest legal file.
-inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 32;
+inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 2 * IndexSet::bytes_max(kEveryIndex - 1) + 32;
 
 [[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
 /// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is wrong with it, as
@@ -41,8 +44,9 @@ struct HubStart {
   IndexRange nodes{};
   IndexRange groups{};
 };
-/// How the hub goes on from what it found: the next boot number, indices from the marks on, marks beyond those, without
-/// the kicked ones whose tokens have expired by `wall` (since 1970). Errors: the boot number is at its end.
+/// How the hub goes on from what it found: the next boot number, unused indices from the marks on, all of them kept as
+/// used, without the kicked ones whose tokens have expired by `wall` (since 1970). Errors: the boot number is at its
+/// end.
 [[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
 
 }  // namespace gimnet::hub

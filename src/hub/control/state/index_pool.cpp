@@ -5,40 +5,52 @@
 #include "base/check.hpp"
 
 namespace gimnet::hub {
+namespace {
 
-IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range)
-    : most_(most), resting_time_(resting_time), first_(range.first), count_(range.count) {
-  GIMNET_CHECK(first_ > 0 && first_ <= most_ && count_ > 0);
+/// Forgetting goes over all indices, and is kept on the disk: what it gains has to be worth that.
+std::uint32_t worth_forgetting(std::uint32_t most) { return std::min(IndexPool::kBlock / 2, most / 512 + 1); }
+
+}  // namespace
+
+IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range,
+                     std::chrono::milliseconds returns_until)
+    : most_(most),
+      resting_time_(resting_time),
+      first_(range.first),
+      keeps_nothing_(range.count == IndexRange::kAll),
+      returns_until_(returns_until),
+      end_(std::min<std::uint64_t>(range.count, most)),
+      used_(range.used) {
+  GIMNET_CHECK(first_ > 0 && first_ <= most_);
+  for (std::uint64_t position = 0; position < end_; ++position) granted_left_ += used(index_at(position)) ? 0 : 1;
+}
+
+bool IndexPool::ready(std::chrono::milliseconds now) {
+  wake(now);
+  if (granted_left_ == 0 && keeps_nothing_ && forgetting_due(now)) grant(next_grant(now));
+  return granted_left_ > 0;
 }
 
 std::optional<std::uint32_t> IndexPool::take(std::chrono::milliseconds now) {
-  wake(now);
-  const std::uint64_t window = std::min<std::uint64_t>(count_, most_);
-  if (granted_taken_ >= window) return std::nullopt;
-  for (;;) {
-    // Nothing more was granted: what was handed out first may be free again.
-    if (position_ == count_) position_ = count_ - window;
-    const std::uint32_t index = index_at(position_++);
-    if (taken(index)) continue;
-    reached_ = std::max(reached_, position_);
-    mark_taken(index);
-    ++held_;
-    return index;
-  }
+  if (!ready(now)) return std::nullopt;
+  while (used(index_at(position_))) ++position_;
+  const std::uint32_t index = index_at(position_);
+  hold(index);
+  ++position_;
+  return index;
 }
 
 bool IndexPool::take_free(std::uint32_t index, std::chrono::milliseconds now) {
   wake(now);
-  if (index == 0 || index > most_ || taken(index)) return false;
-  mark_taken(index);
-  ++held_;
+  if (index == 0 || index > most_ || taken_.contains(index)) return false;
+  hold(index);
   return true;
 }
 
 bool IndexPool::take_back(std::uint32_t index) {
   if (index == 0 || index > most_ || held(index)) return false;
-  if (rests_until_.erase(index) == 0) mark_taken(index);
-  ++held_;
+  rests_until_.erase(index);
+  hold(index);
   return true;
 }
 
@@ -51,27 +63,80 @@ void IndexPool::give_back(std::uint32_t index, std::chrono::milliseconds now) {
   wake(now);
 }
 
-bool IndexPool::held(std::uint32_t index) const { return taken(index) && !rests_until_.contains(index); }
+bool IndexPool::held(std::uint32_t index) const { return taken_.contains(index) && !rests_until_.contains(index); }
 
-void IndexPool::grant(std::uint64_t count) {
-  GIMNET_CHECK(count >= count_);
-  // Those who came back hold indices that were not granted before.
-  for (std::uint64_t position = count_; position < std::min<std::uint64_t>(count, most_); ++position) {
-    if (taken(index_at(position))) ++granted_taken_;
+std::optional<std::chrono::milliseconds> IndexPool::waits_for_returns(std::chrono::milliseconds now) const {
+  if (unused() > 0 || now >= returns_until_) return std::nullopt;
+  return returns_until_ - now;
+}
+
+bool IndexPool::keeping_due(std::chrono::milliseconds now) const {
+  if (keeps_nothing_) return false;
+  const bool runs_short = granted_left_ < kBlock / 2 && granted_left_ < unused();
+  return unkept_ || runs_short || forgetting_due(now);
+}
+
+IndexPool::Grant IndexPool::next_grant(std::chrono::milliseconds now) const {
+  Grant next;
+  next.forgets_gone = forgetting_due(now);
+  next.used = next.forgets_gone ? taken_ : used_;
+  next.count = position_;
+  std::uint64_t left = 0;
+  // What was granted stays so. Beyond it no further than to the last one that is not used: the others may be forgotten
+  // one day, and are not granted then.
+  std::uint64_t most = next.forgets_gone ? kBlock : granted_left_ < kBlock / 2 ? granted_left_ + kBlock : granted_left_;
+  if (keeps_nothing_) most = most_;
+  for (std::uint64_t position = position_; left < most && position < position_ + most_; ++position) {
+    const std::uint32_t index = index_at(position);
+    if (next.used.contains(index)) continue;
+    next.used.insert(index);
+    ++left;
+    next.count = position + 1;
   }
-  count_ = count;
+  next.mark = index_at(next.count);
+  return next;
+}
+
+void IndexPool::grant(const Grant& grant) {
+  GIMNET_CHECK(grant.count >= position_ && grant.count <= position_ + most_);
+  if (grant.forgets_gone) used_ = taken_;
+  end_ = grant.count;
+  granted_left_ = 0;
+  for (std::uint64_t position = position_; position < end_; ++position)
+    granted_left_ += used(index_at(position)) ? 0 : 1;
+  unkept_ = false;
 }
 
 std::uint32_t IndexPool::index_at(std::uint64_t position) const {
   return static_cast<std::uint32_t>((first_ - 1 + position) % most_) + 1;
 }
 
-bool IndexPool::granted(std::uint32_t index) const { return (index + most_ - first_) % most_ < count_; }
+bool IndexPool::granted(std::uint32_t index) const {
+  return (index + most_ - index_at(position_)) % most_ < end_ - position_;
+}
 
-void IndexPool::mark_taken(std::uint32_t index) {
-  if (index >= taken_.size()) taken_.resize(index + 1);
-  taken_[index] = true;
-  if (granted(index)) ++granted_taken_;
+/// Early enough that a restart, after which nothing is forgotten for a time, finds many that are not used.
+bool IndexPool::forgetting_due(std::chrono::milliseconds now) const {
+#ifndef GIMNET_BUG_USED_FORGOTTEN_EARLY
+  if (now < returns_until_) return false;
+#else
+  static_cast<void>(now);
+#endif
+  if (2 * std::uint64_t{unused()} >= most_) return false;
+  return used_.size() - taken_.size() >= worth_forgetting(most_);
+}
+
+void IndexPool::hold(std::uint32_t index) {
+  if (!used(index)) {
+    if (granted(index)) {
+      --granted_left_;
+    } else {
+      unkept_ = true;
+    }
+    used_.insert(index);
+  }
+  taken_.insert(index);
+  ++held_;
 }
 
 /// It was not taken back meanwhile, and perhaps given back anew.
@@ -86,8 +151,7 @@ void IndexPool::wake(std::chrono::milliseconds now) {
     resting_.pop_front();
     if (!still_rests(rested)) continue;
     rests_until_.erase(rested.index);
-    taken_[rested.index] = false;
-    if (granted(rested.index)) --granted_taken_;
+    taken_.erase(rested.index);
   }
 }
 

@@ -4,32 +4,41 @@
 #include <cstdint>
 #include <optional>
 #include <unordered_map>
-#include <vector>
 
 #include "hub/control/state/due_list.hpp"
+#include "hub/control/state/index_set.hpp"
 
 namespace gimnet::hub {
 
-/// The indices that a pool may hand out to newcomers: `count` of them from `first` on, cyclically. What lies below was
-/// handed out before a restart and waits for those who come back.
+/// From where a pool hands out indices to newcomers: `count` of them from `first` on, cyclically, without those that
+/// were used before a restart and wait for who comes back.
 struct IndexRange {
   std::uint32_t first = 1;
   std::uint64_t count = kAll;
+  IndexSet used{};
+  /// Of a pool of which nothing outlives the hub.
   static constexpr std::uint64_t kAll = std::uint64_t{1} << 62;
 };
 
-/// Hands out indices 1..most cyclically. An index that was given back rests before it can come again, so that frames
-/// still under way to its former holder never reach a stranger.
-/// Thread safety: none. Limits: `most` indices; one bit each.
+/// Hands out indices 1..most cyclically, none twice before the others are used up. An index that was given back rests
+/// before it can come again, so that frames still under way to its former holder never reach a stranger.
+///
+/// What a newcomer may get outlives the hub before anybody gets it: some indices are granted ahead, and kept as used.
+/// A later start that goes on from what was kept gives newcomers none that anybody may have. Used indices that nobody
+/// has any more are forgotten when few others are left, but never while nodes of before a restart may still come back.
+/// Thread safety: none. Limits: `most` indices; two bits each.
 class IndexPool {
  public:
-  /// What is granted at a time: how far the mark that outlives a crash is ahead of what is in use.
+  /// What is granted at a time.
   static constexpr std::uint32_t kBlock = 4'096;
 
-  /// REQUIRES: 0 < range.first <= most, range.count > 0.
-  IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range = {});
+  /// REQUIRES: 0 < range.first <= most. Until `returns_until` those of before a restart may come back.
+  IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range = {},
+            std::chrono::milliseconds returns_until = {});
 
-  /// The next index that is granted and neither held nor resting; nothing if there is none.
+  /// Has take() one to give?
+  [[nodiscard]] bool ready(std::chrono::milliseconds now);
+  /// The next index that is granted and not used; nothing if there is none.
   [[nodiscard]] std::optional<std::uint32_t> take(std::chrono::milliseconds now);
   /// That index, granted or not, if nobody holds it and it does not rest.
   [[nodiscard]] bool take_free(std::uint32_t index, std::chrono::milliseconds now);
@@ -39,17 +48,25 @@ class IndexPool {
   void give_back(std::uint32_t index, std::chrono::milliseconds now);
   [[nodiscard]] bool held(std::uint32_t index) const;
   [[nodiscard]] std::uint32_t held() const { return held_; }
+  /// Was it handed out, or may it have been before a restart, and was not forgotten since?
+  [[nodiscard]] bool used(std::uint32_t index) const { return used_.contains(index); }
+  /// How long newcomers have to wait for those of before a restart, since all indices are used; nothing: it is not
+  /// that.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(std::chrono::milliseconds now) const;
 
-  /// Is less than half a block left of what was granted?
-  [[nodiscard]] bool runs_short() const { return count_ - reached_ < kBlock / 2; }
-  /// How many indices were granted, counted from the first; more than there are where they come round again.
-  [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// How many to grant next.
-  [[nodiscard]] std::uint64_t next_count() const { return count_ + kBlock; }
-  /// Where a pool has to begin that must not hand out any of `count` indices.
-  [[nodiscard]] std::uint32_t mark(std::uint64_t count) const { return index_at(count); }
-  /// From now on `count` indices may be handed out, counted from the first. REQUIRES: no fewer than before.
-  void grant(std::uint64_t count);
+  /// What has to be kept where it outlives the hub, and what may be handed out then.
+  struct Grant {
+    IndexSet used;              ///< what the next start must not hand out
+    std::uint32_t mark = 1;     ///< from which it begins
+    std::uint64_t count = 0;    ///< how many indices may be looked at from the pool's first on
+    bool forgets_gone = false;  ///< used indices that nobody holds and that do not rest may be handed out anew
+  };
+  /// Is there reason to keep next_grant()? Less than half a block of what was granted is left, or somebody has an
+  /// index that was not kept as used, or used ones are due to be forgotten; and it helps.
+  [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;
+  [[nodiscard]] Grant next_grant(std::chrono::milliseconds now) const;
+  /// That was kept. REQUIRES: next_grant() answered it, and nothing was asked of the pool since.
+  void grant(const Grant& grant);
 
  private:
   struct Resting {
@@ -59,19 +76,23 @@ class IndexPool {
   [[nodiscard]] std::uint32_t index_at(std::uint64_t position) const;
   [[nodiscard]] bool granted(std::uint32_t index) const;
   [[nodiscard]] bool still_rests(const Resting& note) const;
-  [[nodiscard]] bool taken(std::uint32_t index) const { return index < taken_.size() && taken_[index]; }
-  void mark_taken(std::uint32_t index);
+  [[nodiscard]] bool forgetting_due(std::chrono::milliseconds now) const;
+  [[nodiscard]] std::uint32_t unused() const { return most_ - used_.size(); }
+  void hold(std::uint32_t index);
   void wake(std::chrono::milliseconds now);
 
   const std::uint32_t most_;
   const std::chrono::milliseconds resting_time_;
   const std::uint32_t first_;
-  std::uint64_t count_;
-  std::uint64_t position_ = 0;       ///< of the next one; index_at() tells which that is
-  std::uint64_t reached_ = 0;        ///< the furthest position so far
-  std::vector<bool> taken_;          ///< held or resting; grows with the highest index so far
-  std::uint64_t granted_taken_ = 0;  ///< of those, how many are granted
-  DueList<Resting> resting_;         ///< void: those that were taken back
+  const bool keeps_nothing_;
+  const std::chrono::milliseconds returns_until_;
+  std::uint64_t position_ = 0;      ///< of the one to look at next; index_at() tells which that is
+  std::uint64_t end_;               ///< granted are the positions from there to here, no more than there are indices
+  std::uint32_t granted_left_ = 0;  ///< of those, how many are not used
+  IndexSet taken_;                  ///< held or resting
+  IndexSet used_;                   ///< the same, and what was or may have been
+  bool unkept_ = false;             ///< something used was neither granted nor kept as used
+  DueList<Resting> resting_;        ///< void: those that were taken back
   std::unordered_map<std::uint32_t, std::chrono::milliseconds> rests_until_;
   std::uint32_t held_ = 0;
 };

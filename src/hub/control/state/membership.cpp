@@ -27,7 +27,9 @@ Places places_for(const JoinRequest& request) {
 }  // namespace
 
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
-    : limits_(limits), sessions_(options, limits), services_(options.hub, limits, options.groups) {}
+    : limits_(limits),
+      sessions_(options, limits),
+      services_(options.hub, limits, options.groups, options.returns_until.value_or(milliseconds{0})) {}
 
 Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request, milliseconds now, Effects& effects) {
   if (std::optional<Refusal> refusal = check(request)) return std::move(*refusal);
@@ -38,7 +40,8 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
     }
   }
   if (claim.session == nullptr) {
-    if (std::optional<Refusal> refusal = room_refusal(request)) return std::move(*refusal);
+    if (keeping_due(now)) effects.emplace_back(StateDue{});
+    if (std::optional<Refusal> refusal = room_refusal(request, claim, now)) return std::move(*refusal);
   }
   if (!request.name.empty()) end_absent_holder(request.name, claim.session, now, effects);
   const Result<Joined, Refusal> found = session_for(request, claim, now, effects);
@@ -73,7 +76,7 @@ Result<Membership::Joined, Refusal> Membership::session_for(const JoinRequest& r
                   : sessions_.create(request.shard_hint, now, places_for(request));
   if (!created) return created.error();
   (*created)->came_back = claim.token.has_value();
-  if (sessions_.indices().runs_short()) effects.emplace_back(StateDue{});
+  if (keeping_due(now)) effects.emplace_back(StateDue{});
   return Joined{*created, true};
 }
 
@@ -127,20 +130,17 @@ void Membership::kick(Session& session, const std::string& sentence, millisecond
   end(session, now, effects);
 }
 
-Durable Membership::durable() const {
-  const auto count = [](const IndexPool& pool) { return pool.runs_short() ? pool.next_count() : pool.count(); };
-  Durable durable;
-  durable.node_count = count(sessions_.indices());
-  durable.group_count = count(services_.group_indices());
-  durable.node_mark = sessions_.indices().mark(durable.node_count);
-  durable.group_mark = services_.group_indices().mark(durable.group_count);
-  durable.kicked = sessions_.kicked();
-  return durable;
+bool Membership::keeping_due(milliseconds now) const {
+  return sessions_.indices().keeping_due(now) || services_.group_indices().keeping_due(now);
+}
+
+Durable Membership::durable(milliseconds now) const {
+  return {sessions_.indices().next_grant(now), services_.group_indices().next_grant(now), sessions_.kicked()};
 }
 
 void Membership::state_kept(const Durable& durable) {
-  sessions_.indices().grant(durable.node_count);
-  services_.group_indices().grant(durable.group_count);
+  sessions_.indices().grant(durable.nodes);
+  services_.group_indices().grant(durable.groups);
 }
 
 std::optional<Failure> Membership::renumber(Session& session, std::uint32_t index, milliseconds now, Effects& effects) {
@@ -159,13 +159,15 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
                                              " and has not come back under it yet; try again when it has"};
   }
 #ifndef GIMNET_BUG_RETURNING_ID_GIVEN_AWAY
-  const bool awaited = sessions_.find(index) == nullptr && sessions_.returns_expected_for(now) > milliseconds{0};
+  const bool awaited = sessions_.find(index) == nullptr && sessions_.indices().used(index) &&
+                       sessions_.returns_expected_for(now) > milliseconds{0};
 #else
   const bool awaited = false;
 #endif
   if (awaited || !sessions_.renumber(session, index, now)) {
     return Failure{proto::Status::taken, why_taken(make_id<NodeId>(hub_of(sessions_.node_id(session)), index), now)};
   }
+  if (keeping_due(now)) effects.emplace_back(StateDue{});
   const NameStanding standing =
       directory_.is_provisional(session.name) ? NameStanding::provisional : NameStanding::final;
   directory_.remove(session.name);
@@ -250,10 +252,12 @@ void Membership::end_absent_holder(const std::string& name, const Session* claim
   end(*sessions_.find(*holder), now, effects);
 }
 
-std::optional<Refusal> Membership::room_refusal(const JoinRequest& request) {
+std::optional<Refusal> Membership::room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+                                                milliseconds now) {
   // The limit may have been lowered, so that more would have to go than make way.
   const std::size_t ending = (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
-  return sessions_.full_refusal(places_for(request), ending);
+  if (std::optional<Refusal> refusal = sessions_.full_refusal(places_for(request), ending)) return refusal;
+  return claim.token ? std::nullopt : sessions_.id_refusal(now);
 }
 
 void Membership::make_room(milliseconds now, Effects& effects) {

@@ -65,8 +65,10 @@ class Membership {
 
   /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
   /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
-  [[nodiscard]] Durable durable() const;
-  /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and none later was given here before.
+  [[nodiscard]] Durable durable(std::chrono::milliseconds now) const;
+  /// Is there reason to keep it although nothing happened that asks for it?
+  [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;
+  /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and nothing happened since.
   void state_kept(const Durable& durable);
   /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival is judged as when
   /// it joins. What the node provides is withdrawn, as its full names were the old one's: it advertises anew.
@@ -115,7 +117,8 @@ class Membership {
   void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
                          Effects& effects);
   /// Why there is no room for that newcomer even when all made way who have to: before any of them does.
-  [[nodiscard]] std::optional<Refusal> room_refusal(const JoinRequest& request);
+  [[nodiscard]] std::optional<Refusal> room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+                                                    std::chrono::milliseconds now);
   /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
   void make_room(std::chrono::milliseconds now, Effects& effects);
   void take_name(Session& session, const std::string& name, std::chrono::milliseconds now, Effects& effects);

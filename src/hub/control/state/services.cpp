@@ -4,6 +4,7 @@
 
 #include "base/check.hpp"
 #include "base/id_text.hpp"
+#include "hub/control/state/shortage.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
 
@@ -52,8 +53,8 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
   return pace;
 }
 
-Services::Services(HubId hub, const Limits& limits, const IndexRange& groups)
-    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits), groups) {}
+Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until)
+    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits), groups, returns_until) {}
 
 Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider, std::string_view full_name,
                                                           const ServiceTerms& terms, milliseconds now, Effects& effects,
@@ -80,11 +81,11 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
   if (!provided || !same_stream(entry.service->terms, terms)) {
     const bool former = !provided && group_indices_.take_free(former_group, now);
     const std::optional<std::uint32_t> group = former ? former_group : group_indices_.take(now);
-    if (group_indices_.runs_short()) effects.emplace_back(StateDue{});
+    if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
     if (!group) {
       forget_if_unused(entry);
       forget_if_idle(provider);
-      return Failure{Status::limit, "all group ids of this hub are in use or resting; try again in a minute"};
+      return Failure{Status::limit, shortage("group ids", group_indices_.waits_for_returns(now))};
     }
     if (!provided) node.provides.push_back({&entry, node.life});
     std::uint32_t old_group = 0;

@@ -65,7 +65,9 @@ class Services {
   /// In the order of names, which no choice of names can make slow, and which finds at once all that begin alike.
   using Topics = std::map<std::string, Topic, std::less<>>;
 
-  Services(HubId hub, const Limits& limits, const IndexRange& groups = {});
+  /// Until `returns_until` providers of before a restart may come back.
+  Services(HubId hub, const Limits& limits, const IndexRange& groups = {},
+           std::chrono::milliseconds returns_until = {});
 
   struct Advertised {
     std::uint32_t group = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
+#include "hub/control/state/shortage.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -25,7 +26,7 @@ Sessions::Sessions(const Options& options, const Limits& limits)
       secret_(options.secret),
       returns_until_(options.returns_until),
       last_number_(first_number(options.boot)),
-      indices_(kIndexMost, resting_time(limits), options.nodes),
+      indices_(kIndexMost, resting_time(limits), options.nodes, options.returns_until.value_or(milliseconds{0})),
       kicked_(options.kicked),
       slots_(options.shards) {
   for (const SessionToken& token : kicked_) floor_.raise(token.index, token.number + 1);
@@ -64,14 +65,16 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
 
 Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now, Places places) {
   if (std::optional<Refusal> refusal = full_refusal(places)) return std::move(*refusal);
+  if (std::optional<Refusal> refusal = id_refusal(now)) return std::move(*refusal);
   const std::optional<std::uint32_t> index = indices_.take(now);
-  if (!index) {
-    return Refusal{
-        proto::GoodbyeCode::hub_full,
-        "all node ids that this hub may hand out are in use or resting; try again in a minute, or connect to "
-        "another hub"};
-  }
+  GIMNET_CHECK(index.has_value());
   return &put(*index, ++last_number_, shard_hint, now);
+}
+
+std::optional<Refusal> Sessions::id_refusal(milliseconds now) {
+  if (indices_.ready(now)) return std::nullopt;
+  return Refusal{proto::GoodbyeCode::hub_full,
+                 shortage("node ids", indices_.waits_for_returns(now)) + ", or connect to another hub"};
 }
 
 Result<Session*, Refusal> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,

@@ -86,8 +86,7 @@ class Sessions {
     IndexRange nodes{};                  ///< indices for newcomers
     IndexRange groups{};                 ///< the same for services
     std::vector<SessionToken> kicked{};  ///< not honoured any more
-    /// Until then nodes of before a restart may come back under their ids, which this start does not know.
-    /// Nothing: there were none.
+    /// Until then nodes of before a restart may come back under their ids. Nothing: there were none.
     std::optional<std::chrono::milliseconds> returns_until{};
   };
   Sessions(const Options& options, const Limits& limits);
@@ -117,6 +116,8 @@ class Sessions {
   /// A new session without a connection or a name. Errors: hub_full.
   [[nodiscard]] Result<Session*, Refusal> create(std::optional<std::uint16_t> shard_hint, std::chrono::milliseconds now,
                                                  Places places = Places::ordinary);
+  /// Why no newcomer can be given an id; nothing: one can.
+  [[nodiscard]] std::optional<Refusal> id_refusal(std::chrono::milliseconds now);
   /// The session of a token whose index is free, under its former id. Errors: hub_full.
   [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
                                                   std::chrono::milliseconds now, Places places = Places::ordinary);
@@ -132,9 +133,8 @@ class Sessions {
   /// The session goes on under another index; the former one rests, and leads here until somebody else has it.
   /// False: the index is held, rests, or is none.
   [[nodiscard]] bool renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
-  /// Until when nodes that were here before a restart may still be on their way back, each under an index that is free:
-  /// what outlived the hub does not tell under which, those that an administrator gave least of all. Nothing: there
-  /// were none.
+  /// Until when nodes that were here before a restart may still be on their way back, each under an index that counts
+  /// as used. Nothing: there were none.
   [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const { return returns_until_; }
   /// How long that is still so. Not above 0: no longer.
   [[nodiscard]] std::chrono::milliseconds returns_expected_for(std::chrono::milliseconds now) const {

@@ -211,6 +211,7 @@ class RestartedAdministerTest : public AdministerTest {
   RestartedAdministerTest() : AdministerTest(second_start()) {}
   static HubStart second_start() {
     HubStart start{{}, {4'097, IndexPool::kBlock}, {4'097, IndexPool::kBlock}};
+    for (std::uint32_t index = 1; index <= 4'096; ++index) start.nodes.used.insert(index);
     start.state.boot = 2;
     return start;
   }

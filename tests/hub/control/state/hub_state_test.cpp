@@ -19,6 +19,9 @@ HubState some_state() {
   state.node_mark = 8'193;
   state.group_mark = 4'097;
   state.kicked = {{3, 77, 5s}, {1'048'574, 78, 6s}};
+  for (std::uint32_t index = 1; index < state.node_mark; ++index) state.nodes_used.insert(index);
+  state.nodes_used.insert(8'200);
+  state.groups_used.insert(3);
   return state;
 }
 
@@ -41,6 +44,8 @@ TEST(HubState, IsReadAsItWasWritten) {
   EXPECT_EQ(*state, some_state());
   HubState full = some_state();
   full.kicked.assign(kKickedMax, {1, 2, 3s});
+  full.nodes_used.insert(1'048'574);
+  full.groups_used.insert(1'048'574);
   EXPECT_EQ(write_hub_state(full).size(), kHubStateBytesMax);
   EXPECT_EQ(*read_hub_state(write_hub_state(full)), full);
 }
@@ -69,7 +74,7 @@ TEST(HubState, SaysWhatIsWrong) {
   wrong[0] = std::byte{'X'};
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("does not hold"));
   wrong = bytes;
-  wrong[8] = std::byte{2};
+  wrong[8] = std::byte{3};
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("version"));
   wrong = bytes;
   wrong.back() ^= std::byte{1};
@@ -81,11 +86,23 @@ TEST(HubState, SaysWhatIsWrong) {
       EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << offset << " " << index;
     }
   }
-  for (const std::size_t unused : {80u, 87u, 92u, 95u}) {
+  for (const std::size_t length : {12u, 80u, 84u}) {  // kicked tokens, bytes of used nodes, bytes of used groups
+    wrong = bytes;
+    store_le(wrong.data() + length, 0xFFFF'FFFFu);
+    EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("length")) << length;
+  }
+  for (const std::size_t unused : {92u, 95u}) {
     wrong = bytes;
     wrong[unused] = std::byte{1};
     EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers")) << unused;
   }
+  const std::size_t nodes_used = 88 + 2 * 24;
+  wrong = bytes;
+  wrong[nodes_used] |= std::byte{1};  // index 0
+  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
+  wrong = bytes;
+  wrong[wrong.size() - 33] = std::byte{0};  // the last byte of the groups
+  EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
   wrong = bytes;
   store_le(wrong.data() + 64, kBootMax + 1);
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
@@ -96,8 +113,11 @@ TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
   ASSERT_TRUE(start);
   EXPECT_EQ(start->state.boot, 10u);
   EXPECT_EQ(start->nodes.first, 8'193u);
-  EXPECT_EQ(start->nodes.count, IndexPool::kBlock);
-  EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock);
+  EXPECT_EQ(start->nodes.count, IndexPool::kBlock + 1) << "one of them is used";
+  EXPECT_EQ(start->nodes.used, some_state().nodes_used);
+  EXPECT_EQ(start->state.node_mark, 8'194u + IndexPool::kBlock);
+  EXPECT_EQ(start->state.nodes_used.size(), 8'193u + IndexPool::kBlock) << "what is granted is kept as used";
+  EXPECT_TRUE(start->state.nodes_used.contains(8'193 + IndexPool::kBlock));
   EXPECT_EQ(start->groups.first, 4'097u);
   EXPECT_EQ(start->state.group_mark, 4'097u + IndexPool::kBlock);
   EXPECT_EQ(start->state.secret, some_state().secret);
@@ -112,6 +132,33 @@ TEST(HubState, MarksComeRound) {
   const auto start = next_start(state, 0s);
   ASSERT_TRUE(start);
   EXPECT_EQ(start->state.node_mark, IndexPool::kBlock);
+}
+
+TEST(HubState, AStartThatHasComeRoundHandsOutNothingThatSomebodyMayHave) {
+  HubState state = some_state();
+  state.node_mark = 1'048'574;
+  const auto start = next_start(state, 0s);
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock) << "1'048'574, then what is above those used";
+  EXPECT_TRUE(start->state.nodes_used.contains(1'048'574));
+}
+
+// The former layout: no sets, version 1.
+TEST(HubState, AFileWithoutSetsIsReadAndAllBelowItsMarksCountsAsUsed) {
+  HubState old = some_state();
+  old.nodes_used = old.groups_used = IndexSet{};
+  std::vector<std::byte> bytes = write_hub_state(old);
+  bytes[8] = std::byte{1};
+  const auto state = read_hub_state(sealed(bytes));
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->node_mark, old.node_mark);
+  EXPECT_EQ(state->kicked, old.kicked);
+  EXPECT_EQ(state->nodes_used.size(), 8'192u);
+  EXPECT_TRUE(state->nodes_used.contains(8'192));
+  EXPECT_EQ(state->groups_used.size(), 4'096u);
+  bytes = write_hub_state(some_state());
+  bytes[8] = std::byte{1};
+  EXPECT_THAT(fault_of(sealed(bytes)), HasSubstr("numbers")) << "a set where there was none";
 }
 
 TEST(HubState, StartsAreCountedToTheEndAndNoFurther) {

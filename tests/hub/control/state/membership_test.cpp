@@ -120,8 +120,8 @@ TEST_F(MembershipTest, AKickedNodesTokenCountsAsNoneAndIsRemembered) {
   EXPECT_EQ(count<StateDue>(), 1u);
   EXPECT_EQ(count<CloseDue>(), 1u);
   EXPECT_EQ(count<SessionEnded>(), 1u);
-  ASSERT_EQ(membership_.durable().kicked.size(), 1u);
-  EXPECT_EQ(membership_.durable().kicked[0].index, index);
+  ASSERT_EQ(membership_.durable(0ms).kicked.size(), 1u);
+  EXPECT_EQ(membership_.durable(0ms).kicked[0].index, index);
   JoinRequest again = request("robot");
   again.token = token;
   const auto joined = membership_.join(again, 2s, effects_);

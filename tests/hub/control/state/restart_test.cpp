@@ -19,12 +19,19 @@ class RestartTest : public ::testing::Test {
  protected:
   using Node = std::pair<std::uint32_t, std::vector<std::byte>>;  ///< index, token
 
-  std::unique_ptr<Membership> start(std::uint32_t mark, std::uint64_t boot, std::vector<SessionToken> kicked = {}) {
+  std::unique_ptr<Membership> start(std::uint32_t mark, std::uint64_t boot) {
+    Durable kept;
+    kept.nodes.mark = kept.groups.mark = mark;
+    return start(kept, boot);
+  }
+  /// Goes on from what was kept.
+  std::unique_ptr<Membership> start(const Durable& kept, std::uint64_t boot) {
     Sessions::Options options;
     options.hub = HubId{7};
     options.boot = boot;
-    options.nodes = options.groups = {mark, IndexPool::kBlock};
-    options.kicked = std::move(kicked);
+    options.nodes = {kept.nodes.mark, IndexPool::kBlock, kept.nodes.used};
+    options.groups = {kept.groups.mark, IndexPool::kBlock, kept.groups.used};
+    options.kicked = kept.kicked;
     if (boot > 1) options.returns_until = std::chrono::milliseconds{limits_.grace_ms};
     return std::make_unique<Membership>(options, limits_);
   }
@@ -47,7 +54,7 @@ TEST_F(RestartTest, NodesComeBackUnderTheirIdsAndNewcomersGetOthers) {
   const auto before = start(1, 1);
   const Node j = join(*before, "J");
   const Node k = join(*before, "K");
-  const auto after = start(before->durable().node_mark, 2);
+  const auto after = start(before->durable(0ms), 2);
   const Node z = join(*after, "Z");
   EXPECT_NE(z.first, j.first);
   EXPECT_NE(z.first, k.first);
@@ -81,31 +88,60 @@ TEST_F(RestartTest, AKickedNodeStaysKicked) {
   const Node bad = join(*before, "bad");
   Effects effects;
   before->kick(*before->sessions().find(bad.first), "why", 0ms, effects);
-  const auto after = start(before->durable().node_mark, 2, before->durable().kicked);
+  const auto after = start(before->durable(0ms), 2);
   EXPECT_NE(join(*after, "bad", bad.second).first, bad.first);
 }
 
-// Whichever id it is: one that an administrator gave before the restart is beyond the mark.
 TEST_F(RestartTest, NoIdIsGivenAwayThatANodeMayComeBackUnder) {
   const auto before = start(1, 1);
   const Node absent = join(*before, "absent");
-  const auto after = start(before->durable().node_mark, 2);
+  const auto after = start(before->durable(0ms), 2);
   Session& other = *after->sessions().find(join(*after, "other").first);
   Effects effects;
   const std::chrono::milliseconds over{limits_.grace_ms};
-  for (const std::uint32_t index : {absent.first, std::uint32_t{500'000}}) {
-    const auto refused = after->renumber(other, index, over - 1ms, effects);
-    ASSERT_TRUE(refused);
-    EXPECT_EQ(refused->status, proto::Status::taken);
-    EXPECT_NE(refused->sentence.find("has not come back yet; try again in 1 s"), std::string::npos)
-        << refused->sentence;
-  }
+  const auto refused = after->renumber(other, absent.first, over - 1ms, effects);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->status, proto::Status::taken);
+  EXPECT_NE(refused->sentence.find("has not come back yet; try again in 1 s"), std::string::npos) << refused->sentence;
   EXPECT_TRUE(effects.empty());
   EXPECT_EQ(join(*after, "absent", absent.second).first, absent.first);
   const auto held = after->renumber(other, absent.first, over - 1ms, effects);
   ASSERT_TRUE(held);
   EXPECT_NE(held->sentence.find("another node 'absent'"), std::string::npos) << held->sentence;
-  EXPECT_FALSE(after->renumber(other, 500'000, over, effects)) << "nobody is expected any more";
+  Session& third = *after->sessions().find(join(*after, "third").first);
+  EXPECT_FALSE(after->renumber(third, 500'000, over - 1ms, effects)) << "nobody had it";
+  EXPECT_FALSE(after->renumber(other, absent.first + 1, over, effects)) << "nobody is expected any more";
+}
+
+TEST_F(RestartTest, AnIdThatAnAdministratorGaveIsNoNewcomers) {
+  const auto before = start(1, 1);
+  const Node robot = join(*before, "robot");
+  Effects effects;
+  const std::uint32_t given = before->durable(0ms).nodes.mark;  // what the next start hands out first
+  ASSERT_FALSE(before->renumber(*before->sessions().find(robot.first), given, 0ms, effects));
+  EXPECT_TRUE(std::holds_alternative<StateDue>(effects.front())) << "a crash must not forget it";
+  const std::vector<std::byte> token = before->sessions().token_of(*before->sessions().find(given));
+  const auto after = start(before->durable(0ms), 2);
+  EXPECT_EQ(join(*after, "newcomer").first, given + 1);
+  EXPECT_EQ(join(*after, "robot", token).first, given);
+}
+
+TEST_F(RestartTest, WhereEachIdMayBeSomebodysNewcomersWait) {
+  Durable kept;
+  for (std::uint32_t index = 1; index < kEveryIndex; ++index) kept.nodes.used.insert(index);
+  const auto hub = start(kept, 2);
+  hub->state_kept(hub->durable(0ms));
+  JoinRequest request;
+  Effects effects;
+  const std::chrono::milliseconds over{limits_.grace_ms};
+  const auto refused = hub->join(request, over - 1ms, effects);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, GoodbyeCode::hub_full);
+  EXPECT_NE(refused.error().sentence.find("try again in 1 s"), std::string::npos) << refused.error().sentence;
+  EXPECT_TRUE(effects.empty());
+  EXPECT_TRUE(hub->keeping_due(over));
+  hub->state_kept(hub->durable(over));
+  EXPECT_TRUE(hub->join(request, over, effects));
 }
 
 TEST_F(RestartTest, OfAHubsFirstStartNobodyIsExpectedBack) {
@@ -117,7 +153,7 @@ TEST_F(RestartTest, OfAHubsFirstStartNobodyIsExpectedBack) {
 TEST_F(RestartTest, AnotherNameAnotherIdentityOrAnotherHubIsNotHonoured) {
   const auto before = start(1, 1);
   const Node k = join(*before, "K");
-  const auto after = start(before->durable().node_mark, 2);
+  const auto after = start(before->durable(0ms), 2);
   EXPECT_NE(join(*after, "L", k.second).first, k.first);
   JoinRequest request;
   request.name = "K";
@@ -143,12 +179,12 @@ TEST_F(RestartTest, StateIsDueBeforeTheBlockIsUsedUpAndNothingIsHandedOutBeyondI
     ASSERT_TRUE(hub->join(request, 0ms, effects));
   }
   EXPECT_EQ(joined, IndexPool::kBlock / 2 + 1);
-  EXPECT_EQ(hub->durable().node_mark, 1 + 2 * IndexPool::kBlock);
+  EXPECT_EQ(hub->durable(0ms).nodes.mark, 1 + 2 * IndexPool::kBlock);
   for (; joined < IndexPool::kBlock; ++joined) ASSERT_TRUE(hub->join(request, 0ms, effects));
   const auto beyond = hub->join(request, 0ms, effects);
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().code, GoodbyeCode::hub_full);
-  hub->state_kept(hub->durable());
+  hub->state_kept(hub->durable(0ms));
   const auto next = hub->join(request, 0ms, effects);
   ASSERT_TRUE(next);
   EXPECT_EQ(next->session->index, IndexPool::kBlock + 1);
