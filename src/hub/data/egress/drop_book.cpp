@@ -1,7 +1,9 @@
 #include "hub/data/egress/drop_book.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+#include <utility>
 
 namespace gimnet::hub {
 
@@ -25,18 +27,44 @@ void DropBook::drop_mixed(const std::byte* first, std::uint32_t size, proto::Dro
 void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason) {
   const proto::FrameHeader header = proto::load_header(frame);
   const NodeId sender{header.src};
-  auto note = std::find_if(notes_.begin(), notes_.end(),
-                           [&](const Note& each) { return each.sender == sender && each.reason == reason; });
-  if (note == notes_.end()) {
+  Note* note = find(sender, reason);
+  if (note == nullptr) {
     if (notes_.size() == notes_max_) return;
-    note = notes_.emplace(notes_.end());
+    note = &notes_.emplace_back();
     note->sender = sender;
     note->reason = reason;
+    if (heads_.empty()) heads_.resize(std::bit_ceil(notes_max_));
+    link(static_cast<std::uint32_t>(notes_.size()));
   }
   note->count += frames;
   note->last = header;
   note->following_size = static_cast<std::uint8_t>(std::min<std::size_t>(header.length, proto::kReportFollowingMax));
   std::memcpy(note->following, frame + proto::kHeaderSize, note->following_size);
+}
+
+DropBook::Note* DropBook::find(NodeId sender, proto::DropReason reason) {
+  if (notes_.empty()) return nullptr;
+  for (std::uint32_t number = heads_[place_of(sender, reason)]; number != 0; number = notes_[number - 1].next) {
+    Note& note = notes_[number - 1];
+    if (note.sender == sender && note.reason == reason) return &note;
+  }
+  return nullptr;
+}
+
+std::size_t DropBook::place_of(NodeId sender, proto::DropReason reason) const {
+  // Neighbouring ids, as those of nodes that joined together, have places of their own; so have a node's reasons.
+  return (sender.value() + static_cast<std::size_t>(reason) * 0x9E3779B1u) & (heads_.size() - 1);
+}
+
+void DropBook::link(std::uint32_t number) {
+  Note& note = notes_[number - 1];
+  std::uint32_t& head = heads_[place_of(note.sender, note.reason)];
+  note.next = std::exchange(head, number);
+}
+
+void DropBook::link_all() {
+  std::fill(heads_.begin(), heads_.end(), 0u);
+  for (std::uint32_t number = 1; number <= notes_.size(); ++number) link(number);
 }
 
 std::size_t DropBook::encode(const Note& note, std::span<std::byte, proto::kReportSizeMax> payload) {

@@ -34,6 +34,7 @@ class DropBook {
   /// a while.
   template <class Send>
   void flush(std::uint64_t now_ms, Send&& send) {
+    const std::size_t before = notes_.size();
     for (std::size_t i = 0; i < notes_.size();) {
       Note& note = notes_[i];
       const bool due = now_ms >= note.sent_ms + interval_ms_;
@@ -50,6 +51,7 @@ class DropBook {
       }
       ++i;
     }
+    if (notes_.size() != before) link_all();
   }
 
  private:
@@ -57,6 +59,7 @@ class DropBook {
     NodeId sender;
     proto::DropReason reason{};
     std::uint32_t count = 0;
+    std::uint32_t next = 0;  ///< number of the next one with the same place; 0: none
     std::uint64_t sent_ms = 0;
     proto::FrameHeader last;
     std::uint8_t following_size = 0;
@@ -64,12 +67,18 @@ class DropBook {
   };
 
   void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
+  /// Found by a table, since who drops much has many notes.
+  [[nodiscard]] Note* find(NodeId sender, proto::DropReason reason);
+  [[nodiscard]] std::size_t place_of(NodeId sender, proto::DropReason reason) const;
+  void link(std::uint32_t number);
+  void link_all();
   static std::size_t encode(const Note& note, std::span<std::byte, proto::kReportSizeMax> payload);
 
   Tally& tally_;
   const std::uint64_t interval_ms_;
   const std::uint64_t notes_max_;
-  std::vector<Note> notes_;  ///< Limit: reports
+  std::vector<Note> notes_;           ///< Limit: reports
+  std::vector<std::uint32_t> heads_;  ///< by place_of(): a note's number, its index + 1; empty before the first
 };
 
 }  // namespace gimnet::hub

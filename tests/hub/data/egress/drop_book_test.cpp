@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <utility>
+
 #include "tests/hub/data/support/egress_rig.hpp"
 
 namespace gimnet::hub {
@@ -109,6 +112,31 @@ TEST(DropBook, ReportsAsManySendersAndReasonsAsItIsTold) {
     ASSERT_EQ(sent.size(), notes_max);
     EXPECT_EQ(proto::decode_report(sent[0].payload)->count, 2u);
     EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::away)], notes_max + 2) << "counted all the same";
+  }
+}
+
+// Notes come and go in any order; each is found again while it is there.
+TEST(DropBook, FindsEachOfManyNotes) {
+  Tally tally;
+  DropBook book(tally, 10, 300);
+  std::uint64_t now = 1'000;
+  for (std::uint32_t round = 0; round < 20; ++round, now += 10) {
+    std::map<std::pair<std::uint32_t, DropReason>, std::uint32_t> dropped;
+    for (std::uint32_t src = 1; src <= 60; ++src) {
+      if ((src + round) % 3 == 0) continue;  // quiet in this round, and forgotten
+      for (std::uint32_t times = 0; times <= src % 4; ++times) {
+        const DropReason reason = times % 2 == 0 ? DropReason::away : DropReason::queue_full;
+        drop(book, "x", src << 8, reason);  // ids that share a place
+        ++dropped[{src << 8, reason}];
+      }
+    }
+    std::map<std::pair<std::uint32_t, DropReason>, std::uint32_t> told;
+    for (const auto& each : flush(book, now)) {
+      const auto report = proto::decode_report(each.payload);
+      ASSERT_TRUE(report);
+      told[{index_of(each.sender), report->reason}] += report->count;
+    }
+    EXPECT_EQ(told, dropped);
   }
 }
 
