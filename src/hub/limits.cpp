@@ -27,7 +27,7 @@ constexpr std::array kTable{
     LimitInfo{"stalled_frame_ms", "ms", &Limits::stalled_frame_ms, 100, kHour,
               "a frame that was begun must end within this time", true},
     LimitInfo{"partial_bytes", "bytes", &Limits::partial_bytes, kMiB, 64 * kGiB,
-              "held by all frames that were begun and have not ended"},
+              "held by all frames that were begun and have not ended; each shard has an equal part, and room for one frame"},
     LimitInfo{"handshake_bytes", "bytes", &Limits::handshake_bytes, 256, 64 * kKiB,
               "opening and HELLO together: all that a stranger may make the hub keep", true},
     LimitInfo{"handshake_ms", "ms", &Limits::handshake_ms, 10, kHour, "time until HELLO must be there"},

@@ -25,6 +25,7 @@ class BufferPool {
   BufferPool& operator=(const BufferPool&) = delete;
 
   [[nodiscard]] BufferRef take_slab();
+  [[nodiscard]] std::uint64_t slab_bytes() const { return slab_bytes_; }
   /// A chunk of at least `bytes`. Up to the largest frame with its header it is kept for the next time.
   [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
 

@@ -1,7 +1,8 @@
 #include "hub/shard/shard_state.hpp"
 
-namespace gimnet::hub {
+#include <algorithm>
 
+namespace gimnet::hub {
 ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
     : self(index),
       shared(hub_shared),
@@ -25,7 +26,9 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       pacer(fanout),
       retained(hub_shared.groups, fanout, pacer),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
-      receive_buffer(pool, tally, hub_shared.limits.partial_bytes),
+      receive_buffer(pool, tally,
+                     // Each shard keeps its part of all begun frames, and at least one: in a slab of its own.
+                     std::max(hub_shared.limits.partial_bytes / hub_shared.mailboxes.size(), pool.slab_bytes())),
       gate(limits, tally) {}
 
 Connection* ShardState::find(SessionRef session) const {

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
+#include <string>
+#include <vector>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -19,6 +24,24 @@ TEST(ShardState, FindsExactlyTheSessionThatIsMeant) {
   EXPECT_EQ(state.find(NodeId{7u << 20 | 999}), nullptr);
   EXPECT_EQ(state.find(NodeId{8u << 20 | 1}), nullptr) << "another hub's";
   EXPECT_EQ(rig.state(1).find(a.id), nullptr) << "another shard's";
+}
+
+TEST(ShardState, TheShardsKeepNoMoreBegunFramesTogetherThanOneAlone) {
+  for (const std::size_t shards : {1u, 3u}) {
+    Limits limits;
+    limits.partial_bytes = 1 << 20;  // three slabs
+    testing::HubRig rig(shards, limits);
+    std::vector<testing::FakeNode*> nodes;
+    for (std::size_t i = 0; i < 12; ++i) nodes.push_back(&rig.join(i % shards));
+    for (testing::FakeNode* node : nodes) {
+      const auto bytes = testing::HubRig::frame(*node, node->id.value(), std::string(5000, 'x'));
+      rig.write(*node, std::span(bytes).first(4000));
+    }
+    rig.settle();
+    const auto closed =
+        std::count_if(nodes.begin(), nodes.end(), [](testing::FakeNode* node) { return !!node->goodbye; });
+    EXPECT_EQ(closed, 9) << shards << " shards";
+  }
 }
 
 }  // namespace
