@@ -77,9 +77,11 @@ struct Ground {
     const std::uint64_t nodes_most = find_limit("nodes")->most + find_limit("administrators")->most;
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
-      mailboxes.push_back(std::make_unique<Mailbox>(
-          options.shards, Mailbox::Bounds{options.limits.mailbox_entries, options.limits.mailbox_bytes},
-          *wakers.back()));
+      mailboxes.push_back(
+          std::make_unique<Mailbox>(options.shards,
+                                    Mailbox::Bounds{options.limits.mailbox_entries, options.limits.mailbox_bytes,
+                                                    8 * options.limits.turn_deliveries},
+                                    *wakers.back()));
       counters.push_back(std::make_unique<ShardCounters>());
       readable.push_back(counters.back().get());
       sessions.push_back(std::make_unique<SessionGauges>(nodes_most));

@@ -24,10 +24,14 @@ constexpr std::array kTable{
               "largest frame after its header; 64 KiB is what every hub carries"},
     LimitInfo{"turn_bytes", "bytes", &Limits::turn_bytes, 4 * kKiB, 16 * kMiB,
               "read from one connection before the next one has its turn", true},
+    LimitInfo{"turn_deliveries", "deliveries", &Limits::turn_deliveries, 1, 16'777'216,
+              "frames times recipients of one connection, or of what other shards handed over, before the next one has "
+              "its turn; neighbouring frames with one header count as one"},
     LimitInfo{"stalled_frame_ms", "ms", &Limits::stalled_frame_ms, 100, kHour,
               "a frame that was begun must end within this time", true},
-    LimitInfo{"partial_bytes", "bytes", &Limits::partial_bytes, kMiB, 64 * kGiB,
-              "held by all frames that were begun and have not ended; each shard has an equal part, and room for one frame"},
+    LimitInfo{
+        "partial_bytes", "bytes", &Limits::partial_bytes, kMiB, 64 * kGiB,
+        "held by all frames that were begun and have not ended; each shard has an equal part, and room for one frame"},
     LimitInfo{"handshake_bytes", "bytes", &Limits::handshake_bytes, 256, 64 * kKiB,
               "opening and HELLO together: all that a stranger may make the hub keep", true},
     LimitInfo{"handshake_ms", "ms", &Limits::handshake_ms, 10, kHour, "time until HELLO must be there"},

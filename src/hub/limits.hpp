@@ -17,6 +17,7 @@ struct Limits {
   // Frames and turns
   std::uint64_t frame_bytes = 65'536;
   std::uint64_t turn_bytes = 256 * 1024;
+  std::uint64_t turn_deliveries = 16'384;
   std::uint64_t stalled_frame_ms = 30'000;
   std::uint64_t partial_bytes = 64ull << 20;
   // Joining

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "hub/shard/control_frame.hpp"
+#include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
 
@@ -50,7 +51,30 @@ bool Closer::say_goodbye(Connection& connection, proto::GoodbyeCode code, const 
   return sent.status == IoStatus::ok && sent.bytes == frame.size();
 }
 
+void Closer::give_up_rest(Connection& connection) {
+  const std::byte* next = connection.tail.buffer->data + connection.tail.begin;
+  const std::byte* const end = next + connection.tail.size;
+  // Its sender keeps what was not confirmed, or sees that the hub ends.
+  const bool senders = connection.resume != nullptr || connection.draining;
+  while (next != end) {
+    proto::NextRun found = proto::next_run(next, end, static_cast<std::uint32_t>(state_.limits.frame_bytes));
+    if (found.found != proto::Found::run) return;
+    proto::RunView& view = found.run;
+    const Admission admission =
+        state_.gate.admit(connection.ingress, const_cast<std::byte*>(next), view, state_.now_ms);
+    if (admission == Admission::malformed || admission == Admission::wrong_source) return;
+    if (admission == Admission::data && senders) state_.counters.untaken_frames.add(view.frames);
+    if (admission == Admission::data && !senders) {
+      state_.tally.accepted += view.frames;
+      connection.outbox.counters()->accepted.add(view.frames);
+      state_.drops.drop(view.bytes, view.size, view.frames, proto::DropReason::link_lost);
+    }
+    next += view.size;
+  }
+}
+
 void Closer::detach(Connection& connection, bool said_goodbye) {
+  if (connection.tail.rest) give_up_rest(connection);
   std::unique_ptr<Transport> transport = std::move(connection.transport);
   if (transport->descriptor() >= 0) {
     state_.poller.remove(transport->descriptor());

@@ -27,6 +27,8 @@ class Closer {
  private:
   [[nodiscard]] bool say_goodbye(Connection& connection, proto::GoodbyeCode code, const std::string& sentence);
   void detach(Connection& connection, bool said_goodbye);
+  /// What was read of it and not routed yet is not routed any more.
+  void give_up_rest(Connection& connection);
   void tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code, std::string sentence);
 
   ShardState& state_;

@@ -46,8 +46,10 @@ void IoShard::join() {
 
 void IoShard::let_go() {
   state_.connections.clear();
+  reader_.let_go();
   const auto end_loan = [](const Mail& mail) {
     if (mail.lent != nullptr) BufferPool::end_loan(mail.lent);
+    return true;
   };
   state_.shared.mailboxes[state_.self.value()]->drain(SIZE_MAX, [] {}, end_loan);
 }
@@ -76,7 +78,7 @@ void IoShard::run() {
 }
 
 int IoShard::sleep_ms() {
-  if (flush_again_ || !state_.recipients.dirty().empty()) return 0;
+  if (flush_again_ || !state_.recipients.dirty().empty() || has_rest()) return 0;
   int timeout_ms = keeper_.next_tick_ms();
   if (const std::uint64_t due_ms = state_.pacer.next_due_ms(); due_ms != Pacer::kNever) {
     constexpr std::uint64_t kLongestMs = 60'000;
@@ -88,6 +90,14 @@ int IoShard::sleep_ms() {
     timeout_ms = timeout_ms < 0 ? report_ms : std::min(timeout_ms, report_ms);
   }
   return timeout_ms;
+}
+
+bool IoShard::has_rest() const {
+  if (reader_.has_rest_of_mail()) return true;
+  return std::any_of(state_.with_rest.begin(), state_.with_rest.end(), [this](std::uint64_t token) {
+    const Connection* connection = state_.find_token(token);
+    return connection != nullptr && connection->armed.read;
+  });
 }
 
 bool IoShard::has_work() {
@@ -115,7 +125,13 @@ void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
   take_commands();
   take_mail();
   keeper_.look_for_others();
-  serve(ready);
+  if (state_.with_rest.empty()) {
+    serve(ready);
+  } else {
+    going_on_.swap(state_.with_rest);
+    serve(ready);
+    go_on();
+  }
   read_waiting();
   keeper_.tick();
   state_.pacer.release_due();
@@ -131,13 +147,15 @@ void IoShard::take_commands() {
 
 void IoShard::take_mail() {
   Mailbox& mailbox = *state_.shared.mailboxes[state_.self.value()];
-  if (mailbox.empty()) return;
+  if (mailbox.empty() && !reader_.has_rest_of_mail()) return;
+  reader_.begin_mail();
+  if (!reader_.take_rest_of_mail()) return;
   // A session whose node was seen by another shard has its AttachCommand waiting here: first all commands, then the
   // frames.
   const auto before_taking = [this] {
     while (!commands_.empty()) take_commands();
   };
-  mailbox.drain(kMailPerTurn, before_taking, [this](const Mail& mail) { reader_.take_mail(mail); });
+  mailbox.drain(kMailPerTurn, before_taking, [this](const Mail& mail) { return reader_.take_mail(mail); });
   mailbox.tell_room([this](ShardIndex sender) { state_.shared.wakers[sender.value()]->wake(); });
 }
 
@@ -148,9 +166,8 @@ void IoShard::serve(std::span<const Ready> ready) {
       state_.shared.wakers[state_.self.value()]->clear();
       continue;
     }
-    const std::size_t slot = each.token & (kSlotsMax - 1);
-    Connection* connection = slot < state_.connections.size() ? state_.connections[slot].get() : nullptr;
-    if (connection == nullptr || !connection->connected || connection->token() != each.token) continue;
+    Connection* connection = state_.find_token(each.token);
+    if (connection == nullptr) continue;
     if (each.writable && connection->blocked) flusher_.on_writable(*connection);
     if (each.readable && connection->armed.read) reader_.read(*connection);
     if (state_.tally.received_bytes - flushed_at >= kReadBytesPerFlush) {
@@ -158,6 +175,20 @@ void IoShard::serve(std::span<const Ready> ready) {
       flushed_at = state_.tally.received_bytes;
     }
   }
+}
+
+/// Others were read before.
+void IoShard::go_on() {
+  for (const std::uint64_t token : going_on_) {
+    Connection* connection = state_.find_token(token);
+    if (connection == nullptr || !connection->tail.rest) continue;
+    if (connection->armed.read) {
+      reader_.go_on(*connection);
+    } else {
+      state_.with_rest.push_back(token);
+    }
+  }
+  going_on_.clear();
 }
 
 void IoShard::read_waiting() {

@@ -40,6 +40,8 @@ class IoShard {
   /// knows. now_ms is monotonic.
   void turn(std::span<const Ready> ready, std::uint64_t now_ms);
   [[nodiscard]] ShardState& state() { return state_; }
+  /// Something was read, or handed over, and can be routed on in the next turn.
+  [[nodiscard]] bool has_rest() const;
 
  private:
   /// Mailbox entries and commands that one turn takes.
@@ -56,6 +58,7 @@ class IoShard {
   void take_commands();
   void take_mail();
   void serve(std::span<const Ready> ready);
+  void go_on();
   void read_waiting();
   void flush();
   void finish_turn();
@@ -70,6 +73,7 @@ class IoShard {
   Keeper keeper_;
   MpscQueue<ShardCommand> commands_;
   const Options options_;
+  std::vector<std::uint64_t> going_on_;  ///< who had a rest when this turn began
   bool stopped_ = false;
   bool flush_again_ = false;
   bool room_came_ = false;  ///< in a mailbox, since connections that wait for room were last looked at

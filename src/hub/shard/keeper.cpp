@@ -60,7 +60,8 @@ void Keeper::look_at(Connection& connection) {
       state_.now_ms - connection.last_heard_ms >= std::max(limits.grace_ms, limits.silent_ms)) {
     return closer_.on_broken(connection);
   }
-  const bool heard = connection.holds == 0 && !connection.waits_for_room && !connection.draining;
+  const bool read = connection.holds == 0 && !connection.waits_for_room && !connection.tail.rest;
+  const bool heard = read && !connection.draining;
   if (heard && is_silent(connection)) {
     if (connection.write_failed) return closer_.on_broken(connection);
     state_.counters.silent.add(1);

@@ -1,6 +1,8 @@
 #include "hub/shard/reader.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "proto/frame/extensions.hpp"
@@ -50,9 +52,29 @@ void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t m
   state.recipients.mark_dirty(connection);
 }
 
+std::uint64_t Reader::share() const {
+  const std::size_t rests = state_.receive_buffer.rests();
+  const std::uint64_t all = state_.limits.turn_deliveries;
+  return rests == 0 ? all : std::max<std::uint64_t>(1, all / (1 + rests));
+}
+
+/// In read(), which is once a turn for each connection.
+[[gnu::always_inline]] inline void Reader::route_all(Connection& connection, ReceiveBuffer::Received received) {
+  const std::uint64_t accepted_before = state_.tally.accepted;
+  deliveries_end_ = state_.router.deliveries() + share();
+  const bool open = process(connection, received);
+  connection.outbox.counters()->accepted.add(state_.tally.accepted - accepted_before);
+  state_.fanout.post_all();
+  const std::uint64_t posted = state_.fanout.take_posted();
+  if (!open) return;
+  connection.posted_shards = posted;
+  if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+}
+
 void Reader::read(Connection& connection) {
   state_.egress.owner.check_here();
-  std::uint64_t most = state_.limits.turn_bytes;
+  if (connection.tail.rest) return;
+  std::uint64_t most = state_.receive_buffer.many_rests() ? kFirstReadBytes : state_.limits.turn_bytes;
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
     if (connection.posted_shards != kAllShards) return wait_for_room(connection);
     most = kFirstReadBytes;
@@ -64,19 +86,21 @@ void Reader::read(Connection& connection) {
   if (result.status == IoStatus::would_block) return;
   if (result.status != IoStatus::ok) return closer_.on_end(connection);
   state_.tally.received_bytes += result.bytes;
-  SessionCounters& counters = *connection.outbox.counters();
-  counters.received_bytes.add(result.bytes);
-  const std::uint64_t accepted_before = state_.tally.accepted;
+  connection.outbox.counters()->received_bytes.add(result.bytes);
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
   if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
   if (connection.tell_heard) tell_heard(connection);
-  const bool open = process(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
-  counters.accepted.add(state_.tally.accepted - accepted_before);
-  state_.fanout.post_all();
-  const std::uint64_t posted = state_.fanout.take_posted();
-  if (!open) return;
-  connection.posted_shards = posted;
-  if ((posted & state_.fanout.crowded()) != 0) return wait_for_room(connection);
+  route_all(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
+}
+
+void Reader::go_on(Connection& connection) {
+  if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
+    state_.with_rest.push_back(connection.token());
+    return wait_for_room(connection);
+  }
+  // It may have said more, which is not read before this is done.
+  if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
+  route_all(connection, state_.receive_buffer.go_on(connection.tail));
 }
 
 void Reader::tell_heard(Connection& connection) {
@@ -104,6 +128,10 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
     }
     proto::NextRun found = proto::next_run(next, received.end, length_max);
     if (found.found == proto::Found::run) {
+      if (state_.router.deliveries() >= deliveries_end_) {
+        keep_rest(connection, {next, received.end});
+        break;
+      }
       if (!handle_run(connection, found.run)) return false;
       next += found.run.size;
       continue;
@@ -124,6 +152,11 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
   return true;
 }
 
+void Reader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
+  state_.receive_buffer.keep_rest(connection.tail, rest.data(), rest.data() + rest.size());
+  state_.with_rest.push_back(connection.token());
+}
+
 /// Closed itself, a newcomer would pay for those who begin frames and never end them.
 bool Reader::keep(Connection& connection, std::span<const std::byte> begun, std::uint32_t needed) {
   const std::byte* const end = begun.data() + begun.size();
@@ -141,7 +174,7 @@ Connection* Reader::begun_before(const Connection& connection) const {
   Connection* oldest = nullptr;
   std::uint64_t since_ms = connection.tail_since_ms;
   for (const std::unique_ptr<Connection>& each : state_.connections) {
-    if (each == nullptr || each->tail.empty() || each->tail_since_ms >= since_ms) continue;
+    if (each == nullptr || each->tail.empty() || each->tail.rest || each->tail_since_ms >= since_ms) continue;
     // Who is not read cannot end its frame.
     if (each->holds != 0 || each->waits_for_room) continue;
     since_ms = each->tail_since_ms;
@@ -312,12 +345,31 @@ bool Reader::handle_control(Connection& connection, const proto::RunView& view) 
   return true;
 }
 
-void Reader::take_mail(const Mail& mail) {
+void Reader::begin_mail() { deliveries_end_ = state_.router.deliveries() + state_.limits.turn_deliveries; }
+
+bool Reader::take_rest_of_mail() {
+  if (has_rest_of_mail()) take_frames(std::exchange(mail_rest_, Run{}));
+  return !has_rest_of_mail();
+}
+
+bool Reader::take_mail(const Mail& mail) {
+  if (mail.kind != MailKind::frames) {
+    take_word(mail);
+    return true;
+  }
+  take_frames({state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});
+  return !has_rest_of_mail();
+}
+
+void Reader::take_frames(const Run& frames) {
+  const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
+  mail_rest_ = state_.router.route_handed_over(frames, length_max, deliveries_end_);
+}
+
+void Reader::take_word(const Mail& mail) {
   switch (mail.kind) {
-    case MailKind::frames: {
-      const Run frames{state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames};
-      return state_.router.route_handed_over(frames, static_cast<std::uint32_t>(state_.limits.frame_bytes));
-    }
+    case MailKind::frames:
+      return;
     case MailKind::control:
       return state_.signals.apply_control(mail.node, {mail.small, mail.small_size});
     case MailKind::hold:

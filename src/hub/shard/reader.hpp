@@ -11,16 +11,33 @@ class Reader {
  public:
   Reader(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
 
-  /// Reads what is there, up to one turn's share. The connection may be closed by it.
+  /// Reads what is there, up to one turn's share, and routes it, up to another. The connection may be closed by it.
+  /// Does nothing while it has a rest.
   void read(Connection& connection);
-  /// Frames from another shard.
-  void take_mail(const Mail& mail);
+  /// Routes the rest of what was read in an earlier turn, up to a turn's share. As read(). REQUIRES: it has one.
+  void go_on(Connection& connection);
+  /// Mail has a turn's share too, that of all shards together.
+  void begin_mail();
+  /// What was left of the mail before. Returns false once the share is used up.
+  [[nodiscard]] bool take_rest_of_mail();
+  /// The same with frames or a word from another shard; frames that are too many are left. REQUIRES: none are left.
+  [[nodiscard]] bool take_mail(const Mail& mail);
+  [[nodiscard]] bool has_rest_of_mail() const { return mail_rest_.frames != 0; }
+  /// It lies in another shard's memory.
+  void let_go() { mail_rest_ = Run{}; }
 
  private:
   /// Not read until the shards that it sends to have room.
   /// Apart from read(), of which nearly every call has no use for it.
   [[gnu::noinline]] void tell_heard(Connection& connection);
   void wait_for_room(Connection& connection);
+  void route_all(Connection& connection, ReceiveBuffer::Received received);
+  /// The turn's share is used up: [begin of a whole frame, end) waits for another turn.
+  void keep_rest(Connection& connection, std::span<const std::byte> rest);
+  void take_frames(const Run& frames);
+  void take_word(const Mail& mail);
+  /// The share that a connection has of this turn's deliveries: those with a rest have one together.
+  [[nodiscard]] std::uint64_t share() const;
   /// False: the connection was closed.
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);
   /// Keeps the frame that was begun; where too much is kept, those go whose frames were begun before. False: nobody is
@@ -50,6 +67,8 @@ class Reader {
 
   ShardState& state_;
   Closer& closer_;
+  std::uint64_t deliveries_end_ = 0;  ///< the router's count at which the share is used up
+  Run mail_rest_;
 };
 
 /// Tells the peer how many data frames were taken from it.

@@ -77,6 +77,7 @@ struct ShardState {
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
   std::unordered_map<std::uint32_t, Reading> readings;  ///< by slot, while the conductor waits for them
+  std::vector<std::uint64_t> with_rest;  ///< tokens of connections whose last read was not routed whole, by age
   std::uint64_t now_ms = 0;
   std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
   bool nothing_follows = false;   ///< this shard drains, and so do all others: what waits is all that is to be written
@@ -84,6 +85,12 @@ struct ShardState {
   [[nodiscard]] Connection* find(SessionRef session) const;
   /// A node whose session is on this shard; nullptr if it is not.
   [[nodiscard]] Connection* find(NodeId node) const;
+  /// The connection of a poller's token; nullptr if it has ended, even if another one has its slot.
+  [[nodiscard]] Connection* find_token(std::uint64_t token) const {
+    const std::size_t slot = token & (kSlotsMax - 1);
+    Connection* connection = slot < connections.size() ? connections[slot].get() : nullptr;
+    return connection != nullptr && connection->connected && connection->token() == token ? connection : nullptr;
+  }
   void tell_conductor(ShardEvent event) { shared.inbox.push(std::move(event)); }
 };
 

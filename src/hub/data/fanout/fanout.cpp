@@ -50,13 +50,17 @@ void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader
   recipients_.mark_dirty(recipient);
 }
 
-void Fanout::hand_over(ShardIndex to, const Run& run) {
+void Fanout::hand_over(ShardIndex to, const Run& run, std::size_t deliveries) {
   context_.owner.check_here();
   Stretch& stretch = stretches_[to.value()];
   if (stretch.open.frames != 0) {
-    if (stretch.open.extend(run) || gather(stretch, run)) return;
+    if (stretch.open.extend(run) || gather(stretch, run)) {
+      stretch.deliveries += static_cast<std::uint32_t>(deliveries);
+      return;
+    }
     post(to);
   }
+  stretch.deliveries = static_cast<std::uint32_t>(deliveries);
   stretch.open = run.share();
   open_shards_ |= std::uint64_t{1} << to.value();
 }
@@ -115,7 +119,7 @@ void Fanout::post(ShardIndex to) {
   if (mailboxes_[to.value()]->full(self_, run.size)) {
     put_blocking_only(to, run);
   } else {
-    put(to, run);
+    put(to, run, stretches_[to.value()].deliveries);
   }
   if (mailboxes_[to.value()]->crowded(self_)) crowded_ |= std::uint64_t{1} << to.value();
 }
@@ -139,7 +143,7 @@ void Fanout::put_blocking_only(ShardIndex to, const Run& run) {
   if (blocking.frames != 0) put(to, blocking);
 }
 
-void Fanout::put(ShardIndex to, const Run& run) {
+void Fanout::put(ShardIndex to, const Run& run, std::uint32_t deliveries) {
   context_.tally.queued += run.frames;
   context_.tally.mailbox_entries += 1;
   context_.tally.mailbox_frames += run.frames;
@@ -149,7 +153,9 @@ void Fanout::put(ShardIndex to, const Run& run) {
   mail.size = run.size;
   mail.frames = run.frames;
   mail.lent = BufferPool::lend(*run.buffer.get());
-  if (mailboxes_[to.value()]->post(self_, mail)) ++wakeups_;
+  Mailbox& mailbox = *mailboxes_[to.value()];
+  if (deliveries != 0) mail.set_deliveries(deliveries);
+  if (deliveries != 0 ? mailbox.post_to_many(self_, mail) : mailbox.post(self_, mail)) ++wakeups_;
 }
 
 Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size) {

@@ -19,8 +19,9 @@ class Fanout {
   /// To one recipient here. Frames larger than it takes are dropped.
   void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
   /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one entry; small ones
-  /// that lie apart, with those for others between them, are copied together for it. Their order is kept.
-  void hand_over(ShardIndex to, const Run& run);
+  /// that lie apart, with those for others between them, are copied together for it. Their order is kept. `deliveries`:
+  /// recipients there of frames to many.
+  void hand_over(ShardIndex to, const Run& run, std::size_t deliveries = 0);
   /// No frame behind the last one will come: what was handed over is posted.
   void post_all();
 
@@ -58,6 +59,7 @@ class Fanout {
     Run open;         ///< one behind the other; none: nothing was handed over since the last post()
     BufferRef chunk;  ///< where those are put together that lay apart
     std::uint32_t chunk_used = 0;
+    std::uint32_t deliveries = 0;
   };
 
   void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
@@ -66,7 +68,7 @@ class Fanout {
   [[nodiscard]] std::byte* copy_behind(Stretch& stretch, const Run& run);
   void post(ShardIndex to);
   void post_behind(MailKind kind, const Fence& fence);
-  void put(ShardIndex to, const Run& run);
+  void put(ShardIndex to, const Run& run, std::uint32_t deliveries = 0);
   /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is not read until there
   /// is room; the rest is dropped.
   void put_blocking_only(ShardIndex to, const Run& run);

@@ -15,6 +15,12 @@ bool Mailbox::over(const Pair& pair, std::uint64_t entries, std::uint64_t bytes)
   return waiting_entries > entries || waiting_bytes > bytes;
 }
 
+bool Mailbox::over_half(const Pair& pair) const {
+  // relaxed: as above
+  const std::uint64_t deliveries = pair.sent_deliveries - pair.taken_deliveries.load(std::memory_order_relaxed);
+  return over(pair, bounds_.entries / 2, bounds_.bytes / 2) || deliveries > bounds_.deliveries / 2;
+}
+
 bool Mailbox::full(ShardIndex from, std::uint32_t bytes) const {
   const Pair& pair = pairs_[from.value()];
   // A stretch larger than the bound goes alone.
@@ -23,10 +29,10 @@ bool Mailbox::full(ShardIndex from, std::uint32_t bytes) const {
 
 bool Mailbox::crowded(ShardIndex from) {
   Pair& pair = pairs_[from.value()];
-  if (!over(pair, bounds_.entries / 2, bounds_.bytes / 2)) return false;
+  if (!over_half(pair)) return false;
   pair.sender_waits.store(true, std::memory_order_relaxed);  // relaxed: ordered by the fence
   std::atomic_thread_fence(std::memory_order_seq_cst);       // pairs with the fence in tell_room()
-  return over(pair, bounds_.entries / 2, bounds_.bytes / 2);
+  return over_half(pair);
 }
 
 bool Mailbox::post(ShardIndex from, Mail mail) {

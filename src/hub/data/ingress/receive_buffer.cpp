@@ -8,6 +8,18 @@
 
 namespace gimnet::hub {
 
+[[gnu::always_inline]] inline void ReceiveBuffer::make_room() {
+  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last byte.
+  if (slab_ && slab_->references == 1 && slab_->lent.load(std::memory_order_acquire) == 0) {
+    used_ = 0;
+    pool_.unpin(*slab_.get());
+  }
+  if (!slab_ || kSlabReadBytes - used_ < kLeastRoom) {
+    slab_ = pool_.take_slab();
+    used_ = 0;
+  }
+}
+
 std::span<std::byte> ReceiveBuffer::prepare(FrameTail& tail) {
   reading_.reset();
   if (tail.own) {
@@ -21,15 +33,7 @@ std::span<std::byte> ReceiveBuffer::prepare(FrameTail& tail) {
     GIMNET_CHECK(limit <= reading_->capacity && filled < limit);
     return {reading_->data + filled, limit - filled};
   }
-  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last byte.
-  if (slab_ && slab_->references == 1 && slab_->lent.load(std::memory_order_acquire) == 0) {
-    used_ = 0;
-    pool_.unpin(*slab_.get());
-  }
-  if (!slab_ || kSlabReadBytes - used_ < kLeastRoom) {
-    slab_ = pool_.take_slab();
-    used_ = 0;
-  }
+  make_room();
   reading_ = slab_.share();
   begin_ = used_;
   if (!tail.empty()) std::memcpy(slab_->data + used_, tail.buffer->data + tail.begin, tail.size);
@@ -75,12 +79,55 @@ bool ReceiveBuffer::keep(FrameTail& tail, const std::byte* begin, const std::byt
   return false;
 }
 
+void ReceiveBuffer::keep_rest(FrameTail& tail, const std::byte* begin, const std::byte* end) {
+  tail.size = static_cast<std::uint32_t>(end - begin);
+  tail.rest = true;
+  if (tail.size > kSharedChunkBytes) {
+    tail.begin = static_cast<std::uint32_t>(begin - reading_->data);
+    tail.buffer = reading_.share();
+    // A frame may have been begun at its end, and goes on there: nobody else reads into that slab any more.
+    if (slab_.get() == reading_.get()) slab_.reset();
+  } else {
+    tail.begin = 0;
+    tail.buffer = pool_.take_chunk(tail.size);
+    std::memcpy(tail.buffer->data, begin, tail.size);
+    tally_.moved_tail_bytes += tail.size;
+  }
+  rest_bytes_ += cost(tail);
+  ++rests_;
+}
+
+ReceiveBuffer::Received ReceiveBuffer::go_on(FrameTail& tail) {
+  reading_.reset();
+  const std::uint32_t size = tail.size;
+  if (tail.buffer->kind == BufferKind::slab) {
+    reading_ = tail.buffer.share();
+    begin_ = tail.begin;
+  } else {
+    // In the chunk a frame that was begun at the end would have no room for its own.
+    make_room();
+    reading_ = slab_.share();
+    begin_ = used_;
+    used_ += size;
+    std::memcpy(reading_->data + begin_, tail.buffer->data + tail.begin, size);
+    tally_.moved_tail_bytes += size;
+  }
+  forget(tail);
+  const std::byte* begin = reading_->data + begin_;
+  return {begin, begin + size};
+}
+
 bool ReceiveBuffer::owns_slab(const FrameTail& tail) { return tail.own && tail.buffer->kind == BufferKind::slab; }
 
-std::uint32_t ReceiveBuffer::cost(const FrameTail& tail) { return tail.own ? tail.buffer->capacity : tail.size; }
+std::uint32_t ReceiveBuffer::cost(const FrameTail& tail) {
+  return tail.own || tail.rest ? tail.buffer->capacity : tail.size;
+}
 
 void ReceiveBuffer::forget(FrameTail& tail) {
-  if (!tail.empty()) {
+  if (tail.rest) {
+    rest_bytes_ -= cost(tail);
+    --rests_;
+  } else if (!tail.empty()) {
     tail_bytes_ -= cost(tail);
     if (owns_slab(tail)) --own_slabs_;
   }

@@ -9,14 +9,15 @@
 
 namespace gimnet::hub {
 
-/// The frame that a connection has begun and not finished. Lies in a buffer that the connection then has for itself,
-/// or, when little of it is there, in a copy.
+/// The frame that a connection has begun and not finished, or the rest of a read: whole frames that wait for their
+/// turn. Lies in a buffer that the connection then has for itself, or, when little of it is there, in a copy.
 struct FrameTail {
   BufferRef buffer;
   std::uint32_t begin = 0;
   std::uint32_t size = 0;
   std::uint32_t needed = 0;  ///< bytes of the whole frame, as far as known
   bool own = false;          ///< read on behind it: nobody else reads into that buffer
+  bool rest = false;         ///< begins with a whole frame; nothing is read before it was handed on
 
   [[nodiscard]] bool empty() const { return size == 0; }
 };
@@ -47,7 +48,16 @@ class ReceiveBuffer {
   /// After all whole frames were handed on: [begin, end) of buffer() is left over, the start of a frame of `needed`
   /// bytes. Returns false if too much is kept for begun frames already; nothing is kept then.
   [[nodiscard]] bool keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed);
-  /// Connections that have a slab to themselves.
+  /// Instead: [begin, end) of buffer() begins with a whole frame, and is left for a later turn.
+  void keep_rest(FrameTail& tail, const std::byte* begin, const std::byte* end);
+  /// That turn. REQUIRES: tail.rest. `tail` is empty then, as after commit().
+  [[nodiscard]] Received go_on(FrameTail& tail);
+  /// Rests that are kept, and their bytes. A connection reads nothing while it has one, and little while they are more
+  /// than kRestBytesMax, so that they are no more than that and a read each.
+  [[nodiscard]] std::size_t rests() const { return rests_; }
+  [[nodiscard]] bool many_rests() const { return rest_bytes_ >= kRestBytesMax; }
+  static constexpr std::uint64_t kRestBytesMax = std::uint64_t{16} << 20;
+  /// Connections that have a slab to themselves for a begun frame.
   [[nodiscard]] std::size_t own_slabs() const { return own_slabs_; }
   /// The connection is gone.
   void forget(FrameTail& tail);
@@ -62,6 +72,8 @@ class ReceiveBuffer {
   /// A slab with less room than this is not read into any more.
   static constexpr std::uint32_t kLeastRoom = 64 * 1024;
 
+  /// Makes sure of a slab with room behind used_.
+  void make_room();
   [[nodiscard]] static bool owns_slab(const FrameTail& tail);
   [[nodiscard]] static std::uint32_t cost(const FrameTail& tail);
 
@@ -74,6 +86,8 @@ class ReceiveBuffer {
   std::uint32_t begin_ = 0;  ///< where its bytes begin
   std::uint64_t tail_bytes_ = 0;
   std::size_t own_slabs_ = 0;
+  std::uint64_t rest_bytes_ = 0;
+  std::size_t rests_ = 0;
 };
 
 }  // namespace gimnet::hub

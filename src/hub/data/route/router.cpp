@@ -47,19 +47,25 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool han
   }
 }
 
-void Router::route_handed_over(const Run& frames, std::uint32_t length_max) {
+Run Router::route_handed_over(const Run& frames, std::uint32_t length_max, std::uint64_t deliveries_end) {
   fanout_.context().owner.check_here();
   const std::byte* next = frames.bytes;
   const std::byte* const end = frames.bytes + frames.size;
+  std::uint32_t left = frames.frames;
   begin_bytes();
   while (true) {
     const proto::RunView repeats = append_repeats(next, end);
     next += repeats.size;
+    left -= repeats.frames;
     fanout_.context().tally.queued -= repeats.frames;
-    if (next == end) return;
+    if (next == end) return Run{};
+    if (deliveries_ >= deliveries_end) {
+      return Run{frames.buffer.share(), next, static_cast<std::uint32_t>(end - next), left};
+    }
     const proto::NextRun found = proto::next_run(next, end, length_max);
     GIMNET_CHECK(found.found == proto::Found::run);  // the sending shard parsed them
     next += found.run.size;
+    left -= found.run.frames;
     fanout_.context().tally.queued -= found.run.frames;
     if (append(found.run.bytes, found.run.size, found.run.frames)) continue;
     const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
@@ -116,30 +122,41 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
+  deliveries_ += here.size();
   here.for_each([&](const GroupMember& member) {
     Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
     if (recipient == nullptr) return;
     fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
   });
-  const bool paced = !members->paced_by_shard.empty();
-  if (paced) outcomes += to_paced(run, header, members->paced_by_shard[fanout_.self().value()]);
+  if (!members->paced_by_shard.empty()) {
+    outcomes += to_paced(run, header, members->paced_by_shard[fanout_.self().value()]);
+  }
   if (!handed_over) {
-    std::uint64_t shards = 0;
-    for (std::size_t shard = 0; shard < members->by_shard.size(); ++shard) {
-      const bool any = !members->by_shard[shard].empty() || (paced && !members->paced_by_shard[shard].empty());
-      if (any) shards |= std::uint64_t{1} << shard;
-    }
-    to_other_shards(run, shards, outcomes);
+    outcomes += to_members_elsewhere(run, *members);
     if (members->retain) retained_.keep(run, header);
   }
   settle(run, outcomes);
+}
+
+std::uint32_t Router::to_members_elsewhere(const Run& run, const GroupMembers& members) {
+  std::uint32_t outcomes = 0;
+  for (std::size_t shard = 0; shard < members.by_shard.size(); ++shard) {
+    std::size_t there = members.by_shard[shard].size();
+    if (!members.paced_by_shard.empty()) there += members.paced_by_shard[shard].size();
+    if (there == 0 || shard == fanout_.self().value()) continue;
+    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(shard)}, run, there);
+    deliveries_ += there;
+    ++outcomes;
+  }
+  return outcomes;
 }
 
 /// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one without the other.
 std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const MemberList<PacedMember>& here) {
   const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
+  deliveries_ += here.size();
   here.for_each([&](const PacedMember& member) {
     Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
     if (recipient == nullptr) return;
@@ -154,9 +171,10 @@ std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header,
   return outcomes;
 }
 
-void Router::to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes) {
+void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes) {
   for (shards &= ~(std::uint64_t{1} << fanout_.self().value()); shards != 0; shards &= shards - 1) {
-    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(shards))}, run);
+    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(shards))}, run, deliveries);
+    deliveries_ += deliveries;
     ++outcomes;
   }
 }
@@ -178,6 +196,7 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
   Run shared;  // header and payload without the ids, one for all recipients on this shard
   std::uint64_t shards = 0;
   std::uint32_t outcomes = 0;
+  deliveries_ += header.dst;
   for (std::uint32_t i = 0; i < header.dst; ++i) {
     const NodeId node{load_le<std::uint32_t>(ids + std::size_t{4} * i)};
     const NodePlace place = place_of(node);
@@ -197,7 +216,8 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
     fanout_.deliver(*recipient, shared, local, Handover{.fan_out = true});
     ++outcomes;
   }
-  if (!handed_over) to_other_shards(run, shards, outcomes);
+  // How many of them are there is not counted: no more than all.
+  if (!handed_over) to_other_shards(run, shards, header.dst, outcomes);
   settle(run, outcomes);
 }
 
@@ -206,12 +226,15 @@ void Router::to_everybody(const Run& run, const proto::FrameHeader& header, bool
   if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub) return drop(run, proto::DropReason::no_route);
   if (index_of(dst) != kEveryIndex) return drop(run, proto::DropReason::no_such_node);
   std::uint32_t outcomes = 0;
+  const std::size_t slots = fanout_.recipients().by_slot().size();
+  deliveries_ += slots;
   for (Recipient* recipient : fanout_.recipients().by_slot()) {
     if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
     fanout_.deliver(*recipient, run, header, Handover{.fan_out = true});
     ++outcomes;
   }
-  if (!handed_over) to_other_shards(run, nodes_.shards(), outcomes);
+  // Nodes are spread over the shards: there are about as many on each other one.
+  if (!handed_over) to_other_shards(run, nodes_.shards(), slots, outcomes);
   settle(run, outcomes);
 }
 

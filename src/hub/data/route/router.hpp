@@ -67,8 +67,13 @@ class Router {
   /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate.
   void route(const Run& run, const proto::FrameHeader& header) { dispatch(run, header, false); }
 
-  /// Frames that another shard handed over, any mix: to their recipients on this shard.
-  void route_handed_over(const Run& frames, std::uint32_t length_max);
+  /// Frames that another shard handed over, any mix: to their recipients on this shard, until deliveries() has come to
+  /// `deliveries_end`. Returns those that are left.
+  [[nodiscard]] Run route_handed_over(const Run& frames, std::uint32_t length_max, std::uint64_t deliveries_end);
+
+  /// How many recipients frames to many were offered to, or are where they were handed over, since the start; a run
+  /// counts as one frame. Frames to one are bounded by what is read.
+  [[nodiscard]] std::uint64_t deliveries() const { return deliveries_; }
 
   /// A frame that the hub itself made, to a node on whatever shard (a REPORT).
   [[nodiscard]] NodePlace place_of(NodeId node) const;
@@ -86,7 +91,9 @@ class Router {
   void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
-  void to_other_shards(const Run& run, std::uint64_t shards, std::uint32_t& outcomes);
+  /// deliveries: at each of them.
+  void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes);
+  [[nodiscard]] std::uint32_t to_members_elsewhere(const Run& run, const GroupMembers& members);
   [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header);
   /// REQUIRES: no session has that id.
   [[nodiscard]] proto::DropReason why_absent(NodeId node) const;
@@ -100,6 +107,7 @@ class Router {
   Pacer& pacer_;
   RetainedMessages& retained_;
   RecentRecipients recent_;
+  std::uint64_t deliveries_ = 0;
 };
 
 }  // namespace gimnet::hub

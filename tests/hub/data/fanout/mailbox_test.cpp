@@ -45,6 +45,51 @@ TEST(Mailbox, IsFullAtItsBoundOfBytesAndNotBefore) {
   EXPECT_TRUE(mailbox.full(kSender, 5'000));
 }
 
+TEST(Mailbox, IsCrowdedAtHalfItsBoundOfDeliveriesAndNeverFullForThem) {
+  Waker waker;
+  Mailbox mailbox(2, {.entries = 100, .bytes = 1'000'000, .deliveries = 1'000}, waker);
+  for (const std::uint32_t deliveries : {499u, 1u}) {
+    Mail mail = frames(10);
+    mail.set_deliveries(deliveries);
+    mailbox.post_to_many(kSender, mail);
+    EXPECT_FALSE(mailbox.crowded(kSender)) << "half";
+  }
+  Mail one = frames(10);
+  one.set_deliveries(1);
+  mailbox.post_to_many(kSender, one);
+  EXPECT_TRUE(mailbox.crowded(kSender));
+  EXPECT_FALSE(mailbox.crowded(ShardIndex{0})) << "each pair has its own";
+  one.set_deliveries(1'000'000);
+  mailbox.post_to_many(kSender, one);
+  EXPECT_FALSE(mailbox.full(kSender, 10));
+  EXPECT_EQ(take(mailbox), 4u);
+  EXPECT_FALSE(mailbox.crowded(kSender));
+}
+
+// What was fetched and not taken waits in its order, and counts as waiting.
+TEST(Mailbox, StopsWhereItIsTold) {
+  Waker waker;
+  Mailbox mailbox(2, {.entries = 80, .bytes = 1'000'000}, waker);
+  for (std::uint32_t number = 0; number < 80; ++number) {
+    Mail mail = frames(1);
+    mail.node = NodeId{number};
+    mailbox.post(kSender, mail);
+  }
+  std::uint32_t next = 0;
+  for (int call = 0; call < 16; ++call) {
+    EXPECT_TRUE(mailbox.full(kSender, 0) == (call == 0));
+    const std::size_t taken = mailbox.drain(
+        1'000, [] {},
+        [&](const Mail& mail) {
+          EXPECT_EQ(mail.node.value(), next);
+          return ++next % 5 != 0;
+        });
+    EXPECT_EQ(taken, 5u) << "the one that ends it is taken";
+    EXPECT_EQ(mailbox.empty(), next == 80);
+  }
+  EXPECT_EQ(next, 80u);
+}
+
 TEST(Mailbox, TellsASenderThatFoundItCrowdedOnce) {
   Waker waker;
   Mailbox mailbox(2, {.entries = 8, .bytes = 1'000'000}, waker);

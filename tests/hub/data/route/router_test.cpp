@@ -15,6 +15,7 @@ using ::testing::IsEmpty;
 using testing::RouteRig;
 
 constexpr std::uint32_t kHub = 7u << 20;
+constexpr std::uint64_t kNoEnd = ~std::uint64_t{0};
 
 class RouterTest : public ::testing::Test {
  protected:
@@ -224,10 +225,38 @@ TEST_F(RouterTest, WhatWasHandedOverStaysHere) {
   const hub::Run gone = rig.make_run(kHub | 3, {"left meanwhile"});
   ASSERT_TRUE(frames.extend(gone));
   rig.egress.tally.queued += 3;
-  rig.router.route_handed_over(frames, 65'536);
+  EXPECT_EQ(rig.router.route_handed_over(frames, 65'536, kNoEnd).frames, 0u);
   EXPECT_EQ(a.outbox.lane(1).front().frames, 2u);
   EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
   EXPECT_THAT(rig.take_mail(), IsEmpty()) << "nothing is handed on";
+}
+
+TEST_F(RouterTest, CountsTheRecipientsOfFramesToMany) {
+  for (std::uint32_t index = 2; index <= 4; ++index) rig.add_here(index);
+  rig.add_there(10);
+  rig.route(kHub | 2, {"one", "two"});
+  EXPECT_EQ(rig.router.deliveries(), 0u) << "frames to one are bounded by what is read";
+  rig.publish_group(5, 1, {2, 3, 4}, {10, 11});
+  rig.route(kHub | 5, {"one", "two"}, {.kind = Kind::group});
+  EXPECT_EQ(rig.router.deliveries(), 5u) << "a run is one frame";
+  EXPECT_THAT(rig.take_mail(), ElementsAre(2u));
+}
+
+TEST_F(RouterTest, LeavesWhatWasHandedOverBeyondItsEnd) {
+  Recipient& a = rig.add_here(2);
+  rig.add_here(3);
+  rig.publish_group(5, 1, {2, 3}, {});
+  hub::Run frames = rig.make_run(kHub | 5, {"one"}, {.kind = Kind::group});
+  for (const auto lane : {std::uint8_t{2}, std::uint8_t{1}, std::uint8_t{2}}) {
+    ASSERT_TRUE(frames.extend(rig.make_run(kHub | 5, {"more", "and more"}, {.kind = Kind::group, .lane = lane})));
+  }
+  rig.egress.tally.queued += 7;
+  const hub::Run rest = rig.router.route_handed_over(frames, 65'536, rig.router.deliveries() + 3);
+  EXPECT_EQ(rest.frames, 4u) << "the run that passes the end is handed on whole";
+  EXPECT_EQ(a.outbox.lane(1).front().frames, 1u);
+  EXPECT_EQ(a.outbox.lane(2).front().frames, 2u);
+  EXPECT_EQ(rig.router.route_handed_over(rest, 65'536, kNoEnd).frames, 0u);
+  EXPECT_EQ(rig.egress.tally.queued, 14);
 }
 
 }  // namespace
