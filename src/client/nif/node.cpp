@@ -133,16 +133,13 @@ bool Node::take_over(Admitted admitted, bool first) {
   credits_.tell_all();
   inbound_.begin(session_);
   confirmed_ = inbound_.taken();
-  const auto space = inbound_.space();
-  if (space.size() < admitted.rest.size()) return false;
-  std::copy(admitted.rest.begin(), admitted.rest.end(), space.begin());
+  behind_welcome_ = std::move(admitted.rest);
   if (!first) {
     declarations_.declare_again(!session_.resumed || *let_go > 0);
     received_.push(declarations_.take_events());
     watches_.declare_again();
   }
-  const Inbound::Verdict verdict = inbound_.take(admitted.rest.size(), {wall_now_ns(), steady_now_ns()});
-  return verdict == Inbound::Verdict::going;
+  return true;
 }
 
 void Node::keep_token() {

@@ -91,6 +91,7 @@ class Node final : private InboundHost {
   void run();
   void turn();
   void read_some(std::int64_t now);
+  void take_read(std::size_t bytes, std::int64_t now);
   void on_timers(std::int64_t now, bool reading);
   [[nodiscard]] Deadline next_timer(bool reading, std::int64_t last_write_ns) const;
   void call_back();
@@ -147,8 +148,9 @@ class Node final : private InboundHost {
   TokenStore tokens_;
   Socket socket_;
   Session session_;
-  std::string address_;  ///< of the hub that admitted it last, as a URL
-  std::string name_;     ///< to ask for
+  std::vector<std::byte> behind_welcome_;  ///< came in one read with it, and is the first that is taken
+  std::string address_;                    ///< of the hub that admitted it last, as a URL
+  std::string name_;                       ///< to ask for
   Backoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;

@@ -62,7 +62,10 @@ void Node::turn() {
     disconnect("the connection to the hub broke while writing", proto::GoodbyeCode::done);
     return;
   }
-  const Ready ready = wait_for(socket_, reading, wants.writable, wake_, next_timer(reading, wants.last_write_ns));
+  const bool read_already = reading && !behind_welcome_.empty();
+  const Deadline until = read_already ? steady_now_ns() : next_timer(reading, wants.last_write_ns);
+  Ready ready = wait_for(socket_, reading, wants.writable, wake_, until);
+  ready.readable = ready.readable || read_already;
   if (ready.woken) wake_.clear();
   if (ready.woken || ready.writable) outbound_.write_pending(ready.writable);
   const std::int64_t now = steady_now_ns();
@@ -81,17 +84,28 @@ void Node::turn() {
 void Node::read_some(std::int64_t now) {
   const auto space = inbound_.space();
   if (space.empty()) throw std::bad_alloc();
+  if (!behind_welcome_.empty()) {
+    const std::size_t bytes = std::min(space.size(), behind_welcome_.size());
+    const auto end = behind_welcome_.begin() + static_cast<std::ptrdiff_t>(bytes);
+    std::copy(behind_welcome_.begin(), end, space.begin());
+    behind_welcome_.erase(behind_welcome_.begin(), end);
+    return take_read(bytes, now);
+  }
   const IoResult result = socket_.read(space);
   if (result.state == IoResult::State::would_block) return;
   if (result.state != IoResult::State::done) {
     disconnect("the hub closed the connection", proto::GoodbyeCode::done);
     return;
   }
+  take_read(result.bytes, now);
+}
+
+void Node::take_read(std::size_t bytes, std::int64_t now) {
   last_heard_ns_ = now;
-  const Inbound::Verdict verdict = inbound_.take(result.bytes, {wall_now_ns(), now});
+  const Inbound::Verdict verdict = inbound_.take(bytes, {wall_now_ns(), now});
   {
     const MutexLock lock(mutex_);
-    bytes_received_ += result.bytes;
+    bytes_received_ += bytes;
     ++read_calls_;
     inbound_counts_ = inbound_.counts();
   }
@@ -193,7 +207,7 @@ void Node::redial() {
   if (!take_over(std::move(*admitted), false)) {
     epoch_ = random_bits() | 1;
     session_.hub_epoch = 0;
-    disconnect("the hub's counts or first frames are impossible", proto::GoodbyeCode::malformed);
+    disconnect("the hub's counts are impossible", proto::GoodbyeCode::malformed);
     return;
   }
   outbound_.write_pending(true);

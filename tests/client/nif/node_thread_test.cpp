@@ -157,26 +157,97 @@ TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
   }
 }
 
-TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
-  FakeHub hub;
+/// Opening, WELCOME, a message and what `add` puts behind it, in one write.
+template <class Add>
+FakeConnection admit_with(FakeHub& hub, const Add& add) {
+  FakeConnection connection = hub.accept();
+  EXPECT_TRUE(connection.read_hello());
+  std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
+  add_control(bytes, proto::Kind::link, proto::encode(make_welcome()));
+  add_message(bytes, "at once");
+  add(bytes);
+  connection.send(bytes);
+  return connection;
+}
+
+void add_goodbye(std::vector<std::byte>& bytes, proto::GoodbyeCode code) {
+  add_control(bytes, proto::Kind::link, proto::encode(proto::Goodbye{code, "go away"}));
+}
+
+/// A node that dials a hub on which a test lets it in.
+template <class Add>
+Connected connect_with(FakeHub& hub, const Add& add) {
   nif_options options = default_options();
   const std::string url = hub.url();
   options.url = url.c_str();
   nif_node* node = nullptr;
-  std::thread dialing([&] { EXPECT_EQ(nif_connect(&options, &node), NIF_OK); });
-  FakeConnection connection = hub.accept();
-  ASSERT_TRUE(connection.read_hello());
-  std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
-  add_control(bytes, proto::Kind::link, proto::encode(make_welcome()));
-  add_message(bytes, "at once");
-  connection.send(bytes);
+  std::thread dialing([&] { EXPECT_EQ(nif_connect(&options, &node), NIF_OK) << nif_error_text(); });
+  FakeConnection connection = admit_with(hub, add);
   dialing.join();
-  nif_incoming in;
+  return {OpenNode(node), std::move(connection), {}};
+}
+
+void expect_event(nif_node* node, nif_incoming_type type, proto::GoodbyeCode reason = {}, bool for_good = false) {
+  nif_incoming in{};
   ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
-  EXPECT_EQ(payload_of(in), "at once");
+  EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));
+  if (type == NIF_DISCONNECTED) {
+    EXPECT_EQ(in.reason, static_cast<std::uint32_t>(reason)) << in.text;
+    EXPECT_EQ((in.flags & NIF_DISCONNECTED_FOR_GOOD) != 0, for_good) << in.text;
+  }
+  if (type == NIF_MESSAGE) {
+    EXPECT_EQ(payload_of(in), "at once");
+  }
   nif_release(&in);
-  connection.close();
-  EXPECT_EQ(nif_close(node), NIF_OK);
+}
+
+TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
+  FakeHub hub;
+  const Connected connected = connect_with(hub, [](auto&) {});
+  expect_event(connected.node.get(), NIF_MESSAGE);
+  while (counters_of(connected.node.get()).messages_received == 0) std::this_thread::yield();
+  EXPECT_GT(counters_of(connected.node.get()).bytes_received, 0u);
+}
+
+TEST(NodeThread, AGoodbyeBehindTheFirstWelcomeIsAGoodbye) {
+  FakeHub hub;
+  Connected connected = connect_with(hub, [](auto& bytes) { add_goodbye(bytes, proto::GoodbyeCode::kicked); });
+  nif_node* const node = connected.node.get();
+  expect_event(node, NIF_MESSAGE);
+  expect_event(node, NIF_DISCONNECTED, proto::GoodbyeCode::kicked, true);
+  nif_incoming in{};
+  EXPECT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_REFUSED) << "and it does not come back";
+  EXPECT_EQ(info_of(node).ended, 1);
+}
+
+TEST(NodeThread, AGoodbyeBehindALaterWelcomeIsAGoodbye) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  connected.hub.close();
+  expect_event(node, NIF_DISCONNECTED, proto::GoodbyeCode::done);
+  for (const auto code : {proto::GoodbyeCode::draining, proto::GoodbyeCode::kicked}) {
+    connected.hub = admit_with(hub, [code](auto& bytes) { add_goodbye(bytes, code); });
+    expect_event(node, NIF_CONNECTED);
+    expect_event(node, NIF_MESSAGE);
+    expect_event(node, NIF_DISCONNECTED, code, code == proto::GoodbyeCode::kicked);
+  }
+  nif_incoming in{};
+  EXPECT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_REFUSED) << "and it does not come back";
+}
+
+TEST(NodeThread, WhatIsWrongBehindWelcomeEndsTheConnection) {
+  FakeHub hub;
+  const auto add_garbage = [](auto& bytes) { bytes.insert(bytes.end(), 64, std::byte{0xFF}); };
+  Connected connected = connect_with(hub, add_garbage);
+  nif_node* const node = connected.node.get();
+  for (int i = 0; i < 2; ++i) {
+    expect_event(node, NIF_MESSAGE);
+    expect_event(node, NIF_DISCONNECTED, proto::GoodbyeCode::malformed);
+    EXPECT_TRUE(connected.hub.wait_closed());
+    connected.hub = admit_with(hub, add_garbage);
+    expect_event(node, NIF_CONNECTED);
+  }
 }
 
 }  // namespace
