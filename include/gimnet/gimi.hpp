@@ -186,8 +186,10 @@ struct LostCounts {
   std::uint64_t too_large = 0;   ///< messages larger than NodeOptions::message_bytes_max
   /// Frames that the hub could not send again after a break; a small message has one, a large one many.
   std::uint64_t frames_broken_off = 0;
+  /// Messages of a group that is none of a service this node subscribed, nor lately was.
+  std::uint64_t unknown_service = 0;
   /// How many losses are known: messages, and frames where only those are.
-  [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + frames_broken_off; }
+  [[nodiscard]] std::uint64_t all() const { return incomplete + too_large + frames_broken_off + unknown_service; }
 };
 
 /// A member of the network. Leaves for good when it is destroyed.

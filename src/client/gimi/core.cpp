@@ -296,6 +296,7 @@ nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView
 
 nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+  if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
   if (service == nullptr) return verdict_of(place);
   // After a break the hub gives the last message of a retained service again: it does not know who had it.
   if (service->is_repeated(in.from, view.header.sequence)) return NIF_DONE;
@@ -389,11 +390,8 @@ void Core::on_disconnected(const nif_incoming& in) {
   nif_info info{};
   info.struct_size = sizeof info;
   const bool kept = nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
-  if (kept) {
-    streams_.on_interrupted(steady_now_ns());
-  } else {
-    streams_.on_broken(std::string("the connection to the hub broke: ") + in.text);
-  }
+  if (kept) return streams_.on_interrupted(steady_now_ns());
+  streams_.on_broken(std::string("the connection to the hub broke: ") + in.text);
 }
 
 }  // namespace gimnet::gimi

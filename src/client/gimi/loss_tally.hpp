@@ -19,9 +19,15 @@ class LossTally {
     sum.store(sum.load(std::memory_order_relaxed) + count, std::memory_order_relaxed);
   }
 
+  /// A message of a group that no subscription of this node has.
+  void add_unknown_service() {
+    // See add().
+    unknown_service_.store(unknown_service_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  }
+
   [[nodiscard]] LostCounts counts() const {
     return {incomplete_.load(std::memory_order_relaxed), too_large_.load(std::memory_order_relaxed),  // see add()
-            frames_broken_off_.load(std::memory_order_relaxed)};
+            frames_broken_off_.load(std::memory_order_relaxed), unknown_service_.load(std::memory_order_relaxed)};
   }
 
  private:
@@ -33,6 +39,7 @@ class LossTally {
   std::atomic<std::uint64_t> incomplete_{0};
   std::atomic<std::uint64_t> too_large_{0};
   std::atomic<std::uint64_t> frames_broken_off_{0};
+  std::atomic<std::uint64_t> unknown_service_{0};
 };
 
 }  // namespace gimnet::gimi

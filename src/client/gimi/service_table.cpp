@@ -184,8 +184,17 @@ void ServiceTable::unsubscribe(SubscribedService& service) {
   const MutexLock lock(mutex_);
   service.on_group(0);
   service.place = {};
-  for (const std::uint32_t group : service.groups) forget_group(service, group);
+  end_groups(service);
+}
+
+/// What is still on its way of a subscription that ended is no loss.
+void ServiceTable::end_groups(SubscribedService& service) {
+  for (const std::uint32_t group : service.groups) {
+    forget_group(service, group);
+    ended_groups_.push_back(group);
+  }
   service.groups.clear();
+  while (ended_groups_.size() > kEndedGroupsMax) ended_groups_.pop_front();
 }
 
 Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout, const MakeStream& make) {
@@ -212,9 +221,13 @@ Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout 
 ServiceTable::Found ServiceTable::subscribed(std::uint32_t group) {
   const MutexLock lock(mutex_);
   const auto place = subscribed_by_group_.find(group);
-  if (place == subscribed_by_group_.end()) return {unknown(), nullptr};
+  if (place == subscribed_by_group_.end()) {
+    if (open_ != 0) return {Place::not_yet, nullptr};
+    const bool ended = std::ranges::find(ended_groups_, group) != ended_groups_.end();
+    return {ended ? Place::unwanted : Place::unknown, nullptr};
+  }
   // Of a service that is only sent to nobody takes messages.
-  if (!place->second->read) return {Place::unknown, nullptr};
+  if (!place->second->read) return {Place::unwanted, nullptr};
   return {Place::found, place->second};
 }
 

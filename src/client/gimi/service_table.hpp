@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -50,8 +52,9 @@ class ServiceTable {
   void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);
 
   /// From the library's thread. `not_yet`: the program is just asking the hub about a service, and this may belong
-  /// behind the answer: nif_deliver() comes with it.
-  enum class Place : std::uint8_t { found, unknown, not_yet };
+  /// behind the answer: nif_deliver() comes with it. `unwanted`: of a service that the program does not read (any
+  /// more).
+  enum class Place : std::uint8_t { found, unknown, not_yet, unwanted };
   struct Found {
     Place place = Place::unknown;
     SubscribedService* service = nullptr;
@@ -69,6 +72,9 @@ class ServiceTable {
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
+  /// Of so many groups of subscriptions that ended it is known that messages on their way are not wanted.
+  static constexpr std::size_t kEndedGroupsMax = 64;
+
   /// While one of these lives, groups that nobody knows are `not_yet`.
   class Asking;
   /// Why a service of that name cannot be declared; nothing if it can.
@@ -80,6 +86,7 @@ class ServiceTable {
   [[nodiscard]] nif_status ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms)
       GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void set_place(SubscribedService& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
+  void end_groups(SubscribedService& service) GIMNET_REQUIRES(mutex_);
   void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
 
   Uplink& uplink_;
@@ -98,6 +105,7 @@ class ServiceTable {
   std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::string, std::unique_ptr<SubscribedService>, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, SubscribedService*> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);
+  std::deque<std::uint32_t> ended_groups_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: kEndedGroupsMax
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

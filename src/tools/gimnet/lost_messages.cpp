@@ -30,6 +30,8 @@ std::vector<std::string> LostMessages::rest() {
   add_sentence(sentences, counts_.too_large, told_.too_large, {"message", "larger than this end takes"});
   add_sentence(sentences, counts_.frames_broken_off, told_.frames_broken_off,
                {"frame", "on the way when the connection broke, and a large message has many frames"});
+  add_sentence(sentences, counts_.unknown_service, told_.unknown_service,
+               {"message", "of a service that this end does not know to have subscribed"});
   told_ = counts_;
   return sentences;
 }

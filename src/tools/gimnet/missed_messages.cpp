@@ -46,7 +46,7 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
 }
 
 void MissedMessages::take_lost(const LostCounts& counts) {
-  const std::uint64_t lost = counts.incomplete + counts.too_large;
+  const std::uint64_t lost = counts.incomplete + counts.too_large + counts.unknown_service;
   told_as_lost_ += lost - lost_;
   lost_ = lost;
 }

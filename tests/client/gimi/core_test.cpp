@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "proto/control/ns.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
 // What becomes of those who wait when no connection will come any more.
@@ -36,6 +40,24 @@ class Reconnected : public Conversation {
 
 class Lost : public Conversation {
  protected:
+  static constexpr std::uint32_t kGroup = (7u << 20) | 11;
+
+  void send_to_group(std::uint32_t group) {
+    std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
+    const std::size_t size = proto::gimi::write_message_prefix({1, Operation::data, 0, 0}, std::nullopt, prefix);
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::group;
+    parts.header.dst = group;
+    parts.header.src = kPeerId;
+    parts.key = 0;
+    hub_.send(parts, {reinterpret_cast<const char*>(prefix.data()), size});
+  }
+  /// Everything that was sent before is taken too.
+  void take_one() {
+    const std::string text = "x";
+    answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+    ASSERT_TRUE(node_->receive());
+  }
   /// The first piece of a large message to this node.
   void begin_message(std::uint32_t number, std::uint32_t total) {
     proto::FrameParts parts;
@@ -152,6 +174,33 @@ TEST_F(Lost, MessagesAreCountedByWhy) {
   EXPECT_EQ(node_->lost().incomplete, 2u) << "each was followed by something else";
   EXPECT_EQ(node_->lost().too_large, 1u);
   EXPECT_EQ(node_->lost().frames_broken_off, 0u);
+}
+
+TEST_F(Lost, MessagesOfNoSubscriptionAreCounted) {
+  send_to_group(kGroup);
+  send_to_group(kGroup + 1);
+  take_one();
+  EXPECT_EQ(node_->lost().unknown_service, 2u);
+  EXPECT_EQ(node_->lost().all(), 2u);
+}
+
+TEST_F(Lost, MessagesOnTheirWayWhenASubscriptionEndedAreNotCounted) {
+  std::optional<Subscription> scan;
+  std::thread asking([&] { scan.emplace(node_->subscribe("peer/scan").or_throw()); });
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub_.next_request<proto::ns::Subscribe>(number));
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{kGroup};
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  asking.join();
+  std::thread leaving([&] { scan.reset(); });
+  ASSERT_TRUE(hub_.next_request<proto::ns::Unsubscribe>(number));
+  send_to_group(kGroup);
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
+  leaving.join();
+  send_to_group(kGroup);
+  take_one();
+  EXPECT_EQ(node_->lost().all(), 0u);
 }
 
 TEST_F(Lost, MessagesThatTheHubWillNotSendAgainAreCounted) {

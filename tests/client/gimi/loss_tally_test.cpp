@@ -13,10 +13,13 @@ TEST(LossTally, CountsByWhy) {
   tally.add(proto::DropReason::link_lost, 3);
   tally.add(proto::DropReason::none, 4);  // what a later version calls by another name
   tally.add(proto::DropReason::cut_message, 10);
+  tally.add_unknown_service();
+  tally.add_unknown_service();
+  EXPECT_EQ(tally.counts().unknown_service, 2u);
   EXPECT_EQ(tally.counts().incomplete, 11u);
   EXPECT_EQ(tally.counts().too_large, 2u);
   EXPECT_EQ(tally.counts().frames_broken_off, 7u);
-  EXPECT_EQ(tally.counts().all(), 20u);
+  EXPECT_EQ(tally.counts().all(), 22u);
 }
 
 }  // namespace

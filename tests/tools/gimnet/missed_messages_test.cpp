@@ -53,10 +53,10 @@ TEST_F(MissedMessagesTest, ABrokenConnectionIsTheCauseOfTheGapAcrossIt) {
 
 TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
   take(1);
-  missed_.take_lost({.incomplete = 1, .too_large = 1, .frames_broken_off = 50});
+  missed_.take_lost({.incomplete = 1, .too_large = 0, .frames_broken_off = 50, .unknown_service = 1});
   EXPECT_EQ(take(4), 2u);
   EXPECT_EQ(missed_.rest(), Sentences{});
-  missed_.take_lost({.incomplete = 2, .too_large = 1, .frames_broken_off = 50});
+  missed_.take_lost({.incomplete = 1, .too_large = 1, .frames_broken_off = 50, .unknown_service = 1});
   EXPECT_EQ(take(7), 4u);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
 }
