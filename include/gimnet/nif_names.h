@@ -144,7 +144,9 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
  *  be taken anyway. An epoch of 0, an earlier one, and groups without a window are ignored. */
 nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more);
 
-/** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. */
+/** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. The library subscribes to
+ *  it no more, whatever this answers; where the hub could not be told within the time given, it is as soon as there is a
+ *  connection. */
 nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- asking the hub */

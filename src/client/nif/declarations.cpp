@@ -87,24 +87,39 @@ void Declarations::add_subscription(const proto::ns::Subscribe& subscription, Gr
   subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group});
 }
 
-void Declarations::remove_subscription(const std::string& full_name) {
+bool Declarations::begin_subscription(const std::string& full_name) {
   const MutexLock lock(mutex_);
-  subscriptions_.erase(full_name);
+  const auto found = subscriptions_.find(full_name);
+  return found != subscriptions_.end() && std::exchange(found->second.ended, false);
+}
+
+bool Declarations::end_subscription(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  const auto found = subscriptions_.find(full_name);
+  return found != subscriptions_.end() && !std::exchange(found->second.ended, true);
+}
+
+void Declarations::finish_subscription(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  const auto found = subscriptions_.find(full_name);
+  if (found != subscriptions_.end() && found->second.ended) subscriptions_.erase(found);
 }
 
 bool Declarations::on_service_moved(const proto::ns::ServiceMoved& event) {
   const MutexLock lock(mutex_);
   GroupId former = event.old_group;
+  bool ended = false;
   if (const auto found = subscriptions_.find(event.name); found != subscriptions_.end()) {
     former = std::exchange(found->second.group, event.new_group);
     const bool news = former != event.new_group || (former == GroupId{} && !event.between.empty());
     // What was counted since it came first must not be forgotten.
     if (event.again && !news) return false;
+    ended = found->second.ended;
   }
   for (const GroupId gone : {event.old_group, former}) {
     if (gone != event.new_group && !is_subscribed(gone)) credits_.forget(gone);
   }
-  return true;
+  return !ended;
 }
 
 void Declarations::declare_again(bool forgotten) {
@@ -189,19 +204,31 @@ void Declarations::on_withdrawn(const std::string& service, GroupId group, const
 }
 
 bool Declarations::declare_subscription(const std::string& full_name) {
-  proto::ns::Subscribe request;
-  {
-    const MutexLock lock(mutex_);
-    const auto found = subscriptions_.find(full_name);
-    if (found == subscriptions_.end()) return true;  // ended meanwhile
-    request = found->second.request;
-  }
+  const MutexLock lock(mutex_);  // until it leaves, as in declare_service()
+  const auto found = subscriptions_.find(full_name);
+  if (found == subscriptions_.end()) return true;  // ended meanwhile
+  if (found->second.ended) return unsubscribe(full_name);
   const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
     if (round == round_) on_subscribed(full_name, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(request), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(found->second.request), handler)) return false;
   ++under_way_;
   return true;
+}
+
+bool Declarations::unsubscribe(const std::string& full_name) {
+  const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
+    if (round == round_) on_unsubscribed(full_name, payload);
+  };
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Unsubscribe{full_name}), handler)) return false;
+  ++under_way_;
+  return true;
+}
+
+void Declarations::on_unsubscribed(const std::string& full_name, const proto::Payload& payload) {
+  const auto answer = proto::decode_answer<proto::ns::UnsubscribeAnswer>(payload);
+  if (answer || answer.error().status == proto::Status::not_found) finish_subscription(full_name);
+  answered();
 }
 
 /// What waits for the service goes where it is now.
@@ -276,9 +303,12 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     const auto found = subscriptions_.find(full_name);
     if (found != subscriptions_.end()) {
       former = std::exchange(found->second.group, group);
-      changed = former != group;
+      const bool ended = found->second.ended;
+      changed = former != group && !ended;
+      // What the program asked for in between may never have left.
+      if (ended) subscriptions_due_.push_back(full_name);
       // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to another one.
-      if (changed && !is_subscribed(former)) credits_.forget(former);
+      if (former != group && !is_subscribed(former)) credits_.forget(former);
     }
   }
   if (changed) {

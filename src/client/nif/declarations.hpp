@@ -36,7 +36,13 @@ class Declarations {
   /// The hub does not have the group (any more) that end_service() named.
   void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
-  void remove_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  /// As begin_service(), of a subscription.
+  [[nodiscard]] bool begin_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  /// The subscription ends: it is declared no more, and the hub is told with the next connection if
+  /// finish_subscription() does not come before. False: there is none, or it ended already.
+  bool end_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  /// The hub does not have it (any more).
+  void finish_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
   /// A new connection: declares everything again, a few requests at a time. GROUP messages wait until the services are
   /// through. `forgotten`: what the hub kept of retained services may be gone; it gets their last messages again,
@@ -65,13 +71,16 @@ class Declarations {
   struct Subscription {
     proto::ns::Subscribe request;
     GroupId group;
+    bool ended = false;  ///< for the program, and the hub may still have it
   };
   void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
+  void on_unsubscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   void on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool unsubscribe(const std::string& full_name) GIMNET_REQUIRES(mutex_);
   void enter_group(Service& service, GroupId group) GIMNET_REQUIRES(mutex_);
   void follow_group(Service& service) GIMNET_REQUIRES(mutex_);
   void end_declaring();

@@ -240,12 +240,16 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     }
     ns::SubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
+    const bool ended = found.declarations().begin_subscription(full_name);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "subscribe", full_name, deadline);
       if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
       return asked;
     });
-    if (status != NIF_OK) return status;
+    if (status != NIF_OK) {
+      if (ended) found.declarations().end_subscription(full_name);
+      return status;
+    }
     if (subscription != nullptr) {
       *subscription = {answer.group.value(), answer.message_type,
                        answer.instance,      static_cast<std::uint32_t>(answer.delivery),
@@ -260,11 +264,12 @@ nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeou
     if (const nif_status status = check_name(full_name, "unsubscribe"); status != NIF_OK) return status;
     ns::UnsubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
-    return declare(found, [&] {
-      const nif_status status = ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline);
-      if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_subscription(full_name);
-      return status;
-    });
+    // A reconnect declares by what is entered, so that this needs to be asked once only.
+    const bool ended = found.declarations().end_subscription(full_name);
+    const nif_status status = ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline);
+    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().finish_subscription(full_name);
+    // The library may have told the hub before.
+    return status == NIF_NOT_FOUND && ended ? NIF_OK : status;
   });
 }
 

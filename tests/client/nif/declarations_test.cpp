@@ -217,6 +217,97 @@ TEST(Declarations, WithdrawNothingBehindAServiceThatIsAdvertisedAnew) {
   EXPECT_TRUE(anew);
 }
 
+/// A node that subscribed peer/scan, and is not connected.
+Connected with_broken_subscription(FakeHub& hub) {
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
+  nif_node* const node = connected.node.get();
+  std::thread asking([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  answer_subscribe(connected.hub);
+  asking.join();
+  connected.hub.close();
+  while (info_of(node).connected != 0) std::this_thread::yield();
+  return connected;
+}
+
+/// What the hub sent before was taken.
+void settle(Connected& connected) {
+  connected.hub.send_unicast(kPeerId, kOwnId, "settled");
+  nif_incoming in{};
+  do {
+    ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);
+    nif_release(&in);
+  } while (in.type != NIF_MESSAGE);
+}
+
+TEST(Declarations, UnsubscribeWithTheNextConnectionWhatEndedDuringABreak) {
+  for (const bool known : {true, false}) {
+    FakeHub hub;
+    Connected connected = with_broken_subscription(hub);
+    EXPECT_EQ(nif_unsubscribe(connected.node.get(), "peer/scan", 0), NIF_NOT_CONNECTED);
+    connected.hub = hub.admit(make_welcome(kResumeBytes));
+    answer_unsubscribe(connected.hub, known);
+    expect_nothing_declared(connected);
+    settle(connected);
+    come_back(hub, connected, false);
+    expect_nothing_declared(connected);
+  }
+}
+
+TEST(Declarations, UnsubscribeWhatTheyJustSubscribeAgain) {
+  FakeHub hub;
+  Connected connected = with_broken_subscription(hub);
+  connected.hub = hub.admit(make_welcome(kResumeBytes));
+  std::uint16_t subscribed = 0;
+  ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(subscribed));
+  EXPECT_EQ(nif_unsubscribe(connected.node.get(), "peer/scan", 0), NIF_TIMEOUT);
+  proto::ns::SubscribeAnswer answer;
+  answer.group = GroupId{99};
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, subscribed));
+  std::size_t asked = 0;
+  EXPECT_EQ(nif_send_to(connected.node.get(), kPeerId, "x", 1), NIF_OK);
+  for (bool answered = false; !answered;) {
+    const auto frame = connected.hub.next_message();
+    ASSERT_TRUE(frame);
+    if (frame->header.kind != proto::Kind::ns) continue;
+    const auto payload = frame->view().payload;
+    ASSERT_TRUE(proto::decode<proto::ns::Unsubscribe>(payload));
+    const std::uint16_t number = proto::split_control(payload)->header.request;
+    connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
+    answered = ++asked == 2;  // the program's, and the library's, which cannot know that the other one left
+  }
+  settle(connected);
+  come_back(hub, connected, false);
+  expect_nothing_declared(connected);
+}
+
+TEST(Declarations, UnsubscribeNothingBehindASubscriptionThatBeginsAnew) {
+  FakeHub hub;
+  Connected connected = with_broken_subscription(hub);
+  nif_node* const node = connected.node.get();
+  EXPECT_EQ(nif_unsubscribe(node, "peer/scan", 0), NIF_NOT_CONNECTED);
+  std::thread asking([node] {
+    const nif_pace pace{sizeof pace, 2, 0, 0.0};
+    EXPECT_EQ(nif_subscribe_paced(node, "peer/scan", &pace, nullptr, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(nif_send_to(node, kPeerId, "x", 1), NIF_OK);
+  });
+  connected.hub = hub.admit(make_welcome(kResumeBytes));
+  bool anew = false;
+  while (const auto frame = connected.hub.next_message()) {
+    if (frame->header.kind != proto::Kind::ns) break;
+    const auto payload = frame->view().payload;
+    const std::uint16_t number = proto::split_control(payload)->header.request;
+    if (const auto request = proto::decode<proto::ns::Subscribe>(payload)) {
+      anew |= request->window == 2;
+      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+    } else {
+      EXPECT_FALSE(anew) << "the program's new subscription is gone";
+      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
+    }
+  }
+  asking.join();
+  EXPECT_TRUE(anew);
+}
+
 /// The program advertises once more while the library declares again, and hears of it first.
 TEST(Declarations, GiveTheLastMessageOfAServiceThatIsAdvertisedOnceMoreMeanwhile) {
   for (const std::uint32_t group : {kGroup, 99u}) {

@@ -107,6 +107,23 @@ inline void answer_withdraw(FakeConnection& hub, std::uint32_t group, bool known
                                         : proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
 }
 
+/// The next request is SUBSCRIBE, of a service that nobody provides.
+inline void answer_subscribe(FakeConnection& hub) {
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub.next_request<proto::ns::Subscribe>(number));
+  hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+}
+
+/// The next request is UNSUBSCRIBE; `known`: and the hub has such a subscription.
+inline void answer_unsubscribe(FakeConnection& hub, bool known) {
+  std::uint16_t number = 0;
+  ASSERT_TRUE(hub.next_request<proto::ns::Unsubscribe>(number));
+  const proto::ControlHeader header{proto::ns::Unsubscribe::kOperation, number};
+  hub.send_control(proto::Kind::ns,
+                   known ? proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number)
+                         : proto::encode_refusal(header, {proto::Status::not_found, "no such subscription"}));
+}
+
 /// Skips what was received before the next NIF_OWN_SERVICE_MOVED; returns the group.
 inline std::uint32_t wait_for_move(nif_node* node) {
   for (nif_incoming in; nif_receive(node, &in, NIF_FOREVER) == NIF_OK; nif_release(&in)) {
