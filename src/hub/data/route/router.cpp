@@ -12,6 +12,15 @@ namespace {
 /// (bench/hub/data/fanout/fanout_bench.cpp).
 constexpr std::size_t kReferenceRecipients = 4;
 
+/// In a LIST frame on its way to other shards: not theirs. No shard's mark is 0.
+constexpr std::uint32_t kListedForNobody = 0;
+static_assert(kShardsMax < std::uint32_t{1} << (32 - kIndexBits));
+
+/// The same: the mark of the shard that is to see to that node.
+std::uint32_t listed_for(ShardIndex shard, NodeId node) {
+  return (std::uint32_t{shard.value()} + 1) << kIndexBits | index_of(node);
+}
+
 }  // namespace
 
 void Router::drop(const Run& run, proto::DropReason reason) {
@@ -187,38 +196,69 @@ void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool 
   to_node(run, header, members->provider, handed_over);
 }
 
+/// A LIST frame while it goes to its recipients on this shard.
+struct Router::Listed {
+  Listed(const Run& run_, const proto::FrameHeader& header) : run(run_), ids_size(4 * header.dst), local(header) {
+    local.dst = 0;
+    local.length -= ids_size;
+  }
+  const Run& run;
+  const std::uint32_t ids_size;
+  proto::FrameHeader local;  ///< as its recipients get it
+  Run shared;                ///< header and payload without the ids, one for all, made when the first one needs it
+};
+
 void Router::to_list(const Run& run, const proto::FrameHeader& header, bool handed_over) {
-  const std::uint32_t ids_size = 4 * header.dst;
-  const std::byte* ids = run.bytes + proto::kHeaderSize;
-  proto::FrameHeader local = header;
-  local.dst = 0;
-  local.length = header.length - ids_size;
-  Run shared;  // header and payload without the ids, one for all recipients on this shard
+  if (handed_over) return to_listed_here(run, header);
+  // Nobody else has the frame yet: each id makes room for whose business it is, for the other shards.
+  std::byte* ids = run.buffer->data + (run.bytes - run.buffer->data) + proto::kHeaderSize;
+  Listed listed(run, header);
   std::uint64_t shards = 0;
   std::uint32_t outcomes = 0;
   deliveries_ += header.dst;
-  for (std::uint32_t i = 0; i < header.dst; ++i) {
-    const NodeId node{load_le<std::uint32_t>(ids + std::size_t{4} * i)};
+  for (std::uint32_t i = 0; i < header.dst; ++i, ids += sizeof(std::uint32_t)) {
+    const NodeId node{load_le<std::uint32_t>(ids)};
     const NodePlace place = place_of(node);
     if (place.exists() && place.shard != fanout_.self()) {
+      store_le(ids, listed_for(place.shard, node));
       shards |= std::uint64_t{1} << place.shard.value();
       continue;
     }
-    Recipient* recipient = place.exists() ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
-    if (recipient == nullptr) {
-      // Counted by the shard that took the frame in; on the others the id is somebody else's business.
-      if (handed_over) continue;
-      drop(run, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
-      ++outcomes;
-      continue;
-    }
-    if (shared.frames == 0) shared = fanout_.cut_ids(run, local, ids_size);
-    fanout_.deliver(*recipient, shared, local, Handover{.fan_out = true});
+    store_le(ids, kListedForNobody);
+    to_listed(listed, node, place);
     ++outcomes;
   }
   // How many of them are there is not counted: no more than all.
-  if (!handed_over) to_other_shards(run, shards, header.dst, outcomes);
+  to_other_shards(run, shards, header.dst, outcomes);
   settle(run, outcomes);
+}
+
+/// The tables may have changed since another shard looked: what it left to this one is this one's to count, and
+/// nothing else.
+void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
+  const std::byte* ids = run.bytes + proto::kHeaderSize;
+  Listed listed(run, header);
+  std::uint32_t outcomes = 0;
+  deliveries_ += header.dst;
+  for (std::uint32_t i = 0; i < header.dst; ++i, ids += sizeof(std::uint32_t)) {
+    const auto mark = load_le<std::uint32_t>(ids);
+    const auto node = make_id<NodeId>(hub_, mark & kIndexMask);
+    if (mark != listed_for(fanout_.self(), node)) continue;
+    to_listed(listed, node, place_of(node));
+    ++outcomes;
+  }
+  settle(run, outcomes);
+}
+
+/// To one recipient of the frame, here or nowhere.
+inline void Router::to_listed(Listed& listed, NodeId node, const NodePlace& place) {
+  const bool here = place.exists() && place.shard == fanout_.self();
+  Recipient* recipient = here ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
+  if (recipient == nullptr) {
+    return drop(listed.run, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
+  }
+  if (listed.shared.frames == 0) listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.ids_size);
+  fanout_.deliver(*recipient, listed.shared, listed.local, Handover{.fan_out = true});
 }
 
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over) {

@@ -90,6 +90,9 @@ class Router {
                                        const MemberList<PacedMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_listed_here(const Run& run, const proto::FrameHeader& header);
+  struct Listed;
+  void to_listed(Listed& listed, NodeId node, const NodePlace& place);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
   /// deliveries: at each of them.
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes);

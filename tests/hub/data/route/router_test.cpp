@@ -259,5 +259,36 @@ TEST_F(RouterTest, LeavesWhatWasHandedOverBeyondItsEnd) {
   EXPECT_EQ(rig.egress.tally.queued, 14);
 }
 
+TEST_F(RouterTest, OfAListEachShardCountsWhatWasLeftToIt) {
+  Recipient& a = rig.add_here(2);
+  rig.add_here(3);
+  rig.add_there(4);
+  std::string ids(12, '\0');
+  const std::uint32_t all[] = {kHub | 2, kHub | 3, kHub | 4};
+  std::memcpy(ids.data(), all, sizeof all);
+  // Shard 0 takes the frame in, and what it hands over comes back to it as if it were shard 1, where one has left and
+  // another has come.
+  const hub::Run taken_in = rig.make_run(3, {ids + "payload"}, {.kind = Kind::list});
+  rig.nodes.publish(2, {ShardIndex{1}, ConnectionSlot{2}, 2});
+  rig.nodes.publish(3, {ShardIndex{1}, ConnectionSlot{3}, 3});
+  rig.router.route(taken_in, taken_in.header());
+  EXPECT_EQ(rig.egress.tally.copies, 0u) << "three for another shard are one there";
+  std::byte* const marks = const_cast<std::byte*>(taken_in.bytes) + proto::kHeaderSize;
+  for (std::size_t i = 0; i < 2; ++i) {
+    std::byte* const mark = marks + 4 * i;
+    store_le(mark, load_le<std::uint32_t>(mark) - (1u << kIndexBits));  // for shard 0
+  }
+  rig.nodes.publish(2, {ShardIndex{0}, ConnectionSlot{2}, 2});
+  rig.nodes.publish(3, {});
+  rig.nodes.publish(4, {ShardIndex{0}, ConnectionSlot{4}, 4});
+  rig.egress.tally.queued += 1;
+  rig.egress.accepted += 1;
+  EXPECT_EQ(rig.router.route_handed_over(taken_in, 65'536, kNoEnd).frames, 0u);
+  EXPECT_EQ(a.outbox.lane(1).front().run.header().length, 7u);
+  EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
+  EXPECT_EQ(rig.egress.tally.copies, 1u) << "the one on shard 1 is not counted here";
+  rig.fanout.post_all();
+}
+
 }  // namespace
 }  // namespace gimnet::hub
