@@ -156,7 +156,9 @@ void Flusher::look_after(Connection& connection) {
     progress.block_since_ms = state_.now_ms;
     progress.owed_bytes = connection.sent_bytes;
   }
-  const bool nothing_waits = connection.outbox.stale_bytes() == 0 && taken >= progress.owed_bytes;
+  // A frame of which the transport took a part waits, too: it may be all that a reader who takes nothing was sent.
+  const bool nothing_waits =
+      connection.outbox.stale_bytes() == 0 && !connection.writer.in_stale_frame() && taken >= progress.owed_bytes;
   if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
     progress.taken_bytes = taken;
     progress.since_ms = state_.now_ms;

@@ -77,6 +77,23 @@ TEST(Flusher, ClosesASlowConsumerAndTellsIt) {
   EXPECT_EQ(rig.dropped(DropReason::link_lost), 20u);
 }
 
+// It keeps alive, and of all that it was sent a part of one frame waits, which is in no lane any more.
+TEST(Flusher, ClosesAConsumerThatTookAPartOfOneFrame) {
+  for (const std::uint8_t policy : {std::uint8_t{0}, std::uint8_t{2}}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& slow = rig.join(0);
+    slow.pipe.set_room(1'000);
+    rig.send(a, slow.id.value(), std::string(10'000, 'x'), {.flags = policy});
+    rig.pass_ms(9'900);
+    EXPECT_FALSE(slow.pipe.transport_gone());
+    rig.pass_ms(400);
+    EXPECT_TRUE(slow.pipe.transport_gone());
+    EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 1u);
+    EXPECT_EQ(rig.dropped(DropReason::link_lost), 1u);
+  }
+}
+
 TEST(Flusher, KeepsAConsumerThatTakesJustEnough) {
   for (const std::size_t bytes_per_s : {350u, 450u}) {
     HubRig rig;
@@ -106,6 +123,16 @@ TEST(Flusher, DoesNotCallAConsumerSlowForWaitingLatest) {
   slow.pipe.set_room(MemoryPeer::kAll);
   rig.settle();
   EXPECT_THAT(slow.texts(), ElementsAre("12345678199"));
+}
+
+TEST(Flusher, DoesNotCallAConsumerSlowForAPartOfALatestMessage) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& slow = rig.join(0);
+  slow.pipe.set_room(100);
+  rig.send(a, slow.id.value(), "12345678" + std::string(1'000, 'x'), {.flags = kLatestKeyed});
+  rig.pass_ms(20'000);
+  EXPECT_FALSE(slow.pipe.transport_gone());
 }
 
 TEST(Flusher, DropsBlockedMessagesAfterFiveSecondsWithoutProgress) {

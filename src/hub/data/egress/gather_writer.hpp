@@ -29,6 +29,10 @@ class GatherWriter {
   [[nodiscard]] Flush flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport, EgressContext& context);
 
   [[nodiscard]] bool in_frame() const { return partial_.run.frames != 0; }
+  /// A frame partly written makes its reader slow, but for one that a newer message may replace.
+  [[nodiscard]] bool in_stale_frame() const {
+    return in_frame() && partial_.run.header().policy() != proto::Policy::latest;
+  }
   /// The connection broke: the frame partly written, whole, or an empty run.
   [[nodiscard]] Run take_partial();
 
