@@ -132,12 +132,8 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
 }
 
 void Attacher::begin_anew(Connection& connection, const AttachCommand& command, const Run& partial) {
-  std::uint64_t lost = partial.frames;
-  if (connection.resume) lost += connection.resume->kept.clear();
+  closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
-  connection.outbox.count_dropped(lost);
-  state_.tally.drop(proto::DropReason::link_lost, lost);
-  state_.tally.queued -= static_cast<std::int64_t>(lost);
   connection.resume.reset();
   count_anew(connection);
   if (!command.resume_wanted) return;

@@ -98,12 +98,7 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   state_.counters.connections.subtract(1);
   connection.outbox.clear_control();
   if (connection.waits_when_away) return;
-  const Run partial = connection.writer.take_partial();
-  if (partial.frames != 0) {
-    connection.outbox.count_dropped(partial.frames);
-    state_.tally.queued -= partial.frames;
-    state_.drops.drop(partial.bytes, partial.size, partial.frames, proto::DropReason::link_lost);
-  }
+  lose_unconfirmed(connection, connection.writer.take_partial());
   connection.outbox.drop_all(proto::DropReason::link_lost, state_.egress);
   state_.pacer.on_away(connection);
   if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
@@ -114,17 +109,29 @@ void Closer::tell(const Connection& connection, bool said_by_peer, proto::Goodby
                                                     said_by_peer, code, std::move(sentence)}});
 }
 
+void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
+  std::uint64_t lost = 0;
+  const auto lose = [&](const Run& run) {
+    lost += run.frames;
+    state_.drops.drop_mixed(run.bytes, run.size, proto::DropReason::link_lost);
+  };
+  if (connection.resume) {
+    const std::uint64_t let_go = connection.resume->kept.clear(lose);
+    state_.tally.drop(proto::DropReason::link_lost, let_go);
+    lost += let_go;
+  }
+  if (partial.frames != 0) lose(partial);
+  connection.outbox.count_dropped(lost);
+  state_.tally.queued -= static_cast<std::int64_t>(lost);
+}
+
 void Closer::release(SessionRef session) {
   Connection* connection = state_.find(session);
   if (connection == nullptr) return;
   if (connection->connected) {
     detach(*connection, say_goodbye(*connection, proto::GoodbyeCode::kicked, "the session is over"));
   }
-  const Run partial = connection->writer.take_partial();
-  std::uint64_t lost = partial.frames;
-  if (connection->resume) lost += connection->resume->kept.clear();
-  state_.tally.queued -= static_cast<std::int64_t>(lost);
-  state_.tally.drop(proto::DropReason::link_lost, lost);
+  lose_unconfirmed(*connection, connection->writer.take_partial());
   connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);
   state_.pacer.forget(*connection);
   state_.retained.forget_provider(connection->node);

@@ -21,6 +21,9 @@ class Closer {
   void on_goodbye(Connection& connection, proto::GoodbyeCode code, std::string sentence);
   /// A newer connection of the same session is there: the old one is told `replaced`, the conductor knows.
   void fence(Connection& connection);
+  /// What the connection's peer did not say that it took is lost, and each sender is told that asked for it.
+  /// `partial`: a frame that was written in part, or none.
+  void lose_unconfirmed(Connection& connection, const Run& partial);
   /// The session is over.
   void release(SessionRef session);
 

@@ -144,6 +144,27 @@ TEST(Closer, AReleasedSessionTakesEverythingWithIt) {
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
 }
 
+TEST(Closer, TellsSendersWhatAResumeBufferLost) {
+  for (const bool comes_back_anew : {false, true}) {
+    HubRig rig;
+    FakeNode& a = rig.join(0);
+    FakeNode& b = rig.join(0, {.resume = true});
+    for (int i = 0; i < 3; ++i) rig.send(a, b.id.value(), "written, not confirmed", {.flags = proto::kFlagReport});
+    rig.settle();
+    if (comes_back_anew) {
+      rig.rejoin(b, {.resume = true, .epoch = 78});  // another life, which took nothing
+    } else {
+      rig.release(b);
+    }
+    rig.pass_ms(1'000);
+    rig.settle();
+    EXPECT_EQ(rig.dropped(DropReason::link_lost), 3u);
+    std::uint64_t told = 0;
+    for (const auto& report : a.reports()) told += report.count;
+    EXPECT_EQ(told, 3u) << comes_back_anew;
+  }
+}
+
 // What its shard kept for its services is found by the id that it has now, not by the one under which it sent it.
 TEST(Closer, ARenumberedProvidersLastMessagesGoWithIt) {
   HubRig rig;

@@ -54,13 +54,6 @@ ResumeBuffer::Rewind ResumeBuffer::rewind(std::uint64_t count, RingQueue<Run>& r
   return result;
 }
 
-std::uint64_t ResumeBuffer::clear() {
-  const std::uint64_t lost = unconfirmed();
-  kept_.clear();
-  kept_frames_ = bytes_ = written_ = confirmed_ = lost_below_ = 0;
-  return lost;
-}
-
 void ResumeBuffer::let_front_frame_go() {
   Run& front = kept_.front();
   bytes_ -= front.skip_frame();

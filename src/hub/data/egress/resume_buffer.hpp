@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/egress/entry.hpp"
@@ -36,8 +37,15 @@ class ResumeBuffer {
 
   /// Gives back memory that only a busy connection needs.
   void trim() { kept_.trim(); }
-  /// Forgets all; returns the frames that were never confirmed. Counts begin at 0.
-  std::uint64_t clear();
+  /// Forgets all, none of which was confirmed: calls lose(const Run&) for what is kept, and returns how many frames
+  /// before it were let go. Counts begin at 0.
+  template <class Lose>
+  [[nodiscard]] std::uint64_t clear(Lose&& lose) {
+    const std::uint64_t let_go = unconfirmed() - std::min(kept_frames_, unconfirmed());
+    for (; !kept_.empty(); kept_.pop_front()) lose(std::as_const(kept_.front()));
+    kept_frames_ = bytes_ = written_ = confirmed_ = lost_below_ = 0;
+    return let_go;
+  }
 
   [[nodiscard]] std::uint64_t written() const { return written_; }
   [[nodiscard]] std::uint64_t unconfirmed() const { return written_ - std::max(confirmed_, lost_below_); }

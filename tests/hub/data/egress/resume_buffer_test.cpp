@@ -105,9 +105,21 @@ TEST_F(ResumeBufferTest, TellsTheGapUntilItWasHeardAndTheLossOnce) {
 TEST_F(ResumeBufferTest, ClearTellsWhatWasNeverConfirmed) {
   buffer.wrote(frames(4));
   EXPECT_EQ(buffer.confirm(1), 1u);
-  EXPECT_EQ(buffer.clear(), 3u);
+  std::uint64_t kept = 0;
+  EXPECT_EQ(buffer.clear([&](const hub::Run& run) { kept += run.frames; }), 0u);
+  EXPECT_EQ(kept, 3u);
   EXPECT_EQ(buffer.written(), 0u);
   EXPECT_EQ(buffer.bytes(), 0u);
+}
+
+TEST_F(ResumeBufferTest, ClearTellsWhatItLetGo) {
+  buffer.wrote(frames(10, kDrop));
+  ASSERT_TRUE(buffer.make_room(0, 250));
+  EXPECT_EQ(buffer.confirm(1), 1u);
+  std::uint64_t kept = 0;
+  EXPECT_EQ(buffer.clear([&](const hub::Run& run) { kept += run.frames; }), 2u);
+  EXPECT_EQ(kept, 7u);
+  EXPECT_EQ(buffer.unconfirmed(), 0u);
 }
 
 TEST(IsBlock, ByPolicyOrByKind) {
