@@ -184,11 +184,19 @@ class Frames(HostileInput):
 
     def test_fragments_that_overlap_or_never_end_are_for_their_receiver_to_judge(self):
         sender, receiver = Client(self, self.hub).join(), Client(self, self.hub).join()
-        cases = [(1, 0, 100, b"first"), (1, 3, 100, b"overlaps"), (1, 0, 100, b"again"), (2, 90, 100, b"an end")]
+        cases = [(1, 0, 100, b"first"), (1, 3, 100, b"overlaps"), (1, 0, 100, b"again"), (2, 0, 100, b"never ends")]
         for number, offset, total, data in cases:
             sender.send(sender.frame(receiver.id, struct.pack("<III", number, offset, total) + data, flags=FLAG_FRAGMENT))
         for number, offset, total, data in cases:
             self.assertEqual(receiver.next_data().payload, struct.pack("<III", number, offset, total) + data)
+
+    def test_fragments_that_never_began_are_dropped(self):
+        sender, receiver = Client(self, self.hub).join(), Client(self, self.hub).join()
+        for offset, data in ((90, b"the end ..."), (20, b"a middle")):
+            sender.send(sender.frame(receiver.id, struct.pack("<III", 3, offset, 101) + data, flags=FLAG_FRAGMENT))
+            self.expect("dropped.cut_message")
+        sender.send(sender.frame(receiver.id, b"whole"))
+        self.assertEqual(receiver.next_data().payload, b"whole")
 
     def test_flow_that_is_unknown_or_too_short(self):
         for payload in (b"", b"\x01", b"\x00" * 16, b"\x08" + bytes(15), b"\xff" + bytes(15), b"\x04" + bytes(6),

@@ -264,7 +264,7 @@ void GatherWriter::consume_lane(std::size_t lane, std::size_t bytes, Job& job) {
   queue.on_left(entry, left);
   entry.size -= left;
   entry.frames -= frames_before - entry.run.frames;
-  entry.touched = entry.fragmented;
+  queue.touch(entry);
   if (entry.run.frames == 0 && !entry.next_piece()) {
     entry.frames = 0;
     queue.pop_front();

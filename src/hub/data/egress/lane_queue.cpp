@@ -64,12 +64,14 @@ void LaneQueue::count(const Entry& entry) {
   bytes_ += entry.size;
   if (entry.block) block_bytes_ += entry.size;
   if (entry.latest) latest_bytes_ += entry.size;
+  if (entry.touched) touched_bytes_ += entry.size;
 }
 
 void LaneQueue::discount(const Entry& entry) {
   bytes_ -= entry.size;
   if (entry.block) block_bytes_ -= entry.size;
   if (entry.latest) latest_bytes_ -= entry.size;
+  if (entry.touched) touched_bytes_ -= entry.size;
 }
 
 void LaneQueue::push(Entry entry) {
@@ -183,6 +185,7 @@ void LaneQueue::on_left(const Entry& entry, std::uint32_t bytes) {
   bytes_ -= bytes;
   if (entry.block) block_bytes_ -= bytes;
   if (entry.latest) latest_bytes_ -= bytes;
+  if (entry.touched) touched_bytes_ -= bytes;
 }
 
 void LaneQueue::pop_front() {

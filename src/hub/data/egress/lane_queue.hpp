@@ -29,6 +29,14 @@ class LaneQueue {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   /// Bytes of entries that must not be dropped for room.
   [[nodiscard]] std::uint64_t block_bytes() const { return block_bytes_; }
+  /// Does a message wait of which nothing was written yet? The others are finished whatever happens.
+  [[nodiscard]] bool holds_whole() const { return bytes_ != touched_bytes_; }
+  /// A fragment of the entry was written; the caller has taken it out of its size.
+  void touch(Entry& entry) {
+    if (!entry.fragmented || entry.touched) return;
+    entry.touched = true;
+    touched_bytes_ += entry.size;
+  }
   /// Bytes of entries that a newer message may replace.
   [[nodiscard]] std::uint64_t latest_bytes() const { return latest_bytes_; }
 
@@ -96,6 +104,7 @@ class LaneQueue {
   std::uint64_t bytes_ = 0;
   std::uint64_t block_bytes_ = 0;
   std::uint64_t latest_bytes_ = 0;
+  std::uint64_t touched_bytes_ = 0;
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
   bool indexed_ = false;           ///< streams_ names every LATEST entry that waits
   std::unique_ptr<StreamIndex> streams_;

@@ -103,9 +103,8 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   lanes.open.close();
   Entry entry = make_entry(run, header, handover, context);
   if (entry.fragmented) {
+    if (!follow_message(entry, header, context)) return;
     if (entry.touched && join_message(entry, header, context)) return;
-    // The beginning of a message: a number that was cut before is in use again.
-    if (!entry.touched && !lanes.cut.empty()) forget_cut(NodeId{header.src}, entry.message_number);
   }
   if (!backlog_ && fits(lane, run.size, context.limits)) {
     const bool may_grow = proto::may_form_run(header) && entry.run.buffer.get() == chunk_.get();
@@ -252,7 +251,7 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
         lane.pop_front();
       }
     }
-    lanes_->cut.clear();
+    lanes_->open_messages.clear();
     lanes_->pauses.release_all(context.signals);
   }
   on_emptied(context);
@@ -306,7 +305,8 @@ void Outbox::trim() {
   control_.trim();
   if (!lanes_) return;
   const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) && lanes_->replay.empty() &&
-                    lanes_->pauses.empty() && lanes_->cut.empty() && lanes_->first_control_bytes == 0 && !backlog_;
+                    lanes_->pauses.empty() && lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 &&
+                    !backlog_;
   if (idle) return lanes_.reset();
   lanes_->replay.trim();
   for (LaneQueue& queue : lanes_->queues) queue.trim();

@@ -116,9 +116,11 @@ class Outbox {
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
  private:
-  struct CutMessage {
+  /// A message in fragments.
+  struct OpenMessage {
     NodeId src;
     std::uint32_t number = 0;
+    friend bool operator==(const OpenMessage&, const OpenMessage&) = default;
   };
   /// What data frames need.
   struct Lanes {
@@ -129,13 +131,13 @@ class Outbox {
     RingQueue<Run> replay;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
-    std::vector<CutMessage> cut;
+    std::vector<OpenMessage> open_messages;  ///< of which the beginning was taken and the end has not come, by age
     std::uint32_t first_control_bytes =
         0;  ///< of push_first_control() that have not left; here, since few ever have any
   };
-  /// Messages of which the rest is still refused; beyond it the rest of the oldest is let through, and the recipient
-  /// finds the gap.
-  static constexpr std::size_t kCutMessagesMax = 64;
+  /// Messages in fragments that may be under way to one connection at a time. Beyond it the rest of the oldest is
+  /// refused: a sender that never ends its messages takes the place of nothing else.
+  static constexpr std::size_t kOpenMessagesMax = 256;
   /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not pause: beyond so many
   /// reserves its messages are dropped, BLOCK or not.
   static constexpr std::uint64_t kReservesMax = 8;
@@ -164,8 +166,11 @@ class Outbox {
   /// the same, although it was held: the message is not to be taken.
   [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
   [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
-  [[nodiscard]] bool is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
-  void forget_cut(NodeId src, std::uint32_t number);
+  /// Takes note of where a fragment stands in its message. Returns whether it may go on: no rest of a message of which
+  /// the beginning did not come or was dropped.
+  [[nodiscard]] bool follow_message(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  /// Its rest is refused from now on. Returns whether there was such a message.
+  bool close_message(const OpenMessage& message);
   void put_control(std::span<const std::byte> frame, EgressContext& context);
   [[nodiscard]] std::uint32_t first_control_bytes() const { return lanes_ ? lanes_->first_control_bytes : 0; }
   void tell_lost(const Entry& entry) const;

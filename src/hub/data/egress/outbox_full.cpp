@@ -8,7 +8,6 @@
 namespace gimnet::hub {
 
 bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
-  if (is_cut(entry, header, context)) return true;
   LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
   Entry* message = lane.find_message(NodeId{header.src}, entry.message_number);
   if (message == nullptr) return false;
@@ -30,22 +29,31 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   return true;
 }
 
-void Outbox::forget_cut(NodeId src, std::uint32_t number) {
-  std::erase_if(lanes_->cut, [&](const CutMessage& each) { return each.src == src && each.number == number; });
+bool Outbox::close_message(const OpenMessage& message) {
+  std::vector<OpenMessage>& open = lanes_->open_messages;
+  const auto found = std::ranges::find(open, message);
+  if (found == open.end()) return false;
+  open.erase(found);
+  return true;
 }
 
-bool Outbox::is_cut(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
-  const NodeId src{header.src};
-  std::vector<CutMessage>& all = lanes_->cut;
-  const auto cut = std::ranges::find_if(
-      all, [&](const CutMessage& each) { return each.src == src && each.number == entry.message_number; });
-  if (cut == all.end()) return false;
-  if (entry.complete) all.erase(cut);
+bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+  const OpenMessage message{NodeId{header.src}, entry.message_number};
+  std::vector<OpenMessage>& open = lanes_->open_messages;
+  if (!entry.touched) {
+    // A number in use again: whatever was begun under it before does not go on.
+    close_message(message);
+    if (entry.complete) return true;
+    if (open.size() == kOpenMessagesMax) open.erase(open.begin());
+    open.push_back(message);
+    return true;
+  }
+  if (entry.complete ? close_message(message) : std::ranges::find(open, message) != open.end()) return true;
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
   context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, proto::DropReason::cut_message);
-  return true;
+  return false;
 }
 
 void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
@@ -115,8 +123,8 @@ void Outbox::admit_message(Entry entry, const proto::FrameHeader& header, Egress
       lose(oldest, proto::DropReason::queue_full, context);
     }
   }
-  // A message that is larger than the limit may wait as long as it is the only one.
-  if (fits(index, entry.size, context.limits) || (lane.bytes() == 0 && header.policy() != proto::Policy::drop)) {
+  // Besides what is being written the newest message may wait, however large it is.
+  if (fits(index, entry.size, context.limits) || !lane.holds_whole()) {
     lane.push(std::move(entry));
   } else {
     lose(entry, proto::DropReason::queue_full, context);
@@ -125,11 +133,7 @@ void Outbox::admit_message(Entry entry, const proto::FrameHeader& header, Egress
 
 void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
   if (entry.frames == 0) return;
-  if (entry.fragmented && !entry.complete) {
-    std::vector<CutMessage>& cut = lanes_->cut;
-    if (cut.size() == kCutMessagesMax) cut.erase(cut.begin());
-    cut.push_back({NodeId{entry.run.header().src}, entry.message_number});
-  }
+  if (entry.fragmented && !entry.complete) close_message({NodeId{entry.run.header().src}, entry.message_number});
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;

@@ -20,6 +20,7 @@ using testing::TestFrame;
 
 constexpr std::uint8_t kBlock = 1;
 constexpr std::uint8_t kDrop = 2;
+constexpr std::uint8_t kLatest = 3 | proto::kFlagKeyed;
 constexpr std::uint32_t kKiB = 1024;
 
 Limits small_limits() {
@@ -149,6 +150,7 @@ TEST(FullOutbox, WhatCameBeforeTheRestOfAMessageUnderWayGoesBeforeIt) {
 TEST(FullOutbox, TheRestOfAMessageUnderWayPausesItsSenderBeyondTheLimit) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
+  rig.push_fragment(connection.outbox, 1, 0, 100'000, std::string(8'000, 'a'));
   block(connection);
   for (std::uint32_t i = 0; i < 5; ++i) {
     rig.push_fragment(connection.outbox, 1, 8'000 * (i + 1), 100'000, std::string(8'000, 'a'));
@@ -195,20 +197,21 @@ TEST(FullOutbox, BlockOfASenderThatComesThoughHeldIsDroppedBeyondWhatWasUnderWay
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-TEST(FullOutbox, TheRestOfTheOldestOfTooManyCutMessagesIsLetThrough) {
-  for (const std::uint32_t cut : {64u, 65u}) {
-    EgressRig rig(small_limits());
-    TestConnection connection(rig);
-    block(connection);
-    for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.flags = kDrop});
-    for (std::uint32_t number = 1; number <= cut; ++number) {
-      rig.push_fragment(connection.outbox, number, 0, 2'000, std::string(1'000, 'a'), {.flags = kDrop});
-    }
-    EXPECT_EQ(rig.dropped(DropReason::queue_full), cut);
-    rig.push_fragment(connection.outbox, 1, 1'000, 2'000, std::string(1'000, 'a'), {.flags = kDrop, .lane = 2});
-    EXPECT_EQ(rig.dropped(DropReason::cut_message), cut == 64 ? 1u : 0u) << cut;
-    EXPECT_TRUE(rig.ledger_exact());
+TEST(FullOutbox, TheRestOfEveryMessageThatFoundNoRoomIsRefused) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.flags = kDrop});
+  constexpr std::uint32_t kMany = 1'000;
+  for (std::uint32_t number = 1; number <= kMany; ++number) {
+    rig.push_fragment(connection.outbox, number, 0, 2'000, std::string(1'000, 'a'), {.flags = kDrop});
   }
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), kMany);
+  for (std::uint32_t number = 1; number <= kMany; ++number) {
+    rig.push_fragment(connection.outbox, number, 1'000, 2'000, std::string(1'000, 'a'), {.flags = kDrop, .lane = 2});
+  }
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), kMany);
+  EXPECT_TRUE(rig.ledger_exact());
 }
 
 TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
@@ -219,6 +222,97 @@ TEST(FullOutbox, AMessageLargerThanItsLaneMayWaitAlone) {
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
   rig.push(connection.outbox, sized(40 * kKiB), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the older one";
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+// An outbox may always hold the message that is being written and the newest one.
+TEST(FullOutbox, TheNewestOfMessagesLargerThanTheirLaneWaitsBehindTheOneBeingWritten) {
+  for (const std::uint8_t flags : {kLatest, std::uint8_t{0}, kDrop}) {
+    EgressRig rig(small_limits());
+    TestConnection connection(rig);
+    constexpr std::uint32_t kPart = 10'000;
+    const auto message = [&](std::uint32_t number) {
+      for (std::uint32_t offset = 0; offset < 4 * kPart; offset += kPart) {
+        rig.push_fragment(connection.outbox, number, offset, 4 * kPart,
+                          "key____1" + std::string(kPart - 8, static_cast<char>('0' + number)),
+                          {.kind = Kind::group, .flags = flags});
+      }
+    };
+    connection.peer.set_room(proto::kHeaderSize);
+    message(1);
+    connection.flush();
+    connection.peer.set_room(2 * kPart);
+    connection.flush();
+    message(2);
+    message(3);
+    connection.peer.set_room(MemoryPeer::kAll);
+    connection.flush();
+    const auto texts = connection.take();
+    ASSERT_THAT(texts, SizeIs(8)) << int{flags};
+    EXPECT_EQ(texts[4].substr(0, 2), flags == kDrop ? "2:" : "3:") << int{flags};
+    EXPECT_EQ(
+        rig.dropped(DropReason::cut_message) + rig.dropped(DropReason::replaced) + rig.dropped(DropReason::queue_full),
+        4u);
+    EXPECT_TRUE(rig.ledger_exact());
+  }
+}
+
+// One pair of nodes could fill the budget of the whole hub with it.
+TEST(FullOutbox, ARestWithoutABeginningIsRefused) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  rig.push_fragment(connection.outbox, 1, 1'000, 2'000, std::string(500, 'a'), {.flags = kDrop});
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u) << "where nothing waits, too";
+  block(connection);
+  for (std::uint32_t number = 1; number <= 100; ++number) {
+    rig.push_fragment(connection.outbox, number, 1'000, 1 << 30, std::string(1'000, 'a'), {.flags = kDrop});
+  }
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 101u);
+  EXPECT_EQ(connection.outbox.lane(1).bytes(), 0u);
+  // Under another sender's number neither.
+  rig.push_fragment(connection.outbox, 7, 0, 2'000, std::string(1'000, 'a'), {.src = 2});
+  rig.push_fragment(connection.outbox, 7, 1'000, 2'000, std::string(1'000, 'a'), {.src = 3});
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 102u);
+  rig.push_fragment(connection.outbox, 7, 1'000, 2'000, std::string(1'000, 'a'), {.src = 2});
+  rig.push_fragment(connection.outbox, 7, 1'000, 2'000, std::string(1'000, 'a'), {.src = 2});
+  EXPECT_EQ(rig.dropped(DropReason::cut_message), 103u) << "its end came before";
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, OfSoManyMessagesTheRestIsAwaited) {
+  for (const std::uint32_t begun : {256u, 257u}) {
+    EgressRig rig;
+    TestConnection connection(rig);
+    for (std::uint32_t number = 1; number <= begun; ++number) {
+      rig.push_fragment(connection.outbox, number, 0, 20, std::string(10, 'a'));
+    }
+    rig.push_fragment(connection.outbox, 2, 10, 20, std::string(10, 'a'));
+    EXPECT_FALSE(rig.tally.any_dropped);
+    rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'a'));
+    EXPECT_EQ(rig.dropped(DropReason::cut_message), begun == 256 ? 0u : 1u) << begun;
+    EXPECT_TRUE(rig.ledger_exact());
+  }
+}
+
+// The budget bounds everything, also the rest of messages whose beginning was written.
+TEST(FullOutbox, TheBudgetBoundsContinuedMessagesToo) {
+  Limits limits;
+  limits.budget_bytes = 4 << 20;
+  EgressRig rig(limits);
+  TestConnection connection(rig);
+  for (std::uint32_t number = 1; number <= 100; ++number) {
+    rig.push_fragment(connection.outbox, number, 0, 1 << 30, "a", {.flags = kDrop});
+  }
+  block(connection);
+  for (std::uint32_t round = 0; round < 10; ++round) {
+    for (std::uint32_t number = 1; number <= 100; ++number) {
+      rig.push_fragment(connection.outbox, number, 60'000 + round, 1 << 30, std::string(30'000, 'a'), {.flags = kDrop});
+      connection.flush();
+    }
+  }
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 100u) << "of each message that goes on what comes then";
+  EXPECT_GT(rig.dropped(DropReason::cut_message), 700u) << "and its rest";
+  EXPECT_LE(rig.pool.pinned_bytes(), (4u << 20) + 400'000u);
   EXPECT_TRUE(rig.ledger_exact());
 }
 

@@ -259,22 +259,6 @@ TEST(Outbox, AMessageUnderWayIsFinishedOverItsLimit) {
   EXPECT_THAT(connection.take(), SizeIs(5));
 }
 
-// The budget bounds everything, also the rest of messages whose beginning was written, or never was there.
-TEST(Outbox, TheBudgetBoundsContinuedMessagesToo) {
-  Limits limits;
-  limits.budget_bytes = 4 << 20;
-  EgressRig rig(limits);
-  TestConnection connection(rig);
-  block(connection);
-  for (std::uint32_t number = 1; number <= 1'000; ++number) {
-    rig.push_fragment(connection.outbox, number, 60'000, 1 << 30, std::string(30'000, 'a'), {.flags = kDrop});
-    connection.flush();
-  }
-  EXPECT_GT(rig.dropped(DropReason::over_budget), 800u);
-  EXPECT_LE(rig.pool.pinned_bytes(), (4u << 20) + 400'000u);
-  EXPECT_TRUE(rig.ledger_exact());
-}
-
 TEST(Outbox, RefusesWhatWouldWaitOverTheBudget) {
   Limits limits;
   limits.budget_bytes = 4 << 20;

@@ -27,12 +27,16 @@ class PacerTest : public ::testing::Test {
     const hub::Run run = rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group, .lane = lane});
     EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
   }
-  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset, std::uint32_t total,
-                      const std::string& text, std::uint8_t lane = 1) {
+  hub::Run fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total, const std::string& text,
+                    std::uint8_t lane) {
     std::string all(proto::kFragmentHeaderSize, '\0');
     proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
     const TestFrame frame{.kind = proto::Kind::group, .flags = proto::kFlagFragment, .lane = lane};
-    const hub::Run run = rig.make_run(kGroup.value(), {all + text}, frame);
+    return rig.make_run(kGroup.value(), {all + text}, frame);
+  }
+  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset, std::uint32_t total,
+                      const std::string& text, std::uint8_t lane = 1) {
+    const hub::Run run = fragment(number, offset, total, text, lane);
     EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
   }
   /// What went into the outbox since the last call.
@@ -244,6 +248,9 @@ TEST_F(PacerTest, AMessageWithoutAnEndGivesItsPlaceBack) {
 }
 
 TEST_F(PacerTest, AMessageThatBeganBeforeThePaceIsNotCut) {
+  const hub::Run beginning = fragment(1, 0, 6, "ab", 1);
+  rig.fanout.deliver(recipient, beginning, beginning.header(), {});
+  EXPECT_THAT(sent(), ElementsAre("ab"));
   PacedSubscription& one = rig.pacer.subscribe(recipient, kGroup, {.interval_us = 20'000}, true);
   offer_fragment(one, 1, 2, 6, "cd");
   offer_fragment(one, 1, 4, 6, "ef");
