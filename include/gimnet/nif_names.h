@@ -135,7 +135,7 @@ typedef struct nif_pace {
  *  subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
 nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms);
 
-/** The same with a pace; NULL: none. Also NIF_LIMIT: a number beyond the hub's limit. */
+/** The same with a pace; NULL: none. Also NIF_BAD_REQUEST: a number beyond the hub's limit. */
 nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
                                nif_subscription* subscription, int32_t timeout_ms);
 

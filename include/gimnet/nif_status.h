@@ -26,7 +26,7 @@ typedef enum nif_status {
   NIF_DENIED = 14,       /**< This node may not do that. */
   NIF_LIMIT = 15,        /**< A limit of the hub or of this library was reached; the sentence names it. */
   NIF_NOT_SUPPORTED = 16,    /**< The hub does not know the operation. */
-  NIF_BAD_REQUEST = 17,      /**< The hub could not read the request. */
+  NIF_BAD_REQUEST = 17,      /**< The hub could not read the request, or a number in it is out of range. */
   NIF_TOO_LARGE = 18,        /**< The message is larger than allowed, or than the recipient takes. */
   NIF_NOT_DELIVERED = 19,    /**< The hub reported, while the message was still being sent, that it cannot arrive. */
   NIF_PROTOCOL = 20,         /**< The peer sent bytes that docs/protocol.md forbids; is it a GIMnet hub? */

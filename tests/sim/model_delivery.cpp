@@ -15,7 +15,7 @@ Status Model::judge_delivery(const ns::Advertise& offer) const {
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
-  return counted && offer.window > limits_.sync_window ? Status::limit : Status::done;
+  return counted && offer.window > limits_.sync_window ? Status::bad_request : Status::done;
 }
 
 std::uint32_t Model::window_of(const ns::Advertise& terms) {
@@ -46,7 +46,7 @@ void Model::judge_subscribe(const Asked& asked) {
   if (!wanted) return require_status(asked, Status::bad_request, Checker::answers);
   if (!terms_fit(*wanted)) {
     census_.add(Happening::delivery_refused);
-    return require_status(asked, Status::limit, Checker::limits);
+    return require_status(asked, Status::bad_request, Checker::limits);
   }
   const double rate = wanted->rate_hz;
   const Terms terms{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};

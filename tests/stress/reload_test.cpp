@@ -157,7 +157,7 @@ class Rival {
     ns::Subscribe wide;
     wide.name = "rival/s0";
     wide.window = 5;
-    refused(node_.try_ask<ns::SubscribeAnswer>(Kind::ns, wide), proto::Status::limit);
+    refused(node_.try_ask<ns::SubscribeAnswer>(Kind::ns, wide), proto::Status::bad_request);
     refused(node_.try_ask<ctrl::ReloadAnswer>(Kind::ctrl, ctrl::Reload{}), proto::Status::denied);
     refused(node_.try_ask<ctrl::KickAnswer>(Kind::ctrl, ctrl::Kick{node_.id(), "myself"}), proto::Status::denied);
     if (rounds_.load() % 8 == 0) try_to_administer();

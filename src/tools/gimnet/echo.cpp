@@ -9,9 +9,7 @@ ExitCode run_echo(Session& session) {
   Subscriptions subscriptions(session.node(), session.options().target, session.options().pace);
   // Whoever asks for less than all has gaps on purpose.
   const bool all = !wants_less(session.options().pace);
-  if (const auto opened = subscriptions.open(); !opened) {
-    return code_of_terms(session.fail(opened.failure()), opened.failure(), !all);
-  }
+  if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
   MissedMessages missed([&](std::string_view service) { return subscriptions.take_lateness(service); });
   const ExitCode code =

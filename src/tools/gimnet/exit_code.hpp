@@ -2,7 +2,6 @@
 
 #include <csignal>
 #include <cstdint>
-#include <string>
 
 #include "gimnet/gimi/outcome.hpp"
 
@@ -50,21 +49,6 @@ enum class ExitCode : std::uint8_t {
 [[nodiscard]] constexpr ExitCode exit_code_of_signal(int signal) {
   if (signal == SIGHUP) return ExitCode::hung_up;
   return signal == SIGTERM ? ExitCode::terminated : ExitCode::interrupted;
-}
-
-/// Whether a hub's limit forbids the terms of a request (window, depth, rate) and not the request: the hub names the
-/// limit in its answer, whose status is the same for all.
-[[nodiscard]] inline bool forbids_terms(const Failure& failure) {
-  if (failure.status != Status::limit) return false;
-  for (const char* limit : {"--limit sync_window", "--limit subscription_depth", "--limit subscription_rate_hz"}) {
-    if (failure.sentence.find(limit) != std::string::npos) return true;
-  }
-  return false;
-}
-
-/// `code` of a request of which the user chose the `terms`: those that the hub's limits forbid are wrong words of his.
-[[nodiscard]] inline ExitCode code_of_terms(ExitCode code, const Failure& failure, bool terms) {
-  return terms && forbids_terms(failure) && code == exit_code_of(failure.status) ? ExitCode::usage : code;
 }
 
 }  // namespace gimnet::tool

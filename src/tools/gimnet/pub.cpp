@@ -158,10 +158,7 @@ ExitCode run_pub(Session& session) {
   service.lane = options.lane;
   service.key = options.key;
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
-  if (!publisher) {
-    const bool terms = options.delivery == Delivery::sync;
-    return code_of_terms(session.fail(publisher.failure()), publisher.failure(), terms);
-  }
+  if (!publisher) return session.fail(publisher.failure());
   Standing standing(session);
   auto sent = wait_for_subscribers(session, *publisher, standing);
   UnheardLines unheard;

@@ -117,7 +117,7 @@ Status Reference::judge_terms(const Asked& asked, const ns::Advertise& offer) co
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
-  if (counted && offer.window > limits_.sync_window) return Status::limit;
+  if (counted && offer.window > limits_.sync_window) return Status::bad_request;
   return Status::done;
 }
 
@@ -195,7 +195,7 @@ void Reference::on_subscribe(const Asked& asked) {
   const bool rate_fits = rate == 0.0 || (rate >= 0.001 && rate <= static_cast<double>(limits_.subscription_rate_hz));
   const bool fits = wanted->window <= limits_.sync_window && wanted->depth >= 1 &&
                     wanted->depth <= limits_.subscription_depth && rate_fits;
-  if (!fits) return require_status(asked.answer, Status::limit);
+  if (!fits) return require_status(asked.answer, Status::bad_request);
   Session& session = asked.session;
   const Terms wants{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
   const bool fresh = !session.subscribes.contains(wanted->name);

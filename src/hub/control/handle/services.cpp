@@ -22,8 +22,8 @@ GroupId group_id(const HandlerContext& context, std::uint32_t index) {
 }
 
 proto::Refusal out_of_range(std::string_view what, const std::string& range, std::string_view limit) {
-  return proto::Refusal{Status::limit, std::string{what} + " must be " + range + "; the hub's --limit " +
-                                           std::string{limit} + " bounds it"};
+  return proto::Refusal{Status::bad_request, std::string{what} + " must be " + range + "; the hub's --limit " +
+                                                 std::string{limit} + " bounds it"};
 }
 
 /// What is wrong with how a service wants to be delivered.

@@ -55,7 +55,7 @@ TEST_F(ServiceRequestsTest, SyncAndRetainAreShownAndKeptToTheirLimits) {
   EXPECT_EQ(listed->services[0].window, 1024u);
   EXPECT_TRUE(listed->services[0].retain);
   offer.window = 1025;
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::limit);
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
   offer.delivery = ns::Delivery::stream;
   offer.window = 1;
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
@@ -82,7 +82,7 @@ TEST_F(ServiceRequestsTest, ASubscriberMayWantLess) {
         ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = 0.0009}, ns::Subscribe{.rate_hz = -1.0}}) {
     const auto answer = wants(wrong);
     ASSERT_FALSE(answer);
-    EXPECT_EQ(answer.error().status, Status::limit);
+    EXPECT_EQ(answer.error().status, Status::bad_request);
     EXPECT_NE(answer.error().sentence.find("must be"), std::string::npos);
   }
 }
