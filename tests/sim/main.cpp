@@ -189,8 +189,10 @@ int run(const Arguments& arguments) {
     if (arguments.hashes) std::printf("%s", line);
     hashes += line;
     if (report.broken) {
+      // A planted bug shows itself in more than one way: another checker may be the first in this world.
+      if (!arguments.expect.empty() && arguments.expect != name_of(report.broken->checker)) continue;
       print_failure(options, report);
-      if (arguments.expect == name_of(report.broken->checker)) return 0;
+      if (!arguments.expect.empty()) return 0;
       if (!arguments.hashes && !arguments.world.print) print_smallest(options, report);
       return 1;
     }
