@@ -136,6 +136,8 @@ class Subscription {
   [[nodiscard]] Queue queue() const;
   /// Is there a provider at the moment?
   [[nodiscard]] bool exists() const;
+  /// Is there one who takes data under that name instead? Nothing will come from it; send to it (sender_to_service()).
+  [[nodiscard]] bool accepts() const;
   /// Waits until there is. Errors: timeout, closed.
   Outcome<void> wait_until_exists(Timeout timeout = kForever) const;
   [[nodiscard]] const std::string& name() const;  ///< in full
@@ -260,7 +262,7 @@ class Node {
   Outcome<Queue> accept(std::string_view name, const AcceptOptions& options = {},
                         Timeout timeout = Timeout{5000}) const;
   /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name is the same one.
-  /// Errors: bad_name, limit, denied, timeout, not_connected.
+  /// Errors: bad_name, limit, denied, timeout, not_connected, not_found (it is there and accepts data: send to it).
   Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
                                   Timeout timeout = Timeout{5000}, const PaceOptions& pace = {}) const;
 

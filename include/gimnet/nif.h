@@ -301,8 +301,8 @@ typedef enum nif_incoming_type {
   /** ... and left again [same]. */
   NIF_SUBSCRIBER_LEFT = 7,
   /** A service that this node subscribed appeared, came under another group id, or went [text: full name, former_group
-   * (0: none), group (0: withdrawn), message_type, instance, delivery]. Comes before the first message of the new
-   * group, also after a break; messages of former groups may still come. */
+   * (0: none), group (0: withdrawn), message_type, instance, delivery, direction]. Comes before the first message of
+   * the new group, also after a break; messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
    *  it; reason: nif_status)]. Send to the new id from now on; what waited for the connection goes there, and what is
@@ -351,6 +351,7 @@ typedef struct nif_incoming {
   uint32_t message_type;
   uint32_t instance;
   uint32_t delivery;
+  uint32_t direction;         /**< nif_direction. */
   uint32_t epoch;             /**< Of a GROUP message that counts in a window: for nif_credit(); else 0. */
   const nif_watched* watched; /**< Of a NIF_WATCHED, else NULL. Valid until: nif_release(). */
   const char* text;           /**< NUL-terminated, never NULL. Valid until: nif_release(). */

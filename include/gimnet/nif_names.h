@@ -121,6 +121,9 @@ typedef struct nif_subscription {
   uint32_t delivery; /**< nif_delivery. */
   uint32_t window;   /**< In force: messages that may be untaken; 0: any number. */
   uint32_t retain;   /**< 1: the last message comes first. */
+  /** nif_direction. NIF_ACCEPTS: nothing will come, since the service takes data; this tells where it is, for who sends
+   * to it (NIF_SERVICE). */
+  uint32_t direction;
 } nif_subscription;
 
 /** How much of a service a subscriber wants. Members that are 0 ask for nothing. */

@@ -39,6 +39,7 @@ DueEvent told_moved(const proto::Payload& payload, std::uint32_t to) {
   told.delivery = event->delivery;
   told.window = event->window;
   told.retain = event->retain;
+  told.direction = event->direction;
   return told;
 }
 

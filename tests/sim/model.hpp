@@ -35,6 +35,7 @@ struct DueEvent {
   proto::ns::Delivery delivery{};
   std::uint32_t window = 0;  ///< in force
   bool retain = false;
+  proto::ns::Direction direction{};
   std::uint32_t node = 0;         ///< SUBSCRIBER_...: who
   std::uint32_t subscribers = 0;  ///< SUBSCRIBER_...: now
   friend auto operator<=>(const DueEvent&, const DueEvent&) = default;

@@ -99,6 +99,7 @@ void Model::judge_subscribe_answer(const Asked& asked, const Topic& topic) {
     due.instance = terms.instance;
     due.delivery = terms.delivery;
     due.retain = terms.retain;
+    due.direction = terms.direction;
     if (const auto pace = pace_of(topic, asked.index)) due.window = pace->window;
   }
   require(answer.has_value() && answer->group == due.group, Checker::answers,

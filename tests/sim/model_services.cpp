@@ -60,6 +60,7 @@ void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, st
     event.message_type = terms.message_type;
     event.delivery = terms.delivery;
     event.retain = terms.retain;
+    event.direction = terms.direction;
     if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt) event.window = pace->window;
     due_.push_back(std::move(event));
   }

@@ -241,7 +241,7 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SUBSCRIBER_LEFT:
       return verdict_of(services_.on_subscribers(in.group, in.count));
     case NIF_SERVICE_MOVED:
-      return verdict_of(services_.on_service_moved(in.text, {in.group, {in.message_type, in.instance}}));
+      return verdict_of(services_.on_service_moved(in));
     case NIF_OWN_SERVICE_MOVED:
       return verdict_of(services_.on_own_service_moved(in.text, {in.former_group, in.group}));
     case NIF_NAME_LOST:

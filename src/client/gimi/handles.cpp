@@ -42,6 +42,7 @@ std::optional<Message> Subscription::try_receive() const {
 }
 Queue Subscription::queue() const { return Queue({service_, &service_->queue()}); }
 bool Subscription::exists() const { return service_->exists(); }
+bool Subscription::accepts() const { return service_->accepts(); }
 Outcome<void> Subscription::wait_until_exists(Timeout timeout) const { return service_->wait_until_exists(timeout); }
 const std::string& Subscription::name() const { return service_->name(); }
 std::uint64_t Subscription::missed() const { return service_->missed(); }

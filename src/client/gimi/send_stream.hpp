@@ -30,6 +30,7 @@ class StreamKeeper {
 struct ServicePlace {
   std::uint32_t group = 0;  ///< 0: nobody has it at the moment
   MessageKey key;
+  bool accepts = false;  ///< it takes data, and gives none
 };
 
 /// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any thread; nothing

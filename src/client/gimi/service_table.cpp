@@ -120,7 +120,7 @@ void ServiceTable::set_place(SubscribedService& service, const ServicePlace& pla
   // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8), and the present one.
   constexpr std::size_t kGroups = 8;
   service.place = place;
-  service.on_group(place.group);
+  service.on_place(place);
   if (place.group == 0) return;
   subscribed_by_group_[place.group] = &service;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
@@ -141,7 +141,7 @@ nif_status ServiceTable::ask(SubscribedService& service, const PaceOptions& pace
   const nif_status status = nif_subscribe_paced(uplink_.node(), service.name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
   const MutexLock lock(mutex_);
-  set_place(service, {found.group, {found.message_type, found.instance}});
+  set_place(service, {found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS});
   return NIF_OK;
 }
 
@@ -166,11 +166,19 @@ Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name
     }
   }
   ++service->handles;
-  return service;
+  // It may have been subscribed before, to know where it is or when it was another one.
+  if (!service->accepts()) return service;
+  leave(*service);
+  return Failure{Status::not_found,
+                 "cannot subscribe to '" + full_name + "': it takes data and gives none; send to it"};
 }
 
 void ServiceTable::unsubscribe(SubscribedService& service) {
   const MutexLock turn(asking_);
+  leave(service);
+}
+
+void ServiceTable::leave(SubscribedService& service) {
   if (--service.handles != 0) return;
   {
     const MutexLock lock(mutex_);
@@ -182,8 +190,8 @@ void ServiceTable::unsubscribe(SubscribedService& service) {
   }
   static_cast<void>(nif_unsubscribe(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
   const MutexLock lock(mutex_);
-  service.on_group(0);
   service.place = {};
+  service.on_place({});
   end_groups(service);
 }
 
@@ -239,7 +247,9 @@ ServiceTable::Place ServiceTable::on_subscribers(std::uint32_t group, std::size_
   return Place::found;
 }
 
-ServiceTable::Place ServiceTable::on_service_moved(const std::string& full_name, const ServicePlace& place) {
+ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
+  const std::string full_name = moved.text;
+  const ServicePlace place{moved.group, {moved.message_type, moved.instance}, moved.direction == NIF_ACCEPTS};
   {
     const MutexLock lock(mutex_);
     if (open_ != 0) return Place::not_yet;

@@ -61,7 +61,7 @@ class ServiceTable {
   };
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Place on_service_moved(const std::string& full_name, const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);
   /// `unknown`: nor is one of an earlier service of that name, which had `former`.
   struct OwnMove {
     std::uint32_t former = 0;
@@ -85,6 +85,7 @@ class ServiceTable {
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms)
       GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void leave(SubscribedService& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void set_place(SubscribedService& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
   void end_groups(SubscribedService& service) GIMNET_REQUIRES(mutex_);
   void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);

@@ -6,15 +6,23 @@ namespace gimnet::gimi {
 
 bool SubscribedService::exists() {
   const MutexLock lock(mutex_);
-  return group_ != 0;
+  return exists_;
+}
+
+bool SubscribedService::accepts() {
+  const MutexLock lock(mutex_);
+  return accepts_;
 }
 
 Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
   const std::int64_t deadline = deadline_after(timeout);
   const MutexLock lock(mutex_);
-  while (group_ == 0) {
+  while (!exists_) {
     if (end_) return end_.failure("wait for " + *name_);
-    if (is_over(deadline)) return Failure{Status::timeout, "nobody provides " + *name_ + " yet"};
+    if (is_over(deadline)) {
+      return Failure{Status::timeout, accepts_ ? *name_ + " takes data and gives none; send to it"
+                                               : "nobody provides " + *name_ + " yet"};
+    }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
   return {};
@@ -39,9 +47,10 @@ void SubscribedService::on_message(std::uint32_t from, std::uint32_t sequence) {
   sequence_ = sequence;
 }
 
-void SubscribedService::on_group(std::uint32_t group) {
+void SubscribedService::on_place(const ServicePlace& now) {
   const MutexLock lock(mutex_);
-  group_ = group;
+  exists_ = now.group != 0 && !now.accepts;
+  accepts_ = now.group != 0 && now.accepts;
   changed_.notify_all();
 }
 

@@ -25,7 +25,10 @@ class SubscribedService {
   [[nodiscard]] const std::string& name() const { return *name_; }
   [[nodiscard]] MessageQueue& queue() const { return queue_; }
 
+  /// There is a provider.
   [[nodiscard]] bool exists() GIMNET_EXCLUDES(mutex_);
+  /// There is one who takes data under that name: nothing will come.
+  [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
 
@@ -33,8 +36,7 @@ class SubscribedService {
   [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   /// One of its messages is in the queue.
   void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
-  /// 0: there is no provider.
-  void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
   /// Handles of the program that read it; guarded by the table's asking mutex.
@@ -54,7 +56,8 @@ class SubscribedService {
 
   Mutex mutex_;
   Condition changed_;
-  std::uint32_t group_ GIMNET_GUARDED_BY(mutex_) = 0;
+  bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
   std::uint32_t provider_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -319,6 +319,7 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
       record->incoming.message_type = answer->message_type;
       record->incoming.instance = answer->instance;
       record->incoming.delivery = static_cast<std::uint32_t>(answer->delivery);
+      record->incoming.direction = static_cast<std::uint32_t>(answer->direction);
     }
     events_.push_back(item_of(record, full_name.size()));
   }

@@ -264,6 +264,7 @@ void Inbound::add_moved(const proto::ns::ServiceMoved& event, GroupId from, Grou
   record->incoming.message_type = event.message_type;
   record->incoming.instance = event.instance;
   record->incoming.delivery = static_cast<std::uint32_t>(event.delivery);
+  record->incoming.direction = static_cast<std::uint32_t>(event.direction);
   add_record(record, event.name.size());
 }
 

@@ -251,9 +251,13 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
       return status;
     }
     if (subscription != nullptr) {
-      *subscription = {answer.group.value(), answer.message_type,
-                       answer.instance,      static_cast<std::uint32_t>(answer.delivery),
-                       answer.window,        answer.retain ? 1u : 0u};
+      *subscription = {answer.group.value(),
+                       answer.message_type,
+                       answer.instance,
+                       static_cast<std::uint32_t>(answer.delivery),
+                       answer.window,
+                       answer.retain ? 1u : 0u,
+                       static_cast<std::uint32_t>(answer.direction)};
     }
     return NIF_OK;
   });

@@ -109,6 +109,7 @@ proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
   event.delivery = static_cast<ns::Delivery>(effect.delivery);
   event.window = effect.window;
   event.retain = effect.retain;
+  event.direction = static_cast<ns::Direction>(effect.direction);
   event.again = effect.again;
   for (const std::uint32_t group : effect.between) event.between.push_back(group_id(group));
   return proto::encode(event);

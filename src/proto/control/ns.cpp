@@ -292,6 +292,7 @@ void SubscribeAnswer::write(bitestream::Writer& writer) const {
   put_choice(writer, 7, delivery);
   if (window != 0) writer.put_u32(8, window);
   if (retain) writer.put_bool(9, retain);
+  if (direction != Direction::provides) put_choice(writer, 10, direction);
 }
 SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   SubscribeAnswer answer;
@@ -301,6 +302,7 @@ SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   answer.delivery = read_choice<Delivery>(fields, 7, "delivery");
   answer.window = fields.number<std::uint32_t>(8, "window", 0);
   answer.retain = fields.flag(9, "retain", false);
+  answer.direction = read_choice<Direction>(fields, 10, "direction");
   return answer;
 }
 
@@ -338,6 +340,7 @@ void ServiceMoved::write(bitestream::Writer& writer) const {
   if (retain) writer.put_bool(10, retain);
   if (again) writer.put_bool(11, again);
   for (const GroupId group : between) writer.put_u32(kBetweenKey, group.value());
+  if (direction != Direction::provides) put_choice(writer, 13, direction);
 }
 ServiceMoved ServiceMoved::read(Fields& fields) {
   ServiceMoved moved;
@@ -351,6 +354,7 @@ ServiceMoved ServiceMoved::read(Fields& fields) {
   moved.retain = fields.flag(10, "retain", false);
   moved.again = fields.flag(11, "told again", false);
   moved.between = read_between(fields);
+  moved.direction = read_choice<Direction>(fields, 13, "direction");
   return moved;
 }
 

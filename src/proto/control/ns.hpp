@@ -250,6 +250,7 @@ struct SubscribeAnswer {
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
   std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
   bool retain = false;
+  Direction direction = Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static SubscribeAnswer read(Fields& fields);
   friend bool operator==(const SubscribeAnswer&, const SubscribeAnswer&) = default;
@@ -291,6 +292,7 @@ struct ServiceMoved {
   bool retain = false;
   bool again = false;              ///< told at a return: the node may have heard of it before its connection ended
   std::vector<GroupId> between{};  ///< that the service had meanwhile, in order; messages of them may still come
+  Direction direction = Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServiceMoved read(Fields& fields);
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;

@@ -216,15 +216,43 @@ TEST_F(Services, ASenderFollowsAServiceToItsNodesNewName) {
 TEST_F(Services, ReadingAndSendingToOneServiceDoNotDisturbEachOther) {
   const Node viewer = join();
   const Node robot = join("robot");
-  const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
   std::optional<Subscription> subscription = viewer.subscribe("robot/drive").or_throw();
+  const Queue commands = robot.accept("drive", accepting({5, 0})).or_throw();
   const Sender drive = viewer.sender_to_service("robot/drive", synchronized(1)).or_throw();
   subscription.reset();
   drive.send("1").or_throw();
   drive.settle(kWait).or_throw();
   EXPECT_EQ(viewer.services("robot/drive").or_throw().at(0).subscribers, 1u) << "it is followed";
-  const Subscription again = viewer.subscribe("robot/drive").or_throw();
-  EXPECT_TRUE(again.exists());
+  EXPECT_TRUE(viewer.subscribe("robot/drive").is(Status::not_found));
+  EXPECT_EQ(viewer.services("robot/drive").or_throw().at(0).subscribers, 1u) << "it still is";
+  drive.send("2").or_throw();
+  drive.settle(kWait).or_throw();
+}
+
+TEST_F(Services, OnlyWhatGivesDataCanBeSubscribed) {
+  const Node viewer = join();
+  const Subscription early = viewer.subscribe("robot/drive").or_throw();
+  std::optional<Node> robot = join("robot");
+  ASSERT_TRUE(robot->accept("drive", accepting({5, 0})));
+  EXPECT_TRUE(eventually([&] { return early.accepts(); }));
+  EXPECT_FALSE(early.exists());
+  const auto waited = early.wait_until_exists(Timeout{1});
+  ASSERT_TRUE(waited.is(Status::timeout));
+  EXPECT_EQ(waited.failure().sentence, "robot/drive takes data and gives none; send to it");
+  const Node late = join();
+  const auto refused = late.subscribe("robot/drive");
+  ASSERT_TRUE(refused.is(Status::not_found));
+  EXPECT_EQ(refused.failure().sentence, "cannot subscribe to 'robot/drive': it takes data and gives none; send to it");
+  EXPECT_TRUE(eventually([&] { return viewer.services("robot/drive").or_throw().at(0).subscribers == 1; }));
+  // It may become one that provides.
+  robot.reset();
+  robot = join("robot");
+  const Publisher drive = robot->advertise("drive").or_throw();
+  early.wait_until_exists(kWait).or_throw();
+  EXPECT_FALSE(early.accepts());
+  drive.wait_for_subscribers(1, kWait).or_throw();
+  drive.publish("gives").or_throw();
+  EXPECT_EQ(early.receive(kWait)->text(), "gives");
 }
 
 TEST_F(Services, AreRefusedWithWords) {

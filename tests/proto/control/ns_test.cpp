@@ -42,6 +42,9 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   paced.window = 1;
   paced.retain = true;
   expect_answer("ns/subscribe_paced_answer", 13, paced);
+  SubscribeAnswer accepting{kGroup, 3};
+  accepting.direction = Direction::accepts;
+  expect_answer("ns/subscribe_accepting_answer", 14, accepting);
   expect_request("ns/unsubscribe", 8, Unsubscribe{"robot/odom"});
   expect_answer("ns/unsubscribe_answer", 8, UnsubscribeAnswer{});
 }
@@ -67,6 +70,9 @@ TEST(NsMessages, EventsAreAsTheVectorsSay) {
       "ns/service_moved_again", 0,
       ServiceMoved{
           "robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest, 0, false, true, {GroupId{0x00700008}}});
+  ServiceMoved accepting{"robot/cmd", GroupId{}, GroupId{0x00700006}, 3};
+  accepting.direction = Direction::accepts;
+  expect_request("ns/service_moved_accepting", 0, accepting);
   SubscriberJoined joined;
   joined.group = kGroup;
   joined.node = kNode;

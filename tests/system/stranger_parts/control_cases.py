@@ -43,6 +43,20 @@ class Names(Case):
         self.assertEqual((left[3], left[4], left.get(5, 0)), (group, viewer.id, 0))
         robot.ask(NS, 8, u32(3, group))
 
+    def test_a_subscriber_is_told_that_a_service_takes_data(self):
+        hub = self.hub()
+        viewer, robot = self.stranger(hub), self.stranger(hub, "robot")
+        self.assertEqual(viewer.subscribe("robot/drive")[3], 0)
+        group = robot.advertise("drive", direction=put(6, U8, 1))[3]
+        moved = viewer.event(32)
+        self.assertEqual((moved[5], moved[13]), (group, 1))
+        answer = viewer.subscribe("robot/drive")
+        self.assertEqual((answer[3], answer[10]), (group, 1))
+        group = robot.advertise("drive", direction=put(6, U8, 0))[3]
+        moved = viewer.event(32)
+        self.assertEqual((moved[5], moved.get(13, 0)), (group, 0))
+        self.assertNotIn(10, viewer.subscribe("robot/drive"))
+
     def test_refusals(self):
         hub = self.hub()
         nameless, robot = self.stranger(hub), self.stranger(hub, "robot")

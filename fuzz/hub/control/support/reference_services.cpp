@@ -223,6 +223,7 @@ void Reference::on_subscribe(const Asked& asked) {
     due.instance = offer.instance;
     due.delivery = offer.delivery;
     due.retain = offer.retain;
+    due.direction = offer.direction;
     if (const auto pace = pace_of(topic, asked.id)) due.window = pace->window;
   }
   FUZZ_MUST(*answer == due);

@@ -162,6 +162,7 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
           answer.instance = service->terms.instance;
           answer.delivery = static_cast<ns::Delivery>(service->terms.delivery);
           answer.retain = service->terms.retain;
+          answer.direction = static_cast<ns::Direction>(service->terms.direction);
           if (const auto pace = (*topic)->pace_of(request.session.index)) answer.window = pace->window;
         }
         return answer;

@@ -57,6 +57,7 @@ struct ServiceMovedDue {
   std::uint8_t delivery = 0;
   std::uint32_t window = 0;
   bool retain = false;
+  std::uint8_t direction = 0;
   std::uint64_t move = 0;  ///< numbers the moves of a hub's services: that one and those before it
   // Told once more, to a node that came back
   bool again = false;

@@ -23,6 +23,7 @@ ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t 
   event.instance = service.terms.instance;
   event.delivery = service.terms.delivery;
   event.retain = service.terms.retain;
+  event.direction = service.terms.direction;
   return event;
 }
 

@@ -126,6 +126,23 @@ TEST_F(ServiceRequestsTest, SubscribingTellsTheTerms) {
   EXPECT_EQ(later->message_type, 5u);
 }
 
+TEST_F(ServiceRequestsTest, SubscribersAreToldThatAServiceAcceptsData) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/drive"}));
+  shards.sent.clear();
+  for (const ns::Direction direction : {ns::Direction::accepts, ns::Direction::provides}) {
+    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "drive", .direction = direction}));
+    const auto told = proto::decode<ns::ServiceMoved>(payload_of(*shards.all<SendControlCommand>()[0]));
+    ASSERT_TRUE(told);
+    EXPECT_EQ(told->direction, direction);
+    const auto answer = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/drive"});
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->direction, direction);
+    shards.sent.clear();
+  }
+}
+
 TEST_F(ServiceRequestsTest, WithdrawingAndUnsubscribing) {
   const Node robot = join("robot");
   const Node viewer = join("viewer");
