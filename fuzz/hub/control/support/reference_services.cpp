@@ -66,6 +66,7 @@ void Reference::tell_moved(const std::string& full_name, std::uint32_t old_group
     event.instance = terms.instance;
     event.delivery = terms.delivery;
     event.retain = terms.retain;
+    event.direction = terms.direction;
     if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt) event.window = pace->window;
     const proto::Payload bytes = proto::encode(event);
     due_.emplace_back(subscriber, ns::ServiceMoved::kOperation,
