@@ -155,7 +155,18 @@ void IoShard::take_mail() {
   const auto before_taking = [this] {
     while (!commands_.empty()) take_commands();
   };
-  mailbox.drain(kMailPerTurn, before_taking, [this](const Mail& mail) { return reader_.take_mail(mail); });
+  // What waits is counted against the budget when it is flushed: a mailbox full of the smallest frames would go far
+  // beyond it before that.
+  std::uint64_t unflushed = 0;
+  mailbox.drain(kMailPerTurn, before_taking, [&](const Mail& mail) {
+    const bool goes_on = reader_.take_mail(mail);
+    unflushed += mail.size;
+    if (unflushed >= kReadBytesPerFlush) {
+      flush();
+      unflushed = 0;
+    }
+    return goes_on;
+  });
   mailbox.tell_room([this](ShardIndex sender) { state_.shared.wakers[sender.value()]->wake(); });
 }
 
