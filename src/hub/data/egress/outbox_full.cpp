@@ -30,25 +30,25 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
 }
 
 bool Outbox::close_message(const OpenMessage& message) {
+  // The latest first: it is the one that goes on.
   std::vector<OpenMessage>& open = lanes_->open_messages;
-  const auto found = std::ranges::find(open, message);
-  if (found == open.end()) return false;
-  open.erase(found);
+  const auto found = std::find(open.rbegin(), open.rend(), message);
+  if (found == open.rend()) return false;
+  open.erase(std::next(found).base());
   return true;
 }
 
 bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
   const OpenMessage message{NodeId{header.src}, entry.message_number};
   std::vector<OpenMessage>& open = lanes_->open_messages;
+  if (entry.complete ? close_message(message) : std::find(open.rbegin(), open.rend(), message) != open.rend())
+    return true;
   if (!entry.touched) {
-    // A number in use again: whatever was begun under it before does not go on.
-    close_message(message);
     if (entry.complete) return true;
     if (open.size() == kOpenMessagesMax) open.erase(open.begin());
     open.push_back(message);
     return true;
   }
-  if (entry.complete ? close_message(message) : std::ranges::find(open, message) != open.end()) return true;
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
