@@ -78,7 +78,7 @@ nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms) {
 
 nif_status nif_watch_taken(nif_node* node, uint32_t watch) {
   return with_node(node, [&](Node& found) -> nif_status {
-    found.watches().taken(watch, 1);
+    found.watches().taken(watch);
     return NIF_OK;
   });
 }

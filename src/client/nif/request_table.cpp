@@ -27,8 +27,15 @@ nif_status closed() { return fail(NIF_CLOSED, "the handle was closed"); }
 
 }  // namespace
 
+/// As the hub counts them: what was answered or broke is none to it, though its caller has not seen that yet.
+std::size_t RequestTable::unanswered() const {
+  return static_cast<std::size_t>(std::ranges::count_if(open_, [](const auto& entry) {
+    return entry.second.state == State::waiting || entry.second.state == State::abandoned;
+  }));
+}
+
 std::optional<std::uint16_t> RequestTable::reserve(proto::Kind kind, std::uint16_t operation, Handler handler) {
-  if (open_.size() >= proto::kOpenRequestsMax) return std::nullopt;
+  if (unanswered() >= proto::kOpenRequestsMax) return std::nullopt;
   do {
     ++last_number_;
   } while (last_number_ == proto::kNoRequest || open_.contains(last_number_));
@@ -73,13 +80,12 @@ nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& a
 nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payload, proto::Payload& answer,
                                   Deadline deadline, bool& again) {
   std::uint16_t number = 0;
-  {
-    const MutexLock lock(mutex_);
-    const nif_status status = wait_for_number(kind, operation_of(payload), deadline, number);
-    if (status != NIF_OK) return status;
-  }
-  const bool posted = outbound_.post(request_frame(kind, payload, number));
+  // Until it is posted, so that a break comes before both or behind both: what went out behind it would be counted by
+  // the next hub, and not here.
   const MutexLock lock(mutex_);
+  const nif_status status = wait_for_number(kind, operation_of(payload), deadline, number);
+  if (status != NIF_OK) return status;
+  const bool posted = outbound_.post(request_frame(kind, payload, number));
   if (posted) return wait_for_answer(number, answer, deadline, again);
   open_.erase(number);
   again = true;
@@ -100,20 +106,12 @@ nif_status RequestTable::ask(proto::Kind kind, const proto::Payload& payload, pr
 }
 
 bool RequestTable::ask_later(proto::Kind kind, const proto::Payload& payload, Handler handler) {
-  std::optional<std::uint16_t> number;
-  {
-    const MutexLock lock(mutex_);
-    number = reserve(kind, operation_of(payload), std::move(handler));
-  }
+  const MutexLock lock(mutex_);  // until it is posted, as in ask_once()
+  const std::optional<std::uint16_t> number = reserve(kind, operation_of(payload), std::move(handler));
   if (!number) return false;
   if (outbound_.post(request_frame(kind, payload, *number))) return true;
-  const MutexLock lock(mutex_);
   open_.erase(*number);
   return false;
-}
-
-void RequestTable::tell(proto::Kind kind, const proto::Payload& payload) {
-  static_cast<void>(outbound_.post(request_frame(kind, payload, proto::kNoRequest)));
 }
 
 bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer) {
@@ -128,7 +126,7 @@ bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer)
     if (found == open_.end()) return false;
     Open& open = found->second;
     const bool matches = open.kind == kind && (open.operation | proto::kAnswerBit) == answer.header.operation;
-    // A broken one still belongs to the call that asked: it was posted anew behind the break, and asks once more.
+    // A broken one is the call's that asked, which asks once more under another number.
     if (!matches || open.state == State::answered || open.state == State::broken) return false;
     if (open.state == State::waiting && !open.handler) {
       open.state = State::answered;

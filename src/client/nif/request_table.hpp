@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -12,9 +13,10 @@
 
 namespace gimnet::nif {
 
-/// Matches the hub's answers with the requests that wait for them. At most 64 are under way; further callers wait.
-/// A caller that waits no longer leaves its number taken until the answer or the end of the connection.
-/// Thread safety: ask() from any thread but the library's; the rest from the library's.
+/// Matches the hub's answers with the requests that wait for them. At most proto::kOpenRequestsMax are unanswered, all
+/// of them counted, since the hub closes who asks more; further callers wait. A caller that waits no longer leaves its
+/// number taken until the answer or the end of the connection. Thread safety: ask() from any thread but the library's;
+/// ask_later() from any; the rest from the library's.
 class RequestTable {
  public:
   explicit RequestTable(Outbound& outbound) : outbound_(outbound) {}
@@ -24,14 +26,11 @@ class RequestTable {
   [[nodiscard]] nif_status ask(proto::Kind kind, const proto::Payload& payload, proto::Payload& answer,
                                Deadline deadline) GIMNET_EXCLUDES(mutex_);
 
-  /// Gets the answer on the library's thread; not called when the connection breaks first.
+  /// Gets the answer on the library's thread; not called when the connection breaks first. Not empty.
   using Handler = std::function<void(const proto::Payload& answer)>;
   /// False: no number is free, or not connected.
   [[nodiscard]] bool ask_later(proto::Kind kind, const proto::Payload& payload, Handler handler)
       GIMNET_EXCLUDES(mutex_);
-
-  /// Sends a request whose answer nobody waits for: it has number 0. Nothing happens while not connected.
-  void tell(proto::Kind kind, const proto::Payload& payload);
 
   /// False: nobody asked for it.
   bool on_answer(proto::Kind kind, const proto::ControlView& answer) GIMNET_EXCLUDES(mutex_);
@@ -50,6 +49,7 @@ class RequestTable {
     Handler handler;
   };
 
+  [[nodiscard]] std::size_t unanswered() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::optional<std::uint16_t> reserve(proto::Kind kind, std::uint16_t operation, Handler handler)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status ask_once(proto::Kind kind, const proto::Payload& payload, proto::Payload& answer,

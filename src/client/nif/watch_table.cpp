@@ -60,7 +60,7 @@ ns::Watch WatchTable::add(std::string pattern, std::uint8_t subjects, bool by_ha
   request.watch = last_number_;
   request.pattern = std::move(pattern);
   request.subjects = subjects;
-  watches_.emplace(last_number_, Watch{request, by_hand, false});
+  watches_.emplace(last_number_, Watch{.request = request, .by_hand = by_hand});
   return request;
 }
 
@@ -81,13 +81,34 @@ bool WatchTable::remove(std::uint32_t number) {
 bool WatchTable::on_events(const ns::WatchEvents& events) {
   bool by_hand = false;
   const bool wanted = follows(events, by_hand);
-  if (!wanted || !by_hand) taken(events.watch, 1);
+  if (!wanted || !by_hand) taken(events.watch);
   return wanted;
 }
 
-void WatchTable::taken(std::uint32_t number, std::uint32_t frames) {
-  // Nobody waits for the answer: request number 0 belongs to no one.
-  requests_.tell(proto::Kind::ns, proto::encode(ns::WatchTaken{number, frames}));
+bool WatchTable::tell_taken(std::uint32_t number, std::uint32_t frames) {
+  // It is a request like all others to the hub, so it has a number that is counted until the answer, which says
+  // nothing.
+  return requests_.ask_later(proto::Kind::ns, proto::encode(ns::WatchTaken{number, frames}),
+                             [](const proto::Payload&) {});
+}
+
+void WatchTable::taken(std::uint32_t number) {
+  const MutexLock lock(mutex_);
+  const auto found = watches_.find(number);
+  // Of a watch that ended here and not yet at the hub: where no number is free, the hub may go without.
+  if (found == watches_.end()) return static_cast<void>(tell_taken(number, 1));
+  Watch& watch = found->second;
+  ++watch.untold;
+  if (tell_taken(number, watch.untold)) watch.untold = 0;
+}
+
+void WatchTable::tell_all_taken() {
+  const MutexLock lock(mutex_);
+  for (auto& [number, watch] : watches_) {
+    if (watch.untold == 0) continue;
+    if (!tell_taken(number, watch.untold)) return;
+    watch.untold = 0;
+  }
 }
 
 bool WatchTable::follows(const ns::WatchEvents& events, bool& by_hand) {
@@ -119,13 +140,17 @@ void WatchTable::declare_again() {
   due_.clear();
   {
     const MutexLock lock(mutex_);
-    for (const auto& [number, watch] : watches_) due_.push_back(number);
+    for (auto& [number, watch] : watches_) {
+      due_.push_back(number);
+      watch.untold = 0;  // what was under way ended with the connection
+    }
   }
   go_on();
 }
 
 void WatchTable::go_on() {
   while (!due_.empty() && declare(due_.front())) due_.pop_front();
+  tell_all_taken();
 }
 
 bool WatchTable::declare(std::uint32_t number) {

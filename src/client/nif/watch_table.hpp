@@ -27,8 +27,9 @@ class WatchTable {
   /// False: there is none.
   bool remove(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
-  /// So many frames of that watch were taken: the hub may send more. Any thread.
-  void taken(std::uint32_t number, std::uint32_t frames);
+  /// One more frame of that watch was taken: the hub may send another. It is told later where numbers for requests are
+  /// short. Any thread.
+  void taken(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
   /// What the hub told. True: the program is to have it; false: it is of no watch, or behind a gap, after which the
   /// watch begins anew.
@@ -46,8 +47,11 @@ class WatchTable {
     proto::ns::Watch request;  ///< with the epoch and version that were told last
     bool by_hand = false;      ///< the program says what it took
     bool has_begun = false;    ///< false: what comes is of an earlier life of it, or behind a gap
+    std::uint32_t untold = 0;  ///< frames taken of which the hub is still to be told
   };
   [[nodiscard]] bool follows(const proto::ns::WatchEvents& events, bool& by_hand) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool tell_taken(std::uint32_t number, std::uint32_t frames);
+  void tell_all_taken() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
   void on_answer(std::uint32_t number, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
 

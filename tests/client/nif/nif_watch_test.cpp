@@ -112,8 +112,61 @@ TEST(NifWatch, DeliversWhatIsToldAndAcknowledgesIt) {
         ASSERT_TRUE(taken);
         EXPECT_EQ(taken->watch, request->watch);
         EXPECT_EQ(taken->frames, 1u);
-        EXPECT_EQ(number, 0) << "nobody waits for an answer";
+        EXPECT_NE(number, 0) << "its answer is waited for before the hub's limit is used up";
       });
+}
+
+/// One WATCH_EVENTS with a change behind that version, or, from 0, the begin.
+ns::WatchEvents change_behind(std::uint32_t watch, std::uint64_t version) {
+  ns::WatchEvents events;
+  events.watch = watch;
+  events.epoch = 5;
+  events.after = version;
+  events.version = version + 1;
+  events.changes.resize(1);
+  events.changes[0].kind = version == 0 ? ns::ChangeKind::begin : ns::ChangeKind::left;
+  return events;
+}
+
+void expect_watched(nif_node* node) {
+  nif_incoming in{};
+  ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
+  EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_WATCHED));
+  nif_release(&in);
+}
+
+// The hub counts each WATCH_TAKEN until it has answered it, and closes whoever has more unanswered than 64.
+TEST(NifWatch, WhatItTookCountsAmongTheRequestsThatTheHubHasNotAnswered) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  std::uint32_t watch = 0;
+  std::uint16_t number = 0;
+  converse([&] { ASSERT_EQ(nif_watch(node, nullptr, NIF_WATCH_ALL, &watch, NIF_FOREVER), NIF_OK); },
+           [&] {
+             ASSERT_TRUE(connected.hub.next_request<ns::Watch>(number));
+             connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WatchAnswer{true}, number));
+           });
+  for (std::size_t i = 0; i < proto::kOpenRequestsMax; ++i) {
+    std::uint32_t id = 0;
+    ASSERT_EQ(nif_resolve(node, ("robot-" + std::to_string(i)).c_str(), &id, 0), NIF_TIMEOUT);
+    ASSERT_TRUE(connected.hub.next_request<ns::Resolve>(number));
+  }
+  for (std::uint64_t version = 0; version < 3; ++version) {
+    connected.hub.send_control(proto::Kind::ns, proto::encode(change_behind(watch, version)));
+    expect_watched(node);
+  }
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
+  const auto taken = connected.hub.next_request<ns::WatchTaken>(number);
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(taken->watch, watch);
+  EXPECT_EQ(taken->frames, 3u) << "none of them was told while 64 requests waited";
+  connected.hub.send_control(proto::Kind::ns, proto::encode(change_behind(watch, 3)));
+  expect_watched(node);
+  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WatchTakenAnswer{}, number));
+  const auto next = connected.hub.next_request<ns::WatchTaken>(number);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->frames, 1u);
 }
 
 }  // namespace
