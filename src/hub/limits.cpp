@@ -8,6 +8,7 @@
 
 #include "base/log.hpp"
 #include "base/suggest.hpp"
+#include "proto/control/control_message.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -89,7 +90,8 @@ constexpr std::array kTable{
               "waiting from one shard to another"},
     LimitInfo{"mailbox_bytes", "bytes", &Limits::mailbox_bytes, 256 * kKiB, 16 * kGiB,
               "waiting from one shard to another"},
-    LimitInfo{"requests", "requests", &Limits::requests, 1, 65'536, "unanswered control requests of one node", true},
+    LimitInfo{"requests", "requests", &Limits::requests, proto::kOpenRequestsMax, 65'536,
+              "unanswered control requests of one node, WATCH_TAKEN among them; nodes count on the least", true},
     LimitInfo{"declarations_per_s", "declarations/s", &Limits::declarations_per_s, 1, 1'000'000,
               "names, services and subscriptions that one node may begin or change; repeating them is free", true},
     LimitInfo{"declarations_burst", "declarations", &Limits::declarations_burst, 1, 10'000'000,

@@ -5,6 +5,8 @@
 
 #include <set>
 
+#include "proto/control/control_message.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -40,6 +42,15 @@ TEST(Limits, EachTakesItsLeastAndMostAndNothingBeyond) {
     }
     EXPECT_EQ(limits.*limit.field, limit.least);
   }
+}
+
+// docs/protocol.md, section 8: no WELCOME says less, so a node may always have so many unanswered.
+TEST(Limits, RequestsAreNeverFewerThanEveryNodeMayAsk) {
+  Limits limits;
+  ASSERT_NE(find_limit("requests"), nullptr);
+  EXPECT_EQ(find_limit("requests")->least, proto::kOpenRequestsMax);
+  EXPECT_EQ(set_limit(limits, "requests=64"), "");
+  EXPECT_THAT(set_limit(limits, "requests=63"), HasSubstr("64 to 65536"));
 }
 
 TEST(Limits, SuffixesArePowersOf1024) {

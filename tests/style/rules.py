@@ -27,7 +27,7 @@ MAY_INCLUDE = {
     "base": _BASE,
     "proto": _PROTO,
     "hub/limits.hpp": _BASE,
-    "hub/limits.cpp": _BASE + ("hub/limits.hpp",),
+    "hub/limits.cpp": _PROTO + ("hub/limits.hpp",),
     "hub/observe/counters.hpp": _PROTO,
     "hub/observe/session_gauges.hpp": _PROTO + ("hub/observe/counters.hpp",),
     "hub/observe/counters.cpp": _PROTO + ("hub/observe/counters.hpp",),

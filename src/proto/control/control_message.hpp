@@ -31,7 +31,7 @@ inline constexpr std::size_t kControlHeaderSize = 4;
 inline constexpr std::uint16_t kAnswerBit = 0x8000;
 /// Request number of events, and of everything in LINK frames.
 inline constexpr std::uint16_t kNoRequest = 0;
-/// Requests of one node that may be unanswered.
+/// Requests of one node that may be unanswered at every hub; one may be set to take more.
 inline constexpr std::size_t kOpenRequestsMax = 64;
 
 enum class Status : std::uint16_t {

@@ -49,7 +49,7 @@ class Endings(Case):
         self.assertEqual(self.goodbye(made), 14)
 
     def test_more_requests_than_may_wait(self):
-        made = self.stranger(self.hub("--limit", "requests=1", *PATIENT))
+        made = self.stranger(self.hub(*PATIENT))
         ask = struct.pack("<HH", 5, 1)
         request = struct.pack("<IIIBBBB", len(ask), 0, made.id, NS, 0, 0, 1) + ask
         deadline = time.monotonic() + made.patience_s
