@@ -20,7 +20,9 @@ void RetainedFrames::written(FrameRun run, bool keep) {
   if (!keep) return;
   frames_ += run.frames;
   bytes_ += run.size();
-  const bool extends = !runs_.empty() && runs_.back().chunk == run.chunk && runs_.back().end == run.begin;
+  // Not across lanes: without a resume each run goes back into its own.
+  const bool extends = !runs_.empty() && runs_.back().lane == run.lane && runs_.back().chunk == run.chunk &&
+                       runs_.back().end == run.begin;
   if (extends) {
     runs_.back().end = run.end;
     runs_.back().frames += run.frames;

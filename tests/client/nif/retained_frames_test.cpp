@@ -47,6 +47,24 @@ TEST(RetainedFrames, GivesBackWhatThePeerMissed) {
   EXPECT_EQ(retained.next_count(), 1u);
 }
 
+TEST(RetainedFrames, NeighboursOfOneLaneAreOneRunAndThoseOfTwoAreNot) {
+  RetainedFrames retained(1000);
+  FrameRun rest = run_of(4);
+  retained.written(rest.split(proto::kHeaderSize, 1), true);
+  retained.written(rest.split(proto::kHeaderSize, 1), true);
+  rest.lane = 3;
+  retained.written(rest.split(proto::kHeaderSize, 1), true);
+  rest.lane = 1;
+  retained.written(rest, true);
+  std::deque<FrameRun> again;
+  EXPECT_EQ(retained.take_after(0, again), 0u);
+  ASSERT_EQ(again.size(), 3u);
+  EXPECT_EQ(again[0].frames, 2u);
+  EXPECT_EQ(again[0].lane, 1u);
+  EXPECT_EQ(again[1].lane, 3u);
+  EXPECT_EQ(again[2].lane, 1u);
+}
+
 TEST(RetainedFrames, OnlyCountsWithoutResume) {
   RetainedFrames retained(1000);
   retained.written(run_of(4), false);

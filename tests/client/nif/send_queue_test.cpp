@@ -199,6 +199,22 @@ TEST(SendQueue, ANewEpochKeepsWhatWaitsUnderTheNewId) {
   EXPECT_FALSE(queue.confirm(2)) << "counts begin at 0";
 }
 
+/// Resumed, and broken again before what the hub had missed was written once more; then the hub has forgotten it all.
+TEST(SendQueue, ANewEpochAfterAResumeKeepsTheOrderOfEachLane) {
+  SendQueue queue({});
+  queue.set_resume(true);
+  put(queue, NIF_BACKGROUND, "behind");
+  static_cast<void>(write_all(queue));
+  put(queue, NIF_NORMAL, "first");  // right behind it in memory, and in the resume buffer
+  static_cast<void>(write_all(queue));
+  queue.disconnect();
+  ASSERT_EQ(queue.resume_from(0), 0u);
+  put(queue, NIF_NORMAL, "second");
+  queue.disconnect();
+  queue.restart(99);
+  EXPECT_EQ(payloads(write_all(queue)), (std::vector<std::string>{"first", "second", "behind"}));
+}
+
 TEST(SendQueue, DropsEverything) {
   SendQueue queue({});
   queue.set_resume(true);
