@@ -31,6 +31,9 @@ class Examples(unittest.TestCase):
         hub.again(self)
         wait_until(lambda: subscriber.out.count(b"\n") >= before + 3, "messages by the hub that was started anew")
         self.assertIsNone(publisher.popen.poll(), publisher.err)
+        # The hub is looked at when it is quiet.
+        publisher.signal(signal.SIGKILL)
+        publisher.wait()
 
     def test_a_question_has_its_answer(self):
         hub = Hub(self)
