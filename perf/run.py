@@ -35,7 +35,8 @@ SKIPPED = 77  # what ctest takes for a test that was left out
 
 
 def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    # ./dev looks for whole words in the same arguments.
+    parser = argparse.ArgumentParser(prog="./dev perf", description=__doc__, allow_abbrev=False)
     parser.add_argument("--quick", action="store_true", help="the scenarios that decide, in a few minutes")
     parser.add_argument("--smoke", action="store_true", help="every scenario for a second, with 200 clients for 10,000: nothing lost? not timed")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")

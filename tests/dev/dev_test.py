@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""./dev on a machine that lacks every package, where what it would install, build or run only says that it was called."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+COMMANDS = ("build", "test", "demo", "perf", "bench", "sim", "stress", "fuzz", "lint", "format", "asan", "tsan")
+# All that changes a machine or a tree.
+PROGRAMS = ("apt-get", "sudo", "env", "sh", "cmake", "ctest", "clang-format-19", "shellcheck", "rm", "mkdir")
+CALLED = '#!/bin/sh\necho "${0##*/} $*" >>"$DEV_TEST_CALLS"\n'
+
+
+class Door(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.calls = self.folder / "calls"
+        self.tree = self.folder / "tree"
+        self.programs = self.folder / "programs"
+        self.tree.mkdir()
+        self.programs.mkdir()
+        for entry in ROOT.iterdir():
+            if entry.name != "build":
+                (self.tree / entry.name).symlink_to(entry)
+        for name in PROGRAMS:
+            self.put_program(name, CALLED)
+        self.put_program("dpkg-query", "#!/bin/sh\nexit 1\n")
+
+    def put_program(self, name, text):
+        program = self.programs / name
+        program.write_text(text)
+        program.chmod(0o755)
+
+    def dev(self, *arguments):
+        """The finished process, and the calls of the programs."""
+        self.calls.write_text("")
+        interpreter = pathlib.Path(sys.executable).parent
+        environment = os.environ | {"PATH": f"{self.programs}:{interpreter}:/usr/bin:/bin", "DEV_TEST_CALLS": str(self.calls),
+                                    "PYTHONDONTWRITEBYTECODE": "1"}
+        process = subprocess.run([self.tree / "dev", *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                 timeout=60, env=environment, check=False)
+        return process, self.calls.read_text().splitlines()
+
+    def assert_refuses(self, *arguments, saying):
+        process, calls = self.dev(*arguments)
+        self.assertEqual(process.returncode, 2, process.stderr)
+        self.assertIn(saying, process.stderr)
+        self.assertEqual(process.stdout, "")
+        self.assertEqual(calls, [])
+
+    def test_help_installs_and_builds_nothing(self):
+        for command in COMMANDS:
+            for arguments in ((command, "--help"), (command, "-h"), ("help", command)):
+                with self.subTest(arguments=arguments):
+                    process, calls = self.dev(*arguments)
+                    self.assertEqual((process.returncode, process.stderr), (0, ""))
+                    self.assertRegex(process.stdout, rf"^  ([a-z]+, )?{command}\b")
+                    self.assertEqual(calls, [])
+
+    def test_help_behind_other_arguments_is_help_all_the_same(self):
+        for arguments in (("perf", "--quick", "--help"), ("test", "-R", "x", "-h"), ("fuzz", "nif_receive", "--help")):
+            with self.subTest(arguments=arguments):
+                process, calls = self.dev(*arguments)
+                self.assertEqual((process.returncode, calls), (0, []))
+
+    def test_help_of_perf_tells_its_arguments(self):
+        process, _ = self.dev("perf", "--help")
+        self.assertIn("--instructions", process.stdout)
+        self.assertIn("usage: ./dev perf", process.stdout)
+
+    def test_every_command_has_a_line_of_help(self):
+        process, calls = self.dev("help")
+        self.assertEqual((process.returncode, calls), (0, []))
+        for command in COMMANDS:
+            self.assertRegex(process.stdout, rf"(?m)^  ([a-z]+, )?{command}\b")
+
+    def test_refuses_wrong_arguments_before_it_installs_or_builds(self):
+        self.assert_refuses("nonsense", saying="no command 'nonsense'")
+        self.assert_refuses("build", "--fast", saying="'--fast' is not a target")
+        self.assert_refuses("test", "router", saying="./dev test -R router")
+        self.assert_refuses("tsan", "router", saying="./dev tsan -R router")
+        self.assert_refuses("stress", "churn", saying="./dev stress -R churn")
+        self.assert_refuses("bench", "--benchmark_filter=x", saying="usage: ./dev bench")
+        self.assert_refuses("bench", "router", "mailbox", saying="usage: ./dev bench")
+        self.assert_refuses("fuzz", "nonsense", saying="no fuzz target 'nonsense'")
+        self.assert_refuses("fuzz", "nif_receive", "soon", saying="'soon' is not a number")
+        self.assert_refuses("fuzz", "nif_receive", "1", "2", saying="usage: ./dev fuzz")
+        self.assert_refuses("lint", "src", saying="lint takes no arguments")
+        self.assert_refuses("format", "src", saying="format takes no arguments")
+        self.assert_refuses("perf", "--fast", saying="unrecognized arguments: --fast")
+        self.assert_refuses("perf", "--hel", saying="unrecognized arguments: --hel")
+        self.assert_refuses("perf", "--only", "nonsense", saying="invalid choice: 'nonsense'")
+
+    def test_fuzz_without_a_target_lists_them(self):
+        process, calls = self.dev("fuzz")
+        self.assertEqual((process.returncode, calls), (2, []))
+        self.assertIn("nif_receive_fuzz", process.stdout.splitlines())
+
+    def test_perf_tells_packages_without_installing_them(self):
+        process, calls = self.dev("perf", "--only", "nats", "--quick", "--packages")
+        self.assertEqual((process.returncode, process.stdout.split(), calls), (0, ["nats-server"], []))
+
+    def test_gives_apt_nothing_but_names_of_packages(self):
+        for words, bad in (("usage: run.py [-h]", "usage:"), ("redis-server [-h]", "[-h]"), ("redis-server --purge", "--purge"),
+                           ("mosquitto-", "mosquitto-"), ("a? b", "a?"), ("~i", "~i"), ("Redis", "Redis")):
+            with self.subTest(words=words):
+                self.put_program("python3", f"#!/bin/sh\necho '{words}'\n")
+                self.assert_refuses("perf", "--quick", saying=f"'{bad}' is not the name of a Debian package")
+
+    def test_installs_what_is_missing(self):
+        # The programs say so, too: whoever asked for nothing above would have been seen.
+        process, calls = self.dev("build")
+        self.assertEqual(process.returncode, 0, process.stderr)
+        installs = [call for call in calls if " install " in call]
+        self.assertEqual(len(installs), 1, calls)
+        self.assertRegex(installs[0], r"--no-remove .*-- .*\blibboost1\.81-dev\b")
+        self.assertTrue([call for call in calls if call.startswith("cmake --build")], calls)
+
+
+if __name__ == "__main__":
+    unittest.main()
