@@ -9,11 +9,15 @@ namespace gimnet::hub {
 
 void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason) {
   tally_.drop(reason, frames);
-  const proto::FrameHeader header = proto::load_header(first);
-  if (!header.has(proto::kFlagReport) || header.kind == proto::Kind::report) return;
+  if (!wants_report(proto::load_header(first))) return;
   const std::byte* last = first;
   for (const std::byte* next = first; next < first + size; next += proto::load_header(next).frame_size()) last = next;
   remember(last, frames, reason);
+}
+
+void DropBook::drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason) {
+  tally_.drop(reason, frames);
+  if (wants_report(proto::load_header(start))) remember(start, frames, reason);
 }
 
 void DropBook::drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason) {

@@ -24,6 +24,9 @@ class DropBook {
   /// length.
   void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
 
+  /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT shows need be there.
+  void drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
+
   /// The same for frames with any headers.
   void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);
 
@@ -66,6 +69,9 @@ class DropBook {
     std::byte following[proto::kReportFollowingMax];
   };
 
+  [[nodiscard]] static bool wants_report(const proto::FrameHeader& header) {
+    return header.has(proto::kFlagReport) && header.kind != proto::Kind::report;
+  }
   void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
   /// Found by a table, since who drops much has many notes.
   [[nodiscard]] Note* find(NodeId sender, proto::DropReason reason);

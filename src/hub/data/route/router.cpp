@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstring>
 
+#include "hub/data/route/shared_list.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
@@ -11,15 +12,6 @@ namespace {
 /// From so many recipients on a shard on, a reference each beats a copy each, however small the frames are
 /// (bench/hub/data/fanout/fanout_bench.cpp).
 constexpr std::size_t kReferenceRecipients = 4;
-
-/// In a LIST frame on its way to other shards: not theirs. No shard's mark is 0.
-constexpr std::uint32_t kListedForNobody = 0;
-static_assert(kShardsMax < std::uint32_t{1} << (32 - kIndexBits));
-
-/// The same: the mark of the shard that is to see to that node.
-std::uint32_t listed_for(ShardIndex shard, NodeId node) {
-  return (std::uint32_t{shard.value()} + 1) << kIndexBits | index_of(node);
-}
 
 }  // namespace
 
@@ -198,52 +190,60 @@ void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool 
 
 /// A LIST frame while it goes to its recipients on this shard.
 struct Router::Listed {
-  Listed(const Run& run_, const proto::FrameHeader& header) : run(run_), ids_size(4 * header.dst), local(header) {
+  Listed(const Run& run_, const proto::FrameHeader& header, const SharedList& list_)
+      : run(run_), list(list_), local(header) {
     local.dst = 0;
-    local.length -= ids_size;
+    local.length -= list.bytes();
   }
   const Run& run;
-  const std::uint32_t ids_size;
+  const SharedList list;
   proto::FrameHeader local;  ///< as its recipients get it
   Run shared;                ///< header and payload without the ids, one for all, made when the first one needs it
 };
 
 void Router::to_list(const Run& run, const proto::FrameHeader& header, bool handed_over) {
   if (handed_over) return to_listed_here(run, header);
-  // Nobody else has the frame yet: each id makes room for whose business it is, for the other shards.
-  std::byte* ids = run.buffer->data + (run.bytes - run.buffer->data) + proto::kHeaderSize;
-  Listed listed(run, header);
+  // Nobody else has the frame yet: it is told in it whose business each id is, for the other shards.
+  std::byte* const frame = run.buffer->data + (run.bytes - run.buffer->data);
+  std::byte* const ids = frame + proto::kHeaderSize;
+  Listed listed(run, header, SharedList::find(ids, header.dst, hub_));
   std::uint64_t shards = 0;
   std::uint32_t outcomes = 0;
   deliveries_ += header.dst;
-  for (std::uint32_t i = 0; i < header.dst; ++i, ids += sizeof(std::uint32_t)) {
-    const NodeId node{load_le<std::uint32_t>(ids)};
-    const NodePlace place = place_of(node);
+  for (std::uint32_t i = listed.list.first; i < listed.list.end(); ++i) {
+    const NodeId node = SharedList::id_at(ids, i);
+    const NodePlace place = nodes_.find(index_of(node));
     if (place.exists() && place.shard != fanout_.self()) {
-      store_le(ids, listed_for(place.shard, node));
+      SharedList::mark(ids, i, node, place.shard);
       shards |= std::uint64_t{1} << place.shard.value();
       continue;
     }
-    store_le(ids, kListedForNobody);
     to_listed(listed, node, place);
     ++outcomes;
   }
-  // How many of them are there is not counted: no more than all.
-  to_other_shards(run, shards, header.dst, outcomes);
+  if (const std::uint32_t foreign = header.dst - listed.list.count; foreign != 0) {
+    drop_listed(listed, foreign, proto::DropReason::no_such_node);
+    outcomes += foreign;
+  }
+  if (shards != 0) {
+    store_le(frame + kDstOffset, listed.list.pack());
+    // How many of them are there is not counted: no more than all.
+    to_other_shards(run, shards, header.dst, outcomes);
+  }
   settle(run, outcomes);
 }
 
 /// The tables may have changed since another shard looked: what it left to this one is this one's to count, and
 /// nothing else.
 void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
-  const std::byte* ids = run.bytes + proto::kHeaderSize;
-  Listed listed(run, header);
+  const std::byte* const ids = run.bytes + proto::kHeaderSize;
+  Listed listed(run, header, SharedList::unpack(header.dst));
   std::uint32_t outcomes = 0;
-  deliveries_ += header.dst;
-  for (std::uint32_t i = 0; i < header.dst; ++i, ids += sizeof(std::uint32_t)) {
-    const auto mark = load_le<std::uint32_t>(ids);
-    const auto node = make_id<NodeId>(hub_, mark & kIndexMask);
-    if (mark != listed_for(fanout_.self(), node)) continue;
+  deliveries_ += listed.list.size;
+  for (std::uint32_t i = listed.list.first; i < listed.list.end(); ++i) {
+    const NodeId found = SharedList::id_at(ids, i);
+    const auto node = make_id<NodeId>(hub_, index_of(found));
+    if (found != SharedList::marked(node, fanout_.self())) continue;
     to_listed(listed, node, place_of(node));
     ++outcomes;
   }
@@ -255,10 +255,15 @@ inline void Router::to_listed(Listed& listed, NodeId node, const NodePlace& plac
   const bool here = place.exists() && place.shard == fanout_.self();
   Recipient* recipient = here ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
   if (recipient == nullptr) {
-    return drop(listed.run, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
+    return drop_listed(listed, 1, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
   }
-  if (listed.shared.frames == 0) listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.ids_size);
+  if (listed.shared.frames == 0) listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.list.bytes());
   fanout_.deliver(*recipient, listed.shared, listed.local, Handover{.fan_out = true});
+}
+
+void Router::drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason) {
+  const SharedList::FrameStart start = listed.list.as_sent(listed.run.bytes, hub_);
+  fanout_.context().drops.drop_start(start.data(), outcomes, reason);
 }
 
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over) {

@@ -93,6 +93,7 @@ class Router {
   void to_listed_here(const Run& run, const proto::FrameHeader& header);
   struct Listed;
   void to_listed(Listed& listed, NodeId node, const NodePlace& place);
+  void drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason);
   void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
   /// deliveries: at each of them.
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes);

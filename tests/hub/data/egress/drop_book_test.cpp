@@ -48,6 +48,26 @@ TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
   EXPECT_EQ(report->following.size(), 4u);
 }
 
+TEST(DropBook, CountsAFrameForEachOfItsRecipients) {
+  Tally tally;
+  DropBook book(tally, 10, 4'096);
+  auto start = EgressRig::bytes(std::string(proto::kReportFollowingMax, 'x'), {.flags = proto::kFlagReport});
+  store_le(start.data(), std::uint32_t{1'000'000});  // most of it is somewhere else
+  book.drop_start(start.data(), 3, DropReason::shard_full);
+  EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::shard_full)], 3u);
+  const auto sent = flush(book, 1'000);
+  ASSERT_EQ(sent.size(), 1u);
+  const auto report = proto::decode_report(sent[0].payload);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->count, 3u);
+  EXPECT_EQ(report->header.length, 1'000'000u);
+  EXPECT_EQ(report->following.size(), proto::kReportFollowingMax);
+  const auto quiet = EgressRig::bytes("quiet", {});
+  book.drop_start(quiet.data(), 2, DropReason::shard_full);
+  EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::shard_full)], 5u);
+  EXPECT_TRUE(flush(book, 2'000).empty());
+}
+
 // What is to be written again after a break may come from many senders, one behind the other.
 TEST(DropBook, ReportsEachOfFramesWithDifferentHeaders) {
   Tally tally;
