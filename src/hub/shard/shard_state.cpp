@@ -22,7 +22,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              .drops = drops,
              .signals = signals,
              .hub = hub_shared.hub},
-      fanout(index, hub_shared.mailboxes, recipients, egress),
+      fanout(index, hub_shared.mailboxes, recipients, egress, {hub_shared.hub, hub_shared.nodes, hub_shared.groups}),
       pacer(fanout),
       retained(hub_shared.groups, fanout, pacer),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),

@@ -1,15 +1,18 @@
 #include "hub/data/fanout/fanout.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <type_traits>
 
 #include "hub/data/egress/resume_buffer.hpp"
+#include "hub/data/route/shared_list.hpp"
 
 namespace gimnet::hub {
 
-Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context)
-    : self_(self), mailboxes_(std::move(mailboxes)), recipients_(recipients), context_(context) {
+Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context,
+               const ShardRecipients& elsewhere)
+    : self_(self), mailboxes_(std::move(mailboxes)), recipients_(recipients), context_(context), elsewhere_(elsewhere) {
   GIMNET_CHECK(mailboxes_.size() <= kShardsMax);
   stretches_.resize(mailboxes_.size());
 }
@@ -137,10 +140,22 @@ void Fanout::put_blocking_only(ShardIndex to, const Run& run) {
     if (block) {
       blocking = std::move(frame);
     } else {
-      context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::shard_full);
+      drop_for(to, frame);
     }
   }
   if (blocking.frames != 0) put(to, blocking);
+}
+
+void Fanout::drop_for(ShardIndex to, const Run& frame) {
+  const std::uint32_t recipients = elsewhere_.count(to, frame.bytes);
+  // The last of them may have left since the frame was handed over.
+  const std::uint32_t outcomes = std::max<std::uint32_t>(recipients, 1);
+  const auto reason = recipients == 0 ? proto::DropReason::no_subscriber : proto::DropReason::shard_full;
+  context_.tally.copies += outcomes - 1;
+  const proto::FrameHeader header = frame.header();
+  if (header.kind != proto::Kind::list) return context_.drops.drop_start(frame.bytes, outcomes, reason);
+  const auto start = SharedList::unpack(header.dst).as_sent(frame.bytes, elsewhere_.hub());
+  context_.drops.drop_start(start.data(), outcomes, reason);
 }
 
 void Fanout::put(ShardIndex to, const Run& run, std::uint32_t deliveries) {

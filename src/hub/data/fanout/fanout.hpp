@@ -6,6 +6,7 @@
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/fanout/mailbox.hpp"
 #include "hub/data/fanout/recipient.hpp"
+#include "hub/data/route/shard_recipients.hpp"
 
 namespace gimnet::hub {
 
@@ -14,7 +15,8 @@ namespace gimnet::hub {
 class Fanout {
  public:
   /// mailboxes: of all shards, by index.
-  Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context);
+  Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context,
+         const ShardRecipients& elsewhere);
 
   /// To one recipient here. Frames larger than it takes are dropped.
   void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
@@ -72,11 +74,14 @@ class Fanout {
   /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is not read until there
   /// is room; the rest is dropped.
   void put_blocking_only(ShardIndex to, const Run& run);
+  /// One frame: dropped for each of its recipients there.
+  void drop_for(ShardIndex to, const Run& frame);
 
   const ShardIndex self_;
   const std::vector<Mailbox*> mailboxes_;
   RecipientTable& recipients_;
   EgressContext& context_;
+  const ShardRecipients elsewhere_;
   std::vector<Stretch> stretches_;  ///< by shard
   std::uint64_t open_shards_ = 0;   ///< bit set of those with frames
   BufferRef lists_;                 ///< where LIST frames without their ids are put

@@ -31,13 +31,17 @@ void NodeTable::publish(std::uint32_t index, NodePlace place) {
                                  : place.slot.value();
   words_[index].store(word, std::memory_order_release);            // pairs with the acquire load in find()
   std::uint64_t shards = shards_.load(std::memory_order_relaxed);  // relaxed: this thread wrote it
-  if (before.exists() && --nodes_by_shard_[before.shard.value()] == 0) {
-    shards &= ~(std::uint64_t{1} << before.shard.value());
-  }
-  if (place.exists() && nodes_by_shard_[place.shard.value()]++ == 0) {
-    shards |= std::uint64_t{1} << place.shard.value();
-  }
+  if (before.exists() && change_count(before.shard, -1) == 0) shards &= ~(std::uint64_t{1} << before.shard.value());
+  if (place.exists() && change_count(place.shard, 1) == 1) shards |= std::uint64_t{1} << place.shard.value();
   shards_.store(shards, std::memory_order_relaxed);  // relaxed: see shards()
+}
+
+std::uint32_t NodeTable::change_count(ShardIndex shard, int change) {
+  std::atomic<std::uint32_t>& nodes = nodes_by_shard_[shard.value()];
+  // relaxed: this thread wrote it
+  const std::uint32_t count = nodes.load(std::memory_order_relaxed) + static_cast<std::uint32_t>(change);
+  nodes.store(count, std::memory_order_relaxed);  // relaxed: see nodes_on()
+  return count;
 }
 
 }  // namespace gimnet::hub

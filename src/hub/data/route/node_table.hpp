@@ -58,6 +58,10 @@ class NodeTable {
   [[nodiscard]] std::uint64_t shards() const {
     return shards_.load(std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
   }
+  /// How many nodes live on that shard.
+  [[nodiscard]] std::uint32_t nodes_on(ShardIndex shard) const {
+    return nodes_by_shard_[shard.value()].load(std::memory_order_relaxed);  // relaxed: as above
+  }
 
  private:
   static NodePlace unpack(std::uint64_t word) {
@@ -66,10 +70,13 @@ class NodeTable {
                      static_cast<std::uint32_t>(word >> 32)};
   }
 
+  /// Returns how many there are now.
+  std::uint32_t change_count(ShardIndex shard, int change);
+
   std::atomic<std::uint64_t>* words_;
   std::atomic<std::uint64_t> shards_{0};
   std::atomic<std::uint32_t> returns_below_{0};
-  std::array<std::uint32_t, kShardsMax> nodes_by_shard_{};  ///< the writer's
+  std::array<std::atomic<std::uint32_t>, kShardsMax> nodes_by_shard_{};
 };
 
 }  // namespace gimnet::hub

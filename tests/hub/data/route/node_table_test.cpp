@@ -27,15 +27,20 @@ TEST(NodeTable, KnowsTheShardsWithNodes) {
   table.publish(2, {ShardIndex{5}, ConnectionSlot{2}, 1});
   table.publish(3, {ShardIndex{5}, ConnectionSlot{3}, 1});
   EXPECT_EQ(table.shards(), 0b100001u);
+  EXPECT_EQ(table.nodes_on(ShardIndex{0}), 1u);
+  EXPECT_EQ(table.nodes_on(ShardIndex{5}), 2u);
+  EXPECT_EQ(table.nodes_on(ShardIndex{63}), 0u);
   table.publish(2, {});
   EXPECT_EQ(table.shards(), 0b100001u);
   table.publish(3, {ShardIndex{0}, ConnectionSlot{3}, 2});
   EXPECT_EQ(table.shards(), 1u);
   table.publish(3, {ShardIndex{0}, ConnectionSlot{3}, 2});
   table.publish(1, {});
+  EXPECT_EQ(table.nodes_on(ShardIndex{0}), 1u);
   table.publish(3, {});
   table.publish(3, {});
   EXPECT_EQ(table.shards(), 0u);
+  EXPECT_EQ(table.nodes_on(ShardIndex{0}), 0u);
 }
 
 TEST(NodeTable, KnowsWhoMayComeBack) {

@@ -16,7 +16,7 @@ class RouteRig {
       : egress(limits),
         mailbox_here(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         mailbox_there(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
-        fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context),
+        fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context, {HubId{7}, nodes, groups}),
         pacer(fanout),
         retained(groups, fanout, pacer),
         router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}

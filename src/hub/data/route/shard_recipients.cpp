@@ -1,0 +1,29 @@
+#include "hub/data/route/shard_recipients.hpp"
+
+#include "hub/data/route/shared_list.hpp"
+
+namespace gimnet::hub {
+
+std::uint32_t ShardRecipients::count(ShardIndex shard, const std::byte* frame) const {
+  const proto::FrameHeader header = proto::load_header(frame);
+  switch (header.kind) {
+    case proto::Kind::group:
+      return count_members(shard, GroupId{header.dst});
+    case proto::Kind::list:
+      return SharedList::unpack(header.dst).count_of(shard, frame + proto::kHeaderSize, hub_);
+    case proto::Kind::broadcast:
+      return nodes_.nodes_on(shard);  // its sender lives where it was taken in
+    default:
+      return 1;
+  }
+}
+
+std::uint32_t ShardRecipients::count_members(ShardIndex shard, GroupId group) const {
+  const GroupMembers* members = groups_.find(index_of(group));
+  if (members == nullptr) return 0;
+  std::size_t there = members->by_shard[shard.value()].size();
+  if (!members->paced_by_shard.empty()) there += members->paced_by_shard[shard.value()].size();
+  return static_cast<std::uint32_t>(there);
+}
+
+}  // namespace gimnet::hub

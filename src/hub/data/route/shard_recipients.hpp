@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/ids.hpp"
+#include "hub/data/route/group_table.hpp"
+#include "hub/data/route/node_table.hpp"
+
+namespace gimnet::hub {
+
+/// How many recipients a frame for another shard has there: what it counts as where that shard never gets it. Thread
+/// safety: one shard; the tables are published by the conductor.
+class ShardRecipients {
+ public:
+  ShardRecipients(HubId hub, const NodeTable& nodes, const GroupTable& groups)
+      : hub_(hub), nodes_(nodes), groups_(groups) {}
+
+  /// REQUIRES: a whole frame that the router handed over to that shard (of LIST: a SharedList).
+  [[nodiscard]] std::uint32_t count(ShardIndex shard, const std::byte* frame) const;
+
+  [[nodiscard]] HubId hub() const { return hub_; }
+
+ private:
+  [[nodiscard]] std::uint32_t count_members(ShardIndex shard, GroupId group) const;
+
+  const HubId hub_;
+  const NodeTable& nodes_;
+  const GroupTable& groups_;
+};
+
+}  // namespace gimnet::hub
