@@ -172,24 +172,27 @@ def measure(arguments: argparse.Namespace) -> int:
 
 
 def count_instructions(arguments: argparse.Namespace) -> int:
-    """The exit status: 1 where a script takes more than its budget allows, 77 (skipped) where none can be had."""
+    """The exit status: 1 where a script takes more than its budget allows or could not be counted, 77 (skipped) where no machine
+    like this could."""
     program = arguments.build_dir.resolve() / "bin" / "instruction_scripts"
     try:
         made_by, scripts = instructions.describe(program)
         budget = instructions.load_budget()
         if arguments.instructions:
+            instructions.require_script(arguments.instructions, scripts)
             per_frame, costs = instructions.count(program, arguments.instructions)
             for function, cost in costs.most_common(40):
                 say(f"{cost / sum(costs.values()):7.1%} {cost / sum(costs.values()) * per_frame:9.1f}  {function}")
             return 0
-        reason = None if arguments.update else instructions.why_incomparable(made_by, budget)
-        if reason is not None:
-            say(f"SKIPPED: {reason}")
-            return SKIPPED
+        if not arguments.update:
+            instructions.require_comparable(made_by, budget)
         verdicts = instructions.measure(program, scripts, budget)
-    except instructions.CountingError as error:
+    except instructions.NotCountable as error:
         say(f"SKIPPED: {error}")
         return SKIPPED
+    except instructions.CountingError as error:
+        say(f"error: {error}")
+        return 1
     say("\n".join(["instructions per frame:", *map(str, verdicts)]))
     if arguments.update:
         instructions.update_budget(made_by, verdicts)

@@ -44,7 +44,7 @@ def main() -> int:
             print(f"{script:16} {few:7}: {small:9.1f} a piece   {many:7}: {large:9.1f}   {large / small:5.2f} times")
             if large > small * times:
                 worse.append(script)
-    except instructions.CountingError as error:
+    except instructions.NotCountable as error:
         print(f"SKIPPED: {error}")
         return 77
     assert not worse, f"grow faster than they may: {', '.join(worse)}"

@@ -11,7 +11,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "perf"))
 
 from driver import instructions  # noqa: E402
-from driver.instructions import Verdict, own_costs, why_incomparable  # noqa: E402
+import growth_test  # noqa: E402
+import planted_slow_down_test  # noqa: E402
+import run  # noqa: E402
+from driver.instructions import CountingError, NotCountable, Verdict, own_costs, require_comparable  # noqa: E402
 
 PROFILE = """positions: line
 events: Ir
@@ -68,8 +71,9 @@ class Judging(unittest.TestCase):
 
     def test_another_compiler_is_not_compared(self):
         made_by = {"compiler": "12.2.0", "processor": "x86_64", "build": "release"}
-        self.assertIsNone(why_incomparable(made_by, {"made_by": made_by}))
-        self.assertIn("13.1.0", why_incomparable(made_by | {"compiler": "13.1.0"}, {"made_by": made_by}))
+        require_comparable(made_by, {"made_by": made_by})
+        with self.assertRaisesRegex(NotCountable, "13.1.0"):
+            require_comparable(made_by | {"compiler": "13.1.0"}, {"made_by": made_by})
 
     def test_a_budget_that_is_written_is_read_again(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -82,6 +86,62 @@ class Judging(unittest.TestCase):
     def test_a_program_that_is_not_there_is_an_error_with_a_remedy(self):
         with self.assertRaisesRegex(instructions.CountingError, "build it first"):
             instructions.describe(pathlib.Path("/nowhere/instruction_scripts"))
+
+
+class FailsClosed(unittest.TestCase):
+    """What could not be counted has failed, unless no machine like this could."""
+
+    SKIPPED = 77
+
+    def setUp(self):
+        made_by = {"compiler": "c", "processor": "x", "build": "release"}
+        budget = {"made_by": made_by, "instructions_per_frame": {"parser": 1}}
+        growing = list(growth_test.SCRIPTS)
+        self.made_by = made_by
+        for name, replacement in (("describe", lambda program: (self.made_by, growing if program.name == "growth_scripts" else ["parser"])),
+                                  ("count", self.count), ("load_budget", lambda: budget)):
+            patch = mock.patch.object(instructions, name, replacement)
+            patch.start()
+            self.addCleanup(patch.stop)
+        self.error = CountingError("instruction_scripts parser ended with -11")
+
+    def count(self, program, script):
+        raise self.error
+
+    def gate(self, *more):
+        with mock.patch.object(run, "say"):
+            return run.count_instructions(run.parse_arguments(["--instructions", *more]))
+
+    def ends_of_others(self):
+        """How the two other users end, by their exit status or their exception."""
+        for module in (planted_slow_down_test, growth_test):
+            with mock.patch.object(sys, "argv", ["test", "/nowhere"]), mock.patch("builtins.print"):
+                try:
+                    yield module.main()
+                except CountingError as error:
+                    yield error
+
+    def test_a_script_that_crashes_fails(self):
+        self.assertEqual(self.gate(), 1)
+        self.assertEqual(self.gate("parser"), 1)
+        self.assertEqual(list(self.ends_of_others()), [self.error, self.error])
+
+    def test_an_unknown_script_fails(self):
+        self.assertEqual(self.gate("nonsense"), 1)
+
+    def test_a_program_that_hangs_fails(self):
+        with mock.patch.object(instructions, "SECONDS_MAX", 0.01), self.assertRaises(CountingError) as caught:
+            instructions.run_program(["sleep", "60"])
+        self.assertNotIsInstance(caught.exception, NotCountable)
+
+    def test_without_valgrind_all_are_left_out(self):
+        self.error = NotCountable("valgrind is not installed (package valgrind)")
+        self.assertEqual(self.gate(), self.SKIPPED)
+        self.assertEqual(list(self.ends_of_others()), [self.SKIPPED, self.SKIPPED])
+
+    def test_another_compiler_is_left_out(self):
+        self.made_by = self.made_by | {"compiler": "13.1.0"}
+        self.assertEqual(self.gate(), self.SKIPPED)
 
 
 if __name__ == "__main__":

@@ -27,13 +27,13 @@ def main() -> int:
     try:
         made_by, _ = instructions.describe(folder / "instruction_scripts")
         if made_by["build"] != "release":
-            raise instructions.CountingError("a build without optimisation says nothing of a twentieth")
+            raise instructions.NotCountable("a build without optimisation says nothing of a twentieth")
         clean = {script: instructions.count(folder / "instruction_scripts", script)[0] for script in scripts}
         budget = {"instructions_per_frame": clean}
         planted = [verdict for program, script in bugs
                    for verdict in instructions.measure(folder / program, [script], budget)]
         again = instructions.measure(folder / "instruction_scripts", scripts, budget)
-    except instructions.CountingError as error:
+    except instructions.NotCountable as error:
         print(f"SKIPPED: {error}")
         return 77
     for verdict in planted + again:
