@@ -4,6 +4,7 @@ what is measured and how. The table and all progress go to standard error; --jso
 
 import argparse
 import datetime
+import itertools
 import json
 import os
 import pathlib
@@ -181,8 +182,8 @@ def count_instructions(arguments: argparse.Namespace) -> int:
         if arguments.instructions:
             instructions.require_script(arguments.instructions, scripts)
             per_frame, costs = instructions.count(program, arguments.instructions)
-            for function, cost in costs.most_common(40):
-                say(f"{cost / sum(costs.values()):7.1%} {cost / sum(costs.values()) * per_frame:9.1f}  {function}")
+            for function, cost in itertools.islice(costs.items(), 40):
+                say(f"{cost / per_frame:7.1%} {cost:9.1f}  {function}")
             return 0
         if not arguments.update:
             instructions.require_comparable(made_by, budget)

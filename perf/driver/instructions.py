@@ -1,6 +1,7 @@
 """Instructions per frame of the hub's hot parts (perf/instructions/scripts.cpp), counted by valgrind's callgrind against
-perf/instructions/budget.json: the same on every machine, since only the program's own functions are counted, not the
-libraries', which choose their code by the processor."""
+perf/instructions/budget.json, with what they call in libraries (copies, memory). The same on every machine: the C library is told
+which of its copies to take (LIBRARY_TUNING), which it would choose by the processor. System calls are counted by
+tests/hub/shard/system_calls_test.cpp."""
 
 import collections
 import json
@@ -14,8 +15,13 @@ from dataclasses import dataclass
 BUDGET = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "budget.json"
 TOLERANCE = 0.02
 SECONDS_MAX = 250  # of one program: what takes longer hangs, however loaded the machine is
+# The function below which counting is on (perf/instructions/*.cpp).
+COUNTED = "counted"
 # What plays the nodes is not the hub.
-NOT_COUNTED = ("::testing::", "counted", "MemoryTransport", "MemoryPipe")
+NOT_COUNTED = ("::testing::", "MemoryTransport", "MemoryPipe", "MemoryPeer")
+# glibc's tunables: its copies for a processor without AVX, and none by way of memory where much is copied, which depends on the cache.
+LIBRARY_TUNING = ("glibc.cpu.hwcaps=-AVX_Fast_Unaligned_Load,-AVX2,-AVX512F,-AVX512VL,-SSSE3,-SSE4_1,-SSE4_2,-ERMS"
+                  ":glibc.cpu.x86_non_temporal_threshold=0x10000000")
 
 
 class CountingError(Exception):
@@ -53,30 +59,57 @@ class Verdict:
         return f"{self.script:22} {self.counted:8.1f}  budget {self.budget:8.1f}  {self.change:+7.2%}  {word}".rstrip()
 
 
-def own_costs(profile: str, program: str) -> collections.Counter:
-    """Instructions by function, from callgrind's uncompressed output: those of `program` itself, without callees'."""
+@dataclass(frozen=True)
+class Costs:
+    """Instructions of the counted runs."""
+
+    total: int
+    by_function: collections.Counter  # of each function of the program, with what it calls in libraries
+
+
+def hub_costs(profile: str, program: str) -> Costs:
+    """What callgrind's uncompressed output says of the hub: what runs below counted(), in the program and in libraries, but for
+    what those who play the nodes do and call."""
+    total = 0
     costs: collections.Counter = collections.Counter()
-    owner = function = ""
+    owner = function = callee_owner = callee = ""
     is_of_a_callee = False
     for line in profile.splitlines():
         if line.startswith("ob="):
             owner = line[3:]
         elif line.startswith("fn="):
             function = line[3:]
+        elif line.startswith("cob="):
+            callee_owner = line[4:]
+        elif line.startswith("cfn="):
+            callee = line[4:]
         elif line.startswith("calls="):
-            is_of_a_callee = True  # the next line is what the callee took
+            is_of_a_callee = True  # the next line is what the callee took, with all that it called
         elif line[:1].isdigit() or line[:1] in ("+", "-", "*"):
-            if not is_of_a_callee and owner == program and not any(word in function for word in NOT_COUNTED):
-                costs[function] += int(line.split()[1])
-            is_of_a_callee = False
-    return costs
+            cost = int(line.split()[1])
+            if is_of_a_callee:
+                if callee == COUNTED:
+                    total += cost
+                elif is_of_nodes(callee) and not is_of_nodes(function):
+                    total -= cost
+            # Libraries that call each other are in what they cost the first caller.
+            if owner == program and not is_of_nodes(function) and (not is_of_a_callee or callee_owner not in ("", program)):
+                costs[function] += cost
+            if is_of_a_callee:
+                is_of_a_callee, callee_owner = False, ""
+    return Costs(total, costs)
+
+
+def is_of_nodes(function: str) -> bool:
+    return any(word in function for word in NOT_COUNTED)
 
 
 def run_program(command: list[str]) -> str:
     # A bare environment: its size moves the stack, and with it what depends on alignment.
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS_MAX, stdin=subprocess.DEVNULL,
-                              env={"PATH": os.environ.get("PATH", os.defpath), "GLIBCXX_FORCE_NEW": "1"})
+                              env={"PATH": os.environ.get("PATH", os.defpath), "GLIBCXX_FORCE_NEW": "1",
+                                   "GLIBC_TUNABLES": LIBRARY_TUNING})
     except (OSError, subprocess.TimeoutExpired) as error:
         raise CountingError(f"{command[0]}: {error}") from None
     if done.returncode != 0:
@@ -89,23 +122,23 @@ def describe(program: pathlib.Path) -> tuple[dict, list[str]]:
     if not program.exists():
         raise CountingError(f"{program} is not there: build it first (./dev build instruction_scripts)")
     first, *scripts = run_program([str(program)]).splitlines()
-    compiler, processor, build = first.rsplit(" ", 2)
-    return {"compiler": compiler, "processor": processor, "build": build}, scripts
+    compiler, processor, build, libc = first.rsplit(" ", 3)
+    return {"compiler": compiler, "processor": processor, "build": build, "libc": libc}, scripts
 
 
-def count(program: pathlib.Path, script: str) -> tuple[float, collections.Counter]:
-    """Instructions per frame of a script, and by function."""
+def count(program: pathlib.Path, script: str) -> tuple[float, dict[str, float]]:
+    """Instructions per frame of a script, and by function, the most expensive first."""
     if shutil.which("valgrind") is None:
         raise NotCountable("valgrind is not installed (package valgrind)")
     with tempfile.TemporaryDirectory(prefix="gimnet-instructions-") as folder:
         profile = pathlib.Path(folder, "profile")
-        frames = int(run_program(["valgrind", "--tool=callgrind", "--collect-atstart=no", "--toggle-collect=counted",
-                                  "--skip-plt=no", "--compress-strings=no", "--compress-pos=no", f"--callgrind-out-file={profile}",
+        frames = int(run_program(["valgrind", "--tool=callgrind", "--collect-atstart=no", f"--toggle-collect={COUNTED}",
+                                  "--compress-strings=no", "--compress-pos=no", f"--callgrind-out-file={profile}",
                                   str(program), script]))
-        costs = own_costs(profile.read_text(), str(program))
-    if not costs:
+        costs = hub_costs(profile.read_text(), str(program))
+    if costs.total <= 0:
         raise CountingError(f"callgrind counted nothing in {program} {script}")
-    return sum(costs.values()) / frames, costs
+    return costs.total / frames, {function: cost / frames for function, cost in costs.by_function.most_common()}
 
 
 def load_budget() -> dict:
@@ -113,7 +146,7 @@ def load_budget() -> dict:
 
 
 def require_comparable(made_by: dict, budget: dict) -> None:
-    """Another compiler, processor or kind of build makes other instructions: then the budget says nothing. Raises NotCountable."""
+    """Another compiler, processor, kind of build or C library makes other instructions: then the budget says nothing. Raises NotCountable."""
     if made_by != budget["made_by"]:
         raise NotCountable(f"the budget is for {' '.join(budget['made_by'].values()) or 'nothing yet'}; this is {' '.join(made_by.values())}")
 

@@ -4,6 +4,8 @@
 //     growth_scripts SCRIPT:COUNT   runs it: once to warm up, then once counted; prints COUNT
 //     growth_scripts                prints what compiled it, and the scripts' names
 
+#include <gnu/libc-version.h>
+
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
@@ -40,7 +42,6 @@ namespace gimnet::hub {
 namespace {
 
 using std::chrono::milliseconds;
-
 using Work = std::function<void()>;
 
 [[noreturn]] void wrong(const char* what) {
@@ -392,8 +393,7 @@ int main(int argc, char** argv) {
 #else
   const char* const build = "other";
 #endif
-  std::printf("%s %s %s\n", __VERSION__, GIMNET_PROCESSOR, build);
-  for (const auto& script : gimnet::hub::kScripts)
-    std::printf("%.*s\n", static_cast<int>(script.name.size()), script.name.data());
+  std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build, ::gnu_get_libc_version());
+  for (const auto& script : gimnet::hub::kScripts) std::puts(std::string(script.name).c_str());
   return 0;
 }

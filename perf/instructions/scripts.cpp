@@ -4,6 +4,8 @@
 //     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames of the counted run
 //     instruction_scripts           prints what compiled it, and the scripts' names
 
+#include <gnu/libc-version.h>
+
 #include <array>
 #include <cstdint>
 #include <cstdio>
@@ -270,7 +272,7 @@ int main(int argc, char** argv) {
 #else
     const char* const build = "other";
 #endif
-    std::printf("%s %s %s\n", __VERSION__, GIMNET_PROCESSOR, build);
+    std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build, ::gnu_get_libc_version());
     for (const auto& script : gimnet::hub::kScripts) std::puts(script.name);
     return 0;
   }

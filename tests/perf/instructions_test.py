@@ -14,13 +14,27 @@ from driver import instructions  # noqa: E402
 import growth_test  # noqa: E402
 import planted_slow_down_test  # noqa: E402
 import run  # noqa: E402
-from driver.instructions import CountingError, NotCountable, Verdict, own_costs, require_comparable  # noqa: E402
+from driver.instructions import CountingError, NotCountable, Verdict, hub_costs, require_comparable  # noqa: E402
 
+# What runs below counted(): the hub calls memcpy, a library that calls another, and the transport in memory, which is a node's
+# and calls the hub's append() and memcpy, too.
 PROFILE = """positions: line
 events: Ir
 summary: 999
 
 ob=/build/program
+fl=main.cpp
+fn=main
+cfn=counted
+calls=1 0
+5 1000
+
+fn=counted
+6 3
+cfn=gimnet::hub::Router::route(int)
+calls=1 0
+7 997
+
 fl=a.cpp
 fn=gimnet::hub::Router::route(int)
 10 5
@@ -32,26 +46,62 @@ cfi=???
 cfn=memcpy
 calls=3 0
 12 600
+cfn=gimnet::hub::append()
+calls=1 0
+13 30
+cob=/lib/libstdc++.so.6
+cfn=operator new(unsigned long)
+calls=1 0
+14 54
+cfn=gimnet::hub::MemoryTransport::send(int)
+calls=1 0
+15 300
+
+fn=gimnet::hub::append()
+* 20
+cob=/lib/libc.so.6
+cfn=memcpy
+calls=1 0
+* 50
+
+fn=gimnet::hub::MemoryTransport::send(int)
+3 200
+cfn=gimnet::hub::append()
+calls=1 0
+4 40
+cfn=gimnet::hub::MemoryPipe::take(int)
+calls=1 0
+5 60
+
+fn=gimnet::hub::MemoryPipe::take(int)
+3 60
+
+ob=/lib/libstdc++.so.6
+fn=operator new(unsigned long)
+0 4
+cob=/lib/libc.so.6
+cfn=malloc
+calls=1 0
+0 50
 
 ob=/lib/libc.so.6
 fn=memcpy
-0 600
-
-ob=/build/program
-fn=gimnet::hub::testing::HubRig::ready(unsigned long)
-3 50
-fn=gimnet::hub::Outbox::push()
-* 20
+0 650
+fn=malloc
+0 50
 """
 
 
 class Profile(unittest.TestCase):
-    def test_counts_the_program_s_own_functions_without_their_callees(self):
-        self.assertEqual(own_costs(PROFILE, "/build/program"),
-                         {"gimnet::hub::Router::route(int)": 13, "gimnet::hub::Outbox::push()": 20})
+    def test_counts_all_that_the_hub_does_and_nothing_that_plays_the_nodes(self):
+        self.assertEqual(hub_costs(PROFILE, "/build/program").total, 1000 - 300)
 
-    def test_another_program_has_no_part_in_it(self):
-        self.assertFalse(own_costs(PROFILE, "/build/other"))
+    def test_what_a_library_takes_is_its_caller_s(self):
+        self.assertEqual(hub_costs(PROFILE, "/build/program").by_function,
+                         {"counted": 3, "gimnet::hub::Router::route(int)": 13 + 600 + 54, "gimnet::hub::append()": 70})
+
+    def test_nothing_counted_is_nothing(self):
+        self.assertEqual(hub_costs("events: Ir\nsummary: 0\n", "/build/program").total, 0)
 
 
 class Judging(unittest.TestCase):

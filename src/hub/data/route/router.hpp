@@ -37,7 +37,7 @@ class Router {
   /// False: nothing was done, route() them. REQUIRES: as route().
   [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
 #if defined(GIMNET_BUG_SLOW_ROUTER)
-    asm volatile(".rept 8\n\tnop\n\t.endr");
+    asm volatile(".rept 7\n\tnop\n\t.endr");
 #endif
     // Only of these is dst all that decides where they go.
     if (static_cast<proto::Kind>(frames[kKindOffset]) != proto::Kind::unicast) return false;
