@@ -17,6 +17,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 from driver import against, catalogue, control, instructions, suite  # noqa: E402
+from driver.judgement import faults_of  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.report import write_report  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
@@ -135,16 +136,9 @@ def judge(outcomes: list[Outcome], rows: list[dict], is_smoke: bool) -> int:
     for row in rows:
         is_ours = row["subject"] not in catalogue.RIVAL_CLASSES
         where = f"{row['subject']}, {row['scenario']} {row['size']} B {row['transport']}"
-        faults = []
-        if row.get("wrong"):
-            faults.append((is_ours or is_smoke, f"{row['wrong']} messages arrived that were not sent so"))
-        if row.get("ledger_gap"):
-            faults.append((True, f"the hub's ledger does not explain {row['ledger_gap']} frames"))
-        if row.get("lost"):
-            faults.append((is_ours and is_smoke, f"{row['lost']} messages were lost"))
-        for is_error, sentence in faults:
-            say(f"{'error' if is_error else 'warning'}: {where}: {sentence}")
-            status = 1 if is_error else status
+        for fault in faults_of(where, row, is_ours, is_smoke):
+            say(str(fault))
+            status = 1 if fault.is_error else status
     return status
 
 
@@ -222,6 +216,7 @@ def measure_control(arguments: argparse.Namespace) -> int:
 
 
 def compare_versions(arguments: argparse.Namespace) -> int:
+    """The exit status: 1 where this version is slower, or something of it failed."""
     settings = make_settings(arguments)
     settings.seconds = arguments.seconds or against.PAIR_SECONDS
     cases = list(against.CASES)
@@ -229,12 +224,12 @@ def compare_versions(arguments: argparse.Namespace) -> int:
         cases = list(suite.chosen_plan(arguments.scenario, arguments.size, arguments.transport, ()))
     try:
         document = against.compare_versions(ROOT, arguments.against, cases, arguments.runs, settings)
-    except (against.BuildError, SubjectError) as error:
+    except against.BuildError as error:
         say(f"error: {error}")
         return 1
     if arguments.json:
         print(json.dumps(document, indent=1))
-    return 0
+    return 0 if document["is_good"] else 1
 
 
 def main() -> int:

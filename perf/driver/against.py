@@ -4,10 +4,13 @@ import os
 import pathlib
 import subprocess
 import sys
+from dataclasses import dataclass, field
 
-from driver.measure import Settings, run_once, say
+from driver.figures import COUNTED
+from driver.judgement import Fault, faults_of
+from driver.measure import Settings, run_with_tries, say
 from driver.statistics_of_pairs import CONFIDENCE, Comparison, compare_all, pairs_min
-from driver.subjects import TcpHub, allowed_cpus
+from driver.subjects import SubjectError, TcpHub, allowed_cpus
 from driver.suite import Case
 
 PAIRS = 12
@@ -53,20 +56,41 @@ def build_version(root: pathlib.Path, revision: str) -> tuple[str, pathlib.Path]
     return commit, tree / "build" / "release"
 
 
-def measure_once(build: pathlib.Path, case: Case, settings: Settings) -> float:
-    return run_once(TcpHub(build, allowed_cpus()[:1], settings.hub_arguments), case, settings)[case.spec.metric]
+@dataclass
+class Measured:
+    """What one case came to: `pairs` of old and new, unless it failed; and what was wrong with it."""
+
+    case: Case
+    pairs: list[tuple[float, float]] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    failed: bool = False
 
 
-def measure_pairs(case: Case, other: pathlib.Path, count: int, settings: Settings) -> list[tuple[float, float]]:
-    """Old and new. A pair is both versions one after the other, the first of which changes from pair to pair."""
-    pairs = []
-    for number in range(count):
-        builds = (other, settings.build)
-        if number % 2 == 0:
-            pairs.append(tuple(measure_once(build, case, settings) for build in builds))
-        else:
-            pairs.append(tuple(measure_once(build, case, settings) for build in reversed(builds))[::-1])
-    return pairs
+def measure_once(build: pathlib.Path, case: Case, settings: Settings) -> dict[str, float]:
+    return run_with_tries(lambda: TcpHub(build, allowed_cpus()[:1], settings.hub_arguments), case, settings)
+
+
+def measure_pairs(case: Case, other: pathlib.Path, count: int, settings: Settings) -> Measured:
+    """A pair is both versions one after the other, the first of which changes from pair to pair. A run that fails twice ends this
+    case, and no other."""
+    versions = {"the other version": other, "this version": settings.build}
+    sums: dict[str, dict[str, float]] = {name: {} for name in versions}
+    measured = Measured(case)
+    try:
+        for number in range(count):
+            found = {}
+            for name in list(versions) if number % 2 == 0 else reversed(versions):
+                findings = measure_once(versions[name], case, settings)
+                found[name] = findings[case.spec.metric]
+                for figure in COUNTED:
+                    sums[name][figure] = sums[name].get(figure, 0) + abs(findings.get(figure, 0))
+            measured.pairs.append(tuple(found[name] for name in versions))
+    except SubjectError as error:
+        measured.faults.append(Fault(True, f"{case}: {error}"))
+        measured.failed = True
+    for name, counted in sums.items():
+        measured.faults += faults_of(f"{name}, {case}", counted)
+    return measured
 
 
 def describe(case: Case, comparison: Comparison) -> str:
@@ -85,7 +109,7 @@ def explain(cases: int) -> str:
 
 
 def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count: int | None, settings: Settings) -> dict:
-    """The JSON document; `count` pairs of each case, None: as many as usual. Raises BuildError, SubjectError."""
+    """The JSON document; `count` pairs of each case, None: as many as usual. Raises BuildError."""
     if not cases:
         raise BuildError("none of the scenarios asked for exists in that size and on that transport")
     least = pairs_min(len(cases))
@@ -97,9 +121,16 @@ def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count
     for case in cases:
         say(f"  {case}: {count} pairs")
         measured.append(measure_pairs(case, other, count, settings))
-    comparisons = compare_all(measured)
-    say("\n".join([f"this version against {revision} ({commit[:12]}):", *map(describe, cases, comparisons), explain(len(cases))]))
-    return {"against": revision, "commit": commit, "confidence_of_all": CONFIDENCE, "comparisons": [
+    faults = [fault for each in measured for fault in each.faults]
+    for fault in faults:
+        say(str(fault))
+    cases = [each.case for each in measured if not each.failed]
+    comparisons = compare_all([each.pairs for each in measured if not each.failed])
+    if cases:
+        say("\n".join([f"this version against {revision} ({commit[:12]}):", *map(describe, cases, comparisons), explain(len(cases))]))
+    return {"against": revision, "commit": commit, "confidence_of_all": CONFIDENCE, "faults": [str(each) for each in faults],
+            "is_good": not any(fault.is_error for fault in faults) and all(each.verdict != "slower" for each in comparisons),
+            "comparisons": [
         {"scenario": case.scenario, "size": case.size, "transport": case.transport, "metric": case.spec.metric,
          "ratio": each.ratio, "low": each.low, "high": each.high, "p": each.p, "p_of_all": each.p_of_all,
          "confidence": each.confidence, "pairs": each.pairs, "verdict": each.verdict}

@@ -43,7 +43,7 @@ def summarise(row: dict) -> dict:
     for name in names:
         values = values_of(row, name)
         if name in COUNTED:
-            summary[name] = int(sum(values))
+            summary[name] = int(sum(map(abs, values)))  # a gap may be either way
         else:
             summary[name] = statistics.median(values)
             spread[name] = [min(values), max(values)]

@@ -72,17 +72,20 @@ def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, floa
         return json.loads(done.stdout)
 
 
-def run_patiently(outcome: Outcome, settings: Settings) -> dict[str, float]:
+def run_with_tries(make: Callable[[], Subject], case: Case, settings: Settings) -> dict[str, float]:
     """A second try where the first failed, since a machine that stands still for seconds says nothing of a subject."""
     for tries_left in range(settings.tries_max - 1, -1, -1):
-        subject = make_subject(outcome.subject, outcome.case, settings.build, settings.hub_arguments)
         try:
-            return run_once(subject, outcome.case, settings)
+            return run_once(make(), case, settings)
         except SubjectError as error:
             if tries_left == 0:
                 raise
-            say(f"warning: {outcome.case}: {error}; once more")
+            say(f"warning: {case}: {error}; once more")
     raise AssertionError("not reached")
+
+
+def run_patiently(outcome: Outcome, settings: Settings) -> dict[str, float]:
+    return run_with_tries(lambda: make_subject(outcome.subject, outcome.case, settings.build, settings.hub_arguments), outcome.case, settings)
 
 
 def run_round(members: list[Outcome], number: int, settings: Settings) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 # Of all cases of one comparison together: were there no difference anywhere, in so many of them none would be called one.
 CONFIDENCE = 0.95
 RESAMPLES = 10_000
+# No ratio says how much more than nothing something is: this one stands for it, above every other.
+RATIO_MAX = 1e6
 
 
 def pairs_min(cases: int) -> int:
@@ -71,7 +73,14 @@ def holm(ps: list[float]) -> list[float]:
 
 
 def logarithms_of(pairs: list[tuple[float, float]]) -> list[float]:
-    return [math.log(new / old) for old, new in pairs]
+    return [logarithm_of(old, new) for old, new in pairs]
+
+
+def logarithm_of(old: float, new: float) -> float:
+    if old == new:
+        return 0.0  # both may be 0
+    ratio = new / old if old > 0 else RATIO_MAX
+    return math.log(min(max(ratio, 1 / RATIO_MAX), RATIO_MAX))
 
 
 def interval(logarithms: list[float], cases: int) -> tuple[float, float]:
@@ -83,7 +92,7 @@ def interval(logarithms: list[float], cases: int) -> tuple[float, float]:
 
 
 def compare_all(cases: list[list[tuple[float, float]]]) -> list[Comparison]:
-    """REQUIRES: of each case pairs of old and new, all above 0."""
+    """REQUIRES: of each case pairs of old and new, none below 0."""
     found = [logarithms_of(pairs) for pairs in cases]
     ps = [signed_rank_p(logarithms) for logarithms in found]
     return [Comparison(math.exp(statistics.median(logarithms)), *interval(logarithms, len(cases)), p, p_of_all, len(logarithms))

@@ -4,10 +4,13 @@
 import pathlib
 import random
 import unittest
+from unittest import mock
 
 from support import ROOT
-from driver import against, suite
-from driver.statistics_of_pairs import CONFIDENCE, compare_all, holm, pairs_min, signed_rank_p
+import run
+from driver import against, measure, suite
+from driver.statistics_of_pairs import CONFIDENCE, RATIO_MAX, compare_all, holm, pairs_min, signed_rank_p
+from driver.subjects import SubjectError
 
 OLD = [100.0, 104.0, 98.0, 101.0, 99.0, 130.0, 100.5, 102.0, 97.0, 100.0, 103.0, 99.5]
 NOISE = [1.01, 0.985, 1.002, 0.999, 1.02, 0.98, 0.995, 1.004, 1.015, 0.99, 0.997, 1.006]
@@ -36,6 +39,12 @@ class Pairs(unittest.TestCase):
             self.assertGreater(found[1].confidence, 0.99)
             self.assertLess(found[1].low, factor)
             self.assertGreater(found[1].high, factor)
+
+    def test_nothing_against_nothing_is_no_difference_and_something_is_one(self):
+        nothing, more, less = compare_all([[(0, 0)] * 12, [(0, 3)] * 12, [(3, 0)] * 12])
+        self.assertEqual((nothing.verdict, nothing.ratio), ("no difference", 1))
+        self.assertEqual((more.verdict, less.verdict), ("slower", "faster"))
+        self.assertAlmostEqual(more.ratio, RATIO_MAX, delta=1)
 
     def test_one_wild_pair_decides_nothing(self):
         wild = [(OLD[0], OLD[0] * 9), *((old, old) for old in OLD[1:])]
@@ -87,13 +96,34 @@ class Report(unittest.TestCase):
             self.addCleanup(setattr, against, name, getattr(against, name))
         self.said = []
         self.order = []
+        self.more = {}
+        self.factor = 1.1
+        self.failing = None
         against.build_version = lambda root, revision: ("c0ffee", pathlib.Path("old"))
         against.measure_once = self.measure_once
         against.say = self.said.append
 
     def measure_once(self, build, case, settings):
         self.order.append(str(build))
-        return (100.0 if build == pathlib.Path("old") else 110.0) + len(self.order) % 7
+        if case == self.failing:
+            raise SubjectError("tcphub: it died")
+        cost = (100.0 + len(self.order) % 7) * (1 if build == pathlib.Path("old") else self.factor)
+        return {case.spec.metric: cost} | (self.more if build != pathlib.Path("old") else {})
+
+    def compare(self):
+        """The document, and the exit status of ./dev perf."""
+        documents = []
+        arguments = run.parse_arguments(["--against", "HEAD~1", "--scenario", "one_to_one", "--size", "16", "256", "--transport", "tcp",
+                                         "--runs", "8"])
+        real = against.compare_versions
+
+        def keep(*given):
+            documents.append(real(*given))
+            return documents[-1]
+
+        with mock.patch.object(against, "compare_versions", keep), mock.patch.object(run, "say", self.said.append):
+            status = run.compare_versions(arguments)
+        return documents[0], status
 
     def test_says_the_verdict_of_each_case_and_what_the_confidence_is_of(self):
         settings = against.Settings(build=pathlib.Path("new"))
@@ -103,6 +133,51 @@ class Report(unittest.TestCase):
         self.assertIn("slower, confidence 98.4%, 8 pairs", self.said[-1])
         self.assertIn("all 2 cases together (Holm's method)", self.said[-1])
         self.assertIn("in fewer than 5 of 100", self.said[-1])
+
+    def test_slower_is_a_failure_and_nothing_else_is(self):
+        for factor, verdict, expected in ((1.1, "slower", 1), (1.0, "no difference", 0), (0.9, "faster", 0)):
+            self.factor = factor
+            document, status = self.compare()
+            self.assertEqual({each["verdict"] for each in document["comparisons"]}, {verdict})
+            self.assertEqual(status, expected)
+
+    def test_what_arrived_wrong_is_a_failure_and_what_was_lost_is_said(self):
+        self.factor = 1.0
+        for name, status, sentence in (("wrong", 1, "error: this version, one_to_one 16 B tcp: 8 messages arrived that were not sent so"),
+                                       ("ledger_gap", 1, "the hub's ledger does not explain 8 frames"),
+                                       ("lost", 0, "warning: this version, one_to_one 16 B tcp: 8 messages were lost")):
+            self.more = {name: 1}
+            document, found = self.compare()
+            self.assertEqual(found, status)
+            self.assertIn(sentence, "\n".join(document["faults"]))
+            self.assertIn(sentence, "\n".join(self.said))
+
+    def test_gaps_either_way_do_not_make_up_for_each_other(self):
+        self.more = {"ledger_gap": -1}
+        self.assertIn("does not explain 8 frames", "\n".join(self.compare()[0]["faults"]))
+
+    def test_a_case_that_fails_ends_no_other(self):
+        self.factor = 1.0
+        self.failing = suite.Case("one_to_one", 16, "tcp")
+        document, status = self.compare()
+        self.assertEqual([each["size"] for each in document["comparisons"]], [256])
+        self.assertEqual(document["faults"], ["error: one_to_one 16 B tcp: tcphub: it died"])
+        self.assertEqual(status, 1)
+        self.assertFalse(against.compare_versions(ROOT, "HEAD", [self.failing], None, against.Settings(build=pathlib.Path("n")))["is_good"])
+
+    def test_a_run_that_fails_once_is_made_again(self):
+        tries = []
+
+        def run_once(*_):
+            tries.append(1)
+            if len(tries) == 1:
+                raise SubjectError("the machine stood still")
+            return {"cpu_ns_per_message": 1.0}
+
+        with mock.patch.object(measure, "run_once", run_once), mock.patch.object(measure, "say", self.said.append):
+            measure.run_with_tries(lambda: None, suite.Case("one_to_one", 16, "tcp"), against.Settings(build=pathlib.Path("n")))
+        self.assertEqual(len(tries), 2)
+        self.assertIn("once more", self.said[-1])
 
 
 if __name__ == "__main__":
