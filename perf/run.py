@@ -16,7 +16,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver import against, catalogue, control, instructions, suite  # noqa: E402
+from driver import against, catalogue, control, instructions, suite, usage  # noqa: E402
 from driver.judgement import faults_of  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.report import write_report  # noqa: E402
@@ -54,14 +54,19 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
-    parser.add_argument("--size", nargs="+", action="extend", type=int, default=[], metavar="BYTES")
+    parser.add_argument("--size", nargs="+", action="extend", type=usage.positive_whole, default=[], metavar="BYTES")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
-    parser.add_argument("--seconds", type=float, help="length of each measurement")
-    parser.add_argument("--runs", type=int, help="measurements of which the median is taken (3, and more where they decide nothing)")
+    parser.add_argument("--seconds", type=usage.positive_seconds, help="length of each measurement")
+    parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3, and more where they decide nothing)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
                         help="more for the hub's command line; repeatable, write --hub-argument=--shards")
-    return parser.parse_args(given)
+    arguments = parser.parse_args(given)
+    if (wrong := usage.find_wrong(arguments, parser.get_default)) is not None:
+        parser.error(wrong)
+    if usage.mode_of(arguments) in ("--against", None) and not any(choose_plan(arguments).values()):
+        parser.error("there is nothing to measure: none of these subjects has these scenarios over that transport")
+    return arguments
 
 
 def choose_plan(arguments: argparse.Namespace) -> suite.Plan:
