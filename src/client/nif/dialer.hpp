@@ -24,11 +24,13 @@ struct Admitted {
   std::vector<std::byte> rest;  ///< bytes of the hub that came behind WELCOME
 };
 
+/// The token to show at an address; empty: none.
+using TokenFor = std::function<std::vector<std::byte>(const std::string& address)>;
+
 /// What nif_connect() and the library's thread do to get one: dials each address in turn and shakes hands, until one
 /// hub admits the node, one refuses it, or the time is up. Where several fail, the last hub-less failure is told.
-/// `token_for` gives the token to show at an address where `hello` has none; it may be empty.
+/// `token_for` is asked where `hello` has no token; it may be empty.
 /// Errors: those of dial() and of the hub's GOODBYE; NIF_CLOSED when `cancel` was raised.
-using TokenFor = std::function<std::vector<std::byte>(const std::string& address)>;
 [[nodiscard]] Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
                                               const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel,
                                               const TokenFor& token_for = {});

@@ -15,7 +15,7 @@ namespace gimnet::hub {
 void for_each_counter(const ShardCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 /// The same for the peers that were not admitted: "refused.hub_full" and so on, "refused.garbage",
-/// "refused.no_descriptor".
+/// "refused.unfinished", "refused.no_descriptor".
 void for_each_counter(const RefusalCounters& counters,
                       const std::function<void(const std::string& name, std::uint64_t value)>& take);
 /// The same for requests about names and services: "names.resolve" and so on, "names.unknown",

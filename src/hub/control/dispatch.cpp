@@ -58,7 +58,7 @@ Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
 proto::Payload handle_unknown(HandlerContext&, const Request& request) {
   return proto::encode_refusal(request.header,
                                {proto::Status::not_supported,
-                                "this hub has no operation " + std::to_string(request.header.operation) + " for you"});
+                                "this hub has no operation " + std::to_string(request.header.operation)});
 }
 
 }  // namespace

@@ -43,9 +43,11 @@ struct AttachCommand {
   /// Numbers the connections of a session, from 1. What was said to or by an earlier one is told apart by it.
   std::uint32_t attachment = 0;
   NodeId node;
+  /// The shard finds out by itself: by this the simulations judge what the conductor decided.
   bool new_session = true;
   std::unique_ptr<Transport> transport;
-  /// All of WELCOME but what only the shard knows: resumed, taken, epoch.
+  /// All of WELCOME but what the shard puts in: resumed, and for a session that can resume taken, epoch and
+  /// resume_buffer_bytes.
   proto::Welcome welcome;
   /// What HELLO said of resume: wanted, epochs, count, buffer.
   bool resume_wanted = false;
@@ -141,7 +143,7 @@ using ShardCommand =
 
 // ---- shard -> conductor --------------------------------------------------------------------------------------------
 
-/// A frame of kind NS, CTRL or ROUTE for this hub; `frame` is header and payload.
+/// A frame of kind NS or CTRL for this hub; `frame` is header and payload.
 struct ControlFrameEvent {
   SessionRef session;
   std::uint32_t attachment = 0;  ///< of the connection that it came by

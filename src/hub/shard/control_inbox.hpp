@@ -27,7 +27,7 @@ class ControlInbox {
   std::size_t drain(std::size_t most, Take&& take) {
     return queue_.drain(most, take);
   }
-  /// Conductor: the descriptor that becomes readable at push() after prepare_to_sleep().
+  /// Conductor: its descriptor becomes readable at push() after prepare_to_sleep().
   [[nodiscard]] Waker& waker() { return waker_; }
   [[nodiscard]] bool empty() const { return queue_.empty(); }
 

@@ -68,7 +68,7 @@ unsigned char* store_label(unsigned char* at, const bitestream_key& key, Type ty
   return at + key.text_size;
 }
 
-/// 0: a bool in it is neither 0 nor 1, or a text is not UTF-8.
+/// False: a bool in it is neither 0 nor 1, or a text is not UTF-8.
 bool valid_content(Type type, const unsigned char* bytes, std::size_t size) {
   if (type == BITESTREAM_TEXT) return valid_utf8(bytes, size);
   if (element_type(type) != BITESTREAM_BOOL) return true;

@@ -12,7 +12,9 @@
 
 namespace gimnet::hub {
 
-/// Is a name its holder's for good, or until all hubs have agreed?
+/// Is a name its holder's for good, or until all hubs have agreed? A hub without links is the whole network: it makes
+/// every name final at once. Provisional ones, Directory::confirm(), Membership::name_decided() and NameDecided are for
+/// hubs that meet (docs/protocol.md, section 8), and only tests make them until there are links.
 enum class NameStanding : std::uint8_t { final, provisional };
 
 /// Names of nodes: each has one holder. A live holder keeps it against everybody; one within its grace time keeps it

@@ -36,7 +36,7 @@ class Membership {
 
   struct Joined {
     Session* session = nullptr;
-    bool new_session = false;  ///< for the shards; also one that a token brought back under its former id
+    bool new_session = false;  ///< also one that a token brought back under its former id
   };
   /// Admits a connection, for a new session or for the one whose token it shows. The caller attaches it at its shard
   /// and publishes its place after the effects were carried out. Errors: what GOODBYE says.

@@ -121,7 +121,7 @@ class Sessions {
   /// The session of a token whose index is free, under its former id. Errors: hub_full.
   [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
                                                   std::chrono::milliseconds now, Places places = Places::ordinary);
-  /// A connection was admitted for the session. What it says, or that the node was heard(), tells that it read WELCOME.
+  /// A connection was admitted for the session. What the node says on it tells that it read WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
   void begin_grace(Session& session, std::chrono::milliseconds now);

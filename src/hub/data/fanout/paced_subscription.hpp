@@ -89,7 +89,7 @@ class PacedSubscription {
   /// Holds a whole message behind the others; `message` is empty afterwards. REQUIRES: held() < terms().depth.
   void push_newest(KeptMessage& message);
 
-  /// The subscription ended; its counts go on if it begins again on the same connection.
+  /// False: the subscription ended; its counts go on if it begins again on the same connection.
   bool active = true;
   /// The start that it asked the provider's shard for last (RetainedMessages), and that nothing is for it before that.
   std::uint32_t start_ticket = 0;

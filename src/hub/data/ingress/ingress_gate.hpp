@@ -48,10 +48,9 @@ class IngressGate {
   IngressGate(const Limits& limits, Tally& tally) : limits_(limits), tally_(tally) {}
 
   /// One run of the parser (neighbouring frames with one header but for the length). `run` may be changed in its lane
-  /// byte, and in its source
-  /// where that is the node's former id: its bytes belong to the reading connection alone until they are handed on.
-  /// Where a later frame of the run is malformed, `view` is shortened to the frames before it, and the next run begins
-  /// with that one.
+  /// byte, and in its source where that is the node's former id: its bytes belong to the reading connection alone until
+  /// they are handed on. Where a later frame of the run is malformed, `view` is shortened to the frames before it, and
+  /// the next run begins with that one.
   [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
     // Most runs are like the one before.
     if (load_le<std::uint32_t>(view.bytes + kAttributesOffset) == state.admitted_attributes &&
