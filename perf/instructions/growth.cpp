@@ -171,7 +171,7 @@ Work topics(std::size_t count) {
   return [world, all] {
     for (std::size_t i = 0; i < all->size(); ++i) {
       const auto node = static_cast<std::uint32_t>(i / kPerNode + 1);
-      if (!world->services.subscribe(node, (*all)[i], world->effects)) wrong("a subscription was refused");
+      if (!world->services.subscribe(node, (*all)[i], {}, world->effects)) wrong("a subscription was refused");
     }
     for (std::size_t node = 1; node <= all->size() / kPerNode; ++node) {
       world->services.node_left(static_cast<std::uint32_t>(node), milliseconds{0}, world->effects);
@@ -217,7 +217,7 @@ Work subscribers(std::size_t count) {
   Services& services = world->membership.services();
   if (!services.advertise(world->subscribers[0], "robot/odom", {}, milliseconds{0}, world->effects)) wrong("a service");
   for (std::size_t i = 1; i <= count; ++i) {
-    if (!services.subscribe(world->subscribers[i], "robot/odom", world->effects)) wrong("a subscription was refused");
+    if (!services.subscribe(world->subscribers[i], "robot/odom", {}, world->effects)) wrong("a subscription");
   }
   world->publisher.publish_group(1, world->membership);
   world->effects.clear();
@@ -227,7 +227,7 @@ Work subscribers(std::size_t count) {
       const std::uint32_t node = world->subscribers[1 + i * 7'919 % count];
       if (services.unsubscribe(node, "robot/odom", world->effects)) wrong("it had subscribed");
       if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
-      if (!services.subscribe(node, "robot/odom", world->effects)) wrong("a subscription was refused");
+      if (!services.subscribe(node, "robot/odom", {}, world->effects)) wrong("a subscription was refused");
       if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
       world->effects.clear();
     }

@@ -8,8 +8,6 @@
 #include <span>
 #include <utility>
 
-#include "base/check.hpp"
-
 namespace gimnet {
 
 /// Bytes that grow and are never filled with zeros first: for messages of up to a gigabyte, which realloc() can often
@@ -62,11 +60,6 @@ class ByteBuffer {
     return true;
   }
 
-  /// The bytes between the old and a larger new size are not initialised. REQUIRES: size <= capacity().
-  void set_size(std::size_t size) {
-    GIMNET_CHECK(size <= capacity_);
-    size_ = size;
-  }
   /// Forgets the bytes and keeps the memory.
   void clear() { size_ = 0; }
 

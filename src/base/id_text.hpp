@@ -8,7 +8,7 @@
 
 #include "base/ids.hpp"
 
-// Ids as people read and type them: node `7.17`, group `7#17`.
+// Ids as people read them, node `7.17`, group `7#17`, and as they type those of nodes.
 // Thread safety: pure functions.
 
 namespace gimnet {
@@ -27,16 +27,6 @@ template <class Id>
   return number;
 }
 
-template <class Id>
-[[nodiscard]] std::optional<Id> parse_id(std::string_view text, char separator) {
-  const auto middle = text.find(separator);
-  if (middle == std::string_view::npos) return std::nullopt;
-  const auto hub = parse_number(text.substr(0, middle), kEveryHub.value());
-  const auto index = parse_number(text.substr(middle + 1), kIndexMask);
-  if (!hub || !index) return std::nullopt;
-  return make_id<Id>(HubId{static_cast<std::uint16_t>(*hub)}, *index);
-}
-
 }  // namespace detail
 
 [[nodiscard]] inline std::string to_string(NodeId id) { return detail::id_text(id, '.'); }
@@ -44,11 +34,12 @@ template <class Id>
 
 /// Nothing: not `HUB.INDEX` in decimal, or a part is out of range.
 [[nodiscard]] inline std::optional<NodeId> parse_node_id(std::string_view text) {
-  return detail::parse_id<NodeId>(text, '.');
-}
-/// Nothing: not `HUB#INDEX` in decimal, or a part is out of range.
-[[nodiscard]] inline std::optional<GroupId> parse_group_id(std::string_view text) {
-  return detail::parse_id<GroupId>(text, '#');
+  const auto middle = text.find('.');
+  if (middle == std::string_view::npos) return std::nullopt;
+  const auto hub = detail::parse_number(text.substr(0, middle), kEveryHub.value());
+  const auto index = detail::parse_number(text.substr(middle + 1), kIndexMask);
+  if (!hub || !index) return std::nullopt;
+  return make_id<NodeId>(HubId{static_cast<std::uint16_t>(*hub)}, *index);
 }
 
 }  // namespace gimnet

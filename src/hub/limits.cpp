@@ -216,18 +216,4 @@ std::string set_limit(Limits& limits, const LimitInfo& limit, std::string_view v
   return {};
 }
 
-std::string set_limit(Limits& limits, std::string_view assignment) {
-  const std::size_t equals = assignment.find('=');
-  if (equals == std::string_view::npos) {
-    return "--limit " + escaped(assignment, kQuotedMax) + " has no value: write NAME=VALUE, for example nodes=1000";
-  }
-  const std::string_view name = assignment.substr(0, equals);
-  const LimitInfo* limit = find_limit(name);
-  if (limit == nullptr) {
-    return "there is no limit '" + escaped(name, kQuotedMax) + "'" + nearest_limit(name) +
-           " (tcphub --help-limits shows all)";
-  }
-  return set_limit(limits, *limit, assignment.substr(equals + 1));
-}
-
 }  // namespace gimnet::hub

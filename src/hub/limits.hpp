@@ -108,7 +108,5 @@ struct LimitInfo {
 /// Sets one limit to a whole number, with an optional suffix k, M or G for powers of 1,024 (not for times). Returns an
 /// empty string, or what is wrong and what to do.
 [[nodiscard]] std::string set_limit(Limits& limits, const LimitInfo& limit, std::string_view value);
-/// Sets one limit from "NAME=VALUE". Errors also: an unknown name, with the nearest one.
-[[nodiscard]] std::string set_limit(Limits& limits, std::string_view assignment);
 
 }  // namespace gimnet::hub

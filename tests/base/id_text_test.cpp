@@ -14,7 +14,6 @@ TEST(IdText, ReadsWhatItPrints) {
   for (const auto id : {NodeId{0}, make_id<NodeId>(HubId{7}, 17), NodeId{0xFFFFFFFF}}) {
     EXPECT_EQ(parse_node_id(to_string(id)), id);
   }
-  EXPECT_EQ(parse_group_id("7#17"), make_id<GroupId>(HubId{7}, 17));
 }
 
 TEST(IdText, RefusesEverythingElse) {
@@ -22,7 +21,6 @@ TEST(IdText, RefusesEverythingElse) {
                            "7.1048576", "7.99999999999999999999", "robot"}) {
     EXPECT_EQ(parse_node_id(text), std::nullopt) << text;
   }
-  EXPECT_EQ(parse_group_id("7.17"), std::nullopt);
 }
 
 }  // namespace

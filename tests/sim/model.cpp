@@ -31,7 +31,7 @@ Model::Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
 }
 
 std::optional<GoodbyeCode> Model::judge_name(const std::string& name, std::uint32_t claimant) const {
-  if (!proto::valid_node_name(name)) return GoodbyeCode::bad_name;
+  if (proto::node_name_fault(name) != nullptr) return GoodbyeCode::bad_name;
   const auto holder = names_.find(name);
   if (holder == names_.end() || holder->second == claimant) return std::nullopt;
   if (sessions_.at(holder->second).connected) return GoodbyeCode::name_taken;

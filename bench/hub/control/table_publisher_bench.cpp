@@ -24,7 +24,7 @@ struct World {
     }
     static_cast<void>(membership.services().advertise(subscribers[0], "robot/odom", {}, milliseconds{0}, effects));
     for (std::size_t i = 1; i <= count; ++i) {
-      static_cast<void>(membership.services().subscribe(subscribers[i], "robot/odom", effects));
+      static_cast<void>(membership.services().subscribe(subscribers[i], "robot/odom", {}, effects));
     }
     publisher.publish_group(kGroup, membership);
     effects.clear();
@@ -56,7 +56,7 @@ void change(benchmark::State& state, Publish publish) {
     const std::uint32_t node = hub.subscribers[1 + ++step * 7'919 % static_cast<std::size_t>(state.range(0))];
     static_cast<void>(services.unsubscribe(node, "robot/odom", hub.effects));
     publish(hub, node);
-    static_cast<void>(services.subscribe(node, "robot/odom", hub.effects));
+    static_cast<void>(services.subscribe(node, "robot/odom", {}, hub.effects));
     publish(hub, node);
     hub.effects.clear();
   }

@@ -32,7 +32,6 @@ void check_data(const MessageView& message) {
     const std::size_t size = encode_ack(*ack, written);
     FUZZ_MUST(fuzz::same(std::span(written).first(size), message.data.first(size)));
   }
-  if (const auto ping = decode_ping(message.data)) FUZZ_MUST(ping->echo.size() + kPingTimeSize == message.data.size());
   if (const auto failure = decode_failure(message.data)) {
     FUZZ_MUST(failure->sentence.size() + kErrorStatusSize == message.data.size());
   }

@@ -176,6 +176,7 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   }
   const auto view = proto::split_control(payload);
   if (!view) return close(*session, GoodbyeCode::malformed, "a control frame without operation and request number");
+  // The shards let no ROUTE through (check_header_from_node()): a hole there is not to reach a handler.
   if (kind != proto::Kind::ns && kind != proto::Kind::ctrl) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }

@@ -116,13 +116,12 @@ void TablePublisher::replace(std::uint32_t index, std::unique_ptr<const GroupMem
   collect();
 }
 
-bool TablePublisher::collect() {
+void TablePublisher::collect() {
 #ifdef GIMNET_BUG_LAST_LIST_IS_KEPT
   while (garbage_.size() > 1 && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
 #else
   while (!garbage_.empty() && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
 #endif
-  return !garbage_.empty();
 }
 
 }  // namespace gimnet::hub

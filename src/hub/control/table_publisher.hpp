@@ -44,8 +44,8 @@ class TablePublisher {
   [[nodiscard]] std::optional<ShardIndex> end_group(std::uint32_t index);
   void clear_group(std::uint32_t index);
 
-  /// Frees what nobody looks at any more. True: something is left to free.
-  bool collect();
+  /// Frees what nobody looks at any more.
+  void collect();
   [[nodiscard]] std::size_t garbage() const { return garbage_.size(); }
 
  private:

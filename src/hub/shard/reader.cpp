@@ -147,9 +147,8 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
       continue;
     }
     if (found.found == proto::Found::too_long) {
-      const proto::RunView header{next, proto::kHeaderSize, 1};
       connection.ingress.error = proto::FrameError::too_long;
-      return refuse(connection, header, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+      return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                     "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
     }
     if (connection.tail_since_ms == 0 || next != received.begin) connection.tail_since_ms = state_.now_ms;
@@ -219,19 +218,18 @@ bool Reader::handle_other(Connection& connection, const proto::RunView& view, Ad
       return handle_control(connection, view);
     case Admission::wrong_source:
       state_.counters.wrong_source.add(1);
-      return refuse(connection, view, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
+      return refuse(connection, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
                     "a frame's source is not this connection's node id; put the id from WELCOME into src");
     case Admission::data:
     case Admission::malformed:
       break;
   }
-  return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+  return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                 std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
 }
 
-bool Reader::refuse(Connection& connection, const proto::RunView& view, proto::DropReason reason,
-                    proto::GoodbyeCode code, const std::string& sentence) {
-  static_cast<void>(view);
+bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::GoodbyeCode code,
+                    const std::string& sentence) {
   // One frame came and ended here; what stands behind it is not looked at and so was never a frame.
   state_.tally.accepted += 1;
   state_.tally.drop(reason, 1);
@@ -273,7 +271,7 @@ void Reader::fill_trace(const proto::RunView& view) {
 bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   const auto message = proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
   if (!message) {
-    return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                   "malformed FLOW frame: unknown operation, or too short for it");
   }
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
@@ -335,7 +333,7 @@ bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
   const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize);
   const auto goodbye = proto::decode<proto::Goodbye>(payload);
   if (!goodbye) {
-    return refuse(connection, view, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                   "after WELCOME the only LINK message is GOODBYE");
   }
   closer_.on_goodbye(connection, goodbye->code, goodbye->sentence);

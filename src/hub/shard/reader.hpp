@@ -62,8 +62,8 @@ class Reader {
   void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);
   void fill_trace(const proto::RunView& view);
-  [[nodiscard]] bool refuse(Connection& connection, const proto::RunView& view, proto::DropReason reason,
-                            proto::GoodbyeCode code, const std::string& sentence);
+  [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason, proto::GoodbyeCode code,
+                            const std::string& sentence);
 
   ShardState& state_;
   Closer& closer_;

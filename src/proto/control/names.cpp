@@ -80,12 +80,6 @@ bool matches(std::string_view pattern, std::string_view name) {
   return parsed && valid_name(name) && parsed->matches(name);
 }
 
-ServiceName split_service_name(std::string_view full_name) {
-  const auto slash = full_name.rfind('/');
-  if (slash == std::string_view::npos) return {};
-  return {full_name.substr(0, slash), full_name.substr(slash + 1)};
-}
-
 std::string join_service_name(std::string_view node, std::string_view service) {
   std::string full_name;
   full_name.reserve(node.size() + 1 + service.size());

@@ -17,7 +17,6 @@ inline constexpr std::size_t kNamePartsMax = 16;
 [[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
 /// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends there means the id.
 [[nodiscard]] const char* node_name_fault(std::string_view name);
-[[nodiscard]] inline bool valid_node_name(std::string_view name) { return node_name_fault(name) == nullptr; }
 
 /// A name, of which parts may be `*` (one part) or `**` (any number, none included).
 [[nodiscard]] bool valid_pattern(std::string_view pattern);
@@ -25,12 +24,7 @@ inline constexpr std::size_t kNamePartsMax = 16;
 /// Does the whole name fit the pattern? False where one of them is not valid.
 [[nodiscard]] bool matches(std::string_view pattern, std::string_view name);
 
-/// `node` is all before the last '/', `service` the part after it; without '/', both are empty.
-struct ServiceName {
-  std::string_view node;
-  std::string_view service;
-};
-[[nodiscard]] ServiceName split_service_name(std::string_view full_name);
+/// The full name of a service: what stands behind its last '/' is the name within its node.
 [[nodiscard]] std::string join_service_name(std::string_view node, std::string_view service);
 
 /// The name of a service within its node: a valid name of one part.

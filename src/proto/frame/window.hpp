@@ -32,8 +32,6 @@ class SendWindow {
 
   /// Bytes that may be sent now.
   [[nodiscard]] std::uint32_t room() const { return allowed_ > sent_ ? allowed_ - sent_ : 0; }
-  /// Bytes sent and not confirmed.
-  [[nodiscard]] std::uint32_t under_way() const { return sent_ - taken_; }
   [[nodiscard]] std::uint32_t sent() const { return sent_; }
   [[nodiscard]] std::uint32_t taken() const { return taken_; }
 
@@ -67,12 +65,7 @@ class ReceiveWindow {
   ReceiveWindow(std::uint32_t message, std::uint32_t total, std::uint32_t window = kWindowDefault)
       : message_(message), total_(total), window_(std::max(window, 1u)) {}
 
-  /// `taken` is what was received of the message in total, as Reassembled says.
-  [[nodiscard]] std::optional<Taken> on_received(std::uint32_t taken) {
-    if (!due(taken)) return std::nullopt;
-    return tell(taken);
-  }
-  /// Should the sender be told that so many were received?
+  /// Should the sender be told that so many were received of the message in total, as Reassembled says?
   [[nodiscard]] bool due(std::uint32_t taken) const {
     return taken >= total_ || taken - told_ >= std::max(window_ / 4, 1u);
   }

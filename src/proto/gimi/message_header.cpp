@@ -61,11 +61,6 @@ std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data) {
   return kAckSizeMax;
 }
 
-std::optional<Ping> decode_ping(std::span<const std::byte> data) {
-  if (data.size() < kPingTimeSize) return std::nullopt;
-  return Ping{load_le<std::int64_t>(data.data()), data.subspan(kPingTimeSize)};
-}
-
 std::optional<Failure> decode_failure(std::span<const std::byte> data) {
   if (data.size() < kErrorStatusSize) return std::nullopt;
   const auto text = data.subspan(kErrorStatusSize);

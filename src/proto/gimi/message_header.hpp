@@ -79,14 +79,6 @@ struct Ack {
 /// Returns the size, kAckSize or kAckSizeMax.
 std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data);
 
-/// Data of PING and, unchanged, of PONG. Valid until: its bytes change.
-struct Ping {
-  std::int64_t sent_ns = 0;  ///< the pinger's clock
-  std::span<const std::byte> echo;
-};
-/// Nothing: too short.
-[[nodiscard]] std::optional<Ping> decode_ping(std::span<const std::byte> data);
-
 /// Data of ERROR. Valid until: its bytes change.
 struct Failure {
   std::uint16_t status = 0;

@@ -16,7 +16,7 @@ using proto::ns::ChangeKind;
 // ---- what a HELLO is worth
 
 std::optional<GoodbyeCode> Reference::judge_name(const std::string& name, std::uint64_t claimant) const {
-  if (!proto::valid_node_name(name)) return GoodbyeCode::bad_name;
+  if (proto::node_name_fault(name) != nullptr) return GoodbyeCode::bad_name;
   const auto holder = names_.find(name);
   if (holder == names_.end() || holder->second == claimant) return std::nullopt;
   if (sessions_.at(holder->second).connected) return GoodbyeCode::name_taken;

@@ -83,14 +83,9 @@ class Services {
   /// Errors: not_found, denied. nullopt: done.
   [[nodiscard]] std::optional<Failure> withdraw(std::uint32_t provider, std::uint32_t group,
                                                 std::chrono::milliseconds now, Effects& effects);
-  /// The topic, with or without a service yet. Errors: bad_request, limit.
+  /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors: bad_request, limit.
   [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
                                                         const SubscriberTerms& terms, Effects& effects);
-  /// The same for all that comes.
-  [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
-                                                        Effects& effects) {
-    return subscribe(node, full_name, SubscriberTerms{}, effects);
-  }
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<Failure> unsubscribe(std::uint32_t node, std::string_view full_name, Effects& effects);
 

@@ -196,7 +196,7 @@ void GatherWriter::consume(const Batch& batch, std::size_t bytes, Job& job) {
     switch (pick.source) {
       case Source::partial:
         if (partial_.control) job.context.tally.sent_control_bytes += taken;
-        static_cast<void>(consume_partial(taken, job));
+        consume_partial(taken, job);
         break;
       case Source::control:
         job.context.tally.sent_control_bytes += taken;
@@ -211,12 +211,11 @@ void GatherWriter::consume(const Batch& batch, std::size_t bytes, Job& job) {
   }
 }
 
-std::uint32_t GatherWriter::consume_partial(std::size_t bytes, Job& job) {
+void GatherWriter::consume_partial(std::size_t bytes, Job& job) {
   partial_.offset += static_cast<std::uint32_t>(bytes);
-  if (partial_.offset < partial_.run.size) return 0;
+  if (partial_.offset < partial_.run.size) return;
   Partial whole = std::exchange(partial_, Partial{});
   finish(std::move(whole.run), whole.control, whole.shared, job);
-  return whole.offset;
 }
 
 /// Takes `bytes` from the front of `run`: whole frames are finished, one that was begun becomes the partial frame.

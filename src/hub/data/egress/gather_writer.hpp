@@ -91,7 +91,7 @@ class GatherWriter {
   [[nodiscard]] static std::uint32_t allowed(const Run& run, std::size_t planned, Job& job);
 
   void consume(const Batch& batch, std::size_t bytes, Job& job);
-  [[nodiscard]] std::uint32_t consume_partial(std::size_t bytes, Job& job);
+  void consume_partial(std::size_t bytes, Job& job);
   [[nodiscard]] std::uint32_t consume_run(Run& run, std::size_t bytes, bool control, bool shared, Job& job);
   void consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job);
   void consume_lane(std::size_t lane, std::size_t bytes, Job& job);

@@ -146,7 +146,7 @@ TEST_F(ListingTest, FindsServicesByTheirFullNames) {
   join("robot");
   const std::uint32_t odom = advertise("robot/odom");
   const std::uint32_t pose = advertise("robot/pose");
-  ASSERT_TRUE(membership_.services().subscribe(1, "robot/nobody-offers-that", effects_));
+  ASSERT_TRUE(membership_.services().subscribe(1, "robot/nobody-offers-that", {}, effects_));
   const auto robot = proto::Pattern::parse("robot/*");
   const auto any = proto::Pattern::parse("**/pose");
   EXPECT_EQ(list_services(membership_.services(), {.pattern = &*robot, .most = 10, .work = 64}).indices,

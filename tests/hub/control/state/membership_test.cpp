@@ -215,7 +215,7 @@ TEST_F(MembershipTest, ServicesStayThroughTheGraceTimeAndGoWithIt) {
   Session* robot = join("robot");
   Session* viewer = join("viewer");
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
-  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", effects_));
+  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
   lose(*robot, 1s);
   membership_.tick(1s + kGrace - 1ms, effects_);
   EXPECT_NE(membership_.services().find_group(1), nullptr);
@@ -350,8 +350,8 @@ TEST_F(MembershipTest, ANewNameWithdrawsWhatTheNodeProvides) {
   Session* robot = join("robot");
   Session* viewer = join("viewer");
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0s, effects_));
-  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", effects_));
-  ASSERT_TRUE(membership_.services().subscribe(robot->index, "viewer/pose", effects_));
+  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
+  ASSERT_TRUE(membership_.services().subscribe(robot->index, "viewer/pose", {}, effects_));
   effects_.clear();
   ASSERT_FALSE(membership_.rename(*robot, "forklift", 1s, effects_));
   ASSERT_EQ(count<ServiceMovedDue>(), 1u);

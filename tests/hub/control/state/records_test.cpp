@@ -25,7 +25,7 @@ TEST(Records, TellAllThatIsKnown) {
   terms.metadata = "x y";
   const auto service = membership.services().advertise(session.index, "robot/odom", terms, 1s, effects);
   ASSERT_TRUE(service);
-  ASSERT_TRUE(membership.services().subscribe(session.index, "robot/odom", effects));
+  ASSERT_TRUE(membership.services().subscribe(session.index, "robot/odom", {}, effects));
 
   ns::NodeRecord node;
   node.node = make_id<NodeId>(HubId{7}, session.index);

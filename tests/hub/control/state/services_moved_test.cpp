@@ -26,7 +26,9 @@ class ServicesMovedTest : public ::testing::Test {
     EXPECT_TRUE(done);
     return done ? done->group : 0;
   }
-  void subscribe(const std::string& name = "robot/odom") { EXPECT_TRUE(services_.subscribe(kViewer, name, effects_)); }
+  void subscribe(const std::string& name = "robot/odom") {
+    EXPECT_TRUE(services_.subscribe(kViewer, name, {}, effects_));
+  }
   /// What the node is told at its return, if that is one service.
   ServiceMovedDue told(std::uint32_t node = kViewer) {
     const std::vector<ServiceMovedDue> all = services_.untold_moves(node);
@@ -118,7 +120,7 @@ TEST_F(ServicesMovedTest, GoesWithTheSubscriptionAndWithTheNode) {
   EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty());
   EXPECT_EQ(told(kOther).subscriber, kOther);
   EXPECT_EQ(services_.unsubscribe(kOther, "robot/odom", effects_), std::nullopt);
-  EXPECT_TRUE(services_.subscribe(kOther, "robot/odom", effects_));
+  EXPECT_TRUE(services_.subscribe(kOther, "robot/odom", {}, effects_));
   EXPECT_THAT(services_.untold_moves(kOther), IsEmpty()) << "the answer told";
 }
 

@@ -70,7 +70,7 @@ class ServicesTest : public ::testing::Test {
     return done ? Status::done : done.error().status;
   }
   Status subscribe(std::uint32_t node, const std::string& name) {
-    const auto done = services_.subscribe(node, name, effects_);
+    const auto done = services_.subscribe(node, name, {}, effects_);
     return done ? Status::done : done.error().status;
   }
   std::vector<std::string> take_words() {
@@ -140,7 +140,7 @@ TEST_F(ServicesTest, SubscribingTwiceIsOnce) {
 }
 
 TEST_F(ServicesTest, ANameWithoutAServiceIsWaitedFor) {
-  const auto topic = services_.subscribe(kViewer, "robot/odom", effects_);
+  const auto topic = services_.subscribe(kViewer, "robot/odom", {}, effects_);
   ASSERT_TRUE(topic);
   EXPECT_FALSE((*topic)->service.has_value());
   subscribe(kLogger, "robot/odom");
