@@ -16,6 +16,8 @@
 namespace gimnet::hub {
 namespace {
 
+static_assert(kShardCountMax <= kShardsMax);  // as many as the tables and sets of shards have room for
+
 /// Nobody asked for the default socket: a place for it that cannot be used, as in the environment of a session that has
 /// ended, costs that socket and not the hub.
 std::vector<ListenUrl> addresses_for(const HubOptions& options) {
@@ -78,10 +80,7 @@ struct Ground {
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
       mailboxes.push_back(
-          std::make_unique<Mailbox>(options.shards,
-                                    Mailbox::Bounds{options.limits.mailbox_entries, options.limits.mailbox_bytes,
-                                                    8 * options.limits.turn_deliveries},
-                                    *wakers.back()));
+          std::make_unique<Mailbox>(options.shards, Mailbox::bounds_from(options.limits), *wakers.back()));
       counters.push_back(std::make_unique<ShardCounters>());
       readable.push_back(counters.back().get());
       sessions.push_back(std::make_unique<SessionGauges>(nodes_most));

@@ -9,6 +9,7 @@
 #include "base/log.hpp"
 #include "base/suggest.hpp"
 #include "proto/control/control_message.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -21,7 +22,7 @@ constexpr std::uint64_t kYear = 365 * 24 * kHour;
 constexpr std::size_t kQuotedMax = 60;
 
 constexpr std::array kTable{
-    LimitInfo{"frame_bytes", "bytes", &Limits::frame_bytes, 65'536, kMiB,
+    LimitInfo{"frame_bytes", "bytes", &Limits::frame_bytes, 65'536, proto::kFrameLengthMax,
               "largest frame after its header; 64 KiB is what every hub carries"},
     LimitInfo{"turn_bytes", "bytes", &Limits::turn_bytes, 4 * kKiB, 16 * kMiB,
               "read from one connection before the next one has its turn", true},

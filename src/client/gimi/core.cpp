@@ -22,8 +22,8 @@ namespace {
 constexpr std::size_t kHeaderRoom = 1024;
 /// Status of an ERROR about a DATA that is larger than its receiver takes.
 constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
-/// Of what another node says, so much is kept.
-constexpr std::size_t kSentenceBytesMax = 256;
+/// Of what another node says, so many bytes are kept.
+constexpr std::size_t kPeerWordsMax = 256;
 
 /// NIF refuses what its sender still waits with. Less than its window is on its way already: that comes whole, so that
 /// this library can tell the sender of which message it speaks.
@@ -34,7 +34,7 @@ std::size_t nif_bytes_max(std::size_t message_bytes_max) {
 
 /// What another node says, fit for a terminal.
 std::string plain_words(std::string_view sentence) {
-  std::string words(sentence.substr(0, kSentenceBytesMax));
+  std::string words(sentence.substr(0, kPeerWordsMax));
   std::ranges::replace_if(words, [](char c) { return c < ' ' || c > '~'; }, '?');
   return words;
 }

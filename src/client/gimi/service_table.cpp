@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/gimi/deadline.hpp"
+#include "proto/control/ns.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -118,7 +119,7 @@ SubscribedService& ServiceTable::entry(const std::string& full_name, const Queue
 /// what it published.
 void ServiceTable::set_place(SubscribedService& service, const ServicePlace& place) {
   // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8), and the present one.
-  constexpr std::size_t kGroups = 8;
+  constexpr std::size_t kGroups = proto::ns::kGroupsBetweenMax + 2;
   service.place = place;
   service.on_place(place);
   if (place.group == 0) return;

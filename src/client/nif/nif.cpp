@@ -33,6 +33,7 @@ nif_status nif_connect(const nif_options* options, nif_node** node) {
     if (*node != nullptr) return NIF_OK;
     (*connected)->begin_close();
     (*connected)->close();
+    static_assert(gimnet::nif::kHandlesMax == 4'096);  // as nif.h says, too
     return fail(NIF_LIMIT, "cannot connect: this process has 4,096 open handles");
   });
 }

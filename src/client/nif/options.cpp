@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cstring>
 
+#include "proto/control/fields.hpp"
 #include "proto/control/names.hpp"
 
 namespace gimnet::nif {
 namespace {
 
 constexpr std::size_t kStructSizeMax = 4096;
-constexpr std::size_t kDescriptionBytesMax = 256;
 
 Failure bad(const std::string& why) { return {NIF_BAD_ARGUMENT, "cannot connect: " + why}; }
 
@@ -31,7 +31,9 @@ std::optional<Failure> read_struct(const nif_options* options, nif_options& whol
 std::optional<Failure> read_identity(const nif_options& given, Options& options) {
   if (given.name != nullptr) options.name = given.name;
   if (given.description != nullptr) options.description = given.description;
-  if (options.description.size() > kDescriptionBytesMax) return bad("the description is over 256 bytes");
+  if (options.description.size() > proto::kDescriptionBytesMax) {
+    return bad("the description is over " + std::to_string(proto::kDescriptionBytesMax) + " bytes");
+  }
   const char* fault = options.name.empty() ? nullptr : proto::node_name_fault(options.name);
   if (fault != nullptr) {
     return Failure{NIF_BAD_NAME, "cannot connect as '" + options.name + "': " + std::string(fault)};

@@ -12,7 +12,12 @@ namespace gimnet::nif {
 namespace {
 
 constexpr std::uint8_t kKnownFlags = NIF_FLAG_REPORT | NIF_FLAG_KEYED | NIF_FLAG_MORE;
-constexpr std::uint8_t kTraceSlotsMax = 8;
+/// Less than a TRACE can have (proto::kTraceSlotsMax).
+constexpr std::uint8_t kOwnTraceSlotsMax = 8;
+static_assert(kOwnTraceSlotsMax <= proto::kTraceSlotsMax);
+
+static_assert(NIF_MESSAGE_BYTES_MAX == proto::kMessageBytesMax);
+static_assert(NIF_LIST_RECIPIENTS_MAX == proto::kListRecipientsMax);
 
 Failure bad(const char* why) { return {NIF_BAD_ARGUMENT, std::string("cannot send: ") + why}; }
 
@@ -22,7 +27,7 @@ std::optional<Failure> check_fields(const nif_outgoing& message) {
   if (message.lane > NIF_BACKGROUND) return bad("lane is not a nif_lane");
   if (message.policy > NIF_LATEST) return bad("policy is not a nif_policy");
   if ((message.flags & ~kKnownFlags) != 0) return bad("flags has unknown bits");
-  if (message.trace_slots > kTraceSlotsMax) return bad("trace_slots is over 8");
+  if (message.trace_slots > kOwnTraceSlotsMax) return bad("trace_slots is over 8");
   const bool to_one = message.kind == NIF_UNICAST || message.kind == NIF_SERVICE;
   if (message.policy == NIF_BLOCK && !to_one) return bad("BLOCK is for UNICAST and SERVICE only");
   if (message.policy == NIF_LATEST && to_one && (message.flags & NIF_FLAG_KEYED) == 0) {

@@ -9,6 +9,8 @@
 #include "proto/frame/frame_builder.hpp"
 
 namespace gimnet::nif {
+
+static_assert(NIF_REQUESTS_MAX == proto::kOpenRequestsMax);
 namespace {
 
 std::uint16_t operation_of(const proto::Payload& payload) { return load_le<std::uint16_t>(payload.data()); }

@@ -48,7 +48,7 @@ void put_choice(bitestream::Writer& writer, std::uint32_t key, Choice choice) {
 
 void write_page_request(bitestream::Writer& writer, const std::string& pattern, std::uint32_t after,
                         std::uint32_t records_max) {
-  put_clean_text(writer, 3, pattern, kSentenceBytesMax);
+  put_clean_text(writer, 3, pattern, kWrittenNameBytesMax);
   if (after != 0) writer.put_u32(4, after);
   if (records_max != kPageRecordsDefault) writer.put_u32(5, records_max);
 }
@@ -88,7 +88,7 @@ const char* operation_name(std::uint16_t operation) {
   }
 }
 
-void Resolve::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+void Resolve::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
 Resolve Resolve::read(Fields& fields) { return {read_name(fields, 3, "name")}; }
 
 void ResolveAnswer::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
@@ -169,7 +169,7 @@ ListAnswer ListAnswer::read(Fields& fields) {
 }
 
 void Advertise::write(bitestream::Writer& writer) const {
-  put_clean_text(writer, 3, service, kSentenceBytesMax);
+  put_clean_text(writer, 3, service, kWrittenNameBytesMax);
   writer.put_u32(4, message_type);
   writer.put_u32(5, instance);
   put_choice(writer, 6, direction);
@@ -271,7 +271,7 @@ ServicesAnswer ServicesAnswer::read(Fields& fields) {
 }
 
 void Subscribe::write(bitestream::Writer& writer) const {
-  put_clean_text(writer, 3, name, kSentenceBytesMax);
+  put_clean_text(writer, 3, name, kWrittenNameBytesMax);
   if (window != 0) writer.put_u32(4, window);
   if (depth != 1) writer.put_u32(5, depth);
   if (rate_hz != 0.0) writer.put_f64(6, rate_hz);
@@ -306,7 +306,7 @@ SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   return answer;
 }
 
-void Unsubscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+void Unsubscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
 Unsubscribe Unsubscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
 
 namespace {
@@ -330,7 +330,7 @@ std::vector<GroupId> read_between(Fields& fields) {
 }  // namespace
 
 void ServiceMoved::write(bitestream::Writer& writer) const {
-  put_clean_text(writer, 3, name, kSentenceBytesMax);
+  put_clean_text(writer, 3, name, kWrittenNameBytesMax);
   writer.put_u32(4, old_group.value());
   writer.put_u32(5, new_group.value());
   writer.put_u32(6, message_type);

@@ -4,7 +4,7 @@
 
 namespace gimnet::proto::ns {
 
-void RegisterName::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kSentenceBytesMax); }
+void RegisterName::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
 RegisterName RegisterName::read(Fields& fields) { return {fields.required_text(3, "name", kNameBytesMax)}; }
 
 void RegisterNameAnswer::write(bitestream::Writer& writer) const {

@@ -22,7 +22,7 @@ Change read_change(Fields& fields) {
 
 void Watch::write(bitestream::Writer& writer) const {
   writer.put_u32(3, watch);
-  put_clean_text(writer, 4, pattern, kSentenceBytesMax);
+  put_clean_text(writer, 4, pattern, kWrittenNameBytesMax);
   if (subjects != kWatchAll) writer.put_u8(5, subjects);
   if (epoch != 0) {
     writer.put_u64(6, epoch);

@@ -15,6 +15,7 @@
 #include "hub/data/buffer.hpp"
 #include "hub/data/ring_queue.hpp"
 #include "hub/data/route/node_table.hpp"
+#include "hub/limits.hpp"
 #include "proto/frame/flow.hpp"
 
 namespace gimnet::hub {
@@ -81,6 +82,12 @@ class Mailbox {
     std::uint64_t bytes;
     std::uint64_t deliveries = ~std::uint64_t{0};  ///< makes it crowded, never full
   };
+  /// So many shares of a turn (turn_deliveries) may wait between two shards before their senders are not read.
+  static constexpr std::uint64_t kWaitingShares = 4;
+  [[nodiscard]] static Bounds bounds_from(const Limits& limits) {
+    // crowded() begins at half of each
+    return {limits.mailbox_entries, limits.mailbox_bytes, 2 * kWaitingShares * limits.turn_deliveries};
+  }
   Mailbox(std::size_t shards, Bounds bounds, Waker& waker);
 
   /// Sender: no room for another entry of that many bytes.

@@ -88,9 +88,7 @@ HubRig::HubRig(std::size_t shards, Limits limits)
   std::vector<SessionGauges*> sessions;
   for (std::size_t i = 0; i < shards; ++i) {
     wakers_.push_back(std::make_unique<Waker>());
-    mailboxes_.push_back(std::make_unique<Mailbox>(
-        shards, Mailbox::Bounds{limits_.mailbox_entries, limits_.mailbox_bytes, 8 * limits_.turn_deliveries},
-        *wakers_.back()));
+    mailboxes_.push_back(std::make_unique<Mailbox>(shards, Mailbox::bounds_from(limits_), *wakers_.back()));
     counters_.push_back(std::make_unique<ShardCounters>());
     wakers.push_back(wakers_.back().get());
     mailboxes.push_back(mailboxes_.back().get());
