@@ -36,6 +36,7 @@ inline constexpr std::uint32_t kIndexBits = 20;
 inline constexpr std::uint32_t kIndexMask = (1u << kIndexBits) - 1;
 inline constexpr std::uint32_t kHubIndex = 0;             ///< the hub itself
 inline constexpr std::uint32_t kEveryIndex = kIndexMask;  ///< every node of a hub
+inline constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
 inline constexpr HubId kOwnHub{0};
 inline constexpr HubId kEveryHub{4095};
 inline constexpr std::uint16_t kHubIdMax = 4094;

@@ -17,7 +17,6 @@ namespace gimnet {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::array<std::string_view, 5> kNames{"error", "warning", "info", "debug", "off"};
 
 constinit std::atomic<LogLevel> level_now{LogLevel::info};
 
@@ -60,7 +59,7 @@ void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_
   out.budget.add_left_out(out.throttle.take_forgotten());
   if (!out.budget.take(out.rates.all_per_s, now)) return out.budget.add_left_out(alike);
   if (!stderr_takes_a_line()) return out.budget.add_left_out(1 + alike);
-  std::string line = time_stamp() + " " + std::string{kNames[static_cast<std::size_t>(level)]} + " " + escaped(text);
+  std::string line = time_stamp() + " " + std::string{log_level_name(level)} + " " + escaped(text);
   if (alike > 0) line += " (" + std::to_string(alike) + " lines like this were left out)";
   if (const std::uint64_t count = out.budget.take_left_out(); count > 0) {
     line += " (" + std::to_string(count) + " lines before this were left out)";
@@ -72,9 +71,9 @@ void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_
 }  // namespace
 
 bool parse_log_level(std::string_view name, LogLevel& level) {
-  const auto* const found = std::find(kNames.begin(), kNames.end(), name);
-  if (found == kNames.end()) return false;
-  level = static_cast<LogLevel>(found - kNames.begin());
+  const auto* const found = std::find(kLogLevelNames.begin(), kLogLevelNames.end(), name);
+  if (found == kLogLevelNames.end()) return false;
+  level = static_cast<LogLevel>(found - kLogLevelNames.begin());
   return true;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -8,7 +10,11 @@ namespace gimnet {
 
 enum class LogLevel : std::uint8_t { error = 0, warning = 1, info = 2, debug = 3, off = 4 };
 
-/// "error", "warning", "info", "debug" or "off"; false for anything else.
+inline constexpr std::array<std::string_view, 5> kLogLevelNames{"error", "warning", "info", "debug", "off"};
+[[nodiscard]] constexpr std::string_view log_level_name(LogLevel level) {
+  return kLogLevelNames[static_cast<std::size_t>(level)];
+}
+/// One of kLogLevelNames; false for anything else.
 [[nodiscard]] bool parse_log_level(std::string_view name, LogLevel& level);
 
 /// Lines above this level are not written. `off` silences all. Default: info. Thread safety: any thread.
@@ -44,6 +50,8 @@ inline void log_warning(std::string_view text) { log_line(LogLevel::warning, tex
 inline void log_info(std::string_view text) { log_line(LogLevel::info, text); }
 inline void log_debug(std::string_view text) { log_line(LogLevel::debug, text); }
 
+/// So much of what somebody gave does a sentence repeat.
+inline constexpr std::size_t kQuotedMax = 60;
 /// `text` with control characters and bytes above 0x7e as \xNN, quotes and backslashes kept, cut to `most` characters.
 [[nodiscard]] std::string escaped(std::string_view text, std::size_t most = 1'000);
 

@@ -5,8 +5,6 @@
 namespace gimnet {
 namespace {
 
-constexpr std::size_t kQuotedMax = 60;
-
 std::string fault_of(const std::string& name, std::string_view value, Takes takes) {
   if (takes == Takes::nothing) return name + " takes no value: write " + name + " alone, or leave it out";
   if (takes == Takes::value) return value.empty() ? name + " is empty: give it a value, or leave it out" : "";

@@ -19,7 +19,6 @@ constexpr std::uint64_t kMiB = 1024 * kKiB;
 constexpr std::uint64_t kGiB = 1024 * kMiB;
 constexpr std::uint64_t kHour = 3'600'000;
 constexpr std::uint64_t kYear = 365 * 24 * kHour;
-constexpr std::size_t kQuotedMax = 60;
 
 constexpr std::array kTable{
     LimitInfo{"frame_bytes", "bytes", &Limits::frame_bytes, 65'536, proto::kFrameLengthMax,

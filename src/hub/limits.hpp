@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -83,6 +84,12 @@ struct Limits {
   // The log
   std::uint64_t log_lines_per_s = 100;
   std::uint64_t peer_log_lines_per_s = 10;
+
+  /// Those of the four fields laneN_bytes. REQUIRES: lane < 4.
+  [[nodiscard]] std::uint64_t lane_bytes(std::size_t lane) const {
+    const std::uint64_t by_lane[] = {lane0_bytes, lane1_bytes, lane2_bytes, lane3_bytes};
+    return by_lane[lane];
+  }
 };
 
 /// One row of the table of limits.

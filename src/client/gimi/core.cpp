@@ -77,14 +77,13 @@ class AckReceipt final : public Receipt {
 /// The GIMI header in the 16 bytes that a report repeats: behind the key, where nothing stands before it. NIF takes the
 /// fragment header away of what it remembers.
 std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
-  constexpr std::size_t kKeySize = 8;
   const auto bytes = payload_of(in);
-  if (bytes.size() < proto::kHeaderSize + kKeySize + proto::gimi::kMessageHeaderSize) return std::nullopt;
+  if (bytes.size() < proto::kHeaderSize + proto::kKeySize + proto::gimi::kMessageHeaderSize) return std::nullopt;
   const proto::FrameHeader header = proto::load_header(bytes.data());
   if (!header.has(proto::kFlagKeyed) || header.has(proto::kFlagFragment) || header.has(proto::kFlagExt)) {
     return std::nullopt;
   }
-  return proto::gimi::load_message_header(bytes.data() + proto::kHeaderSize + kKeySize);
+  return proto::gimi::load_message_header(bytes.data() + proto::kHeaderSize + proto::kKeySize);
 }
 
 }  // namespace

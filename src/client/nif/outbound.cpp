@@ -88,6 +88,12 @@ bool Outbound::put_frame(std::span<std::byte> memory, std::span<const std::byte>
   return true;
 }
 
+bool Outbound::put_flow(const proto::flow::Message& message) {
+  std::array<std::byte, proto::flow::kFrameSizeMax> frame;
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{0}, frame);
+  return put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
+}
+
 bool Outbound::post(std::span<const std::byte> frame) {
   const MutexLock lock(mutex_);
   if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame)) return false;
@@ -134,12 +140,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
   full_ = false;
   broken_ = false;
   last_write_ns_ = steady_now_ns();
-  if (missing > 0) {
-    std::array<std::byte, proto::flow::kFrameSizeMax> frame;
-    const proto::flow::Skip skip{proto::DropReason::link_lost, missing};
-    const std::size_t size = proto::flow::encode_frame(skip, NodeId{0}, frame);
-    if (!put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size))) return std::nullopt;
-  }
+  if (missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, missing})) return std::nullopt;
   // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes in.
   if (state_ != State::ended) state_ = State::connected;
   changed_.notify_all();
@@ -264,11 +265,7 @@ void Outbound::on_resume(const proto::flow::Target& target) {
 
 void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
   const MutexLock lock(mutex_);
-  if (taken != 0) {
-    std::array<std::byte, proto::flow::kFrameSizeMax> confirm;
-    const std::size_t size = proto::flow::encode_frame(proto::flow::Confirm{taken}, NodeId{0}, confirm);
-    static_cast<void>(put_frame(queue_.append_control(size), std::span<const std::byte>(confirm).first(size)));
-  }
+  if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
   goodbye_.assign(goodbye.begin(), goodbye.end());
 }
 

@@ -134,6 +134,8 @@ class Outbound {
                                                 Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
+  /// Queues a FLOW frame; false: no memory.
+  [[nodiscard]] bool put_flow(const proto::flow::Message& message) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);

@@ -275,10 +275,7 @@ nif_status Outbound::flush() {
 /// One question at a time: the answer to an earlier one may be all that is wanted, and if not the next one follows it.
 bool Outbound::ask_for_confirm() {
   if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written()) return false;
-  std::array<std::byte, proto::flow::kFrameSizeMax> frame;
-  const proto::flow::Ping ping{kAskSequence, wall_now_ns()};
-  const std::size_t size = proto::flow::encode_frame(ping, NodeId{0}, frame);
-  asked_ = put_frame(queue_.append_control(size), std::span<const std::byte>(frame).first(size));
+  asked_ = put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
   if (asked_) write_or_leave(false);
   return asked_;
 }

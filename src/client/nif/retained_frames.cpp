@@ -5,15 +5,6 @@
 #include <utility>
 
 namespace gimnet::nif {
-namespace {
-
-/// A frame sent with BLOCK is never let go; BLOCK is also the default of the kinds that go to one node.
-bool is_blocking(const proto::FrameHeader& header) {
-  if (header.policy() != proto::Policy::kind_default) return header.policy() == proto::Policy::block;
-  return header.kind != proto::Kind::group && header.kind != proto::Kind::list && header.kind != proto::Kind::broadcast;
-}
-
-}  // namespace
 
 void RetainedFrames::written(FrameRun run, bool keep) {
   next_ += run.frames;
@@ -57,7 +48,7 @@ void RetainedFrames::drop_front(std::uint64_t count) {
 }
 
 bool RetainedFrames::make_room(std::size_t more) {
-  while (bytes_ + more > bytes_max_ && !runs_.empty() && !is_blocking(runs_.front().first_header())) {
+  while (bytes_ + more > bytes_max_ && !runs_.empty() && !proto::is_block(runs_.front().first_header())) {
     drop_front(1);
     ++let_go_;
   }

@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "base/clock.hpp"
+#include "base/descriptor.hpp"
 #include "hub/config/toml_file.hpp"
 
 namespace gimnet::hub {
@@ -37,20 +38,6 @@ std::string instead_of_file(const struct stat& info, bool pipes) {
   if (S_ISCHR(info.st_mode) && info.st_rdev == makedev(1, 3)) return {};
   return std::string{"it is a device"} + kRemedy;
 }
-
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return number_; }
-
- private:
-  const int number_;
-};
 
 /// Reads what is there, at most one byte more than a configuration may have. 0: the end, EAGAIN: the rest is not
 /// there yet, or another error.

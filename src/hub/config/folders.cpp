@@ -6,14 +6,13 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <system_error>
+
+#include "base/descriptor.hpp"
 
 namespace gimnet::hub {
 namespace {
 
 constexpr mode_t kPrivate = 0700;
-
-std::string system_text(int error) { return std::generic_category().message(error); }
 
 /// "" when there is a folder at `path` then; `info` describes it.
 std::string make_folder(const std::string& path, struct stat& info) {

@@ -147,7 +147,7 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
   for (const std::string& assignment : raw.limits) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos) {
-      return "--limit " + escaped(assignment, 60) + " has no value: write NAME=VALUE, for example nodes=1000";
+      return "--limit " + escaped(assignment, kQuotedMax) + " has no value: write NAME=VALUE, for example nodes=1000";
     }
     sources.flags.push_back(flag("limits." + assignment.substr(0, equals), "--limit", assignment.substr(equals + 1)));
   }
@@ -202,7 +202,7 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
   if (raw.help) return CommandLineEnding{0, app.help()};
   if (const std::vector<std::string> extras = app.remaining(); !extras.empty()) {
     const std::string word = extras.front().substr(0, extras.front().find('='));
-    return wrong("there is no argument '" + escaped(word, 60) + "'" + did_you_mean(word, kOptionNames) +
+    return wrong("there is no argument '" + escaped(word, kQuotedMax) + "'" + did_you_mean(word, kOptionNames) +
                  " (tcphub --help shows all)");
   }
   if (raw.version) return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};

@@ -21,10 +21,8 @@ namespace {
 
 using Kind = Value::Kind;
 
-constexpr std::size_t kQuotedMax = 60;
 constexpr std::string_view kLimits = "limits.";
 constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
-constexpr std::array<std::string_view, 5> kLogLevels{"error", "warning", "info", "debug", "off"};
 
 std::string_view kind_name(Kind kind) {
   constexpr std::array<std::string_view, 8> kNames{"words",      "a text",         "a whole number", "true or false",
@@ -165,7 +163,7 @@ std::string show_flag(const HubOptions& options) {
 }
 
 void set_log_level(Configuration& configuration, const Given& given, Faults& faults) {
-  if (!one_of(given, kLogLevels, "error, warning, info, debug or off", faults)) return;
+  if (!one_of(given, kLogLevelNames, "error, warning, info, debug or off", faults)) return;
   static_cast<void>(parse_log_level(given.value.text, configuration.options.log_level));
 }
 
@@ -179,9 +177,7 @@ std::string show_listen(const HubOptions& options) {
   return "[" + list + "]";
 }
 
-std::string show_log_level(const HubOptions& options) {
-  return toml_quoted(kLogLevels[static_cast<std::size_t>(options.log_level)]);
-}
+std::string show_log_level(const HubOptions& options) { return toml_quoted(log_level_name(options.log_level)); }
 
 constexpr std::array kSettings{
     Setting{"listen", "addresses to listen on: tcp://HOST:PORT or unix:/PATH", false, set_listen, show_listen},

@@ -24,7 +24,6 @@ namespace fs = std::filesystem;
 constexpr std::string_view kPrefix = "TCPHUB_";
 constexpr std::string_view kLimitsPrefix = "TCPHUB_LIMITS_";
 constexpr std::string_view kFileVariable = "TCPHUB_CONFIG";
-constexpr std::size_t kQuotedMax = 60;
 
 std::string upper(std::string_view text) {
   std::string result{text};

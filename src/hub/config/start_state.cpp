@@ -14,8 +14,6 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
-
 template <class Bytes>
 void fill_randomly(Bytes& bytes) {
   const auto target = std::as_writable_bytes(std::span{&bytes, 1});

@@ -9,9 +9,9 @@
 #include <cerrno>
 #include <charconv>
 #include <span>
-#include <system_error>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "hub/config/folders.hpp"
 #include "hub/control/port_owner.hpp"
 
@@ -22,25 +22,6 @@ constexpr mode_t kPrivate = 0600;
 constexpr const char* kState = "state";
 constexpr const char* kFresh = "state.new";
 constexpr const char* kLock = "lock";
-
-std::string system_text(int error) { return std::generic_category().message(error); }
-
-/// Closes on the way out unless it was released.
-class File {
- public:
-  explicit File(int descriptor) : descriptor_(descriptor) {}
-  ~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  [[nodiscard]] int get() const { return descriptor_; }
-  [[nodiscard]] bool open() const { return descriptor_ >= 0; }
-  int release() { return std::exchange(descriptor_, -1); }
-
- private:
-  int descriptor_;
-};
 
 /// "" for a regular file of this user that nobody else may look into, or why it is none.
 std::string private_file_fault(int descriptor, const std::string& path) {
@@ -105,12 +86,12 @@ Error in_use(const std::string& path, int lock) {
 
 Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) {
   if (std::string error = prepare_state_folder(path); !error.empty()) return Error{std::move(error)};
-  File folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!folder.open()) return Error{"cannot use the folder " + path + " for state: " + system_text(errno)};
+  Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder.is_open()) return Error{"cannot use the folder " + path + " for state: " + system_text(errno)};
   const std::string name = path + "/" + kLock;
   const bool was_used = ::faccessat(folder.get(), kLock, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
-  File lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
-  if (!lock.open()) return Error{"cannot use the state folder: " + name + ": " + system_text(errno)};
+  Descriptor lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  if (!lock.is_open()) return Error{"cannot use the state folder: " + name + ": " + system_text(errno)};
   if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
@@ -129,8 +110,8 @@ StateFolder::~StateFolder() {
 
 Result<std::optional<HubState>> StateFolder::read() const {
   const std::string name = path_ + "/" + kState;
-  const File file(::openat(folder_, kState, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!file.open()) {
+  const Descriptor file(::openat(folder_, kState, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!file.is_open()) {
     if (errno == ENOENT) return std::optional<HubState>{};
     return Error{"cannot read " + name + ": " + system_text(errno)};
   }
@@ -155,8 +136,8 @@ std::string StateFolder::write(const HubState& state) {
   };
   // A file left over by a crash, or a link that somebody put there: never written through.
   if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) return failed("remove the old one");
-  const File file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
-  if (!file.open()) return failed("create");
+  const Descriptor file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  if (!file.is_open()) return failed("create");
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");
   if (::fsync(file.get()) != 0) return failed("fsync");
   if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");

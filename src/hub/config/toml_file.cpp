@@ -30,7 +30,7 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::size_t kQuotedMax = 120;
+constexpr std::size_t kQuotedLineMax = 120;
 constexpr std::string_view kOnlyTable = "limits";
 /// Bytes that may be parsed in vain to find where something begins of which the end was left out; a file that needs
 /// more is left alone from there.
@@ -60,7 +60,7 @@ std::string_view quoted_part(std::string_view text) {
 }
 
 std::string given_twice(std::string_view key) {
-  return "'" + escaped(key, kQuotedMax) + "' is given twice; leave one of them out";
+  return "'" + escaped(key, kQuotedLineMax) + "' is given twice; leave one of them out";
 }
 
 Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines& lines, const Places& places) {
@@ -75,11 +75,11 @@ Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines
   if (what.ends_with("is not representable in 64 bits")) {
     // It is told behind the number.
     const auto [number, begin] = lines.number_before(line, column);
-    return {places.of(line, begin), "no key can be '" + escaped(number, kQuotedMax) +
+    return {places.of(line, begin), "no key can be '" + escaped(number, kQuotedLineMax) +
                                         "': it does not fit in 64 bits; give a number that is nearer to 0"};
   }
   return {places.of(line, column),
-          "this is not TOML: " + escaped(what, kQuotedMax) + "; write KEY = VALUE, texts in quotes"};
+          "this is not TOML: " + escaped(what, kQuotedLineMax) + "; write KEY = VALUE, texts in quotes"};
 }
 
 bool is_at_end(const toml::parse_error& error) {

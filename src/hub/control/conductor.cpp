@@ -18,10 +18,6 @@ using proto::Goodbye;
 using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 
-std::string title(NodeId node, const Session& session) {
-  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
-}
-
 /// Was the request of no use to anybody?
 bool is_odd(proto::Status status) {
 #ifndef GIMNET_BUG_DENIED_IS_NOT_ODD
@@ -56,8 +52,6 @@ std::uint64_t epoch_of(const HubStart& start) {
   const std::uint64_t epoch = load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
   return epoch != 0 ? epoch : 1;
 }
-
-SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
 
 }  // namespace
 

@@ -11,8 +11,6 @@ namespace {
 using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
-SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
-
 }  // namespace
 
 GroupId EffectRunner::group_id(std::uint32_t group) const {

@@ -11,10 +11,10 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::size_t kQuotedMax = 120;
+constexpr std::size_t kQuotedLineMax = 120;
 
 Error refuse(std::string_view text, std::string_view why) {
-  return Error{"cannot listen on " + escaped(text, kQuotedMax) + ": " + std::string{why}};
+  return Error{"cannot listen on " + escaped(text, kQuotedLineMax) + ": " + std::string{why}};
 }
 
 constexpr std::string_view kForms = "write tcp://127.0.0.1:7450, tcp://[::1]:7450 or unix:/path/to/socket";
@@ -46,7 +46,7 @@ Result<ListenUrl> parse_tcp(std::string_view text, std::string_view rest) {
   url.host = std::string{bracketed ? rest.substr(1, colon - 2) : rest.substr(0, colon)};
   if (url.host == "localhost") url.host = "127.0.0.1";
   if (bracketed ? !is_v6(url.host) : !is_v4(url.host)) {
-    return refuse(text, "'" + escaped(url.host, kQuotedMax) + "' is not a numeric address; " + std::string{kForms});
+    return refuse(text, "'" + escaped(url.host, kQuotedLineMax) + "' is not a numeric address; " + std::string{kForms});
   }
   return url;
 }

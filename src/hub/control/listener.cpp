@@ -9,8 +9,8 @@
 
 #include <cerrno>
 #include <cstring>
-#include <system_error>
 
+#include "base/descriptor.hpp"
 #include "hub/control/port_owner.hpp"
 
 namespace gimnet::hub {
@@ -21,24 +21,6 @@ constexpr int kBacklog = 4'096;
 Error refuse(const ListenUrl& url, const std::string& why) {
   return Error{"cannot listen on " + url.text() + ": " + why};
 }
-
-std::string system_text(int error) { return std::generic_category().message(error); }
-
-/// Closes on the way out unless it was released.
-class Descriptor {
- public:
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return value_; }
-  int release() { return std::exchange(value_, -1); }
-
- private:
-  int value_;
-};
 
 struct TcpAddress {
   sockaddr_storage storage{};

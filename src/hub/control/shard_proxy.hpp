@@ -1,9 +1,13 @@
 #pragma once
 
 #include "base/ids.hpp"
+#include "hub/control/state/place.hpp"
 #include "hub/shard/commands.hpp"
 
 namespace gimnet::hub {
+
+/// The session at that place, as its shard knows it.
+[[nodiscard]] inline SessionRef ref_of(const Place& place) { return SessionRef{place.slot, place.generation}; }
 
 /// The conductor's door to the shards. Thread safety: the conductor's thread only.
 class ShardProxy {

@@ -89,10 +89,8 @@ void Keeper::look_at(Connection& connection) {
 /// Written at once: ten thousand who are told at one tick would each take a piece of memory until its end, and the
 /// shard would keep all of it.
 void Keeper::say_ping(Connection& connection) {
-  std::byte frame[proto::flow::kFrameSizeMax];
   const proto::flow::Ping ping{++connection.ping_sequence, wall_now_ns()};
-  const std::size_t size = proto::flow::encode_frame(ping, NodeId{}, frame);
-  if (connection.outbox.push_control({frame, size}, state_.egress)) flusher_.flush(connection);
+  if (push_flow(state_, connection, ping)) flusher_.flush(connection);
 }
 
 void Keeper::drain(std::uint64_t deadline_ms) {

@@ -28,10 +28,14 @@ Word word_of(const Mail& mail) {
 
 }  // namespace
 
-void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
+bool push_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
   std::byte frame[proto::flow::kFrameSizeMax];
   const std::size_t size = proto::flow::encode_frame(message, NodeId{}, frame);
-  if (connection.outbox.push_control({frame, size}, state.egress)) state.recipients.mark_dirty(connection);
+  return connection.outbox.push_control({frame, size}, state.egress);
+}
+
+void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
+  if (push_flow(state, connection, message)) state.recipients.mark_dirty(connection);
 }
 
 void send_confirm(ShardState& state, Connection& connection) {
@@ -47,11 +51,9 @@ void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t m
   Reading& reading = state.readings[connection.slot.value()];
   reading.wanted = move;
   if (reading.sequence != 0) return;
-  std::byte frame[proto::flow::kFrameSizeMax];
   if (++connection.ping_sequence == 0) ++connection.ping_sequence;
-  const proto::flow::Ping ping{connection.ping_sequence, wall_now_ns()};
   // Without room it is asked behind the next one, or not at all: then the node is told again at its next return.
-  if (!connection.outbox.push_control({frame, proto::flow::encode_frame(ping, NodeId{}, frame)}, state.egress)) return;
+  if (!push_flow(state, connection, proto::flow::Ping{connection.ping_sequence, wall_now_ns()})) return;
   reading.sequence = connection.ping_sequence;
   reading.asked = move;
   state.recipients.mark_dirty(connection);

@@ -52,22 +52,16 @@ void Signals::apply_control(NodeId node, std::span<const std::byte> frame) {
   if (is_resume(frame)) connection->missed_resume = true;
 }
 
-void Signals::hold(NodeId sender) {
-  const NodePlace place = state_.router.place_of(sender);
-  if (!place.exists()) return;
-  if (place.shard == state_.self) return apply_hold(sender, true);
-  Mail mail;
-  mail.kind = MailKind::hold;
-  mail.node = sender;
-  state_.fanout.post_word(place.shard, mail);
-}
+void Signals::hold(NodeId sender) { tell_hold(sender, true); }
 
-void Signals::release(NodeId sender) {
+void Signals::release(NodeId sender) { tell_hold(sender, false); }
+
+void Signals::tell_hold(NodeId sender, bool hold) {
   const NodePlace place = state_.router.place_of(sender);
   if (!place.exists()) return;
-  if (place.shard == state_.self) return apply_hold(sender, false);
+  if (place.shard == state_.self) return apply_hold(sender, hold);
   Mail mail;
-  mail.kind = MailKind::release;
+  mail.kind = hold ? MailKind::hold : MailKind::release;
   mail.node = sender;
   state_.fanout.post_word(place.shard, mail);
 }

@@ -37,6 +37,7 @@ class Signals final : public SenderSignals {
 
  private:
   void flow(NodeId sender, const proto::flow::Message& message);
+  void tell_hold(NodeId sender, bool hold);
 
   ShardState& state_;
 };

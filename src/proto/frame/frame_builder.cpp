@@ -9,8 +9,6 @@
 namespace gimnet::proto {
 namespace {
 
-constexpr std::size_t kKeySize = 8;
-
 FrameHeader complete_header(const FrameParts& parts, std::size_t prefix) {
   const std::size_t length = prefix - kHeaderSize + parts.payload_size;
   GIMNET_CHECK(length <= UINT32_MAX);

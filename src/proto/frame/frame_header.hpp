@@ -66,6 +66,25 @@ struct FrameHeader {
 };
 static_assert(sizeof(FrameHeader) == kHeaderSize);
 
+// Where a header has them, for who looks at a few of its bytes only.
+inline constexpr std::size_t kDstOffset = offsetof(FrameHeader, dst);
+inline constexpr std::size_t kSrcOffset = offsetof(FrameHeader, src);
+inline constexpr std::size_t kKindOffset = offsetof(FrameHeader, kind);
+inline constexpr std::size_t kLaneOffset = offsetof(FrameHeader, lane);
+/// 8 bytes: dst and src.
+inline constexpr std::size_t kAddressesOffset = kDstOffset;
+/// 4 bytes: kind, flags, hops, lane.
+inline constexpr std::size_t kAttributesOffset = kKindOffset;
+
+/// Bytes of the key of a frame with KEYED.
+inline constexpr std::size_t kKeySize = 8;
+
+/// Never dropped for room: BLOCK, or a kind whose default it is.
+[[nodiscard]] constexpr bool is_block(const FrameHeader& header) {
+  if (header.policy() != Policy::kind_default) return header.policy() == Policy::block;
+  return header.kind != Kind::group && header.kind != Kind::list && header.kind != Kind::broadcast;
+}
+
 /// REQUIRES: 16 readable bytes at `bytes`.
 [[nodiscard]] inline FrameHeader load_header(const std::byte* bytes) {
   static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);

@@ -5,8 +5,6 @@
 namespace gimnet::proto {
 namespace {
 
-inline constexpr std::size_t kKeySize = 8;
-
 /// What of the frame has not been taken apart yet.
 class Rest {
  public:

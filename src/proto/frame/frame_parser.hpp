@@ -69,8 +69,8 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   if (may_form_run(header)) {
     std::size_t frame_size = size;
     auto length_and_dst = load_le<std::uint64_t>(begin);
-    const auto dst = load_le<std::uint32_t>(begin + 4);
-    const auto src_and_attributes = load_le<std::uint64_t>(begin + 8);
+    const auto dst = load_le<std::uint32_t>(begin + kDstOffset);
+    const auto src_and_attributes = load_le<std::uint64_t>(begin + kSrcOffset);
     while (true) {
       // Most frames are as long as the one before. Where the next one begins is then known without waiting for what
       // this one says, so that several are compared at a time: half the time of a run of small frames.
@@ -80,13 +80,14 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
       while (available - size >= frame_size &&
 #endif
              load_le<std::uint64_t>(begin + size) == length_and_dst &&
-             load_le<std::uint64_t>(begin + size + 8) == src_and_attributes) {
+             load_le<std::uint64_t>(begin + size + kSrcOffset) == src_and_attributes) {
         size += frame_size;
         ++frames;
       }
       if (available - size < kHeaderSize) break;
       const std::byte* next = begin + size;
-      if (load_le<std::uint32_t>(next + 4) != dst || load_le<std::uint64_t>(next + 8) != src_and_attributes) break;
+      const auto next_dst = load_le<std::uint32_t>(next + kDstOffset);
+      if (next_dst != dst || load_le<std::uint64_t>(next + kSrcOffset) != src_and_attributes) break;
       const auto length = load_le<std::uint32_t>(next);
       if (length > max_length || kHeaderSize + length > available - size) break;
       frame_size = kHeaderSize + length;

@@ -60,13 +60,16 @@ Result<double> number_of(std::string_view name, std::string_view text, const Bou
   return value;
 }
 
-// Does a node's name hold to docs/protocol.md, section 8, as one part?
+// With a '/' and the name of a service it is to be within the 255 bytes of a full name.
+constexpr std::size_t kRobotNameBytesMax = 200;
+
+// Is it a node's name by docs/protocol.md, section 8, of one part?
 bool is_node_name(std::string_view name) {
   const auto allowed = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
            c == '-';
   };
-  return !name.empty() && name.size() <= 200 && std::all_of(name.begin(), name.end(), allowed);
+  return !name.empty() && name.size() <= kRobotNameBytesMax && std::all_of(name.begin(), name.end(), allowed);
 }
 
 std::optional<Error> apply(Options& options, std::string_view name, std::string_view value) {

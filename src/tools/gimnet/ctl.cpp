@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 
+#include "base/ids.hpp"
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/hub_status.hpp"
 #include "tools/gimnet/json_writer.hpp"
@@ -9,8 +10,6 @@
 
 namespace gimnet::tool {
 namespace {
-
-constexpr std::uint32_t kHubShift = 20;
 
 std::string json_of(const std::vector<RouteRecord>& routes) {
   JsonWriter json;
@@ -56,8 +55,8 @@ std::optional<Peer> parse_new_id(const std::string& text, Peer node) {
   if (const auto id = Peer::parse(text)) return id;
   std::uint32_t index = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (error != std::errc{} || end != text.data() + text.size() || index >= 1u << kHubShift) return std::nullopt;
-  return Peer{(node.id >> kHubShift << kHubShift) | index};
+  if (error != std::errc{} || end != text.data() + text.size() || index > kIndexMask) return std::nullopt;
+  return Peer{make_id<NodeId>(hub_of(NodeId{node.id}), index).value()};
 }
 
 /// What a command that only changes something says when it is done.

@@ -15,16 +15,16 @@ namespace {
 /// Where the size is not known before.
 constexpr std::size_t kFirstBytes = std::size_t{1} << 20;
 
-Failure cannot_read(const std::string& path, int error) {
-  return {Status::system, "cannot read " + path + ": " + std::strerror(error)};
-}
-
 Failure too_large(const std::string& path, std::size_t bytes_max) {
   return {Status::too_large, "cannot send " + path + ": it is larger than a message can be, " +
                                  std::to_string(bytes_max) + " bytes; send it in parts"};
 }
 
 }  // namespace
+
+Failure cannot_read(const std::string& what, int error) {
+  return {Status::system, "cannot read " + what + ": " + std::strerror(error)};
+}
 
 Outcome<FileContent> FileContent::read(const std::string& path, std::size_t bytes_max) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);

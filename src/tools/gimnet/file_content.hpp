@@ -10,6 +10,9 @@
 
 namespace gimnet::tool {
 
+/// `error` is an errno.
+[[nodiscard]] Failure cannot_read(const std::string& what, int error);
+
 /// All bytes of a file, a pipe or a device, in memory once. Thread safety: immutable.
 class FileContent {
  public:

@@ -4,6 +4,7 @@
 
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/decimal.hpp"
 #include "tools/gimnet/json_writer.hpp"
 #include "tools/gimnet/round_trips.hpp"
 
@@ -16,11 +17,7 @@ struct Tally {
   std::uint64_t lost = 0;
 };
 
-std::string microseconds(double value) {
-  std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
-}
+std::string microseconds(double value) { return decimal(value, 1); }
 
 void print_json(Session& session, Peer peer, const Tally& tally) {
   const RoundTrips::Summary us = tally.round_trips.summary_us();

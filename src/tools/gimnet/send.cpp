@@ -22,10 +22,6 @@ constexpr std::size_t kWindow = 64;
 /// The largest message that any node can take.
 constexpr std::size_t kMessageBytesMax = std::size_t{1} << 30;
 
-Failure cannot_read(const std::string& what, int error) {
-  return {Status::system, "cannot read " + what + ": " + std::strerror(error)};
-}
-
 /// So that a wrong name is known before anything else is done.
 Outcome<void> check_readable(const std::string& path) {
   if (path.empty() || ::access(path.c_str(), R_OK) == 0) return {};

@@ -1,7 +1,5 @@
 #include "hub/control/handle/administer.hpp"
 
-#include <array>
-
 #include "base/id_text.hpp"
 #include "base/suggest.hpp"
 #include "proto/control/ctrl.hpp"
@@ -14,8 +12,6 @@ namespace ctrl = proto::ctrl;
 using proto::Refusal;
 using proto::Status;
 
-constexpr std::size_t kQuotedMax = 60;
-
 /// The session of a node of this hub, also by an id that it had before; or why there is none.
 Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) {
   Sessions& sessions = context.membership.sessions();
@@ -24,10 +20,6 @@ Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) 
   if (session != nullptr) return session;
   return Refusal{Status::not_found,
                  "there is no node " + to_string(node) + " on this hub; `gimnet nodes` lists those that are there"};
-}
-
-std::string title(NodeId node, const Session& session) {
-  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
 }
 
 std::string by_whom(const Session& admin) { return admin.origin.transport.str() + " " + admin.origin.address.str(); }
@@ -95,14 +87,13 @@ Result<ctrl::ReloadAnswer, Refusal> reload(HandlerContext& context) {
 }
 
 Result<ctrl::SetLogLevelAnswer, Refusal> set_level(HandlerContext& context, const ctrl::SetLogLevel& wanted) {
-  constexpr std::array<std::string_view, 5> kLevels{"error", "warning", "info", "debug", "off"};
   LogLevel level{};
   if (!parse_log_level(wanted.level, level)) {
     return Refusal{Status::bad_request, "there is no log level '" + escaped(wanted.level, kQuotedMax) +
                                             "': error, warning, info, debug or off" +
-                                            did_you_mean(wanted.level, kLevels)};
+                                            did_you_mean(wanted.level, kLogLevelNames)};
   }
-  ctrl::SetLogLevelAnswer answer{std::string{kLevels[static_cast<std::size_t>(log_level())]}};
+  ctrl::SetLogLevelAnswer answer{std::string{log_level_name(log_level())}};
   set_log_level(level);
   if (context.administration != nullptr) context.administration->log_level_set(level);
   return answer;

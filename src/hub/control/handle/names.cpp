@@ -11,8 +11,6 @@ namespace {
 using proto::Status;
 namespace ns = proto::ns;
 
-constexpr std::size_t kQuotedMax = 60;
-
 Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const ns::List& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {

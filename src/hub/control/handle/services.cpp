@@ -15,8 +15,6 @@ namespace {
 using proto::Status;
 namespace ns = proto::ns;
 
-constexpr std::size_t kQuotedMax = 60;
-
 GroupId group_id(const HandlerContext& context, std::uint32_t index) {
   return make_id<GroupId>(context.facts.id, index);
 }

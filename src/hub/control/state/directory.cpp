@@ -8,8 +8,6 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::size_t kQuotedMax = 60;
-
 std::string age_text(std::chrono::milliseconds age) {
   const auto seconds = age.count() / 1'000;
   if (seconds < 120) return std::to_string(seconds) + " s";

@@ -13,7 +13,6 @@ constexpr std::array<std::byte, 8> kMagic = {std::byte{'G'}, std::byte{'I'}, std
 constexpr std::uint32_t kVersion = 2;
 /// Without the sets of used indices: all below the marks count as used.
 constexpr std::uint32_t kVersionOfMarks = 1;
-constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
 constexpr const char* kNoHub = "it holds numbers that no hub writes";
 
 // Layout, little-endian: magic, u32 version, u32 number of kicked tokens, secret, unique id, u64 boot, u32 node mark,

@@ -31,7 +31,7 @@ struct HubState {
 
 inline constexpr std::size_t kKickedMax = 65'536;
 /// The longest legal file.
-inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 2 * IndexSet::bytes_max(kEveryIndex - 1) + 32;
+inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 2 * IndexSet::bytes_max(kIndexMost) + 32;
 
 [[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
 /// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is wrong with it, as

@@ -145,7 +145,7 @@ void Membership::state_kept(const Durable& durable) {
 
 std::optional<Failure> Membership::renumber(Session& session, std::uint32_t index, milliseconds now, Effects& effects) {
   if (index == kHubIndex || index >= kEveryIndex) {
-    return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to 1048574"};
+    return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
   }
   const std::uint32_t former = session.index;
   if (index == former) {

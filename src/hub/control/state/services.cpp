@@ -54,7 +54,7 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
 }
 
 Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until)
-    : hub_(hub), limits_(limits), group_indices_(kEveryIndex - 1, resting_time(limits), groups, returns_until) {}
+    : hub_(hub), limits_(limits), group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
 
 Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider, std::string_view full_name,
                                                           const ServiceTerms& terms, milliseconds now, Effects& effects,

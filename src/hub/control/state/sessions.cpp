@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
+#include "base/id_text.hpp"
 #include "hub/control/state/shortage.hpp"
 
 namespace gimnet::hub {
@@ -10,14 +11,16 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
-
 /// An id that was given back rests for as long as its node might come back and a frame for it might still wait.
 milliseconds resting_time(const Limits& limits) {
   return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
 }
 
 }  // namespace
+
+std::string title(NodeId node, const Session& session) {
+  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
+}
 
 Sessions::Sessions(const Options& options, const Limits& limits)
     : limits_(limits),

@@ -64,6 +64,9 @@ struct Session {
   TokenBucket oddities;      ///< requests of no use
 };
 
+/// How people are told of a node: "node 7.17 'robot'".
+[[nodiscard]] std::string title(NodeId node, const Session& session);
+
 /// Why somebody was not let in: what GOODBYE says.
 using Refusal = proto::Goodbye;
 

@@ -12,7 +12,6 @@ using proto::Status;
 using std::chrono::milliseconds;
 namespace ns = proto::ns;
 
-constexpr std::size_t kQuotedMax = 60;
 /// No change is longer: a page that has more room than this takes one more.
 constexpr std::size_t kChangeBytesMax = 6 * 1024;
 /// No record is shorter: how many fill a page, which takes none once a longest change might not fit.

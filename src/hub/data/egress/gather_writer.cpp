@@ -234,10 +234,8 @@ std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool contro
   }
   std::uint32_t left = whole.size;
   if (whole.size < bytes) {
-    partial_.run = run.share();
+    partial_.run = run.take_frame();
     partial_.offset = static_cast<std::uint32_t>(bytes - whole.size);
-    partial_.run.size = run.skip_frame();
-    partial_.run.frames = 1;
     partial_.control = control;
     partial_.shared = shared;
     left += partial_.run.size;

@@ -10,8 +10,8 @@ namespace gimnet::hub {
 namespace {
 
 bool same_header(const std::byte* a, const std::byte* b) {
-  return load_le<std::uint64_t>(a + 4) == load_le<std::uint64_t>(b + 4) &&
-         load_le<std::uint32_t>(a + 12) == load_le<std::uint32_t>(b + 12);
+  return load_le<std::uint64_t>(a + proto::kAddressesOffset) == load_le<std::uint64_t>(b + proto::kAddressesOffset) &&
+         load_le<std::uint32_t>(a + proto::kAttributesOffset) == load_le<std::uint32_t>(b + proto::kAttributesOffset);
 }
 
 /// Streams and messages that left may stay in their index until they are more than the others, and these.
@@ -56,7 +56,7 @@ LatestStream LaneQueue::stream_of(const Entry& entry) {
     if (frame) key = frame->key.value_or(0);
   }
   const auto kind = static_cast<std::uint16_t>(static_cast<std::uint16_t>(header.kind) << 8);
-  return {load_le<std::uint64_t>(entry.run.bytes + 4), key,
+  return {load_le<std::uint64_t>(entry.run.bytes + proto::kAddressesOffset), key,
           static_cast<std::uint16_t>(kind | (header.flags & proto::kFlagKeyed))};
 }
 
@@ -162,10 +162,9 @@ bool LaneQueue::drop_oldest(Entry& dropped) {
       entry.frames = 0;
     } else {
       dropped = Entry{};
-      dropped.run = entry.run.share();
-      dropped.run.size = entry.run.skip_frame();
-      dropped.run.frames = dropped.frames = 1;
+      dropped.run = entry.run.take_frame();
       dropped.size = dropped.run.size;
+      dropped.frames = 1;
       entry.size -= dropped.size;
       --entry.frames;
       count(entry);

@@ -22,8 +22,8 @@ struct OpenRun {
 
   /// May `size` bytes of frames with one header come behind it? REQUIRES: size is not 0.
   [[nodiscard]] bool takes(const std::byte* frames, std::uint32_t size) const {
-    return size <= room && load_le<std::uint64_t>(frames + 4) == addresses &&
-           load_le<std::uint32_t>(frames + 12) == attributes;
+    return size <= room && load_le<std::uint64_t>(frames + proto::kAddressesOffset) == addresses &&
+           load_le<std::uint32_t>(frames + proto::kAttributesOffset) == attributes;
   }
   /// REQUIRES: takes().
   void append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {

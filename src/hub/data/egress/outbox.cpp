@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include "hub/data/egress/resume_buffer.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
@@ -12,11 +11,6 @@ namespace {
 constexpr std::uint32_t kFirstChunkBytes = 256 - kBufferRoom;
 constexpr std::uint32_t kChunkGrowth = 4;  // from one size of the pool to the next
 }  // namespace
-
-std::uint64_t Outbox::lane_limit(std::size_t lane, const Limits& limits) {
-  const std::uint64_t by_lane[] = {limits.lane0_bytes, limits.lane1_bytes, limits.lane2_bytes, limits.lane3_bytes};
-  return by_lane[lane];
-}
 
 std::uint64_t Outbox::data_bytes() const {
   if (!lanes_) return 0;
@@ -44,7 +38,7 @@ bool Outbox::has_block() const {
 }
 
 bool Outbox::fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const {
-  return lanes_->queues[lane].bytes() + bytes <= lane_limit(lane, limits);
+  return lanes_->queues[lane].bytes() + bytes <= limits.lane_bytes(lane);
 }
 
 Run Outbox::copy(const Run& run, EgressContext& context) {
@@ -73,7 +67,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   entry.run = by_copy ? copy(run, context) : run.share();
   entry.size = run.size;
   entry.frames = run.frames;
-  entry.block = is_block(header);
+  entry.block = proto::is_block(header);
   entry.latest = header.policy() == proto::Policy::latest;
   entry.shared = handover.fan_out;
   if (header.has(proto::kFlagFragment)) {
@@ -117,11 +111,11 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
 
 void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
   Entry& last = lane.entries().back();
-  const std::uint64_t lane_room = lane_limit(lane_index, limits) - lane.bytes();
+  const std::uint64_t lane_room = limits.lane_bytes(lane_index) - lane.bytes();
   const auto room = static_cast<std::uint32_t>(std::min<std::uint64_t>(chunk_->capacity - chunk_used_, lane_room));
   lanes_->open = {room,
-                  load_le<std::uint32_t>(last.run.bytes + 12),
-                  load_le<std::uint64_t>(last.run.bytes + 4),
+                  load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
+                  load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),
                   chunk_->data + chunk_used_,
                   &lane,
                   &last};
@@ -217,7 +211,7 @@ void Outbox::on_emptied(EgressContext& context) {
 void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
-    if (lanes_->queues[lane].bytes() <= lane_limit(lane, context.limits) / 2) {
+    if (lanes_->queues[lane].bytes() <= context.limits.lane_bytes(lane) / 2) {
       lanes_->pauses.on_room(static_cast<proto::Lane>(lane), context.signals);
     }
   }

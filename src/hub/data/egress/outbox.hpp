@@ -156,7 +156,6 @@ class Outbox {
   [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
                                  EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
-  [[nodiscard]] static std::uint64_t lane_limit(std::size_t lane, const Limits& limits);
   [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
 
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);

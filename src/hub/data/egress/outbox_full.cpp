@@ -88,7 +88,7 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
   const std::size_t lane = header.lane & proto::kLaneMask;
   const Limits& limits = context.limits;
   const std::uint64_t bytes = lanes_->queues[lane].bytes() + entry.size;
-  const std::uint64_t limit = lane_limit(lane, limits);
+  const std::uint64_t limit = limits.lane_bytes(lane);
   const std::uint64_t since_held =
       lanes_->pauses.on_full(NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
                              bytes > limit + limits.reserve_bytes, context.signals);
@@ -103,9 +103,9 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
 void Outbox::admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
   while (entry.run.frames > 1) {
     Entry first;
-    first.run = entry.run.share();
-    first.run.size = first.size = entry.run.skip_frame();
-    first.run.frames = first.frames = 1;
+    first.run = entry.run.take_frame();
+    first.size = first.run.size;
+    first.frames = 1;
     first.shared = entry.shared;
     entry.size -= first.size;
     --entry.frames;

@@ -2,16 +2,11 @@
 
 namespace gimnet::hub {
 
-bool is_block(const proto::FrameHeader& header) {
-  if (header.policy() != proto::Policy::kind_default) return header.policy() == proto::Policy::block;
-  return header.kind != proto::Kind::group && header.kind != proto::Kind::list && header.kind != proto::Kind::broadcast;
-}
-
 bool ResumeBuffer::make_room(std::uint64_t planned, std::uint32_t size, const CountedGroups* counted) {
   if (planned + size > bytes_max_) return false;
   while (bytes_ + planned + size > bytes_max_) {
     const proto::FrameHeader front = kept_.front().header();
-    if (is_block(front)) return false;
+    if (proto::is_block(front)) return false;
     // Nobody could say how many messages of a group a gap has.
     if (counted != nullptr && front.kind == proto::Kind::group && counted->counts(GroupId{front.dst})) return false;
     let_front_frame_go();

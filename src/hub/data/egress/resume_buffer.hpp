@@ -65,7 +65,4 @@ class ResumeBuffer {
   std::uint64_t lost_below_ = 0;  ///< frames below it were confirmed or are lost, and counted as that
 };
 
-/// Never dropped for room: BLOCK, or a kind whose default it is.
-[[nodiscard]] bool is_block(const proto::FrameHeader& header);
-
 }  // namespace gimnet::hub

@@ -25,6 +25,13 @@ struct Run {
     --frames;
     return frame;
   }
+  /// The first frame, which this run loses.
+  [[nodiscard]] Run take_frame() {
+    Run frame = share();
+    frame.size = skip_frame();
+    frame.frames = 1;
+    return frame;
+  }
   /// Extends this run by `next` if that lies right behind it in the same buffer.
   bool extend(const Run& next) {
     if (buffer.get() != next.buffer.get() || bytes + size != next.bytes) return false;

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <type_traits>
 
-#include "hub/data/egress/resume_buffer.hpp"
 #include "hub/data/route/shared_list.hpp"
 
 namespace gimnet::hub {
@@ -35,9 +34,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
   }
   Run rest = run.share();
   while (rest.frames != 0) {
-    Run frame = rest.share();
-    frame.size = rest.skip_frame();
-    frame.frames = 1;
+    const Run frame = rest.take_frame();
     if (frame.size - proto::kHeaderSize <= recipient.frame_bytes) {
       push(recipient, frame, frame.header(), handover);
     } else {
@@ -131,10 +128,8 @@ void Fanout::put_blocking_only(ShardIndex to, const Run& run) {
   Run rest = run.share();
   Run blocking;
   while (rest.frames != 0) {
-    Run frame = rest.share();
-    frame.size = rest.skip_frame();
-    frame.frames = 1;
-    const bool block = is_block(frame.header());
+    Run frame = rest.take_frame();
+    const bool block = proto::is_block(frame.header());
     if (block && blocking.extend(frame)) continue;
     if (blocking.frames != 0) put(to, std::exchange(blocking, Run{}));
     if (block) {

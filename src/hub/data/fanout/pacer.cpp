@@ -11,14 +11,6 @@ namespace {
 using proto::DropReason;
 using State = PacedSubscription::Open::State;
 
-/// The first frame of `run`, which loses it.
-Run take_frame(Run& run) {
-  Run frame = run.share();
-  frame.size = run.skip_frame();
-  frame.frames = 1;
-  return frame;
-}
-
 }  // namespace
 
 PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms, bool was_plain) {
@@ -98,7 +90,7 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const p
     return pass(subscription, rest, run.frames, header, handover);
   }
   while (rest.frames != 0) {
-    const Run frame = take_frame(rest);
+    const Run frame = rest.take_frame();
     if (subscription.held() == 0 && subscription.may_begin(now_us())) {
       subscription.on_begun(now_us());
       pass(subscription, frame, 1, header, handover);
@@ -187,9 +179,8 @@ void Pacer::keep(KeptMessage& message, const Run& frame, Handover handover) {
 
 void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane) {
   while (subscription.held() >= subscription.terms().depth) drop_oldest(subscription, DropReason::replaced);
-  const std::uint64_t limits[] = {context_.limits.lane0_bytes, context_.limits.lane1_bytes, context_.limits.lane2_bytes,
-                                  context_.limits.lane3_bytes};
-  while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limits[lane]) {
+  const std::uint64_t limit = context_.limits.lane_bytes(lane);
+  while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limit) {
     drop_oldest(subscription, DropReason::queue_full);
   }
   subscription.push_newest(message);
@@ -261,7 +252,7 @@ void Pacer::write_kept(PacedSubscription& subscription, const KeptMessage& messa
   context_.tally.queued -= message.frames();
   message.for_each([&](const Run& run) {
     for (Run rest = run.share(); rest.frames != 0;) {
-      const Run frame = take_frame(rest);
+      const Run frame = rest.take_frame();
       fanout_.deliver(subscription.recipient(), frame, frame.header(), Handover{});
     }
   });

@@ -177,9 +177,7 @@ void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {
   context_.tally.queued -= frames.frames;
   PacedSubscription* subscription = subscription_of(start);
   for (Run rest = frames.share(); rest.frames != 0;) {
-    Run frame = rest.share();
-    frame.size = rest.skip_frame();
-    frame.frames = 1;
+    const Run frame = rest.take_frame();
     const bool taken = subscription != nullptr && subscription->active &&
                        pacer_.offer(*subscription, frame, frame.header(), Handover{});
     if (!taken) context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::no_subscriber);

@@ -21,7 +21,7 @@ Admission refuse(IngressState& state, proto::FrameError error) {
 void write_source(std::byte* run, const proto::RunView& view, std::uint32_t source) {
   for (std::uint32_t done = 0; done < view.size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
-    store_le(run + done + IngressGate::kSourceOffset, source);
+    store_le(run + done + proto::kSrcOffset, source);
     done += frame;
   }
 }
@@ -48,7 +48,7 @@ void keep_frames_with_key(proto::RunView& view) {
 
 Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
   proto::FrameHeader header = proto::load_header(view.bytes);
-  const auto attributes = load_le<std::uint32_t>(view.bytes + kAttributesOffset);
+  const auto attributes = load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset);
 #if defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
   if (attributes != state.admitted_attributes) {
 #else
@@ -140,7 +140,7 @@ void IngressGate::limit_lane0(IngressState& state, std::byte* run, const proto::
   if (!moves) return;
   for (std::uint32_t done = 0; done < view.size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
-    run[done + kLaneOffset] = static_cast<std::byte>(proto::Lane::normal);
+    run[done + proto::kLaneOffset] = static_cast<std::byte>(proto::Lane::normal);
     done += frame;
   }
   tally_.lane0_demoted += view.frames;

@@ -53,20 +53,15 @@ class IngressGate {
   /// the next run begins with that one.
   [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
     // Most runs are like the one before.
-    if (load_le<std::uint32_t>(view.bytes + kAttributesOffset) == state.admitted_attributes &&
+    if (load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset) == state.admitted_attributes &&
 #if !defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
-        load_le<std::uint32_t>(view.bytes + kSourceOffset) == state.node.value() &&
+        load_le<std::uint32_t>(view.bytes + proto::kSrcOffset) == state.node.value() &&
 #endif
-        view.bytes[kLaneOffset] != static_cast<std::byte>(proto::Lane::real_time)) {
+        view.bytes[proto::kLaneOffset] != static_cast<std::byte>(proto::Lane::real_time)) {
       return Admission::data;
     }
     return look_at(state, run, view, now_ms);
   }
-
-  // Where a header has them (docs/protocol.md, section 2)
-  static constexpr std::size_t kSourceOffset = 8;
-  static constexpr std::size_t kAttributesOffset = 12;  ///< kind, flags, hops, lane
-  static constexpr std::size_t kLaneOffset = 15;
 
  private:
   [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms);

@@ -20,7 +20,7 @@ class RecentRecipients {
   /// REQUIRES: its outbox has just taken `frame`, UNICAST, admitted, for it and from these bytes, by Outbox::append().
   void note(Recipient& recipient, const std::byte* frame) {
     const proto::FrameHeader header = proto::load_header(frame);
-    const auto attributes = load_le<std::uint32_t>(frame + kAttributesOffset);
+    const auto attributes = load_le<std::uint32_t>(frame + proto::kAttributesOffset);
     Outbox*& place = outboxes_[header.dst % kPlaces];
     if (place == &recipient.outbox && attributes == attributes_) return;
     if (header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) || header.has(proto::kFlagKeyed)) return;
@@ -45,10 +45,10 @@ class RecentRecipients {
     const Outbox* before = nullptr;
     while (available - appended.size >= proto::kHeaderSize) {
       const std::byte* frame = begin + appended.size;
-      Outbox* outbox = outboxes_[load_le<std::uint32_t>(frame + kDstOffset) % kPlaces];
+      Outbox* outbox = outboxes_[load_le<std::uint32_t>(frame + proto::kDstOffset) % kPlaces];
       if (outbox == before || outbox == nullptr) break;
 #if !defined(GIMNET_BUG_RECENT_TAKES_OTHER_SORTS)
-      if (load_le<std::uint32_t>(frame + kAttributesOffset) != attributes_) break;
+      if (load_le<std::uint32_t>(frame + proto::kAttributesOffset) != attributes_) break;
 #endif
       const std::size_t size = proto::kHeaderSize + std::size_t{load_le<std::uint32_t>(frame)};
       if (size > available - appended.size || !outbox->append(frame, static_cast<std::uint32_t>(size), 1)) break;
@@ -62,9 +62,6 @@ class RecentRecipients {
   }
 
  private:
-  // Where a header has them (docs/protocol.md, section 2)
-  static constexpr std::size_t kDstOffset = 4;
-  static constexpr std::size_t kAttributesOffset = 12;  ///< kind, flags, hops, lane
   /// Nodes with neighbouring ids, as those that joined together have, do not share a place.
   static constexpr std::size_t kPlaces = 32;
 

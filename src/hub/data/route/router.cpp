@@ -226,7 +226,7 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
     outcomes += foreign;
   }
   if (shards != 0) {
-    store_le(frame + kDstOffset, listed.list.pack());
+    store_le(frame + proto::kDstOffset, listed.list.pack());
     // How many of them are there is not counted: no more than all.
     to_other_shards(run, shards, header.dst, outcomes);
   }

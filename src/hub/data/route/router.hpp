@@ -40,8 +40,8 @@ class Router {
     asm volatile(".rept 7\n\tnop\n\t.endr");
 #endif
     // Only of these is dst all that decides where they go.
-    if (static_cast<proto::Kind>(frames[kKindOffset]) != proto::Kind::unicast) return false;
-    const NodeId node{load_le<std::uint32_t>(frames + kDstOffset)};
+    if (static_cast<proto::Kind>(frames[proto::kKindOffset]) != proto::Kind::unicast) return false;
+    const NodeId node{load_le<std::uint32_t>(frames + proto::kDstOffset)};
     if (hub_of(node) != hub_) return false;
     const NodePlace place = nodes_.find(index_of(node));
     if (place.shard != fanout_.self()) return false;
@@ -79,9 +79,6 @@ class Router {
   [[nodiscard]] NodePlace place_of(NodeId node) const;
 
  private:
-  static constexpr std::size_t kDstOffset = 4;
-  static constexpr std::size_t kKindOffset = 12;
-
   void dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
   [[nodiscard]] bool still_goes_by(NodeId node, const proto::FrameHeader& header) const;

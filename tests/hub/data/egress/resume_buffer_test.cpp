@@ -122,19 +122,5 @@ TEST_F(ResumeBufferTest, ClearTellsWhatItLetGo) {
   EXPECT_EQ(buffer.unconfirmed(), 0u);
 }
 
-TEST(IsBlock, ByPolicyOrByKind) {
-  proto::FrameHeader header;
-  EXPECT_TRUE(is_block(header));
-  header.flags = 2;
-  EXPECT_FALSE(is_block(header));
-  header.flags = 0;
-  header.kind = proto::Kind::group;
-  EXPECT_FALSE(is_block(header));
-  header.kind = proto::Kind::service;
-  EXPECT_TRUE(is_block(header));
-  header.kind = static_cast<proto::Kind>(9);
-  EXPECT_TRUE(is_block(header));
-}
-
 }  // namespace
 }  // namespace gimnet::hub
