@@ -8,9 +8,9 @@
 
 #include "fuzz/support/fuzz_input.hpp"
 #include "hub/shard/io_shard.hpp"
-#include "hub/transport/memory_transport.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_parser.hpp"
+#include "tests/support/memory_transport.hpp"
 
 namespace gimnet::hub::fuzzing {
 

@@ -21,9 +21,9 @@ struct IoResult {
   std::size_t bytes = 0;
 };
 
-/// A byte stream to one peer: the seam under a connection. TCP and Unix sockets (transport/socket_transport), and a
-/// pipe in memory with short writes and faults for tests (transport/memory_transport) implement it. One virtual call
-/// per system call, never per frame.
+/// A byte stream to one peer: the seam under a connection. TCP and Unix sockets (transport/socket_transport) implement
+/// it, and for tests a pipe in memory with short writes and faults (tests/support). One virtual call per system call,
+/// never per frame.
 /// Thread safety: none; belongs to the thread of its connection. Ownership: owns its descriptor.
 class Transport {
  public:

@@ -7,8 +7,8 @@
 
 #include "hub/data/egress/gather_writer.hpp"
 #include "hub/data/egress/outbox.hpp"
-#include "hub/transport/memory_transport.hpp"
 #include "proto/frame/fragment_header.hpp"
+#include "tests/support/memory_transport.hpp"
 
 namespace gimnet::hub::testing {
 

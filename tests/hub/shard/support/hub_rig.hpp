@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "hub/shard/io_shard.hpp"
-#include "hub/transport/memory_transport.hpp"
 #include "proto/control/link.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "proto/frame/report.hpp"
+#include "tests/support/memory_transport.hpp"
 
 namespace gimnet::hub::testing {
 
