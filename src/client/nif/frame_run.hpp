@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 
-#include "base/endian.hpp"
 #include "client/nif/chunk_pool.hpp"
 #include "proto/frame/frame_header.hpp"
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/nif/watch_table.hpp"
+#include "proto/control/ns_register.hpp"
 
 namespace gimnet::nif {
 namespace {

@@ -14,7 +14,6 @@
 #include "client/nif/storage.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/control/link.hpp"
-#include "proto/control/ns_register.hpp"
 #include "proto/control/ns_watch.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_parser.hpp"

@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "base/mutex.hpp"
-#include "client/nif/error.hpp"
 
 namespace gimnet::nif {
 

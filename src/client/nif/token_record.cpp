@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "base/endian.hpp"
-#include "proto/control/link.hpp"
+#include "proto/control/fields.hpp"
 
 namespace gimnet::nif {
 namespace {

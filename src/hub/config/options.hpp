@@ -5,7 +5,6 @@
 #include <variant>
 #include <vector>
 
-#include "hub/config/hub_options.hpp"
 #include "hub/config/settings.hpp"
 #include "hub/config/sources.hpp"
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "base/ids.hpp"
-#include "proto/control/link.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {

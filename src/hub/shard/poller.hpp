@@ -6,8 +6,6 @@
 #include <cstdint>
 #include <span>
 
-#include "hub/transport/transport.hpp"
-
 namespace gimnet::hub {
 
 /// What a descriptor is waited for.

@@ -8,6 +8,7 @@
 
 #include "hub/control/state/directory.hpp"
 #include "hub/control/state/due_list.hpp"
+#include "hub/control/state/durable.hpp"
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/sessions.hpp"

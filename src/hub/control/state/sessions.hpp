@@ -16,7 +16,6 @@
 #include "base/result.hpp"
 #include "base/token_bucket.hpp"
 #include "hub/control/state/due_list.hpp"
-#include "hub/control/state/durable.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/number_floor.hpp"
 #include "hub/control/state/place.hpp"

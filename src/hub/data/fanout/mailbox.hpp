@@ -16,7 +16,6 @@
 #include "hub/data/ring_queue.hpp"
 #include "hub/data/route/node_table.hpp"
 #include "hub/limits.hpp"
-#include "proto/frame/flow.hpp"
 
 namespace gimnet::hub {
 
