@@ -231,23 +231,6 @@ TEST(IoShard, ReadsLaterWhileAnotherShardHasTooMuchToDo) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
 }
 
-// What waits between shards when the hub ends is let go on both sides.
-TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
-  HubRig rig(2);
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(1);
-  FakeNode& c = rig.join(0);
-  b.pipe.set_room(0);
-  c.pipe.set_room(0);
-  for (int i = 0; i < 20; ++i) {
-    rig.send(a, b.id.value(), std::string(30'000, 'x'));
-    rig.send(b, c.id.value(), std::string(30'000, 'x'));
-    rig.turn();
-  }
-  rig.send(a, b.id.value(), "in the mailbox");
-  rig.turn_shard(0);
-}
-
 TEST(IoShard, RunsOnAThreadOfItsOwnUntilItIsStopped) {
   HubRig rig(1);
   rig.command(0, StopCommand{});

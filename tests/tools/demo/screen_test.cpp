@@ -49,7 +49,13 @@ TEST(Screen, EveryExtentCanBeDrawn) {
   ScreenState with_help = state();
   with_help.help = true;
   for (int columns = 0; columns < 90; columns += 7) {
-    for (int rows = 0; rows < 30; rows += 3) (void)draw_screen(monitor, with_help, {columns, rows});
+    for (int rows = 0; rows < 30; rows += 3) {
+      const Canvas canvas = draw_screen(monitor, with_help, {columns, rows});
+      EXPECT_EQ(canvas.extent(), (Extent{columns, rows}));
+      if (columns < kScreenLeast.columns || rows < kScreenLeast.rows) continue;
+      EXPECT_THAT(lines_of(canvas), HasSubstr("GIMnet")) << columns << " x " << rows;
+      EXPECT_EQ(canvas.at({0, 1}).code, U'╭') << columns << " x " << rows;
+    }
   }
 }
 

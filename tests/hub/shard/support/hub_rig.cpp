@@ -104,7 +104,9 @@ HubRig::HubRig(std::size_t shards, Limits limits)
   }
 }
 
-HubRig::~HubRig() {
+HubRig::~HubRig() { let_go(); }
+
+void HubRig::let_go() {
   for (const auto& shard : shards_) shard->let_go();
 }
 

@@ -129,6 +129,8 @@ class HubRig {
   /// Turns until nothing moves any more, and each node read what came for it.
   void settle();
   void settle_without_reading();
+  /// What a hub does at its end, when its threads are gone.
+  void let_go();
   /// Starts the threads of all shards and waits for their end: each was told to stop before.
   void run_threads();
   /// Fake time passes in ticks, each with a turn.
