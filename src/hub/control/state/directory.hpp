@@ -34,8 +34,8 @@ class Directory {
 
   /// Why `claimant` (nullptr: somebody new) cannot have the name; nothing if it can, perhaps from a holder who is away
   /// and whom the caller then has to end.
-  [[nodiscard]] std::optional<Refusal> refusal(std::string_view name, const Session* claimant, const Sessions& sessions,
-                                               std::chrono::milliseconds now) const;
+  [[nodiscard]] std::optional<proto::Goodbye> refusal(std::string_view name, const Session* claimant,
+                                                      const Sessions& sessions, std::chrono::milliseconds now) const;
 
   /// REQUIRES: nobody holds the name.
   void put(std::string_view name, std::uint32_t index, NameStanding standing = NameStanding::final);

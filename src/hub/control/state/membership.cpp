@@ -31,20 +31,21 @@ Membership::Membership(const Sessions::Options& options, const Limits& limits)
       sessions_(options, limits),
       services_(options.hub, limits, options.groups, options.returns_until.value_or(milliseconds{0})) {}
 
-Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request, milliseconds now, Effects& effects) {
-  if (std::optional<Refusal> refusal = check(request)) return std::move(*refusal);
+Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request, milliseconds now,
+                                                            Effects& effects) {
+  if (std::optional<proto::Goodbye> refusal = check(request)) return std::move(*refusal);
   const Sessions::Claim claim = sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<Refusal> refusal = directory_.refusal(request.name, claim.session, sessions_, now)) {
+    if (std::optional<proto::Goodbye> refusal = directory_.refusal(request.name, claim.session, sessions_, now)) {
       return std::move(*refusal);
     }
   }
   if (claim.session == nullptr) {
     if (keeping_due(now)) effects.emplace_back(StateDue{});
-    if (std::optional<Refusal> refusal = room_refusal(request, claim, now)) return std::move(*refusal);
+    if (std::optional<proto::Goodbye> refusal = room_refusal(request, claim, now)) return std::move(*refusal);
   }
   if (!request.name.empty()) end_absent_holder(request.name, claim.session, now, effects);
-  const Result<Joined, Refusal> found = session_for(request, claim, now, effects);
+  const Result<Joined, proto::Goodbye> found = session_for(request, claim, now, effects);
   if (!found) return found.error();
   Session& session = *found->session;
   if (!request.name.empty() && request.name != session.name) take_name(session, request.name, now, effects);
@@ -63,15 +64,16 @@ Result<Membership::Joined, Refusal> Membership::join(const JoinRequest& request,
   return *found;
 }
 
-Result<Membership::Joined, Refusal> Membership::session_for(const JoinRequest& request, const Sessions::Claim& claim,
-                                                            milliseconds now, Effects& effects) {
+Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinRequest& request,
+                                                                   const Sessions::Claim& claim, milliseconds now,
+                                                                   Effects& effects) {
   if (claim.session != nullptr) {
     services_.node_returned(claim.session->index);
     claim.session->came_back = true;
     return Joined{claim.session, false};
   }
   make_room(now, effects);
-  const Result<Session*, Refusal> created =
+  const Result<Session*, proto::Goodbye> created =
       claim.token ? sessions_.restore(*claim.token, request.shard_hint, now, places_for(request))
                   : sessions_.create(request.shard_hint, now, places_for(request));
   if (!created) return created.error();
@@ -95,13 +97,13 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
   effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
 }
 
-std::optional<Failure> Membership::rename(Session& session, const std::string& name, milliseconds now,
-                                          Effects& effects) {
+std::optional<proto::Refusal> Membership::rename(Session& session, const std::string& name, milliseconds now,
+                                                 Effects& effects) {
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
-    if (const std::optional<Refusal> refusal = directory_.refusal(name, &session, sessions_, now)) {
+    if (const std::optional<proto::Goodbye> refusal = directory_.refusal(name, &session, sessions_, now)) {
       const bool taken = refusal->code == GoodbyeCode::name_taken;
-      return Failure{taken ? proto::Status::taken : proto::Status::bad_request, refusal->sentence};
+      return proto::Refusal{taken ? proto::Status::taken : proto::Status::bad_request, refusal->sentence};
     }
     end_absent_holder(name, &session, now, effects);
   }
@@ -143,20 +145,22 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
-std::optional<Failure> Membership::renumber(Session& session, std::uint32_t index, milliseconds now, Effects& effects) {
+std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index, milliseconds now,
+                                                   Effects& effects) {
   if (index == kHubIndex || index >= kEveryIndex) {
-    return Failure{proto::Status::bad_request, "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
+    return proto::Refusal{proto::Status::bad_request,
+                          "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
   }
   const std::uint32_t former = session.index;
   if (index == former) {
-    return Failure{proto::Status::taken,
-                   "this node has the id " + to_string(sessions_.node_id(session)) + " already; choose a free one"};
+    return proto::Refusal{proto::Status::taken, "this node has the id " + to_string(sessions_.node_id(session)) +
+                                                    " already; choose a free one"};
   }
   // Messages for an id that the node never learned of would wait for it, and it would take none of them. A WELCOME that
   // was sent may have been lost: that is why it has to be heard of.
   if (session.renumbered) {
-    return Failure{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
-                                             " and has not come back under it yet; try again when it has"};
+    return proto::Refusal{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
+                                                    " and has not come back under it yet; try again when it has"};
   }
 #ifndef GIMNET_BUG_RETURNING_ID_GIVEN_AWAY
   const bool awaited = sessions_.find(index) == nullptr && sessions_.indices().used(index) &&
@@ -165,7 +169,8 @@ std::optional<Failure> Membership::renumber(Session& session, std::uint32_t inde
   const bool awaited = false;
 #endif
   if (awaited || !sessions_.renumber(session, index, now)) {
-    return Failure{proto::Status::taken, why_taken(make_id<NodeId>(hub_of(sessions_.node_id(session)), index), now)};
+    return proto::Refusal{proto::Status::taken,
+                          why_taken(make_id<NodeId>(hub_of(sessions_.node_id(session)), index), now)};
   }
   if (keeping_due(now)) effects.emplace_back(StateDue{});
   const NameStanding standing =
@@ -225,22 +230,25 @@ std::optional<milliseconds> Membership::next_deadline() const {
   return deadline;
 }
 
-std::optional<Refusal> Membership::check(const JoinRequest& request) const {
+std::optional<proto::Goodbye> Membership::check(const JoinRequest& request) const {
   if (request.role == proto::Role::hub) {
-    return Refusal{GoodbyeCode::not_allowed, "this hub takes no links from other hubs; connect as a node"};
+    return proto::Goodbye{GoodbyeCode::not_allowed, "this hub takes no links from other hubs; connect as a node"};
   }
   if (request.role == proto::Role::admin && !request.may_administer) {
     // By another way it would not be told apart from nobody, by this one it is told as whom it came.
     if (request.identity.starts_with("uid ")) {
-      return Refusal{GoodbyeCode::not_allowed, "only root and the user that runs the hub administer it, and this is " +
-                                                   request.identity + "; run the command as one of them"};
+      return proto::Goodbye{GoodbyeCode::not_allowed,
+                            "only root and the user that runs the hub administer it, and this is " + request.identity +
+                                "; run the command as one of them"};
     }
-    return Refusal{GoodbyeCode::not_allowed,
-                   "administrators connect over the hub's Unix socket, as root or as the user that runs the hub"};
+    return proto::Goodbye{
+        GoodbyeCode::not_allowed,
+        "administrators connect over the hub's Unix socket, as root or as the user that runs the hub"};
   }
   if (request.role != proto::Role::node && request.role != proto::Role::admin) {
-    return Refusal{GoodbyeCode::not_allowed,
-                   "there is no role " + std::to_string(static_cast<int>(request.role)) + "; connect as a node (0)"};
+    return proto::Goodbye{
+        GoodbyeCode::not_allowed,
+        "there is no role " + std::to_string(static_cast<int>(request.role)) + "; connect as a node (0)"};
   }
   return std::nullopt;
 }
@@ -252,11 +260,11 @@ void Membership::end_absent_holder(const std::string& name, const Session* claim
   end(*sessions_.find(*holder), now, effects);
 }
 
-std::optional<Refusal> Membership::room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
-                                                milliseconds now) {
+std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+                                                       milliseconds now) {
   // The limit may have been lowered, so that more would have to go than make way.
   const std::size_t ending = (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
-  if (std::optional<Refusal> refusal = sessions_.full_refusal(places_for(request), ending)) return refusal;
+  if (std::optional<proto::Goodbye> refusal = sessions_.full_refusal(places_for(request), ending)) return refusal;
   return claim.token ? std::nullopt : sessions_.id_refusal(now);
 }
 

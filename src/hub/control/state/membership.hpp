@@ -41,8 +41,8 @@ class Membership {
   };
   /// Admits a connection, for a new session or for the one whose token it shows. The caller attaches it at its shard
   /// and publishes its place after the effects were carried out. Errors: what GOODBYE says.
-  [[nodiscard]] Result<Joined, Refusal> join(const JoinRequest& request, std::chrono::milliseconds now,
-                                             Effects& effects);
+  [[nodiscard]] Result<Joined, proto::Goodbye> join(const JoinRequest& request, std::chrono::milliseconds now,
+                                                    Effects& effects);
 
   /// How a connection ended.
   struct Ending {
@@ -61,8 +61,8 @@ class Membership {
   /// The session's node goes on under another index, with name, services, subscriptions and token. Errors: taken (held,
   /// at rest, or perhaps that of a node that has not come back since a restart), bad_request (no index of a node).
   /// nullopt: done.
-  [[nodiscard]] std::optional<Failure> renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now,
-                                                Effects& effects);
+  [[nodiscard]] std::optional<proto::Refusal> renumber(Session& session, std::uint32_t index,
+                                                       std::chrono::milliseconds now, Effects& effects);
 
   /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
   /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
@@ -74,8 +74,8 @@ class Membership {
   /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival is judged as when
   /// it joins. What the node provides is withdrawn, as its full names were the old one's: it advertises anew.
   /// Errors: taken, bad_request. nullopt: done.
-  [[nodiscard]] std::optional<Failure> rename(Session& session, const std::string& name, std::chrono::milliseconds now,
-                                              Effects& effects);
+  [[nodiscard]] std::optional<proto::Refusal> rename(Session& session, const std::string& name,
+                                                     std::chrono::milliseconds now, Effects& effects);
 
   /// What became of a claim to a name.
   struct NameDecision {
@@ -108,18 +108,18 @@ class Membership {
   };
   /// Is it still the return that was noted?
   [[nodiscard]] bool still_redeclares(const Redeclaring& due) const;
-  [[nodiscard]] std::optional<Refusal> check(const JoinRequest& request) const;
+  [[nodiscard]] std::optional<proto::Goodbye> check(const JoinRequest& request) const;
   /// The session that the request is for: the one whose token it shows, or a new one.
-  [[nodiscard]] Result<Joined, Refusal> session_for(const JoinRequest& request, const Sessions::Claim& claim,
-                                                    std::chrono::milliseconds now, Effects& effects);
+  [[nodiscard]] Result<Joined, proto::Goodbye> session_for(const JoinRequest& request, const Sessions::Claim& claim,
+                                                           std::chrono::milliseconds now, Effects& effects);
   /// Why that id cannot be given to another node.
   [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
   void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
                          Effects& effects);
   /// Why there is no room for that newcomer even when all made way who have to: before any of them does.
-  [[nodiscard]] std::optional<Refusal> room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
-                                                    std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<proto::Goodbye> room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+                                                           std::chrono::milliseconds now);
   /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
   void make_room(std::chrono::milliseconds now, Effects& effects);
   void take_name(Session& session, const std::string& name, std::chrono::milliseconds now, Effects& effects);

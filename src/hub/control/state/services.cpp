@@ -30,13 +30,14 @@ bool same_stream(const ServiceTerms& a, const ServiceTerms& b) {
          a.delivery == b.delivery && a.window == b.window && a.retain == b.retain;
 }
 
-Failure bad_name(const char* fault) {
-  return Failure{Status::bad_request, std::string{"the full name of a service cannot be that: "} + fault};
+proto::Refusal bad_name(const char* fault) {
+  return proto::Refusal{Status::bad_request, std::string{"the full name of a service cannot be that: "} + fault};
 }
 
-Failure limit_reached(std::string_view what, std::uint64_t limit, std::string_view name) {
-  return Failure{Status::limit, "a node may have " + std::to_string(limit) + " " + std::string{what} +
-                                    "; end one first, or start the hub with a larger --limit " + std::string{name}};
+proto::Refusal limit_reached(std::string_view what, std::uint64_t limit, std::string_view name) {
+  return proto::Refusal{Status::limit, "a node may have " + std::to_string(limit) + " " + std::string{what} +
+                                           "; end one first, or start the hub with a larger --limit " +
+                                           std::string{name}};
 }
 
 }  // namespace
@@ -56,16 +57,16 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
 Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until)
     : hub_(hub), limits_(limits), group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
 
-Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider, std::string_view full_name,
-                                                          const ServiceTerms& terms, milliseconds now, Effects& effects,
-                                                          std::uint32_t former_group) {
+Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t provider, std::string_view full_name,
+                                                                 const ServiceTerms& terms, milliseconds now,
+                                                                 Effects& effects, std::uint32_t former_group) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   const auto known = topics_.find(full_name);
   const bool provided = known != topics_.end() && known->second.service.has_value();
   if (provided && known->second.service->provider != provider) {
-    return Failure{Status::taken, "the service '" + std::string{full_name} + "' is provided by node " +
-                                      to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
-                                      "; choose another name"};
+    return proto::Refusal{Status::taken, "the service '" + std::string{full_name} + "' is provided by node " +
+                                             to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
+                                             "; choose another name"};
   }
   Node& node = nodes_[provider];
 #ifdef GIMNET_BUG_ONE_SERVICE_TOO_MANY
@@ -85,7 +86,7 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
     if (!group) {
       forget_if_unused(entry);
       forget_if_idle(provider);
-      return Failure{Status::limit, shortage("group ids", group_indices_.waits_for_returns(now))};
+      return proto::Refusal{Status::limit, shortage("group ids", group_indices_.waits_for_returns(now))};
     }
     if (!provided) node.provides.push_back({&entry, node.life});
     std::uint32_t old_group = 0;
@@ -104,15 +105,16 @@ Result<Services::Advertised, Failure> Services::advertise(std::uint32_t provider
   return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
 }
 
-std::optional<Failure> Services::withdraw(std::uint32_t provider, std::uint32_t group, milliseconds now,
-                                          Effects& effects) {
+std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::uint32_t group, milliseconds now,
+                                                 Effects& effects) {
   const auto found = groups_.find(group);
   if (found == groups_.end()) {
-    return Failure{Status::not_found, "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
+    return proto::Refusal{Status::not_found, "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
   }
   Topic& entry = *found->second;
   if (entry.service->provider != provider) {
-    return Failure{Status::denied, "the service '" + std::string{entry.full_name} + "' is provided by another node"};
+    return proto::Refusal{Status::denied,
+                          "the service '" + std::string{entry.full_name} + "' is provided by another node"};
   }
   Node& node = nodes_[provider];
   node.provides.erase(find_topic(node.provides, entry));
@@ -122,8 +124,8 @@ std::optional<Failure> Services::withdraw(std::uint32_t provider, std::uint32_t 
   return std::nullopt;
 }
 
-Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std::string_view full_name,
-                                                  const SubscriberTerms& terms, Effects& effects) {
+Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_index, std::string_view full_name,
+                                                         const SubscriberTerms& terms, Effects& effects) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   Node& node = nodes_[node_index];
   const auto known = topics_.find(full_name);
@@ -152,7 +154,8 @@ Result<const Topic*, Failure> Services::subscribe(std::uint32_t node_index, std:
   return &entry;
 }
 
-std::optional<Failure> Services::unsubscribe(std::uint32_t node_index, std::string_view full_name, Effects& effects) {
+std::optional<proto::Refusal> Services::unsubscribe(std::uint32_t node_index, std::string_view full_name,
+                                                    Effects& effects) {
   const auto known = topics_.find(full_name);
   const auto node = nodes_.find(node_index);
   if (known != topics_.end() && node != nodes_.end()) {
@@ -164,7 +167,7 @@ std::optional<Failure> Services::unsubscribe(std::uint32_t node_index, std::stri
       return std::nullopt;
     }
   }
-  return Failure{Status::not_found, "this node is not subscribed to that service"};
+  return proto::Refusal{Status::not_found, "this node is not subscribed to that service"};
 }
 
 std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>& list, std::uint32_t life) {

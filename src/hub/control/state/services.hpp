@@ -20,9 +20,6 @@
 
 namespace gimnet::hub {
 
-/// Why a request was not granted: what its answer says.
-using Failure = proto::Refusal;
-
 /// What a provider says of its service.
 struct ServiceTerms {
   std::uint32_t message_type = 0;
@@ -77,17 +74,18 @@ class Services {
   /// new one, which its subscribers are told before it is published. `former_group`: the one that the service had
   /// before the hub or the session came back, 0: none; it gets that if nobody has or had it since. Errors: bad_request,
   /// taken, limit.
-  [[nodiscard]] Result<Advertised, Failure> advertise(std::uint32_t provider, std::string_view full_name,
-                                                      const ServiceTerms& terms, std::chrono::milliseconds now,
-                                                      Effects& effects, std::uint32_t former_group = 0);
+  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider, std::string_view full_name,
+                                                             const ServiceTerms& terms, std::chrono::milliseconds now,
+                                                             Effects& effects, std::uint32_t former_group = 0);
   /// Errors: not_found, denied. nullopt: done.
-  [[nodiscard]] std::optional<Failure> withdraw(std::uint32_t provider, std::uint32_t group,
-                                                std::chrono::milliseconds now, Effects& effects);
+  [[nodiscard]] std::optional<proto::Refusal> withdraw(std::uint32_t provider, std::uint32_t group,
+                                                       std::chrono::milliseconds now, Effects& effects);
   /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors: bad_request, limit.
-  [[nodiscard]] Result<const Topic*, Failure> subscribe(std::uint32_t node, std::string_view full_name,
-                                                        const SubscriberTerms& terms, Effects& effects);
+  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(std::uint32_t node, std::string_view full_name,
+                                                               const SubscriberTerms& terms, Effects& effects);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<Failure> unsubscribe(std::uint32_t node, std::string_view full_name, Effects& effects);
+  [[nodiscard]] std::optional<proto::Refusal> unsubscribe(std::uint32_t node, std::string_view full_name,
+                                                          Effects& effects);
 
   /// The node came back on a new connection: it will declare again what it still wants.
   void node_returned(std::uint32_t node);

@@ -66,34 +66,36 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
   return {nullptr, token};
 }
 
-Result<Session*, Refusal> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now, Places places) {
-  if (std::optional<Refusal> refusal = full_refusal(places)) return std::move(*refusal);
-  if (std::optional<Refusal> refusal = id_refusal(now)) return std::move(*refusal);
+Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now,
+                                                  Places places) {
+  if (std::optional<proto::Goodbye> refusal = full_refusal(places)) return std::move(*refusal);
+  if (std::optional<proto::Goodbye> refusal = id_refusal(now)) return std::move(*refusal);
   const std::optional<std::uint32_t> index = indices_.take(now);
   GIMNET_CHECK(index.has_value());
   return &put(*index, ++last_number_, shard_hint, now);
 }
 
-std::optional<Refusal> Sessions::id_refusal(milliseconds now) {
+std::optional<proto::Goodbye> Sessions::id_refusal(milliseconds now) {
   if (indices_.ready(now)) return std::nullopt;
-  return Refusal{proto::GoodbyeCode::hub_full,
-                 shortage("node ids", indices_.waits_for_returns(now)) + ", or connect to another hub"};
+  return proto::Goodbye{proto::GoodbyeCode::hub_full,
+                        shortage("node ids", indices_.waits_for_returns(now)) + ", or connect to another hub"};
 }
 
-Result<Session*, Refusal> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
-                                            milliseconds now, Places places) {
-  if (std::optional<Refusal> refusal = full_refusal(places)) return std::move(*refusal);
+Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
+                                                   milliseconds now, Places places) {
+  if (std::optional<proto::Goodbye> refusal = full_refusal(places)) return std::move(*refusal);
   const bool taken = indices_.take_back(token.index);
   GIMNET_CHECK(taken);
   return &put(token.index, token.number, shard_hint, now);
 }
 
-std::optional<Refusal> Sessions::full_refusal(Places places, std::size_t ending) const {
+std::optional<proto::Goodbye> Sessions::full_refusal(Places places, std::size_t ending) const {
   const std::uint64_t most = limits_.nodes + (places == Places::all ? limits_.administrators : 0);
   if (sessions_.size() - ending < most) return std::nullopt;
-  return Refusal{proto::GoodbyeCode::hub_full, "this hub takes " + std::to_string(limits_.nodes) +
-                                                   " nodes and has them; connect to another one, or start it with a "
-                                                   "larger --limit nodes"};
+  return proto::Goodbye{proto::GoodbyeCode::hub_full,
+                        "this hub takes " + std::to_string(limits_.nodes) +
+                            " nodes and has them; connect to another one, or start it with a "
+                            "larger --limit nodes"};
 }
 
 Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,

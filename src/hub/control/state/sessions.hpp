@@ -66,9 +66,6 @@ struct Session {
 /// How people are told of a node: "node 7.17 'robot'".
 [[nodiscard]] std::string title(NodeId node, const Session& session);
 
-/// Why somebody was not let in: what GOODBYE says.
-using Refusal = proto::Goodbye;
-
 enum class Placement : std::uint8_t { spread, hint };
 
 /// Which places a newcomer may have: also those that are kept for administrators, or not.
@@ -116,13 +113,16 @@ class Sessions {
   [[nodiscard]] Claim claim(const Presented& presented);
 
   /// A new session without a connection or a name. Errors: hub_full.
-  [[nodiscard]] Result<Session*, Refusal> create(std::optional<std::uint16_t> shard_hint, std::chrono::milliseconds now,
-                                                 Places places = Places::ordinary);
+  [[nodiscard]] Result<Session*, proto::Goodbye> create(std::optional<std::uint16_t> shard_hint,
+                                                        std::chrono::milliseconds now,
+                                                        Places places = Places::ordinary);
   /// Why no newcomer can be given an id; nothing: one can.
-  [[nodiscard]] std::optional<Refusal> id_refusal(std::chrono::milliseconds now);
+  [[nodiscard]] std::optional<proto::Goodbye> id_refusal(std::chrono::milliseconds now);
   /// The session of a token whose index is free, under its former id. Errors: hub_full.
-  [[nodiscard]] Result<Session*, Refusal> restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
-                                                  std::chrono::milliseconds now, Places places = Places::ordinary);
+  [[nodiscard]] Result<Session*, proto::Goodbye> restore(const SessionToken& token,
+                                                         std::optional<std::uint16_t> shard_hint,
+                                                         std::chrono::milliseconds now,
+                                                         Places places = Places::ordinary);
   /// A connection was admitted for the session. What the node says on it tells that it read WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
@@ -158,7 +158,7 @@ class Sessions {
   /// Is there a session for longest_away_nameless()?
   [[nodiscard]] bool nameless_away();
   /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
-  [[nodiscard]] std::optional<Refusal> full_refusal(Places places, std::size_t ending = 0) const;
+  [[nodiscard]] std::optional<proto::Goodbye> full_refusal(Places places, std::size_t ending = 0) const;
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.

@@ -58,15 +58,15 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
   journal_.add(std::move(change));
 }
 
-Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Watch& wanted) {
-  if (wanted.watch == 0) return Failure{Status::bad_request, "a watch has a number other than 0"};
+Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node, const ns::Watch& wanted) {
+  if (wanted.watch == 0) return proto::Refusal{Status::bad_request, "a watch has a number other than 0"};
   Watch watch;
   watch.number = wanted.watch;
   watch.subjects = wanted.subjects;
   if (!wanted.pattern.empty()) watch.pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !watch.pattern) {
-    return Failure{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
-                                            "' is no pattern: write a name in which a part may be * or **"};
+    return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
+                                                   "' is no pattern: write a name in which a part may be * or **"};
   }
   Watcher& watcher = watchers_[node];
   const auto old = std::ranges::find(watcher.watches, wanted.watch, &Watch::number);
@@ -75,9 +75,10 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
     const bool own = watcher.watches.size() >= limits_.watches_per_node;
     if (watcher.watches.empty()) watchers_.erase(node);
     const std::string limit = own ? "watches_per_node" : "watches";
-    return Failure{Status::limit, (own ? "a node may have " + std::to_string(limits_.watches_per_node)
-                                       : "this hub takes " + std::to_string(limits_.watches)) +
-                                      " watches; end one first, or start the hub with a larger --limit " + limit};
+    return proto::Refusal{Status::limit, (own ? "a node may have " + std::to_string(limits_.watches_per_node)
+                                              : "this hub takes " + std::to_string(limits_.watches)) +
+                                             " watches; end one first, or start the hub with a larger --limit " +
+                                             limit};
   }
   journal_.begin();
   const bool goes_on = wanted.epoch == journal_.epoch() && journal_.reaches(wanted.version);
@@ -95,9 +96,9 @@ Result<ns::WatchAnswer, Failure> Watches::watch(std::uint32_t node, const ns::Wa
   return ns::WatchAnswer{!goes_on};
 }
 
-std::optional<Failure> Watches::unwatch(std::uint32_t node, std::uint32_t number) {
+std::optional<proto::Refusal> Watches::unwatch(std::uint32_t node, std::uint32_t number) {
   const auto unknown = [number] {
-    return Failure{Status::not_found, "this node has no watch " + std::to_string(number)};
+    return proto::Refusal{Status::not_found, "this node has no watch " + std::to_string(number)};
   };
   const auto found = watchers_.find(node);
   if (found == watchers_.end()) return unknown();

@@ -28,9 +28,10 @@ class Watches {
   void note(const ServiceNoted& noted, const Membership& membership, std::chrono::milliseconds now);
 
   /// Begins a watch, or one of that number anew. Errors: bad_request, limit.
-  [[nodiscard]] Result<proto::ns::WatchAnswer, Failure> watch(std::uint32_t node, const proto::ns::Watch& wanted);
+  [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(std::uint32_t node,
+                                                                     const proto::ns::Watch& wanted);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<Failure> unwatch(std::uint32_t node, std::uint32_t watch);
+  [[nodiscard]] std::optional<proto::Refusal> unwatch(std::uint32_t node, std::uint32_t watch);
   /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
   void taken(std::uint32_t node, const proto::ns::WatchTaken& taken);
   /// The node's connection ended, and its watches with it.
