@@ -104,10 +104,10 @@ proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
   event.new_group = group_id(effect.new_group);
   event.message_type = effect.message_type;
   event.instance = effect.instance;
-  event.delivery = static_cast<ns::Delivery>(effect.delivery);
+  event.delivery = effect.delivery;
   event.window = effect.window;
   event.retain = effect.retain;
-  event.direction = static_cast<ns::Direction>(effect.direction);
+  event.direction = effect.direction;
   event.again = effect.again;
   for (const std::uint32_t group : effect.between) event.between.push_back(group_id(group));
   return proto::encode(event);

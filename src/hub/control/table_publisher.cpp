@@ -37,8 +37,7 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
 #ifndef GIMNET_BUG_RETAIN_NOT_PUBLISHED
     members->retain = topic->service->terms.retain;
 #endif
-    members->accepts =
-        static_cast<proto::ns::Direction>(topic->service->terms.direction) == proto::ns::Direction::accepts;
+    members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
     for (const std::uint32_t subscriber : topic->subscribers) {
       const NodePlace place = place_of(subscriber, membership);
       GIMNET_CHECK(place.exists());

@@ -64,7 +64,7 @@ TEST_F(TablePublisherTest, PublishesWhichServicesTakeData) {
   const Session& robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   ServiceTerms terms;
-  terms.direction = static_cast<std::uint8_t>(proto::ns::Direction::accepts);
+  terms.direction = proto::ns::Direction::accepts;
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/drive", terms, 0ms, effects_));
   for (const std::uint32_t group : {1u, 2u}) publisher_.publish_group(group, membership_);
   EXPECT_FALSE(groups_.find(1)->accepts);

@@ -76,8 +76,8 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   ServiceTerms terms;
   terms.message_type = offer.message_type;
   terms.instance = offer.instance;
-  terms.direction = static_cast<std::uint8_t>(offer.direction);
-  terms.delivery = static_cast<std::uint8_t>(offer.delivery);
+  terms.direction = offer.direction;
+  terms.delivery = offer.delivery;
   terms.metadata = offer.metadata;
   terms.window = offer.delivery == ns::Delivery::sync ? std::max(1u, offer.window) : 0;
   terms.retain = offer.retain;
@@ -158,9 +158,9 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
           answer.group = group_id(context, service->group);
           answer.message_type = service->terms.message_type;
           answer.instance = service->terms.instance;
-          answer.delivery = static_cast<ns::Delivery>(service->terms.delivery);
+          answer.delivery = service->terms.delivery;
           answer.retain = service->terms.retain;
-          answer.direction = static_cast<ns::Direction>(service->terms.direction);
+          answer.direction = service->terms.direction;
           if (const auto pace = (*topic)->pace_of(request.session.index)) answer.window = pace->window;
         }
         return answer;

@@ -54,10 +54,10 @@ struct ServiceMovedDue {
   std::uint32_t new_group = 0;
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
-  std::uint8_t delivery = 0;
+  proto::ns::Delivery delivery = proto::ns::Delivery::stream;
   std::uint32_t window = 0;
   bool retain = false;
-  std::uint8_t direction = 0;
+  proto::ns::Direction direction = proto::ns::Direction::provides;
   std::uint64_t move = 0;  ///< numbers the moves of a hub's services: that one and those before it
   // Told once more, to a node that came back
   bool again = false;

@@ -27,8 +27,8 @@ ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
   record.node = make_id<NodeId>(hub.id, service.provider);
   record.message_type = service.terms.message_type;
   record.instance = service.terms.instance;
-  record.direction = static_cast<ns::Direction>(service.terms.direction);
-  record.delivery = static_cast<ns::Delivery>(service.terms.delivery);
+  record.direction = service.terms.direction;
+  record.delivery = service.terms.delivery;
   record.metadata = service.terms.metadata;
   record.window = service.terms.window;
   record.retain = service.terms.retain;

@@ -46,7 +46,7 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
   if (!service) return std::nullopt;
   const auto asked = terms.find(subscriber);
   SubscriberTerms pace = asked != terms.end() ? asked->second : SubscriberTerms{};
-  const bool counted = static_cast<proto::ns::Delivery>(service->terms.delivery) == proto::ns::Delivery::sync;
+  const bool counted = service->terms.delivery == proto::ns::Delivery::sync;
   const std::uint32_t most = counted ? service->terms.window : 0;
   pace.window = pace.window == 0 ? most : std::min(pace.window, most);
   const bool bounded = pace.window != 0 || pace.interval_us != 0 || service->terms.retain;

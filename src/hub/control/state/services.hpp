@@ -24,8 +24,8 @@ namespace gimnet::hub {
 struct ServiceTerms {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
-  std::uint8_t direction = 0;
-  std::uint8_t delivery = 0;
+  proto::ns::Direction direction = proto::ns::Direction::provides;
+  proto::ns::Delivery delivery = proto::ns::Delivery::stream;
   std::string metadata;
   std::uint32_t window = 0;  ///< of sync(n)
   bool retain = false;

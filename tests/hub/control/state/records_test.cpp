@@ -21,7 +21,7 @@ TEST(Records, TellAllThatIsKnown) {
   ServiceTerms terms;
   terms.message_type = 3;
   terms.instance = 4;
-  terms.direction = 1;
+  terms.direction = proto::ns::Direction::accepts;
   terms.metadata = "x y";
   const auto service = membership.services().advertise(session.index, "robot/odom", terms, 1s, effects);
   ASSERT_TRUE(service);

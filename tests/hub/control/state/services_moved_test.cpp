@@ -20,7 +20,7 @@ class ServicesMovedTest : public ::testing::Test {
   std::uint32_t advertise(std::uint32_t type, const std::string& name = "robot/odom", std::uint32_t former_group = 0) {
     ServiceTerms terms;
     terms.message_type = type;
-    terms.delivery = static_cast<std::uint8_t>(proto::ns::Delivery::sync);
+    terms.delivery = proto::ns::Delivery::sync;
     terms.window = 3;
     const auto done = services_.advertise(kRobot, name, terms, now_, effects_, former_group);
     EXPECT_TRUE(done);

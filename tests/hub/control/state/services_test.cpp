@@ -21,7 +21,7 @@ ServiceTerms odometry() {
   ServiceTerms terms;
   terms.message_type = 5;
   terms.instance = 6;
-  terms.delivery = 1;
+  terms.delivery = proto::ns::Delivery::latest;
   return terms;
 }
 
@@ -265,7 +265,7 @@ TEST_F(ServicesTest, AGroupIdRestsBeforeItComesAgain) {
 
 ServiceTerms map_in_sync() {
   ServiceTerms terms;
-  terms.delivery = static_cast<std::uint8_t>(proto::ns::Delivery::sync);
+  terms.delivery = proto::ns::Delivery::sync;
   terms.window = 4;
   terms.retain = true;
   return terms;
