@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "hub/shard/control_frame.hpp"
+#include "hub/shard/flow_words.hpp"
 #include "hub/shard/flusher.hpp"
-#include "hub/shard/reader.hpp"
 
 namespace gimnet::hub {
 namespace {

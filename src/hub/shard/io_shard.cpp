@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/clock.hpp"
+#include "hub/shard/flow_words.hpp"
 
 namespace gimnet::hub {
 namespace {

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "base/clock.hpp"
+#include "hub/shard/flow_words.hpp"
 
 namespace gimnet::hub {
 

@@ -1,0 +1,38 @@
+#include "hub/shard/flow_words.hpp"
+
+#include "base/clock.hpp"
+
+namespace gimnet::hub {
+
+bool push_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
+  std::byte frame[proto::flow::kFrameSizeMax];
+  const std::size_t size = proto::flow::encode_frame(message, NodeId{}, frame);
+  return connection.outbox.push_control({frame, size}, state.egress);
+}
+
+void send_flow(ShardState& state, Connection& connection, const proto::flow::Message& message) {
+  if (push_flow(state, connection, message)) state.recipients.mark_dirty(connection);
+}
+
+void send_confirm(ShardState& state, Connection& connection) {
+  ResumeState& resume = *connection.resume;
+  if (resume.taken == resume.taken_told) return;
+  resume.taken_told = resume.taken;
+  resume.bytes_since_told = 0;
+  send_flow(state, connection, proto::flow::Confirm{resume.taken});
+}
+
+/// One PING is under way at a time, so that a service that moves all the time costs one a round trip.
+void ask_whether_read(ShardState& state, Connection& connection, std::uint64_t move) {
+  Reading& reading = state.readings[connection.slot.value()];
+  reading.wanted = move;
+  if (reading.sequence != 0) return;
+  if (++connection.ping_sequence == 0) ++connection.ping_sequence;
+  // Without room it is asked behind the next one, or not at all: then the node is told again at its next return.
+  if (!push_flow(state, connection, proto::flow::Ping{connection.ping_sequence, wall_now_ns()})) return;
+  reading.sequence = connection.ping_sequence;
+  reading.asked = move;
+  state.recipients.mark_dirty(connection);
+}
+
+}  // namespace gimnet::hub
