@@ -1,4 +1,4 @@
-#include "tests/client/nif/support/system_calls.hpp"
+#include "tests/support/system_calls.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,6 +21,7 @@
 namespace gimnet::nif::test {
 namespace {
 
+using gimnet::test::system_calls_of;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using Calls = std::vector<int>;

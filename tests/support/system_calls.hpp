@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-namespace gimnet::nif::test {
+namespace gimnet::test {
 
 /// Runs both in one thread of their own and returns the numbers (SYS_...) of all system calls that the second made, in
 /// their order, as the kernel tells them (seccomp). What a process does for its memory and to tell the time is left
@@ -12,4 +12,4 @@ namespace gimnet::nif::test {
 [[nodiscard]] std::optional<std::vector<int>> system_calls_of(const std::function<void()>& before,
                                                               const std::function<void()>& counted);
 
-}  // namespace gimnet::nif::test
+}  // namespace gimnet::test

@@ -1,4 +1,4 @@
-#include "tests/client/nif/support/system_calls.hpp"
+#include "tests/support/system_calls.hpp"
 
 #include <linux/filter.h>
 #include <linux/seccomp.h>
@@ -16,7 +16,7 @@
 #include <cstdio>
 #include <thread>
 
-namespace gimnet::nif::test {
+namespace gimnet::test {
 namespace {
 
 constexpr int kNotYet = -1;
@@ -100,4 +100,4 @@ std::optional<std::vector<int>> system_calls_of(const std::function<void()>& bef
   return calls;
 }
 
-}  // namespace gimnet::nif::test
+}  // namespace gimnet::test
