@@ -3,7 +3,9 @@
 what is measured and how. The table and all progress go to standard error; --json prints one document on standard output."""
 
 import argparse
+import dataclasses
 import datetime
+import functools
 import itertools
 import json
 import os
@@ -13,6 +15,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
@@ -30,7 +33,7 @@ WHOLE_SECONDS = 0.5
 RUNS = 3
 RUNS_MAX = 9  # of what lies far apart or decides nothing, as long as there is time:
 QUICK_EXTRA_SECONDS = 45
-WHOLE_EXTRA_SECONDS = 120
+WHOLE_EXTRA_SECONDS = 240
 SMOKE_CLIENTS = 200  # of scenarios with 10,000 or 1,000: in a smoke run it is not counted how long they take
 SMOKE_PATIENCE_SECONDS = 30
 SKIPPED = 77  # what ctest takes for a test that was left out
@@ -93,10 +96,17 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
 
+def lengths(arguments: argparse.Namespace) -> Callable[[str, suite.Case], float] | None:
+    """How long each measurement takes, where that is not --seconds or QUICK_SECONDS times the scenario's factor."""
+    if arguments.seconds or arguments.quick or arguments.against is not None:
+        return None
+    return suite.smoke_seconds if arguments.smoke else functools.partial(suite.whole_seconds, WHOLE_SECONDS)
+
+
 def make_settings(arguments: argparse.Namespace) -> Settings:
     usual = suite.SMOKE_SECONDS if arguments.smoke else QUICK_SECONDS if arguments.quick else WHOLE_SECONDS
     return Settings(build=arguments.build_dir, seconds=arguments.seconds or usual,
-                    seconds_of=suite.smoke_seconds if arguments.smoke and not arguments.seconds else None,
+                    seconds_of=lengths(arguments),
                     runs=arguments.runs or (1 if arguments.smoke else RUNS),
                     runs_max=0 if arguments.smoke or arguments.runs else RUNS_MAX,
                     extra_seconds=QUICK_EXTRA_SECONDS if arguments.quick else WHOLE_EXTRA_SECONDS,
@@ -163,7 +173,9 @@ def measure(arguments: argparse.Namespace) -> int:
     document = {"results": rows, "absent": absences, "machine": describe_machine(), "version": program_version(),
                 "versions": catalogue.rival_versions(list(chosen_subjects(arguments))),
                 "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-                "seconds": settings.seconds, "runs": settings.runs, "runs_max": settings.runs_max, "hub_arguments": settings.hub_arguments}
+                "seconds": settings.seconds, "longer": [[*dataclasses.astuple(case), least, subjects] for case, (least, subjects) in
+                                                                suite.WHOLE_SECONDS.items() if settings.seconds_of is not None and not arguments.smoke],
+                "runs": settings.runs, "runs_max": settings.runs_max, "hub_arguments": settings.hub_arguments}
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:

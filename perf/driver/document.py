@@ -95,6 +95,8 @@ def runs_of(result: dict) -> str:
     """How many runs, and how long."""
     wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart or do not agree on a goal" if result["runs_max"] > result["runs"] else ""
     longer = [f"{name} {shown(result['seconds'] * spec.seconds_factor)}" for name, spec in SCENARIOS.items() if spec.seconds_factor != 1]
+    longer += [f"{scenario} {size} B {transport} of {', '.join(subjects)} {shown(seconds)}"
+               for scenario, size, transport, seconds, subjects in result.get("longer", [])]
     runs = "one run" if result["runs"] == 1 else f"{result['runs']} runs"
     return f"{runs}{wild}, of {result['seconds']} s each ({', '.join(longer)} s)"
 

@@ -14,7 +14,8 @@ namespace gimnet::perf {
 [[nodiscard]] std::int64_t context_switches(pid_t process);
 
 /// What a process has used since this was made, user and system time apart. The sum is exact; their ratio is the
-/// kernel's, which looks 100 times a second.
+/// kernel's, which with CONFIG_TICK_CPU_ACCOUNTING (Debian's too) looks at each tick whose it is, CONFIG_HZ times a
+/// second, and that is all it knows: getrusage() and cgroups tell the same. Few seconds say little of a small part.
 class CpuMeter {
  public:
   struct Used {

@@ -94,6 +94,23 @@ class Suite(unittest.TestCase):
         self.assertLess(sum(lengths.values()), 35)
         self.assertLess(settings.clients, 1000)
 
+    def test_a_whole_run_measures_rare_and_coarse_figures_long_enough(self):
+        whole = run.make_settings(run.parse_arguments([]))
+        case = suite.Case("ping_paced", 16, "tcp")
+        self.assertEqual([whole.length_of(name, case) for name in ("tcphub_spinning", "nats")], [20, 2])
+        self.assertEqual(whole.length_of("mosquitto", suite.Case("library_burst", 16, "unix")), 5)
+        self.assertEqual(whole.length_of("tcphub", suite.Case("one_to_one", 16, "tcp")), 0.5)
+        round_trips = 1_000 * whole.length_of("tcphub_spinning", case)
+        self.assertGreaterEqual(round_trips * (1 - 0.999), 20, "as many lie beyond the 99.9th percentile")
+        for words in (["--quick"], ["--smoke"], ["--seconds", "0.5"]):
+            self.assertLess(run.make_settings(run.parse_arguments(words)).length_of("tcphub_spinning", case), 3)
+        longer = sum((seconds - 0.5 * case.spec.seconds_factor) * len(names) for case, (seconds, names) in suite.WHOLE_SECONDS.items())
+        self.assertLess(3 * longer, 300, "a whole run shall stay one of less than an hour")
+
+    def test_what_was_measured_longer_is_said(self):
+        text = make_document(result_of([]) | {"longer": [["ping_paced", 16, "tcp", 20, ["null", "tcphub"]]]})
+        self.assertIn("ping_paced 16 B tcp of null, tcphub 20", text)
+
     def test_some_scenarios_are_measured_longer(self):
         settings = run.make_settings(run.parse_arguments(["--seconds", "2"]))
         self.assertEqual([settings.length_of("tcphub", suite.Case(name, 16, "tcp")) for name in ("one_to_one", "ping_paced")], [2, 8])
