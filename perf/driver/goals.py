@@ -50,6 +50,7 @@ GOALS = (
     Goal("ping_two_cpus", 16, "tcp", NULL, None, 0.35, subject="tcphub_spinning"),
     Goal("ping_paced", 16, "tcp", "p999_us", None, 250, subject="tcphub_spinning"),
     Goal("ping_under_bulk", 16, "tcp", "p99_over_idle", None, 1.5),
+    Goal("ping_under_bulk", 16, "unix", "p99_over_idle", None, 1.5),
     Goal("stalled_subscriber", 1024, "tcp", "rate_kept", None, 0.95, at_least=True),
     # What the hub may hold at all (budget_bytes), and what may wait for one node (a lane and the reserve) with the buffers it lies in.
     Goal("stalled_subscriber", 1024, "tcp", "rss_growth_bytes", 256 << 20, 4 << 20),

@@ -149,7 +149,8 @@ def quick_cases() -> list[Case]:
                 ("broadcast_100", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16), ("ping_paced", 16),
                 ("ping_under_bulk", 16),
                 ("stalled_subscriber", 1024), ("idle_10000", 16), ("idle_alone", 16), ("connect_10000", 16)]
-    over_unix = [("one_to_one", 16), ("one_to_one", 65536), ("one_to_one_unbatched", 16), ("ping_one_cpu", 16)]
+    over_unix = [("one_to_one", 16), ("one_to_one", 65536), ("one_to_one_unbatched", 16), ("ping_one_cpu", 16), ("ping_two_cpus", 16),
+                 ("ping_under_bulk", 16)]
     return [Case(*case, "tcp") for case in over_tcp] + [Case(*case, "unix") for case in over_unix]
 
 
