@@ -115,7 +115,8 @@ void FrameWire::take_data(Client& client, const proto::FrameHeader& header, std:
   if (header.kind == proto::Kind::unicast && header.dst != node_id(client)) return client.inbox.on_wrong();
   if (header.flags == 0) return client.inbox.on_message(body);
   if (header.flags != proto::kFlagFragment || body.size() <= kFragmentHeaderBytes) return client.inbox.on_wrong();
-  client.inbox.on_piece(load_u32(body.data() + 4), load_u32(body.data() + 8), body.subspan(kFragmentHeaderBytes));
+  client.inbox.on_piece(load_u32(body.data()), load_u32(body.data() + 4), load_u32(body.data() + 8),
+                        body.subspan(kFragmentHeaderBytes));
 }
 
 void FrameWire::take_other(Client&, const proto::FrameHeader&, std::span<const std::byte>) {

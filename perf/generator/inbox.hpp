@@ -31,11 +31,15 @@ class Inbox {
     if (take_stamp(load_u64(payload.data()))) ++delivered_;
   }
 
-  /// A part of a message that travels in pieces; `total` is the size of the whole message.
-  void on_piece(std::size_t offset, std::size_t total, std::span<const std::byte> piece) {
+  /// A part of a message that travels in pieces; `number` tells those of one message from those of others, which are
+  /// the same but for their stamps, and `total` is the size of the whole message.
+  void on_piece(std::uint32_t number, std::size_t offset, std::size_t total, std::span<const std::byte> piece) {
     const std::size_t skipped = offset == 0 ? kStampBytes : 0;
-    if (offset == 0) piece_end_ = 0;
-    if (offset != piece_end_ || total != payload_.size() || piece.size() < skipped + 1 ||
+    if (offset == 0) {
+      piece_end_ = 0;
+      piece_number_ = number;
+    }
+    if (number != piece_number_ || offset != piece_end_ || total != payload_.size() || piece.size() < skipped + 1 ||
         offset + piece.size() > total || !same(piece, skipped, offset)) {
       ++wrong_;
       piece_end_ = 0;
@@ -80,6 +84,7 @@ class Inbox {
   std::uint64_t wrong_ = 0;
   std::uint64_t piece_stamp_ = 0;
   std::size_t piece_end_ = 0;
+  std::uint32_t piece_number_ = 0;
   StreamId stream_ = 0;
 };
 

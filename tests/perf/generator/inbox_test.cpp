@@ -9,6 +9,7 @@ namespace {
 
 constexpr StreamId kStream = 3;
 constexpr std::size_t kBytes = 64;
+constexpr std::uint32_t kNumber = 9;
 
 std::vector<std::byte> message(std::uint64_t sequence, StreamId stream = kStream, std::size_t size = kBytes) {
   const auto pattern = pattern_payload(size);
@@ -73,9 +74,9 @@ TEST(Inbox, PutsPiecesTogether) {
   Inbox inbox = inbox_for(kBytes);
   const auto whole = message(0);
   const std::span<const std::byte> bytes(whole);
-  inbox.on_piece(0, kBytes, bytes.first(20));
+  inbox.on_piece(kNumber, 0, kBytes, bytes.first(20));
   EXPECT_EQ(inbox.delivered(), 0u);
-  inbox.on_piece(20, kBytes, bytes.subspan(20));
+  inbox.on_piece(kNumber, 20, kBytes, bytes.subspan(20));
   EXPECT_EQ(inbox.delivered(), 1u);
   EXPECT_EQ(inbox.wrong(), 0u);
 }
@@ -84,31 +85,41 @@ TEST(Inbox, SeesAMissingARepeatedAndAChangedPiece) {
   const auto whole = message(0);
   const std::span<const std::byte> bytes(whole);
   Inbox missing = inbox_for(kBytes);
-  missing.on_piece(0, kBytes, bytes.first(20));
-  missing.on_piece(40, kBytes, bytes.subspan(40));
+  missing.on_piece(kNumber, 0, kBytes, bytes.first(20));
+  missing.on_piece(kNumber, 40, kBytes, bytes.subspan(40));
   EXPECT_EQ(missing.wrong(), 1u);
   EXPECT_EQ(missing.delivered(), 0u);
 
   Inbox repeated = inbox_for(kBytes);
-  repeated.on_piece(0, kBytes, bytes.first(20));
-  repeated.on_piece(20, kBytes, bytes.subspan(20, 20));
-  repeated.on_piece(20, kBytes, bytes.subspan(20, 20));
+  repeated.on_piece(kNumber, 0, kBytes, bytes.first(20));
+  repeated.on_piece(kNumber, 20, kBytes, bytes.subspan(20, 20));
+  repeated.on_piece(kNumber, 20, kBytes, bytes.subspan(20, 20));
   EXPECT_EQ(repeated.wrong(), 1u);
 
   Inbox changed = inbox_for(kBytes);
   auto other = whole;
   other[50] ^= std::byte{1};
-  changed.on_piece(0, kBytes, bytes.first(20));
-  changed.on_piece(20, kBytes, std::span<const std::byte>(other).subspan(20));
+  changed.on_piece(kNumber, 0, kBytes, bytes.first(20));
+  changed.on_piece(kNumber, 20, kBytes, std::span<const std::byte>(other).subspan(20));
   EXPECT_EQ(changed.wrong(), 1u);
   EXPECT_EQ(changed.delivered(), 0u);
+}
+
+TEST(Inbox, SeesAPieceOfAnotherMessageWithTheSameBytes) {
+  Inbox inbox = inbox_for(kBytes);
+  const auto whole = message(0);
+  const std::span<const std::byte> bytes(whole);
+  inbox.on_piece(kNumber, 0, kBytes, bytes.first(20));
+  inbox.on_piece(kNumber + 1, 20, kBytes, bytes.subspan(20));
+  EXPECT_EQ(inbox.wrong(), 1u);
+  EXPECT_EQ(inbox.delivered(), 0u);
 }
 
 TEST(Inbox, SeesPiecesThatLieAboutTheTotal) {
   Inbox inbox = inbox_for(kBytes);
   const auto whole = message(0);
-  inbox.on_piece(0, kBytes - 1, whole);
-  inbox.on_piece(0, kBytes + 1, whole);
+  inbox.on_piece(kNumber, 0, kBytes - 1, whole);
+  inbox.on_piece(kNumber, 0, kBytes + 1, whole);
   EXPECT_EQ(inbox.wrong(), 2u);
 }
 
