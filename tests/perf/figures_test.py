@@ -161,12 +161,12 @@ class Yardstick(unittest.TestCase):
         paced = suite.Case("ping_paced", 16, "tcp")
         rows = make_rows([outcome("null", ONE_TO_ONE, [22, 11, 33]), outcome("tcphub", ONE_TO_ONE, [99]), outcome("null", paced, [76])])
         lines = yardstick_table(rows).splitlines()[2:]
-        self.assertEqual(lines, ["| one_to_one | 16 | CPU, us a message | 0.022 | 0.011 to 0.033 | 0.011 | 2 |",
-                                 "| ping_paced | 16 | round trip, us, median | 76 |  | 152 | 0.5 |"])
+        self.assertEqual(lines, ["| one_to_one | 16 | tcp | CPU, us a message | 0.022 | 0.011 to 0.033 | 0.011 | 2 |",
+                                 "| ping_paced | 16 | tcp | round trip, us, median | 76 |  | 152 | 0.5 |"])
 
     def test_it_is_measured_in_the_whole_suite(self):
-        for scenario, size, _, _ in ELSEWHERE:
-            self.assertIn("null", suite.whole_plan(("null", "tcphub"))[suite.Case(scenario, size, "tcp")])
+        for scenario, size, transport, _, _ in ELSEWHERE:
+            self.assertIn("null", suite.whole_plan(("null", "tcphub"))[suite.Case(scenario, size, transport)])
 
     def test_without_a_null_relay_there_is_no_table(self):
         self.assertEqual(yardstick_table(make_rows([outcome("tcphub", ONE_TO_ONE, [99])])), "")
