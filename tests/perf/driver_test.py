@@ -4,12 +4,14 @@
 import contextlib
 import io
 import pathlib
+import subprocess
 import tempfile
 import unittest
+from unittest import mock
 
 from support import outcome, result_of
 import run
-from driver import catalogue, plots, suite
+from driver import catalogue, library, plots, subjects, suite
 from driver.document import make_document
 from driver.goals import GOALS, RIVAL_FIELDS
 from driver.measure import Outcome, make_group
@@ -225,6 +227,27 @@ class Arguments(unittest.TestCase):
                       "--against HEAD --runs 9 --json --scenario one_to_one --hub-argument=--spin", "--smoke --only nats",
                       "--build-dir build/release --instructions"):
             run.parse_arguments(words.split())
+
+
+class Ledgers(unittest.TestCase):
+    """Of library runs, which other programs make than the generator."""
+
+    def test_a_hub_of_ours_tells_it_and_others_have_none(self):
+        case = suite.Case("library_burst", 16, "tcp")
+        settings = run.make_settings(run.parse_arguments([]))
+        answer = subprocess.CompletedProcess([], 0, '{"cpu_share": 0, "ledger_gap": 3, "dropped_frames": 1, "queued_frames": 0}', "")
+        with mock.patch.object(library.subprocess, "run", return_value=answer) as ran:
+            self.assertEqual(library.ask_for_ledger(self.subject("nats"), case, settings), {})
+            ran.assert_not_called()
+            self.assertEqual(library.ask_for_ledger(self.subject("gimnet"), case, settings),
+                             {"ledger_gap": 3, "dropped_frames": 1, "queued_frames": 0})
+        failed = subprocess.CompletedProcess([], 1, "", "no answer")
+        with mock.patch.object(library.subprocess, "run", return_value=failed), self.assertRaisesRegex(subjects.SubjectError, "no answer"):
+            library.ask_for_ledger(self.subject("gimnet"), case, settings)
+
+    @staticmethod
+    def subject(wire: str):
+        return mock.Mock(wire=wire, urls={"tcp": "tcp://127.0.0.1:1"}, pid=1)
 
 
 class Absences(unittest.TestCase):
