@@ -23,7 +23,7 @@ from driver import against, catalogue, control, instructions, suite, usage  # no
 from driver.judgement import faults_of  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
 from driver.report import write_report  # noqa: E402
-from driver.subjects import SubjectError, allowed_cpus  # noqa: E402
+from driver.subjects import SubjectError, allowed_cpus, remove_left_folders  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -256,6 +256,7 @@ def main() -> int:
         return 0
     if arguments.instructions is not None:
         return count_instructions(arguments)
+    remove_left_folders()
     if arguments.control:
         return measure_control(arguments)
     if arguments.against is not None:

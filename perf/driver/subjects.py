@@ -1,10 +1,14 @@
 """The programs that are measured: how each is started, pinned to its processor, found ready, and ended."""
 
 import ctypes
+import fcntl
+import glob
+import io
 import os
 import pathlib
 import resource
 import select
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -14,7 +18,9 @@ READY_SECONDS = 15
 PR_SET_PDEATHSIG = 1
 # Where the system lets it, a subject may hold so many connections: some refuse what 10,000 and their own files need.
 DESCRIPTORS_MIN = 65_536
-# The hub sets this on every connection; the null relay gets the same.
+FOLDER_PREFIX = "gimnet-perf-"
+LOCK = "in-use"
+# The hub sets this on every connection (`socket_send_bytes`); the null relay gets the same.
 SEND_BUFFER_BYTES = 256 * 1024
 
 
@@ -44,6 +50,27 @@ def child_setup(cpus: list[int]):
     return set_up
 
 
+def lock_folder(folder: str) -> io.FileIO:
+    """Who has it open says that the folder is in use; the kernel lets it go with the process, however that ends."""
+    lock = open(os.path.join(folder, LOCK), "wb", buffering=0)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        raise
+    return lock
+
+
+def remove_left_folders() -> None:
+    """Those of runs that were killed and could not clear up."""
+    for path in glob.glob(os.path.join(tempfile.gettempdir(), FOLDER_PREFIX + "*", LOCK)):
+        try:
+            with lock_folder(os.path.dirname(path)):
+                shutil.rmtree(os.path.dirname(path), ignore_errors=True)
+        except OSError:
+            pass  # in use, or somebody else's
+
+
 class Subject:
     """A running hub or relay, for `with`. Listens on TCP and, unless `transports` says otherwise, on a Unix socket."""
 
@@ -63,7 +90,8 @@ class Subject:
         raise NotImplementedError
 
     def __enter__(self) -> "Subject":
-        self._folder = tempfile.TemporaryDirectory(prefix="gimnet-perf-")
+        self._folder = tempfile.TemporaryDirectory(prefix=FOLDER_PREFIX)
+        self._lock = lock_folder(self._folder.name)
         self._log = open(os.path.join(self._folder.name, "log"), "w+b")
         command = self.command(self._folder.name)
         try:
@@ -130,6 +158,7 @@ class Subject:
                 self._process.stdout.close()
             self._process = None
         self._log.close()
+        self._lock.close()
         self._folder.cleanup()
 
 

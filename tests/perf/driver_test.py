@@ -3,13 +3,17 @@
 
 import contextlib
 import io
+import math
+import os
 import pathlib
+import re
 import subprocess
+import sys
 import tempfile
 import unittest
 from unittest import mock
 
-from support import outcome, result_of
+from support import ROOT, outcome, result_of
 import run
 from driver import catalogue, library, plots, subjects, suite
 from driver.document import make_document
@@ -227,6 +231,39 @@ class Arguments(unittest.TestCase):
                       "--against HEAD --runs 9 --json --scenario one_to_one --hub-argument=--spin", "--smoke --only nats",
                       "--build-dir build/release --instructions"):
             run.parse_arguments(words.split())
+
+
+class Folders(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        patch = mock.patch.object(tempfile, "tempdir", folder.name)
+        patch.start()
+        self.addCleanup(patch.stop)
+
+    def test_what_a_killed_run_left_is_removed_and_what_is_in_use_stays(self):
+        in_use = tempfile.mkdtemp(prefix=subjects.FOLDER_PREFIX)
+        other = tempfile.mkdtemp(prefix="something-else-")
+        script = ("import sys; sys.path.insert(0, sys.argv[1]); from driver import subjects; import tempfile\n"
+                  "lock = subjects.lock_folder(tempfile.mkdtemp(prefix=subjects.FOLDER_PREFIX)); print('ready', flush=True); sys.stdin.read()")
+        environment = os.environ | {"TMPDIR": tempfile.gettempdir()}
+        with subjects.lock_folder(in_use), subprocess.Popen([sys.executable, "-c", script, str(ROOT / "perf")], env=environment,
+                                                            stdin=subprocess.PIPE, stdout=subprocess.PIPE) as killed:
+            self.assertEqual(killed.stdout.readline(), b"ready\n")
+            subjects.remove_left_folders()
+            self.assertEqual(len(os.listdir(tempfile.gettempdir())), 3)
+            killed.kill()
+            killed.wait()
+            subjects.remove_left_folders()
+        self.assertEqual({os.path.join(tempfile.gettempdir(), name) for name in os.listdir(tempfile.gettempdir())}, {in_use, other})
+
+
+class Parameters(unittest.TestCase):
+    def test_the_null_relay_has_the_hub_s_send_buffer(self):
+        limits = (ROOT / "src" / "hub" / "limits.hpp").read_text()
+        (bytes_of_hub,) = re.findall(r"socket_send_bytes = ([0-9* ]+);", limits)
+        factors = [int(factor) for factor in bytes_of_hub.split("*")]
+        self.assertEqual(subjects.SEND_BUFFER_BYTES, math.prod(factors))
 
 
 class Ledgers(unittest.TestCase):
