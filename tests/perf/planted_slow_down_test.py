@@ -10,8 +10,9 @@ sys.path.insert(0, str(ROOT / "perf"))
 
 from driver import instructions  # noqa: E402
 
-# What a planted bug adds, so that what is shown is that a twentieth is found, and not a half.
-LEAST, MOST = 0.04, 0.06
+# What a planted bug adds, so that what is shown is that a twentieth is found, and not a half. Its source is compiled apart from the library's,
+# which by itself is up to 2 % either way.
+LEAST, MOST = 0.03, 0.08
 LIST = ROOT / "perf" / "instructions" / "planted_bugs.txt"
 
 
