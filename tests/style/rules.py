@@ -66,7 +66,7 @@ _MEMORY_ORDER = re.compile(r"\bmemory_order(_|::)(relaxed|consume|acquire|releas
 _SLEEP = re.compile(r"\b(sleep_for|sleep_until|usleep|nanosleep)\b|\b(time|asyncio)\.sleep\b|(?<![\w.])sleep\(")
 _CLOCK = re.compile(r"\b\w*clock::now\b|\b(clock_gettime|gettimeofday|timespec_get)\b|"
                     r"(?<![\w.>])(?:std::|::)?time\(\s*(nullptr|NULL|0|&)")
-_RANDOM = re.compile(r"\brandom_device\b|\b(getrandom|getentropy|s?rand|drand48|arc4random)\s*\(")
+_RANDOM = re.compile(r"\brandom_device\b|\b(random_bits|fill_randomly|getrandom|getentropy|s?rand|drand48|arc4random)\s*\(")
 # What grows at one end and shrinks at the other, as a member, a local or an alias; and a vector made to do so.
 _QUEUE = re.compile(r"^\s*(?:using \w+ = |static |mutable )*std::(deque|list|queue|priority_queue)<.*;")
 _FRONT_ERASED = re.compile(r"\b(\w+)\.erase\(\1\.begin\(\)\)")
@@ -202,7 +202,8 @@ def queues_name_their_limit(tree):
 
 # Who may ask for the time, and for randomness that no seed gives: everybody else is handed them, and can be simulated.
 CLOCKS = ("src/base/clock.hpp",)
-RANDOMNESS = ("src/hub/config/start_state.cpp", "src/hub/shard/attacher.cpp", "src/client/nif/platform_linux.cpp")
+RANDOMNESS = ("src/base/random.hpp", "src/base/random.cpp", "src/hub/config/start_state.cpp", "src/hub/shard/attacher.cpp",
+              "src/client/nif/node.cpp", "src/client/nif/node_thread.cpp")
 
 
 def time_and_chance_are_handed_in(tree):

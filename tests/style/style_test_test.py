@@ -173,6 +173,7 @@ CASES = {
             {"src/tools/a.cpp": "auto a = std::time(nullptr);\n"},
             {"src/hub/a.cpp": "std::random_device device{};\n"},
             {"src/hub/a.cpp": "int a = rand();\n"},
+            {"src/hub/a.cpp": "auto a = random_bits();\n"},
             {"src/hub/a.cpp": "std::this_thread::sleep_for(a);\n"},
         ],
     ),

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/random.hpp"
 #include "client/nif/handshake.hpp"
 #include "proto/frame/frame_builder.hpp"
 

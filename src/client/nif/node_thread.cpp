@@ -3,6 +3,7 @@
 #include <span>
 #include <utility>
 
+#include "base/random.hpp"
 #include "client/nif/handshake.hpp"
 #include "client/nif/node.hpp"
 

@@ -110,8 +110,6 @@ class SignalsBlocked {
   std::unique_ptr<Saved> saved_;
 };
 
-/// Bits that nobody can guess.
-[[nodiscard]] std::uint64_t random_bits();
 /// Changes in a child after fork(); never in the process that called it.
 [[nodiscard]] std::uint32_t fork_generation();
 [[nodiscard]] std::string system_error_text(int error);

@@ -6,7 +6,6 @@
 #include <pthread.h>
 #include <signal.h>
 #include <sys/eventfd.h>
-#include <sys/random.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -227,13 +226,6 @@ SignalsBlocked::SignalsBlocked() : saved_(std::make_unique<Saved>()) {
 }
 
 SignalsBlocked::~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &saved_->set, nullptr); }
-
-std::uint64_t random_bits() {
-  std::uint64_t bits = 0;
-  while (::getrandom(&bits, sizeof bits, 0) != static_cast<ssize_t>(sizeof bits)) {
-  }
-  return bits;
-}
 
 std::uint32_t fork_generation() {
   static std::once_flag once;

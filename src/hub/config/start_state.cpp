@@ -1,29 +1,22 @@
 #include "hub/config/start_state.hpp"
 
-#include <sys/random.h>
 #include <sys/stat.h>
 
 #include <cctype>
 #include <cerrno>
 #include <span>
 
-#include "base/check.hpp"
 #include "base/log.hpp"
+#include "base/random.hpp"
 #include "hub/config/folders.hpp"
 
 namespace gimnet::hub {
 namespace {
 
-template <class Bytes>
-void fill_randomly(Bytes& bytes) {
-  const auto target = std::as_writable_bytes(std::span{&bytes, 1});
-  GIMNET_CHECK(::getrandom(target.data(), target.size(), 0) == static_cast<ssize_t>(target.size()));
-}
 
 /// The first index of a block that an earlier hub has hardly used.
 std::uint32_t random_mark() {
-  std::uint32_t number = 0;
-  fill_randomly(number);
+  const auto number = static_cast<std::uint32_t>(random_bits());
   return 1 + number % (kIndexMost / IndexPool::kBlock) * IndexPool::kBlock;
 }
 

@@ -1,10 +1,9 @@
 #include "hub/shard/attacher.hpp"
 
-#include <sys/random.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "base/random.hpp"
 #include "hub/shard/control_frame.hpp"
 #include "hub/shard/flow_words.hpp"
 #include "hub/shard/flusher.hpp"
@@ -15,9 +14,7 @@ namespace {
 std::uint64_t random_epoch() {
   std::uint64_t epoch = 0;
   // Epochs only have to differ from earlier ones; 0 means none.
-  while (epoch == 0) {
-    if (::getrandom(&epoch, sizeof epoch, 0) != sizeof epoch) epoch = 0;
-  }
+  while (epoch == 0) epoch = random_bits();
   return epoch;
 }
 
