@@ -12,8 +12,8 @@
 
 namespace gimnet::nif {
 
-/// The folder `tokens` in this user's runtime folder (XDG_RUNTIME_DIR/gimnet, else gimnet-<uid> in the temporary
-/// folder): made if need be, and refused unless it is a folder of mode 0700 of this user, not reached over a link.
+/// The folder `tokens` in runtime_folder_of_user(): both made if need be, and refused unless they are folders of mode
+/// 0700 of this user, not reached over a link.
 /// Thread safety: none. Ownership: of a descriptor.
 class PrivateFolder {
  public:

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 
+#include "base/runtime_folder.hpp"
 #include "client/nif/locked_file.hpp"
 
 namespace gimnet::nif {
@@ -63,19 +64,14 @@ bool is_there(Descriptor folder, const char* name, const struct stat& opened) {
 }  // namespace
 
 PrivateFolder::PrivateFolder() {
-  const std::string runtime = environment("XDG_RUNTIME_DIR");
-  const std::string temporary = environment("TMPDIR");
-  const bool given = runtime.starts_with('/');
-  const std::string base = given ? runtime : temporary.starts_with('/') ? temporary : "/tmp";
-  descriptor_ = ::open(base.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const RuntimeFolder folder = runtime_folder_of_user();
+  descriptor_ = ::open(folder.above.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor_ < 0) {
-    fault_ = "cannot use the folder " + base + ": " + system_error_text(errno);
+    fault_ = "cannot use the folder " + folder.above + ": " + system_error_text(errno);
     return;
   }
-  const std::string name = given ? "gimnet" : "gimnet-" + std::to_string(::getuid());
-  const std::string path = base + "/" + name;
-  enter(descriptor_, name, path);
-  if (fault_.empty()) enter(descriptor_, "tokens", path + "/tokens");
+  enter(descriptor_, folder.name, folder.path());
+  if (fault_.empty()) enter(descriptor_, "tokens", folder.path() + "/tokens");
 }
 
 PrivateFolder::~PrivateFolder() {

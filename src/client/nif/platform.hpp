@@ -92,8 +92,8 @@ struct Ready {
 
 /// "" where it is not set.
 [[nodiscard]] std::string environment(const char* name);
-/// The hub's folder of this user: `gimnet` in XDG_RUNTIME_DIR or, if that is not set, gimnet-<uid> in the temporary
-/// folder, only if it is there, belongs to this user and is closed to others. "" if there is none.
+/// Where this user's hub has its socket: runtime_folder_of_user(). One in the temporary folder, where anybody can make
+/// folders, counts only if it is there, belongs to this user and is closed to others; else "".
 [[nodiscard]] std::string runtime_folder();
 [[nodiscard]] std::size_t unix_path_max();
 

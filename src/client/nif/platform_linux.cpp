@@ -21,6 +21,7 @@
 #include <mutex>
 #include <system_error>
 
+#include "base/runtime_folder.hpp"
 #include "client/nif/endpoint.hpp"
 #include "client/nif/platform.hpp"
 
@@ -117,7 +118,7 @@ Result<Socket, Failure> dial_tcp(const Endpoint& endpoint, const SocketOptions& 
 /// The folder is there, belongs to this user, and is closed to everybody else.
 bool is_own_folder(const std::string& path) {
   struct stat info{};
-  return ::lstat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode) && info.st_uid == ::getuid() &&
+  return ::lstat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode) && info.st_uid == ::geteuid() &&
          (info.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
@@ -206,11 +207,10 @@ std::string environment(const char* name) {
 }
 
 std::string runtime_folder() {
-  if (const std::string xdg = environment("XDG_RUNTIME_DIR"); !xdg.empty()) return xdg + "/gimnet";
-  std::string temporary = environment("TMPDIR");
-  if (temporary.empty()) temporary = "/tmp";
-  const std::string folder = temporary + "/gimnet-" + std::to_string(::getuid());
-  return is_own_folder(folder) ? folder : "";
+  const RuntimeFolder folder = runtime_folder_of_user();
+  // XDG_RUNTIME_DIR is nobody else's already. Its owner may have given the folder in it to a container, in which the
+  // same user has another id.
+  return folder.in_private || is_own_folder(folder.path()) ? folder.path() : "";
 }
 
 std::size_t unix_path_max() { return sizeof(sockaddr_un::sun_path) - 1; }

@@ -9,6 +9,8 @@
 
 #include "base/descriptor.hpp"
 
+#include "base/runtime_folder.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -45,22 +47,14 @@ std::string prepare_private_folder(const std::string& path) {
   return {};
 }
 
-std::string runtime_folder_path() {
-  const char* given = std::getenv("XDG_RUNTIME_DIR");
-  if (given != nullptr && *given == '/') return std::string{given} + "/gimnet";
-  const char* temporary = std::getenv("TMPDIR");
-  return std::string{temporary != nullptr && *temporary == '/' ? temporary : "/tmp"} + "/gimnet-" +
-         std::to_string(::geteuid());
-}
-
 Result<std::string> runtime_folder() {
-  const std::string path = runtime_folder_path();
+  const std::string path = runtime_folder_of_user().path();
   if (std::string error = prepare_private_folder(path); !error.empty()) return Error{error};
   return path;
 }
 
 std::vector<std::string> default_addresses() {
-  return {"tcp://127.0.0.1:7450", "unix:" + runtime_folder_path() + "/tcphub.sock"};
+  return {"tcp://127.0.0.1:7450", "unix:" + runtime_folder_of_user().path() + "/tcphub.sock"};
 }
 
 std::string prepare_state_folder(const std::string& path) {

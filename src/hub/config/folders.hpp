@@ -11,12 +11,9 @@ namespace gimnet::hub {
 /// another user, others have rights in it, or nothing can be put into it.
 [[nodiscard]] std::string prepare_private_folder(const std::string& path);
 
-/// The user's folder for sockets of this network, made ready: XDG_RUNTIME_DIR/gimnet, or, where that is not set, a
-/// folder of mode 0700 named after the user id in the system's temporary folder.
+/// The user's folder for sockets of this network, runtime_folder_of_user(), made ready. Errors: as
+/// prepare_private_folder().
 [[nodiscard]] Result<std::string> runtime_folder();
-
-/// The same folder's path; nothing is made.
-[[nodiscard]] std::string runtime_folder_path();
 
 /// Where a hub listens if nobody says: loopback, and a Unix socket in the runtime folder. Nothing is made.
 [[nodiscard]] std::vector<std::string> default_addresses();

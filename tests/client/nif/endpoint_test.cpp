@@ -56,6 +56,20 @@ TEST(Endpoint, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
   EXPECT_NE(refused.error().sentence.find("GIMNET_HUB"), std::string::npos);
 }
 
+// As a hub does: else it would look where none is.
+TEST(Endpoint, LooksNowhereElseForAVariableThatIsNoAbsolutePath) {
+  std::string folder = ::testing::TempDir() + "nif_endpoint_XXXXXX";
+  ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+  const Environment hub("GIMNET_HUB", "");
+  const Environment runtime("XDG_RUNTIME_DIR", "run/user");
+  const Environment temporary("TMPDIR", folder.c_str());
+  const std::string own = folder + "/gimnet-" + std::to_string(::geteuid());
+  ASSERT_EQ(::mkdir(own.c_str(), 0700), 0);
+  EXPECT_EQ((*endpoints_for(""))[0].url(), "unix:" + own + "/tcphub.sock");
+  ::rmdir(own.c_str());
+  ::rmdir(folder.c_str());
+}
+
 TEST(Endpoint, SuggestsTheSchemeThatIsMissing) {
   EXPECT_NE(parse_endpoint("localhost:7450").error().sentence.find("did you mean tcp://localhost:7450?"),
             std::string::npos);
