@@ -98,7 +98,8 @@ typedef struct nif_options {
   const char* url;
   const char* name;        /**< Name to register, NULL or "": a node without a name, found by id only. */
   const char* description; /**< For people, at most 256 bytes. */
-  /** How long nif_connect() may take altogether, default 5,000. */
+  /** How long nif_connect() may take altogether, finding the host's address included. 0: 5,000; NIF_FOREVER, or any
+   * negative time: as long as it takes. */
   int32_t connect_timeout_ms;
   /** Not 0: nif_connect() dials again until connect_timeout_ms is over if there is no hub yet. */
   uint8_t wait_for_hub;
@@ -174,7 +175,7 @@ typedef struct nif_info {
   uint8_t ended;      /**< 1: no connection will come any more; nif_last_error() says why. Close the handle. */
 } nif_info;
 
-/** Fills *info. */
+/** Fills *info, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or struct_size is not set. */
 nif_status nif_get_info(nif_node* node, nif_info* info);
 
 /** The node id, or 0 if there is no such handle. */
@@ -258,7 +259,8 @@ nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout
 /** nif_send() of one piece to one node in the normal lane, with the default policy, without a time limit. */
 nif_status nif_send_to(nif_node* node, uint32_t to, const void* data, size_t size);
 
-/** Writes what NIF_FLAG_MORE held back. Does not wait. */
+/** Writes what NIF_FLAG_MORE held back. Does not wait: what the kernel does not take now goes without further calls.
+ * NIF_NOT_CONNECTED, NIF_REPLACED, NIF_REFUSED: no connection will come any more. */
 nif_status nif_flush(nif_node* node);
 
 /** Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub.
@@ -327,16 +329,15 @@ enum {
   /** The node was kicked, or no_reconnect is set: no connection will come any more, and nothing follows. */
   NIF_DISCONNECTED_FOR_GOOD = 0x01
 };
-/** Bits of nif_incoming.flags of a NIF_MESSAGE: NIF_FLAG_REPORT, NIF_FLAG_KEYED. */
 
 /** Something received. Belongs to the caller until nif_release(). */
 typedef struct nif_incoming {
-  uint32_t type; /**< nif_incoming_type; unknown ones of later versions are to be released and skipped. */
-  uint32_t from;
-  uint32_t to; /**< Own id, group id, broadcast address; 0 for LIST. */
-  uint8_t kind;
-  uint8_t lane;
-  uint8_t flags;
+  uint32_t type;       /**< nif_incoming_type; unknown ones of later versions are to be released and skipped. */
+  uint32_t from;       /**< Node id. */
+  uint32_t to;         /**< Own id, group id, broadcast address; 0 for LIST. */
+  uint8_t kind;        /**< nif_kind; of a NIF_REPORT also 7, see there. */
+  uint8_t lane;        /**< nif_lane. */
+  uint8_t flags;       /**< Of a NIF_MESSAGE: NIF_FLAG_REPORT, NIF_FLAG_KEYED; of others as nif_incoming_type says. */
   uint8_t policy;      /**< nif_policy with which it was sent. */
   uint64_t key;        /**< With NIF_FLAG_KEYED. */
   const void* payload; /**< Aligned to 1. Valid until: nif_release(). */
@@ -344,13 +345,15 @@ typedef struct nif_incoming {
   const void* extensions; /**< EXT as on the wire, without its leading u16; NULL: none. */
   size_t extensions_size;
   int64_t arrival_ns; /**< When it was read from the socket, ns since 1970. */
-  uint64_t count;
+  uint64_t count;     /**< Frames of a NIF_REPORT, messages or frames of a NIF_GAP, subscribers; NIF_COUNT_UNKNOWN. */
+  /** nif_drop_reason of a NIF_REPORT and a NIF_GAP, the GOODBYE code (docs/protocol.md, section 3) of a
+   * NIF_DISCONNECTED, nif_status of a NIF_OWN_SERVICE_MOVED and a NIF_WATCHED; else 0. */
   uint32_t reason;
-  uint32_t group;
-  uint32_t former_group;
-  uint32_t message_type;
-  uint32_t instance;
-  uint32_t delivery;
+  uint32_t group;             /**< Group id; 0: none. */
+  uint32_t former_group;      /**< Group id; 0: none. */
+  uint32_t message_type;      /**< As its provider advertised it. */
+  uint32_t instance;          /**< The same. */
+  uint32_t delivery;          /**< nif_delivery. */
   uint32_t direction;         /**< nif_direction. */
   uint32_t epoch;             /**< Of a GROUP message that counts in a window: for nif_credit(); else 0. */
   const nif_watched* watched; /**< Of a NIF_WATCHED, else NULL. Valid until: nif_release(). */
@@ -372,7 +375,9 @@ void nif_release(nif_incoming* in);
  * if there is no such handle or no descriptor. Valid until: nif_close(). */
 int nif_event_fd(nif_node* node);
 
-/** After NIF_NOT_NOW: there is room again, the callback is called again with what waits. */
+/** After NIF_NOT_NOW: there is room again, the library's thread calls the callback again with what waits. Does not
+ * wait; may be called in the callback. Nothing happens where nothing was held back. No errors beside those of handles.
+ */
 nif_status nif_deliver(nif_node* node);
 
 #ifdef __cplusplus

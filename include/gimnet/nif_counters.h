@@ -39,7 +39,8 @@ typedef struct nif_counters {
   uint64_t last_messages_not_kept;
 } nif_counters;
 
-/** Fills *counters. */
+/** Fills *counters, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or struct_size is not
+ * set. */
 nif_status nif_get_counters(nif_node* node, nif_counters* counters);
 
 #ifdef __cplusplus

@@ -144,12 +144,14 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
 
 /** With nif_options.credit_by_program: the program took so many messages of the group that came with this
  *  nif_incoming.epoch. The hub is told at once, or, with `more`, when half of the window was taken: more is waiting to
- *  be taken anyway. An epoch of 0, an earlier one, and groups without a window are ignored. */
+ *  be taken anyway. An epoch of 0, an earlier one, and groups without a window are ignored. Does not wait; may be
+ * called in the callback. No errors beside those of handles: while the connection is broken it is told after it is
+ * back. */
 nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more);
 
 /** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. The library subscribes to
- *  it no more, whatever this answers; where the hub could not be told within the time given, it is as soon as there is a
- *  connection. */
+ *  it no more, whatever this answers; where the hub could not be told within the time given, it is as soon as there is
+ * a connection. */
 nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- asking the hub */
@@ -168,6 +170,9 @@ enum {
   NIF_CTRL_ROUTES = 9
 };
 
+/** Most bytes of content of a nif_request(). */
+#define NIF_REQUEST_BYTES_MAX ((size_t)16 * 1024)
+
 /** An answer of the hub as it came. Belongs to the caller until nif_free_reply(). */
 typedef struct nif_reply {
   uint16_t status;     /**< Of the wire: 0 done. */
@@ -177,7 +182,8 @@ typedef struct nif_reply {
 } nif_reply;
 
 /** Sends a request (kind NIF_NS or NIF_CTRL, an operation below 0x8000, and its Bitestream) to the own hub and waits
- * for the answer. NIF_OK: *reply holds it, whatever its status. */
+ * for the answer. NIF_OK: *reply holds it, whatever its status. NIF_BAD_ARGUMENT also: another kind or operation, or
+ * more than NIF_REQUEST_BYTES_MAX bytes of content. */
 nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content, size_t size,
                        nif_reply** reply, int32_t timeout_ms);
 void nif_free_reply(nif_reply* reply);

@@ -1,7 +1,7 @@
 #ifndef GIMNET_NIF_STATUS_H
 #define GIMNET_NIF_STATUS_H
 
-/* What the calls of NIF answer. Included by gimnet/nif.h. */
+/* What the calls of NIF answer, and why messages did not arrive. Included by gimnet/nif.h. */
 
 #ifdef __cplusplus
 extern "C" {
@@ -43,6 +43,31 @@ const char* nif_status_text(nif_status status);
 /** What went wrong in the last call of this thread that did not answer NIF_OK or NIF_TIMEOUT: what happened, to what,
  *  what to do. Never NULL. Valid until: the next nif_* call of this thread. */
 const char* nif_error_text(void);
+
+/** Why frames did not arrive: nif_incoming.reason of a NIF_REPORT and a NIF_GAP. The numbers are those of the wire, and
+ *  their meaning is in docs/protocol.md, section 5; later versions may have more. */
+typedef enum nif_drop_reason {
+  NIF_DROP_NO_SUCH_NODE = 1,
+  NIF_DROP_NO_ROUTE = 2,
+  NIF_DROP_AWAY = 3,
+  NIF_DROP_QUEUE_FULL = 4,
+  NIF_DROP_REPLACED = 5,
+  NIF_DROP_TOO_OLD = 6,
+  NIF_DROP_HOP_LIMIT = 7,
+  NIF_DROP_TOO_LARGE = 8,
+  NIF_DROP_NOT_ALLOWED = 9,
+  NIF_DROP_WRONG_WAY = 10,
+  NIF_DROP_LINK_LOST = 11,
+  NIF_DROP_SHARD_FULL = 12,
+  NIF_DROP_NO_SUCH_GROUP = 13,
+  NIF_DROP_RENUMBERED = 14,
+  NIF_DROP_OVER_BUDGET = 15,
+  NIF_DROP_TIMED_OUT = 16,
+  NIF_DROP_CUT_MESSAGE = 17,
+  NIF_DROP_NO_SUBSCRIBER = 18,
+  NIF_DROP_MALFORMED = 19,
+  NIF_DROP_WRONG_SOURCE = 20
+} nif_drop_reason;
 
 #ifdef __cplusplus
 }

@@ -75,7 +75,8 @@ nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects, uin
 nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms);
 
 /** For a watch with NIF_WATCH_BY_HAND: one that was `last` has been seen to, the hub may send more. Does not wait; may
- * be called in the callback. */
+ * be called in the callback. A number that no watch has is ignored. No errors beside those of handles: while the
+ * connection is broken there is nothing to tell, and the hub begins to count anew. */
 nif_status nif_watch_taken(nif_node* node, uint32_t watch);
 
 /** Ends a watch. NIF_NOT_FOUND. What was received before still comes. */

@@ -284,8 +284,7 @@ nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const v
       return fail(NIF_BAD_ARGUMENT, "cannot ask: reply or content is NULL");
     }
     *reply = nullptr;
-    constexpr std::size_t kContentMax = 16 * 1024;
-    if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit || size > kContentMax) {
+    if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit || size > NIF_REQUEST_BYTES_MAX) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: kind, operation or size is out of range");
     }
     proto::Payload request(proto::kControlHeaderSize + size);
