@@ -26,8 +26,15 @@
  *
  * Timeouts are in milliseconds: 0 does not wait, NIF_FOREVER waits without a limit.
  *
- * Text given to the library is NUL-terminated and is copied. Structures whose first member is struct_size are versioned
- * by it: set it to sizeof and leave what you do not need zero; zero always means the default.
+ * Text given to the library is NUL-terminated and is copied.
+ *
+ * Versions. Structures whose first member is struct_size are versioned by it: set it to sizeof and leave what you do
+ * not need zero; zero always means the default. A program goes on with a library that has more members: those it does
+ * not give are zero, and it gets those that it has. One with a library that has fewer is refused only if it sets one of
+ * the others. Structures without it, of which programs keep arrays (nif_bytes, nif_incoming, nif_subscription and the
+ * records of lists), keep their members while NIF_VERSION_MAJOR is the same: what comes later gets a function or a
+ * structure of its own. nif_watched, nif_reply and the lists are made by the library alone and may get members at their
+ * end: read them where the library has put them, and do not copy them.
  *
  * What travels on the wire is in docs/protocol.md; how this library uses it, and why, in docs/nif.md.
  */

@@ -6,6 +6,7 @@
 
 #include "client/nif/api.hpp"
 #include "client/nif/outgoing.hpp"
+#include "client/nif/sized_struct.hpp"
 
 // The C API but for names and services.
 
@@ -14,10 +15,12 @@ using gimnet::nif::deadline_after;
 using gimnet::nif::fail;
 using gimnet::nif::find_node;
 using gimnet::nif::guarded;
+using gimnet::nif::has_size;
 using gimnet::nif::Node;
 using gimnet::nif::NodeRef;
 using gimnet::nif::with_node;
 using gimnet::nif::with_waiting_node;
+using gimnet::nif::write_struct;
 
 extern "C" {
 
@@ -44,8 +47,8 @@ nif_status nif_close(nif_node* node) {
 
 nif_status nif_get_info(nif_node* node, nif_info* info) {
   return with_node(node, [&](Node& found) -> nif_status {
-    if (info == nullptr || info->struct_size < sizeof(std::size_t)) return fail(NIF_BAD_ARGUMENT, "info has no size");
-    found.fill_info(*info);
+    if (!has_size(info)) return fail(NIF_BAD_ARGUMENT, "cannot tell the state: info is NULL or has no struct_size");
+    write_struct(found.info(), *info);
     return NIF_OK;
   });
 }
@@ -138,10 +141,10 @@ nif_status nif_deliver(nif_node* node) {
 
 nif_status nif_get_counters(nif_node* node, nif_counters* counters) {
   return with_node(node, [&](Node& found) -> nif_status {
-    if (counters == nullptr || counters->struct_size < sizeof(std::size_t)) {
-      return fail(NIF_BAD_ARGUMENT, "counters has no size");
+    if (!has_size(counters)) {
+      return fail(NIF_BAD_ARGUMENT, "cannot tell the counters: counters is NULL or has no struct_size");
     }
-    found.fill_counters(*counters);
+    write_struct(found.counters(), *counters);
     return NIF_OK;
   });
 }

@@ -11,6 +11,7 @@
 #include "client/nif/api.hpp"
 #include "client/nif/ask.hpp"
 #include "client/nif/record_list.hpp"
+#include "client/nif/sized_struct.hpp"
 #include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
 
@@ -28,6 +29,7 @@ using gimnet::nif::Deadline;
 using gimnet::nif::deadline_after;
 using gimnet::nif::fail;
 using gimnet::nif::Node;
+using gimnet::nif::read_struct;
 using gimnet::nif::with_waiting_node;
 
 namespace {
@@ -148,9 +150,10 @@ nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_li
 nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
                          int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (service == nullptr || service->struct_size < sizeof(nif_service) || group == nullptr) {
-      return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is missing, or struct_size is wrong");
-    }
+    if (service == nullptr || group == nullptr)
+      return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is NULL");
+    nif_service whole;
+    if (auto failure = read_struct(service, whole, "advertise", "nif_service")) return fail(*failure);
     if (service->direction > NIF_ACCEPTS || service->delivery > NIF_SYNC_DELIVERY) {
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: direction or delivery is not one of its enumeration");
     }
@@ -228,8 +231,9 @@ nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t m
 nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
                                nif_subscription* subscription, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (pace != nullptr && pace->struct_size < sizeof(nif_pace)) {
-      return fail(NIF_BAD_ARGUMENT, "cannot subscribe: nif_pace.struct_size is not sizeof(nif_pace)");
+    nif_pace whole;
+    if (pace != nullptr) {
+      if (auto failure = read_struct(pace, whole, "subscribe", "nif_pace")) return fail(*failure);
     }
     if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK) return status;
     ns::Subscribe request{full_name};

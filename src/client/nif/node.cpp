@@ -279,22 +279,18 @@ std::uint32_t Node::reconnects() {
   return info_.reconnects;
 }
 
-void Node::fill_info(nif_info& info) {
+nif_info Node::info() {
   const auto best = clock_.best();
   const MutexLock lock(mutex_);
-  const std::size_t size = info.struct_size;
   nif_info whole = info_;
-  whole.struct_size = size;
   whole.keep_alive_seen = best ? 1 : 0;
   whole.round_trip_ns = best ? best->round_trip_ns : 0;
   whole.clock_offset_ns = best ? best->offset_ns : 0;
-  std::memcpy(&info, &whole, std::min(size, sizeof whole));
+  return whole;
 }
 
-void Node::fill_counters(nif_counters& counters) {
-  const std::size_t size = counters.struct_size;
+nif_counters Node::counters() {
   nif_counters whole{};
-  whole.struct_size = size;
   outbound_.add_counters(whole);
   whole.receive_queue_bytes = received_.bytes();
   whole.read_stops = received_.stops();
@@ -308,7 +304,7 @@ void Node::fill_counters(nif_counters& counters) {
     whole.bytes_received = bytes_received_;
     whole.read_calls = read_calls_;
   }
-  std::memcpy(&counters, &whole, std::min(size, sizeof whole));
+  return whole;
 }
 
 nif_status Node::ping_hub(HubClock::Measurement& measured, Deadline deadline) {

@@ -51,10 +51,10 @@ class Node final : private InboundHost {
   [[nodiscard]] const Options& options() const { return options_; }
 
   [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
-  void fill_info(nif_info& info) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] nif_info info() GIMNET_EXCLUDES(mutex_);
   /// How often it has connected anew. Grows before anything is declared on the new connection.
   [[nodiscard]] std::uint32_t reconnects() GIMNET_EXCLUDES(mutex_);
-  void fill_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] nif_counters counters() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::string last_error() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status ping_hub(HubClock::Measurement& measured, Deadline deadline);
   /// The callback has room again.

@@ -3,30 +3,14 @@
 #include <algorithm>
 #include <cstring>
 
+#include "client/nif/sized_struct.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/names.hpp"
 
 namespace gimnet::nif {
 namespace {
 
-constexpr std::size_t kStructSizeMax = 4096;
-
 Failure bad(const std::string& why) { return {NIF_BAD_ARGUMENT, "cannot connect: " + why}; }
-
-/// A program compiled with an older header gives a shorter struct: what it does not have is zero, the default.
-std::optional<Failure> read_struct(const nif_options* options, nif_options& whole) {
-  whole = {};
-  if (options == nullptr) return std::nullopt;
-  if (options->struct_size < sizeof(std::size_t) || options->struct_size > kStructSizeMax) {
-    return bad("nif_options.struct_size is not sizeof(nif_options)");
-  }
-  const auto* bytes = reinterpret_cast<const unsigned char*>(options);
-  std::memcpy(&whole, bytes, std::min(options->struct_size, sizeof whole));
-  const bool newer = options->struct_size > sizeof whole &&
-                     std::any_of(bytes + sizeof whole, bytes + options->struct_size, [](auto b) { return b != 0; });
-  if (newer) return bad("nif_options asks for something that this version of the library does not have");
-  return std::nullopt;
-}
 
 std::optional<Failure> read_identity(const nif_options& given, Options& options) {
   if (given.name != nullptr) options.name = given.name;
@@ -73,8 +57,12 @@ std::optional<Failure> read_limits(const nif_options& given, Options& options) {
 }  // namespace
 
 Result<Options, Failure> read_options(const nif_options* options) {
-  nif_options given;
-  if (auto failure = read_struct(options, given)) return std::move(*failure);
+  nif_options given{};
+  if (options == nullptr) options = &given;
+  if (options != &given) {
+    if (auto failure = read_struct(options, given, "connect", "nif_options")) return std::move(*failure);
+    given = *options;
+  }
   Options checked;
   if (auto failure = read_identity(given, checked)) return std::move(*failure);
   if (auto failure = read_limits(given, checked)) return std::move(*failure);

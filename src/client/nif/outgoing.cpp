@@ -6,6 +6,7 @@
 
 #include "base/endian.hpp"
 #include "client/nif/pause_table.hpp"
+#include "client/nif/sized_struct.hpp"
 #include "proto/frame/fragmenter.hpp"
 
 namespace gimnet::nif {
@@ -22,7 +23,6 @@ static_assert(NIF_LIST_RECIPIENTS_MAX == proto::kListRecipientsMax);
 Failure bad(const char* why) { return {NIF_BAD_ARGUMENT, std::string("cannot send: ") + why}; }
 
 std::optional<Failure> check_fields(const nif_outgoing& message) {
-  if (message.struct_size < sizeof(nif_outgoing)) return bad("struct_size is not sizeof(nif_outgoing)");
   if (message.kind > NIF_SERVICE) return bad("kind is not a nif_kind");
   if (message.lane > NIF_BACKGROUND) return bad("lane is not a nif_lane");
   if (message.policy > NIF_LATEST) return bad("policy is not a nif_policy");
@@ -85,7 +85,11 @@ void Outgoing::read_extensions(const nif_outgoing& message) {
   parts_.extensions = writer.written();
 }
 
-std::optional<Failure> Outgoing::read(const nif_outgoing& message) {
+std::optional<Failure> Outgoing::read(const nif_outgoing& given) {
+  nif_outgoing whole;
+  const nif_outgoing* known = &given;
+  if (auto failure = read_struct(known, whole, "send", "nif_outgoing")) return failure;
+  const nif_outgoing& message = *known;
   if (auto failure = check_fields(message)) return failure;
   parts_.header.kind = static_cast<proto::Kind>(message.kind);
   parts_.header.lane = message.lane;

@@ -7,6 +7,15 @@
 
 #include "gimnet/nif.h"
 
+/* gimnet/nif.h, "Versions": programs keep arrays of these, so they never change while NIF_VERSION_MAJOR is the same. */
+#if UINTPTR_MAX == UINT64_MAX
+_Static_assert(sizeof(nif_bytes) == 16, "nif_bytes");
+_Static_assert(sizeof(nif_incoming) == 128, "nif_incoming");
+_Static_assert(sizeof(nif_subscription) == 28, "nif_subscription");
+_Static_assert(sizeof(nif_node_record) == 56, "nif_node_record");
+_Static_assert(sizeof(nif_service_record) == 56, "nif_service_record");
+#endif
+
 static int failed(const char* step) {
   fprintf(stderr, "%s: %s\n", step, nif_error_text());
   return 1;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cstddef>
 #include <string>
 #include <thread>
 #include <vector>
@@ -120,6 +121,63 @@ TEST(NifNames, ChecksNamesBeforeItAsks) {
   EXPECT_EQ(nif_advertise(node, &service, &id, nullptr, 0), NIF_BAD_ARGUMENT);
   nif_node_list* list = nullptr;
   EXPECT_EQ(nif_list_nodes(node, "a//b", &list, 0), NIF_BAD_NAME);
+}
+
+/// What a program of a later version gives.
+template <class Known>
+struct Newer {
+  Known known;
+  std::uint64_t more;
+};
+
+TEST(NifNames, TakesStructuresOfOlderAndNewerPrograms) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  std::uint32_t group = 0;
+  Newer<nif_service> service{};
+  service.known.struct_size = offsetof(nif_service, window);
+  service.known.name = "odom";
+  service.known.window = 5;
+  nif_pace pace{};
+  pace.struct_size = offsetof(nif_pace, rate_hz);
+  pace.depth = 3;
+  pace.rate_hz = 7.0;
+  converse(
+      [&] {
+        EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, NIF_FOREVER), NIF_OK);
+        EXPECT_EQ(nif_subscribe_paced(node, "robot/odom", &pace, nullptr, NIF_FOREVER), NIF_OK);
+      },
+      [&] {
+        std::uint16_t number = 0;
+        const auto advertised = connected.hub.next_request<ns::Advertise>(number);
+        ASSERT_TRUE(advertised);
+        EXPECT_EQ(advertised->service, "odom");
+        EXPECT_EQ(advertised->window, 0u) << "that is none of its members";
+        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{9}, 0}, number));
+        const auto subscribed = connected.hub.next_request<ns::Subscribe>(number);
+        ASSERT_TRUE(subscribed);
+        EXPECT_EQ(subscribed->depth, 3u);
+        EXPECT_EQ(subscribed->rate_hz, 0.0) << "that is none of its members";
+        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
+      });
+  service.known.struct_size = sizeof service;
+  service.known.name = "two/parts";
+  EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, 0), NIF_BAD_NAME) << "it asks for nothing there";
+  service.more = 1;
+  EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, 0), NIF_BAD_ARGUMENT);
+  pace.struct_size = 0;
+  EXPECT_EQ(nif_subscribe_paced(node, "robot/odom", &pace, nullptr, 0), NIF_BAD_ARGUMENT);
+}
+
+TEST(NifNames, RequestsHaveALargestContent) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  nif_node* const node = connected.node.get();
+  const std::string content(NIF_REQUEST_BYTES_MAX + 1, 'x');
+  nif_reply* reply = nullptr;
+  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX, &reply, 0), NIF_TIMEOUT);
+  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX + 1, &reply, 0), NIF_BAD_ARGUMENT);
 }
 
 TEST(NifNames, ListsAllPages) {

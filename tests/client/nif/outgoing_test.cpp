@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,7 @@ TEST(Outgoing, ChecksEveryField) {
     change(message);
     return read(message);
   };
-  EXPECT_EQ(bad([](auto& m) { m.struct_size -= 1; }), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(bad([](auto& m) { m.struct_size = 3; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.kind = 5; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.lane = 4; }), NIF_BAD_ARGUMENT);
   EXPECT_EQ(bad([](auto& m) { m.policy = 4; }), NIF_BAD_ARGUMENT);
@@ -45,6 +46,24 @@ TEST(Outgoing, ChecksEveryField) {
               m.policy = NIF_BLOCK;
             }),
             NIF_BAD_ARGUMENT);
+}
+
+TEST(Outgoing, AnOlderProgramGivesAShorterStruct) {
+  nif_outgoing message = message_to((7u << 20) | 1);
+  message.trace_slots = 9;  // what stands there is none of its
+  message.struct_size = offsetof(nif_outgoing, trace_slots);
+  EXPECT_EQ(read(message), NIF_OK);
+}
+
+TEST(Outgoing, ANewerProgramMayNotAskForWhatIsNotThere) {
+  struct Newer {
+    nif_outgoing known;
+    std::uint64_t more;
+  } message{message_to((7u << 20) | 1), 0};
+  message.known.struct_size = sizeof message;
+  EXPECT_EQ(read(message.known), NIF_OK);
+  message.more = 1;
+  EXPECT_EQ(read(message.known), NIF_BAD_ARGUMENT);
 }
 
 TEST(Outgoing, SortsRecipientsAndCountsThemOnce) {

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <optional>
+#include <string>
+
+#include "client/nif/error.hpp"
+
+// Structures of the C API whose first member is struct_size: gimnet/nif.h, "Versions".
+
+namespace gimnet::nif {
+
+/// No structure of any version is larger.
+inline constexpr std::size_t kStructSizeMax = 4096;
+
+/// What a program gave, as this version of the library has it. One compiled with an older header gives a shorter
+/// structure: what that does not have is zero, the default. One of a newer header may give a longer one, as long as it
+/// asks for nothing there. `given` leads to `whole` then. `doing` and `name` are for the sentence.
+template <class Struct>
+[[nodiscard]] std::optional<Failure> read_struct(const Struct*& given, Struct& whole, const char* doing,
+                                                 const char* name) {
+  const std::size_t size = given->struct_size;
+  if (size == sizeof(Struct)) return std::nullopt;
+  const auto bad = [&](const std::string& why) {
+    return Failure{NIF_BAD_ARGUMENT, std::string("cannot ") + doing + ": " + name + why};
+  };
+  if (size < sizeof(std::size_t) || size > kStructSizeMax)
+    return bad(std::string(".struct_size is not sizeof(") + name + ")");
+  const auto* bytes = reinterpret_cast<const unsigned char*>(given);
+  const auto asked = [](unsigned char byte) { return byte != 0; };
+  if (size > sizeof whole && std::any_of(bytes + sizeof whole, bytes + size, asked)) {
+    return bad(" asks for something that this version of the library does not have");
+  }
+  whole = {};
+  std::memcpy(&whole, bytes, std::min(size, sizeof whole));
+  given = &whole;
+  return std::nullopt;
+}
+
+/// Gives a program as much of `whole` as the structure has that it gave. REQUIRES: has_size(given).
+template <class Struct>
+void write_struct(const Struct& whole, Struct& given) {
+  const std::size_t size = given.struct_size;
+  std::memcpy(&given, &whole, std::min(size, sizeof whole));
+  given.struct_size = size;
+}
+
+/// Can anything be written into it?
+template <class Struct>
+[[nodiscard]] bool has_size(const Struct* given) {
+  return given != nullptr && given->struct_size >= sizeof(std::size_t);
+}
+
+}  // namespace gimnet::nif
