@@ -189,7 +189,8 @@ nif_status nif_get_info(nif_node* node, nif_info* info);
 uint32_t nif_id(nif_node* node);
 
 /** Copies the sentence of the last trouble of the connection itself (why it broke, what the hub's GOODBYE said), empty
- * if there was none, into buffer, cut to size - 1 bytes. Returns the length that it has uncut. */
+ * if there was none, into buffer, cut between characters to at most size - 1 bytes. Returns the length that it has
+ * uncut; 0 also if there is no such handle. buffer may be NULL if size is 0. */
 size_t nif_last_error(nif_node* node, char* buffer, size_t size);
 
 /* ---------------------------------------------------------------- sending */

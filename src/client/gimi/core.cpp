@@ -1,7 +1,6 @@
 #include "client/gimi/core.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -192,9 +191,7 @@ NodeState Core::state_now() const {
   nif_counters counters{};
   counters.struct_size = sizeof counters;
   if (nif_get_counters(node(), &counters) == NIF_OK) state.last_messages_not_kept = counters.last_messages_not_kept;
-  std::array<char, 512> trouble{};
-  static_cast<void>(nif_last_error(node(), trouble.data(), trouble.size()));
-  state.trouble = trouble.data();
+  state.trouble = uplink_.trouble();
   return state;
 }
 

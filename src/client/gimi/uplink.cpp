@@ -88,6 +88,16 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
   return nif_send(node(), &outgoing, timeout_ms);
 }
 
+std::string Uplink::trouble() const {
+  std::string words(NIF_SENTENCE_BYTES_MAX, '\0');
+  // It may be another, longer one by now.
+  for (std::size_t size = 0; (size = nif_last_error(node(), words.data(), words.size())) >= words.size();) {
+    words.assign(size + 1, '\0');
+  }
+  words.resize(words.find('\0'));
+  return words;
+}
+
 std::uint32_t Uplink::next_ping() {
   std::uint32_t number = 0;
   while (number == 0) number = ++pings_;

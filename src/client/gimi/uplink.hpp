@@ -40,6 +40,9 @@ class Uplink {
   [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header, bool stamped,
                                     BytesView data, std::int32_t timeout_ms) const;
 
+  /// nif_last_error(), whole.
+  [[nodiscard]] std::string trouble() const;
+
   /// A number for a PING; never 0.
   [[nodiscard]] std::uint32_t next_ping();
 

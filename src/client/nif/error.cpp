@@ -1,14 +1,14 @@
 #include "client/nif/error.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
+
+#include "base/cut_text.hpp"
 
 namespace gimnet::nif {
 namespace {
 
-constexpr std::size_t kSentenceMax = 512;
-thread_local constinit std::array<char, kSentenceMax> t_sentence{};
+thread_local constinit std::array<char, NIF_SENTENCE_BYTES_MAX + 1> t_sentence{};
 
 constexpr std::array<const char*, 26> kTexts{
     "done",           "timeout",       "closed",      "bad argument", "no hub",
@@ -21,9 +21,9 @@ constexpr std::array<const char*, 26> kTexts{
 }  // namespace
 
 nif_status fail(nif_status status, std::string_view sentence) {
-  const std::size_t size = std::min(sentence.size(), kSentenceMax - 1);
-  std::memcpy(t_sentence.data(), sentence.data(), size);
-  t_sentence[size] = '\0';
+  const std::string_view kept = cut_text(sentence, NIF_SENTENCE_BYTES_MAX);
+  std::memmove(t_sentence.data(), kept.data(), kept.size());  // it may be said again
+  t_sentence[kept.size()] = '\0';
   return status;
 }
 
