@@ -199,7 +199,8 @@ class Node {
  public:
   /// Joins; `name` and `hub` as in NodeOptions. Throws GimnetError.
   explicit Node(std::string_view name = {}, std::string_view hub = {});
-  /// Joins. Errors: no_hub, timeout, bad_version, name_taken, bad_name, refused, bad_argument, protocol, system.
+  /// Joins. Errors: no_hub, no_host, timeout, bad_version, name_taken, bad_name, refused, bad_argument, protocol,
+  /// system.
   static Outcome<Node> join(const NodeOptions& options);
 
   Node(Node&&) noexcept;

@@ -152,9 +152,10 @@ typedef struct nif_options {
 } nif_options;
 
 /** Connects to a hub, registers the name, and stores the new handle in *node.
- *  Returns when the hub admitted the node, or failed: NIF_BAD_ARGUMENT (URL, options), NIF_NO_HUB, NIF_TIMEOUT,
- *  NIF_BAD_VERSION, NIF_DENIED (administrator), NIF_NAME_TAKEN, NIF_BAD_NAME, NIF_HUB_FULL, NIF_REFUSED, NIF_PROTOCOL,
- * NIF_NO_MEMORY, NIF_LIMIT (too many handles), NIF_SYSTEM. On failure *node is NULL. options may be NULL: all defaults.
+ *  Returns when the hub admitted the node, or failed: NIF_BAD_ARGUMENT (URL, options), NIF_NO_HUB, NIF_NO_HOST,
+ *  NIF_TIMEOUT, NIF_BAD_VERSION, NIF_DENIED (administrator), NIF_NAME_TAKEN, NIF_BAD_NAME, NIF_HUB_FULL, NIF_REFUSED,
+ * NIF_PROTOCOL, NIF_NO_MEMORY, NIF_LIMIT (too many handles), NIF_SYSTEM. On failure *node is NULL. options may be NULL:
+ * all defaults.
  */
 nif_status nif_connect(const nif_options* options, nif_node** node);
 

@@ -13,7 +13,7 @@ typedef enum nif_status {
   NIF_TIMEOUT = 1,       /**< The time given was not enough; nothing was done unless the function says so. Try again. */
   NIF_CLOSED = 2,        /**< No such handle, or it was closed while the call waited. */
   NIF_BAD_ARGUMENT = 3,  /**< A parameter is outside its range; the sentence says which. A mistake of the program. */
-  NIF_NO_HUB = 4,        /**< Nothing answers at the address. Is the hub running? Is the URL right? */
+  NIF_NO_HUB = 4,        /**< Nothing answers at the address. Is the hub running? See also NIF_NO_HOST. */
   NIF_NOT_CONNECTED = 5, /**< The connection is broken at the moment; the library dials again by itself. */
   NIF_BAD_VERSION = 6,   /**< The hub speaks another major version of the protocol. */
   NIF_NAME_TAKEN = 7,    /**< Another live node holds the name; the sentence names it. Choose another name. */
@@ -34,7 +34,8 @@ typedef enum nif_status {
   NIF_IN_CALLBACK = 22,      /**< The call would wait for the library's own thread, which is inside the callback. */
   NIF_FORKED = 23,           /**< The handle belongs to the parent process. */
   NIF_BUFFER_TOO_SMALL = 24, /**< The caller's buffer is too small; the size needed was stored. */
-  NIF_SYSTEM = 25            /**< The operating system refused; the sentence says what. */
+  NIF_SYSTEM = 25,           /**< The operating system refused; the sentence says what. */
+  NIF_NO_HOST = 26           /**< No address is known for the host in the hub's URL. Is its name right? */
 } nif_status;
 
 /** A short English text for a status, for example "name taken". Never NULL; static. */

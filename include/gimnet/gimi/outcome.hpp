@@ -21,6 +21,7 @@ enum class Status : std::uint8_t {
   closed,         ///< The node was closed.
   bad_argument,   ///< A parameter is outside its range: a mistake of the program.
   no_hub,         ///< Nothing answers at the hub's address.
+  no_host,        ///< No address is known for the host in the hub's URL.
   not_connected,  ///< The connection is broken at the moment.
   bad_version,    ///< The hub speaks another major version of the protocol.
   name_taken,     ///< Another live node holds the name.

@@ -12,6 +12,8 @@ std::string_view status_text(Status status) {
       return "bad argument";
     case Status::no_hub:
       return "no hub";
+    case Status::no_host:
+      return "unknown host";
     case Status::not_connected:
       return "not connected";
     case Status::bad_version:

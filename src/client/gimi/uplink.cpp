@@ -18,6 +18,8 @@ Status status_of(nif_status status) {
       return Status::bad_argument;
     case NIF_NO_HUB:
       return Status::no_hub;
+    case NIF_NO_HOST:
+      return Status::no_host;
     case NIF_NOT_CONNECTED:
       return Status::not_connected;
     case NIF_BAD_VERSION:

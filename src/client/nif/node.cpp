@@ -27,7 +27,9 @@ void copy_text(char* to, std::size_t size, const std::string& text) {
 }
 
 /// Worth another try while the hub may still be starting.
-bool may_come(nif_status status) { return status == NIF_NO_HUB || status == NIF_HUB_FULL || status == NIF_REFUSED; }
+bool may_come(nif_status status) {
+  return status == NIF_NO_HUB || status == NIF_NO_HOST || status == NIF_HUB_FULL || status == NIF_REFUSED;
+}
 
 }  // namespace
 

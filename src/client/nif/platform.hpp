@@ -76,7 +76,7 @@ class Socket {
 inline constexpr std::size_t kWritePiecesMax = 64;
 
 /// Connects, trying each address of the host. Gives up at the deadline or when `cancel` is raised.
-/// Errors: NIF_NO_HUB, NIF_TIMEOUT, NIF_CLOSED (cancelled), NIF_NO_MEMORY, NIF_SYSTEM.
+/// Errors: NIF_NO_HUB, NIF_NO_HOST, NIF_TIMEOUT, NIF_CLOSED (cancelled), NIF_NO_MEMORY, NIF_SYSTEM.
 [[nodiscard]] Result<Socket, Failure> dial(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
                                            const WakeSignal& cancel);
 
@@ -89,6 +89,13 @@ struct Ready {
 /// Waits until the socket is ready for what is asked, the signal is raised, or the deadline. The socket may be closed
 /// (then only the signal counts).
 [[nodiscard]] Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wake, Deadline deadline);
+
+struct Raised {
+  bool one = false;
+  bool other = false;
+};
+/// Waits until one of them is raised, or the deadline; maybe less.
+[[nodiscard]] Raised wait_for_either(const WakeSignal& one, const WakeSignal& other, Deadline deadline);
 
 /// "" where it is not set.
 [[nodiscard]] std::string environment(const char* name);

@@ -1,5 +1,4 @@
 #include <fcntl.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -23,6 +22,7 @@
 
 #include "base/runtime_folder.hpp"
 #include "client/nif/endpoint.hpp"
+#include "client/nif/host_lookup.hpp"
 #include "client/nif/platform.hpp"
 
 namespace gimnet::nif {
@@ -97,18 +97,12 @@ Result<Socket, Failure> dial_unix(const Endpoint& endpoint, const SocketOptions&
 
 Result<Socket, Failure> dial_tcp(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
                                  const WakeSignal& cancel) {
-  addrinfo hints{};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const int error = ::getaddrinfo(endpoint.host.c_str(), std::to_string(endpoint.port).c_str(), &hints, &found);
-  if (error != 0) {
-    return Failure{NIF_NO_HUB, "cannot find the host of " + endpoint.url() + ": " + ::gai_strerror(error)};
-  }
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, &::freeaddrinfo);
-  Failure last{NIF_NO_HUB, "the host of " + endpoint.url() + " has no address"};
-  for (const addrinfo* at = addresses.get(); at != nullptr; at = at->ai_next) {
-    auto dialed = dial_address(at->ai_addr, at->ai_addrlen, endpoint, options, deadline, cancel);
+  const auto addresses = find_addresses(endpoint, deadline, cancel);
+  if (!addresses) return addresses.error();
+  Failure last;
+  for (const HostAddress& address : *addresses) {
+    auto dialed = dial_address(reinterpret_cast<const sockaddr*>(address.data()),
+                               static_cast<socklen_t>(address.size()), endpoint, options, deadline, cancel);
     if (dialed || dialed.error().status == NIF_CLOSED) return dialed;
     last = dialed.error();
   }
@@ -199,6 +193,12 @@ Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wa
   ready.readable = (waits[1].revents & POLLIN) != 0 || (broken && read);
   ready.writable = (waits[1].revents & POLLOUT) != 0 || (broken && write);
   return ready;
+}
+
+Raised wait_for_either(const WakeSignal& one, const WakeSignal& other, Deadline deadline) {
+  std::array<pollfd, 2> waits{{{one.descriptor(), POLLIN, 0}, {other.descriptor(), POLLIN, 0}}};
+  if (::poll(waits.data(), waits.size(), poll_timeout_ms(deadline)) <= 0) return {};
+  return {waits[0].revents != 0, waits[1].revents != 0};
 }
 
 std::string environment(const char* name) {

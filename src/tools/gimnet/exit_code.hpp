@@ -28,6 +28,7 @@ enum class ExitCode : std::uint8_t {
     case Status::bad_name:
       return ExitCode::usage;
     case Status::no_hub:
+    case Status::no_host:
     case Status::not_connected:
     case Status::refused:
       return ExitCode::no_connection;

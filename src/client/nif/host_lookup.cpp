@@ -1,0 +1,121 @@
+#include "client/nif/host_lookup.hpp"
+
+#include <netdb.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "base/mutex.hpp"
+#include "client/nif/endpoint.hpp"
+
+namespace gimnet::nif {
+namespace {
+
+constinit std::atomic<int> g_lookups{0};
+
+HostAddresses ask_system(const std::string& host, std::uint16_t port, int flags) {
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = flags;
+  addrinfo* first = nullptr;
+  const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &first);
+  if (error != 0) return {::gai_strerror(error), {}};
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(first, &::freeaddrinfo);
+  HostAddresses addresses;
+  for (const addrinfo* at = first; at != nullptr; at = at->ai_next) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(at->ai_addr);
+    addresses.found.emplace_back(bytes, bytes + at->ai_addrlen);
+  }
+  if (addresses.found.empty()) addresses.fault = "it has no address";
+  return addresses;
+}
+
+/// One search, which belongs to who asked and to the thread that looks; whoever is last frees it.
+class Search {
+ public:
+  Search() { g_lookups.fetch_add(1, std::memory_order_relaxed); }  // a number by itself
+  ~Search() { g_lookups.fetch_sub(1, std::memory_order_relaxed); }
+  Search(const Search&) = delete;
+  Search& operator=(const Search&) = delete;
+
+  [[nodiscard]] const WakeSignal& ended() const { return ended_; }
+  void end(HostAddresses addresses) GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    addresses_ = std::move(addresses);
+    ended_.raise();
+  }
+  [[nodiscard]] std::optional<HostAddresses> take() GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return std::exchange(addresses_, std::nullopt);
+  }
+
+ private:
+  WakeSignal ended_;
+  Mutex mutex_;
+  std::optional<HostAddresses> addresses_ GIMNET_GUARDED_BY(mutex_);
+};
+
+Failure not_found(const Endpoint& endpoint, const std::string& why) {
+  return {NIF_NO_HOST, "cannot find the host of " + endpoint.url() + ": " + why};
+}
+
+/// False: the system has no thread left.
+bool begin(std::shared_ptr<Search> search, const Endpoint& endpoint, const HostLookup& lookup) {
+  try {
+    const SignalsBlocked blocked;
+    std::thread([search = std::move(search), lookup, host = endpoint.host, port = endpoint.port] {
+      try {
+        search->end(lookup(host, port));
+      } catch (const std::exception&) {
+        search->end({"out of memory", {}});
+      }
+    }).detach();
+  } catch (const std::system_error&) {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
+                                                         const WakeSignal& cancel) {
+  // A number needs nobody to be asked.
+  HostAddresses numeric = ask_system(endpoint.host, endpoint.port, AI_NUMERICHOST);
+  if (numeric.fault.empty()) return std::move(numeric.found);
+  return find_addresses(endpoint, deadline, cancel,
+                        [](const std::string& host, std::uint16_t port) { return ask_system(host, port, 0); });
+}
+
+Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
+                                                         const WakeSignal& cancel, const HostLookup& lookup) {
+  if (g_lookups.load(std::memory_order_relaxed) >= kHostLookupsMax) {  // a number by itself
+    return not_found(endpoint, "too many searches for hosts have no answer yet; does the name server answer?");
+  }
+  const auto search = std::make_shared<Search>();
+  if (!search->ended().valid() || !begin(search, endpoint, lookup)) {
+    return Failure{NIF_NO_MEMORY, "cannot find the host of " + endpoint.url() + ": no descriptor or thread is left"};
+  }
+  for (;;) {
+    const Raised raised = wait_for_either(search->ended(), cancel, deadline);
+    if (raised.other) return Failure{NIF_CLOSED, "closed while connecting to " + endpoint.url()};
+    if (raised.one) break;
+    if (deadline != kNever && steady_now_ns() >= deadline) {
+      return Failure{NIF_TIMEOUT, "cannot find the host of " + endpoint.url() +
+                                      " within the time given: does the name server answer?"};
+    }
+  }
+  HostAddresses addresses = search->take().value_or(HostAddresses{"it has no address", {}});
+  if (!addresses.fault.empty()) return not_found(endpoint, addresses.fault);
+  return std::move(addresses.found);
+}
+
+}  // namespace gimnet::nif
