@@ -76,6 +76,7 @@ struct SendCounts {
   std::uint64_t skipped = 0;  ///< not sent: AtFullWindow::skip, or replaced by a newer one under hold_latest
   std::size_t waiting = 0;    ///< sent and not acknowledged yet, and one that is held
   std::string loss;           ///< why the last one was lost, in words; "" if none was
+  LossReason loss_reason = LossReason::none;  ///< the same for programs
 };
 
 /// A stream of messages with one key, to one node or to whoever accepts one service. Several Senders of one (peer,

@@ -38,6 +38,37 @@ enum class Status : std::uint8_t {
   system,         ///< The operating system refused, or memory is out.
 };
 
+/// Why a message did not arrive.
+enum class LossReason : std::uint8_t {
+  none = 0,  ///< None was lost.
+  // As the hub reported it: docs/protocol.md, section 5. Later hubs may have more, below 64.
+  no_such_node = 1,
+  no_route = 2,
+  away = 3,
+  queue_full = 4,
+  replaced = 5,
+  too_old = 6,
+  hop_limit = 7,
+  too_large = 8,
+  not_allowed = 9,
+  wrong_way = 10,
+  link_lost = 11,
+  shard_full = 12,
+  no_such_group = 13,
+  renumbered = 14,
+  over_budget = 15,
+  timed_out = 16,
+  cut_message = 17,
+  no_subscriber = 18,
+  malformed = 19,
+  wrong_source = 20,
+  // As this node knows by itself.
+  not_received = 64,     ///< Its receiver answered a later question, but did not get it.
+  refused = 65,          ///< Its receiver does not take it: it is too large.
+  connection_lost = 66,  ///< The own connection broke, or ended.
+  service_gone = 67,     ///< The service was withdrawn or is somewhere else, and cannot tell any more.
+};
+
 /// A short English text, for example "name taken". Static.
 [[nodiscard]] std::string_view status_text(Status status);
 

@@ -311,9 +311,8 @@ nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView&
   if (in.kind != NIF_UNICAST || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
   const std::string sentence = "it takes messages of at most " + std::to_string(message_bytes_max_) +
                                " bytes, and this one has " + std::to_string(view.data.size());
-  const auto key = proto::gimi::StreamKey::of(in.key);
-  const Envelope envelope{
-      in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), {key.type, key.instance}, 0, 0};
+  const StreamName name = received_stream_of(in);
+  const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
   // Where there is no room for it, the sender learns from the next PONG that the message is not here.
   static_cast<void>(uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
                                      proto::gimi::encode_failure({kTooLarge, sentence}), 0));
@@ -324,7 +323,7 @@ void Core::on_error(const nif_incoming& in, const proto::gimi::MessageView& view
   const auto failure = proto::gimi::decode_failure(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
   streams_.on_refused(stream_of(in, in.from, 0), view.header.sequence,
-                      "the receiver refused it: " + plain_words(failure->sentence));
+                      {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
 }
 
 void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -346,7 +345,8 @@ void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view)
 }
 
 void Core::on_report(const nif_incoming& in) {
-  if (in.kind == static_cast<std::uint8_t>(proto::Kind::taken)) return streams_.on_doubt(report_words(in.text));
+  if (in.kind == static_cast<std::uint8_t>(proto::Kind::taken))
+    return streams_.on_doubt(reported_loss(in.reason, in.text));
   if (!is_for_one(in)) return;
   const auto header = reported_header(in);
   const bool to_service = in.kind == NIF_SERVICE;
@@ -371,7 +371,7 @@ void Core::on_connected(const nif_incoming& in) {
   streams_.on_interrupted(0);
   services_.on_reconnected();
   if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
-  streams_.on_broken("the connection to the hub broke, and what was on its way is lost");
+  streams_.on_broken({LossReason::connection_lost, "the connection to the hub broke, and what was on its way is lost"});
 }
 
 void Core::on_disconnected(const nif_incoming& in) {
@@ -379,7 +379,7 @@ void Core::on_disconnected(const nif_incoming& in) {
     // NIF answers every call with the reason from now on; this one does nothing else.
     const nif_status status = nif_flush(node());
     const Ending ending(status_of(status), nif_error_text());
-    streams_.on_broken(ending.why());
+    streams_.on_broken({LossReason::connection_lost, ending.why()});
     end(ending);
     return;
   }
@@ -387,7 +387,7 @@ void Core::on_disconnected(const nif_incoming& in) {
   info.struct_size = sizeof info;
   const bool kept = nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
   if (kept) return streams_.on_interrupted(steady_now_ns());
-  streams_.on_broken(std::string("the connection to the hub broke: ") + in.text);
+  streams_.on_broken({LossReason::connection_lost, std::string("the connection to the hub broke: ") + in.text});
 }
 
 }  // namespace gimnet::gimi

@@ -1,11 +1,21 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "gimnet/gimi/outcome.hpp"
+
 namespace gimnet::gimi {
+
+/// Why messages were lost, or may be: for programs, and for people. By itself: they are not.
+struct Loss {
+  LossReason reason = LossReason::none;
+  std::string words;
+  [[nodiscard]] explicit operator bool() const { return !words.empty(); }
+};
 
 /// What a hub's report says to people: the reason's name, and what it means where the name does not tell.
 [[nodiscard]] inline std::string report_words(std::string_view reason) {
@@ -26,6 +36,11 @@ namespace gimnet::gimi {
     if (name == reason) words += ": " + std::string(meaning);
   }
   return words;
+}
+
+/// What a hub's report of that reason, which has that name, says.
+[[nodiscard]] inline Loss reported_loss(std::uint32_t reason, std::string_view name) {
+  return {reason < 64 ? static_cast<LossReason>(reason) : LossReason::none, report_words(name)};
 }
 
 }  // namespace gimnet::gimi

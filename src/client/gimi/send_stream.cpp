@@ -12,6 +12,8 @@ using proto::gimi::Operation;
 
 proto::gimi::MessageHeader header_of(Operation operation, std::uint32_t number) { return {number, operation, 0, 0}; }
 
+Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"}; }
+
 }  // namespace
 
 Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
@@ -82,7 +84,7 @@ void SendStream::hold_again(std::vector<std::byte> data) {
   if (held_) {
     ++counts_.skipped;  // a newer one came meanwhile
   } else if (end_ || destination_.id == 0) {
-    settle_freed({.acknowledged = 0, .lost = 1}, end_ ? end_.why() : "the service was withdrawn");
+    settle_freed({.acknowledged = 0, .lost = 1}, end_ ? Loss{LossReason::connection_lost, end_.why()} : withdrawn());
   } else {
     held_ = std::move(data);
   }
@@ -159,11 +161,14 @@ SendCounts SendStream::counts() {
   return counts;
 }
 
-void SendStream::settle_freed(const SendWindow::Freed& freed, const std::string& why) {
+void SendStream::settle_freed(const SendWindow::Freed& freed, const Loss& why) {
   if (!freed.any()) return;
   counts_.acknowledged += freed.acknowledged;
   counts_.lost += freed.lost;
-  if (freed.lost != 0) counts_.loss = why;
+  if (freed.lost != 0) {
+    counts_.loss = why.words;
+    counts_.loss_reason = why.reason;
+  }
   changed_.notify_all();
 }
 
@@ -171,39 +176,41 @@ bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const MutexLock lock(mutex_);
   const bool answers = ack.pong_sequence != 0 && ack.pong_sequence == window_.ping_number();
   const SendWindow::Freed freed = window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
-  const std::string& doubt = asked_.empty() ? doubt_ : asked_;
-  settle_freed(freed, doubt.empty() ? "the receiver answered a later question, but did not get them" : doubt);
-  if (answers) asked_.clear();
+  const Loss& doubt = asked_ ? asked_ : doubt_;
+  settle_freed(
+      freed,
+      doubt ? doubt : Loss{LossReason::not_received, "the receiver answered a later question, but did not get them"});
+  if (answers) asked_ = {};
   if (freed.lost != 0 || window_.empty()) forget_doubts();
   return held_ && window_.has_room(held_->size());
 }
 
-void SendStream::on_lost(std::uint32_t sequence, const std::string& why) {
+void SendStream::on_lost(std::uint32_t sequence, const Loss& why) {
   const MutexLock lock(mutex_);
   settle_freed(window_.lose(sequence), why);
   if (window_.empty()) forget_doubts();
 }
 
 void SendStream::forget_doubts() {
-  doubt_.clear();
-  asked_.clear();
+  doubt_ = {};
+  asked_ = {};
 }
 
-void SendStream::on_doubt(const std::string& why) {
+void SendStream::on_doubt(const Loss& why) {
   const MutexLock lock(mutex_);
   // The first reason counts: what is reported after it may be its consequence.
-  if (doubt_.empty() && !window_.empty()) doubt_ = why;
+  if (!doubt_ && !window_.empty()) doubt_ = why;
   window_.hurry();
 }
 
-void SendStream::lose_all(const std::string& why) {
+void SendStream::lose_all(const Loss& why) {
   SendWindow::Freed freed = window_.lose_all();
   if (std::exchange(held_, std::nullopt)) ++freed.lost;
   settle_freed(freed, why);
   forget_doubts();
 }
 
-void SendStream::on_broken(const std::string& why) {
+void SendStream::on_broken(const Loss& why) {
   const MutexLock lock(mutex_);
   lose_all(why);
 }
@@ -211,8 +218,9 @@ void SendStream::on_broken(const std::string& why) {
 void SendStream::on_moved(const ServicePlace& place) {
   const MutexLock lock(mutex_);
   if (place.group == destination_.id) return;
-  lose_all(place.group == 0 ? "the service was withdrawn"
-                            : "the service is somewhere else now, and cannot tell any more");
+  lose_all(place.group == 0
+               ? withdrawn()
+               : Loss{LossReason::service_gone, "the service is somewhere else now, and cannot tell any more"});
   destination_.id = place.group;
   if (place.group != 0) destination_.key = place.key;
   changed_.notify_all();
@@ -239,7 +247,7 @@ bool SendStream::tick(std::int64_t now_ns) {
       sequence = window_.open(data->size(), now_ns);
     } else if (window_.ping_due(now_ns)) {
       ping = window_.ping_number() != 0 ? window_.ping_number() : uplink_.next_ping();
-      if (ping != window_.ping_number()) asked_ = std::exchange(doubt_, "");
+      if (ping != window_.ping_number()) asked_ = std::exchange(doubt_, {});
       window_.ping_sent(ping, now_ns);  // before the PONG can be here
     } else {
       return true;

@@ -8,6 +8,7 @@
 #include "base/mutex.hpp"
 #include "client/gimi/ack_book.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/report_words.hpp"
 #include "client/gimi/send_window.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi.hpp"
@@ -65,11 +66,11 @@ class SendStream {
   /// True: a message that is held can go; tick() sends it.
   [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
   /// One message is known to be lost.
-  void on_lost(std::uint32_t sequence, const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_lost(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages may be lost, and that is why: ask.
-  void on_doubt(const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// What waits is lost, or nobody will ever tell.
-  void on_broken(const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_broken(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// The service is somewhere else now: what waits for an ACK from its former place gets none any more.
   void on_moved(const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
@@ -92,11 +93,11 @@ class SendStream {
   [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more) GIMNET_REQUIRES(mutex_);
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
   void hold_again(std::vector<std::byte> data) GIMNET_REQUIRES(mutex_);
-  void lose_all(const std::string& why) GIMNET_REQUIRES(mutex_);
+  void lose_all(const Loss& why) GIMNET_REQUIRES(mutex_);
   void forget_doubts() GIMNET_REQUIRES(mutex_);
   /// REQUIRES: something was lost.
   [[nodiscard]] Failure loss() const GIMNET_REQUIRES(mutex_);
-  void settle_freed(const SendWindow::Freed& freed, const std::string& why) GIMNET_REQUIRES(mutex_);
+  void settle_freed(const SendWindow::Freed& freed, const Loss& why) GIMNET_REQUIRES(mutex_);
   void watch_if_needed() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::string target() const { return service_.empty() ? to_.text() : service_; }
 
@@ -115,10 +116,10 @@ class SendStream {
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;    ///< one thread is between a sequence and NIF
   bool unflushed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< NIF holds messages back because of More::yes
   bool watched_ GIMNET_GUARDED_BY(mutex_) = false;
-  /// Why messages may be lost, as the hub reported it since the last PING; "": nothing. A PONG that answers a PING
+  /// Why messages may be lost, as the hub reported it since the last PING, if it did. A PONG that answers a PING
   /// behind all of it settles it: `asked_` is what was in doubt when the open PING was sent.
-  std::string doubt_ GIMNET_GUARDED_BY(mutex_);
-  std::string asked_ GIMNET_GUARDED_BY(mutex_);
+  Loss doubt_ GIMNET_GUARDED_BY(mutex_);
+  Loss asked_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 

@@ -97,12 +97,12 @@ void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence, const p
   if (stream != nullptr && stream->on_ack(sequence, ack)) attend_(true);
 }
 
-void StreamTable::on_refused(const StreamName& name, std::uint32_t sequence, const std::string& why) {
+void StreamTable::on_refused(const StreamName& name, std::uint32_t sequence, const Loss& why) {
   if (SendStream* stream = find(name); stream != nullptr) stream->on_lost(sequence, why);
 }
 
 void StreamTable::on_report(const Report& report) {
-  const std::string why = report_words(report.text);
+  const Loss why = reported_loss(report.reason, report.text);
   if (is_route_gone(report.reason) && report.name.group != 0) {
     if (SendStream* stream = find(report.name); stream != nullptr) stream->on_broken(why);
     return;
@@ -127,12 +127,12 @@ void StreamTable::on_report(const Report& report) {
   attend_(true);
 }
 
-void StreamTable::on_doubt(const std::string& why) {
+void StreamTable::on_doubt(const Loss& why) {
   for (SendStream* stream : all()) stream->on_doubt(why);
   attend_(true);
 }
 
-void StreamTable::on_broken(const std::string& why) {
+void StreamTable::on_broken(const Loss& why) {
   for (SendStream* stream : all()) stream->on_broken(why);
 }
 
@@ -151,7 +151,7 @@ void StreamTable::watch(SendStream& stream) {
 bool StreamTable::tick(std::int64_t now_ns) {
   const std::int64_t interrupted_ns = interrupted_ns_.load();
   if (interrupted_ns != 0 && now_ns - interrupted_ns > kGraceNs) {
-    on_broken("the connection to the hub broke and did not come back in time");
+    on_broken({LossReason::connection_lost, "the connection to the hub broke and did not come back in time"});
   }
   std::vector<SendStream*> watched;
   {

@@ -34,7 +34,7 @@ class StreamTable final : public StreamKeeper {
   void on_ack(const StreamName& name, std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
 
   /// The receiver says that it did not take that DATA, and why.
-  void on_refused(const StreamName& name, std::uint32_t sequence, const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_refused(const StreamName& name, std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
 
   /// What the hub says of a frame of this node that it could not deliver.
   struct Report {
@@ -47,9 +47,9 @@ class StreamTable final : public StreamKeeper {
   };
   void on_report(const Report& report) GIMNET_EXCLUDES(mutex_);
   /// The hub could not deliver some frames, and does not say which.
-  void on_doubt(const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Everything that waits is lost, or nobody will ever tell.
-  void on_broken(const std::string& why) GIMNET_EXCLUDES(mutex_);
+  void on_broken(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// The connection broke at that time, and what waits may still be saved by a resume; 0: it is there again. When that
   /// takes longer than a hub keeps a session, tick() gives up what waits.
   void on_interrupted(std::int64_t since_ns) { interrupted_ns_.store(since_ns); }

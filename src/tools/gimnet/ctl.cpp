@@ -143,8 +143,8 @@ ExitCode run_ctl(Session& session) {
   // It asks once: coming back by itself would have it wait for a hub that it has just ended.
   how.reconnect = false;
   if (const auto ending = only_reads(action) ? session.join_to_look(how) : session.join(how)) {
-    const bool by_socket = session.join_failure().starts_with("the hub at unix:");
-    if (*ending == ExitCode::denied && !by_socket)
+    // At the default addresses too: the socket there is this user's own, who would have been let in.
+    if (*ending == ExitCode::denied && !session.hub().starts_with("unix:"))
       say("changing needs the hub's Unix socket: --hub unix:/PATH, as `tcphub` prints it");
     return *ending;
   }

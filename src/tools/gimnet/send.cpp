@@ -91,14 +91,14 @@ Failure reason(const Session& session, const SendCounts& counts, bool rest, Fail
   const std::string& target = session.options().target;
   return {Status::not_delivered,
           std::to_string(counts.lost) + " of " + std::to_string(counts.sent) + " messages were not acknowledged by " +
-              target + ": " + loss_words(counts.loss, target) + "; " + std::to_string(counts.acknowledged) +
+              target + ": " + loss_words(counts, target) + "; " + std::to_string(counts.acknowledged) +
               (counts.acknowledged == 1 ? " was" : " were") + (rest ? ", and the rest of the input was not sent" : "")};
 }
 
 /// It was the id of nobody: as a name that nobody has.
 bool nobody_there(const SendCounts& counts) {
-  const auto reports = [&](const char* reason) { return counts.loss.find(reason) != std::string::npos; };
-  return counts.acknowledged == 0 && (reports("no_such_node") || reports("no_route"));
+  const bool nobody = counts.loss_reason == LossReason::no_such_node || counts.loss_reason == LossReason::no_route;
+  return counts.acknowledged == 0 && nobody;
 }
 
 }  // namespace

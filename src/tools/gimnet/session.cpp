@@ -44,11 +44,10 @@ std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
 std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
-    join_failure_ = failure.sentence;
-    if (failure.status == Status::no_hub) {
+    if (failure.status == Status::no_hub || failure.status == Status::no_host) {
       if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?')) failure.sentence += '.';
-      failure.sentence += advice(
-          failure.sentence.starts_with("cannot find the host") ? "look at its name" : "start one there with `tcphub`");
+      failure.sentence +=
+          advice(failure.status == Status::no_host ? "look at its name" : "start one there with `tcphub`");
     }
     const ExitCode code = fail(failure);
     // Whoever answers there lets nobody in, or is no hub.
@@ -96,9 +95,14 @@ std::string Session::wider_pattern(const std::string& kind, const std::string& w
 }
 
 /// What to do where no hub answers: `remedy`, or name another.
-std::string Session::advice(std::string remedy) const {
+std::string Session::hub() const {
+  if (!options_.hub.empty()) return options_.hub;
   const char* named = std::getenv("GIMNET_HUB");
-  if (options_.hub.empty() && named != nullptr && *named != '\0') {
+  return named != nullptr ? named : "";
+}
+
+std::string Session::advice(std::string remedy) const {
+  if (options_.hub.empty() && !hub().empty()) {
     return " That address is GIMNET_HUB's: " + remedy + ", or change it";
   }
   if (options_.hub.empty()) return " Start one with `tcphub`, or name yours with --hub";

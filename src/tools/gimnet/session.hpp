@@ -37,8 +37,8 @@ class Session {
   [[nodiscard]] std::optional<ExitCode> join(NodeOptions how);
   /// Joins to look at the hub: at one that takes no nodes any more, as an administrator, where this user is one.
   [[nodiscard]] std::optional<ExitCode> join_to_look(NodeOptions how = {});
-  /// Why it could not be joined; "": it could.
-  [[nodiscard]] const std::string& join_failure() const { return join_failure_; }
+  /// The hub that was asked for, by --hub or GIMNET_HUB; "": the hub of this machine.
+  [[nodiscard]] std::string hub() const;
   /// REQUIRES: joined.
   [[nodiscard]] Node& node() { return *node_; }
 
@@ -76,7 +76,6 @@ class Session {
   StopSignal& stop_;
   Output output_;
   std::optional<Node> node_;
-  std::string join_failure_;
   ExitCode code_ = ExitCode::done;
 };
 

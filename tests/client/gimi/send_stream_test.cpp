@@ -120,6 +120,7 @@ TEST_F(SendStreamTest, AReportOfOneMessageFreesIt) {
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().lost, 1u);
   EXPECT_NE(stream.counts().loss.find("queue_full"), std::string::npos);
+  EXPECT_EQ(stream.counts().loss_reason, LossReason::queue_full);
 }
 
 TEST_F(SendStreamTest, AReportOfAFragmentFreesItsMessage) {
@@ -193,6 +194,7 @@ TEST_F(SendStreamTest, ARefusalFreesTheMessageAndSaysWhy) {
   answer({1, Operation::error, 0, 0}, proto::gimi::encode_failure({6, "it is \x1b too large"}));
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   EXPECT_EQ(stream.counts().loss, "the receiver refused it: it is ? too large");
+  EXPECT_EQ(stream.counts().loss_reason, LossReason::refused);
 }
 
 TEST_F(SendStreamTest, AnErrorOfAnotherKindFreesNothing) {
@@ -266,6 +268,7 @@ class SettledDoubt : public Conversation {
     acknowledge(1, 0, next_ping());
     EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
     EXPECT_EQ(stream_.counts().loss, "the receiver answered a later question, but did not get them");
+    EXPECT_EQ(stream_.counts().loss_reason, LossReason::not_received);
   }
 
   Sender stream_;

@@ -2,20 +2,26 @@
 
 #include <gtest/gtest.h>
 
-#include "client/gimi/report_words.hpp"
-
 namespace gimnet::tool {
 namespace {
 
+SendCounts lost(LossReason reason) {
+  SendCounts counts;
+  counts.lost = 1;
+  counts.loss = "as the library says it";
+  counts.loss_reason = reason;
+  return counts;
+}
+
 TEST(LossWords, SayThatANodeHasLeftThatWasCalledByItsName) {
-  const std::string loss = gimi::report_words("no_such_node");
-  EXPECT_EQ(loss_words(loss, "robot/arm"), "the hub reports no_such_node: robot/arm has left");
-  EXPECT_EQ(loss_words(loss, "7.17"), loss) << "an id may be wrong";
+  const SendCounts counts = lost(LossReason::no_such_node);
+  EXPECT_EQ(loss_words(counts, "robot/arm"), "the hub reports no_such_node: robot/arm has left");
+  EXPECT_EQ(loss_words(counts, "7.17"), counts.loss) << "an id may be wrong";
 }
 
 TEST(LossWords, LeaveOtherReasonsAlone) {
-  for (const char* reason : {"queue_full", "no_route", "away"}) {
-    EXPECT_EQ(loss_words(gimi::report_words(reason), "robot"), gimi::report_words(reason));
+  for (const LossReason reason : {LossReason::queue_full, LossReason::no_route, LossReason::not_received}) {
+    EXPECT_EQ(loss_words(lost(reason), "robot"), "as the library says it");
   }
 }
 
