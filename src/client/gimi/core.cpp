@@ -308,21 +308,21 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
 nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {
   inbox_.count_dropped();
   losses_.add(proto::DropReason::too_large, 1);
-  if (in.kind != NIF_UNICAST || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
+  if (!is_for_one(in) || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
   const std::string sentence = "it takes messages of at most " + std::to_string(message_bytes_max_) +
                                " bytes, and this one has " + std::to_string(view.data.size());
   const StreamName name = received_stream_of(in);
   const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
   // Where there is no room for it, the sender learns from the next PONG that the message is not here.
   static_cast<void>(uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
-                                     proto::gimi::encode_failure({kTooLarge, sentence}), 0));
+                                     proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
   return NIF_DONE;
 }
 
 void Core::on_error(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto failure = proto::gimi::decode_failure(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
-  streams_.on_refused(stream_of(in, in.from, 0), view.header.sequence,
+  streams_.on_refused(stream_of(in, in.from, failure->group), view.header.sequence,
                       {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
 }
 

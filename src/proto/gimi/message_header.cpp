@@ -63,14 +63,26 @@ std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data) {
 
 std::optional<Failure> decode_failure(std::span<const std::byte> data) {
   if (data.size() < kErrorStatusSize) return std::nullopt;
-  const auto text = data.subspan(kErrorStatusSize);
-  return Failure{load_le<std::uint16_t>(data.data()), {reinterpret_cast<const char*>(text.data()), text.size()}};
+  Failure failure;
+  failure.status = load_le<std::uint16_t>(data.data());
+  data = data.subspan(kErrorStatusSize);
+  if ((failure.status & kErrorGroupBit) != 0) {
+    if (data.size() < sizeof failure.group) return std::nullopt;
+    failure.status ^= kErrorGroupBit;
+    failure.group = load_le<std::uint32_t>(data.data());
+    data = data.subspan(sizeof failure.group);
+  }
+  failure.sentence = {reinterpret_cast<const char*>(data.data()), data.size()};
+  return failure;
 }
 
 std::vector<std::byte> encode_failure(const Failure& failure) {
-  std::vector<std::byte> data(kErrorStatusSize + failure.sentence.size());
-  store_le(data.data(), failure.status);
-  std::ranges::copy(std::as_bytes(std::span(failure.sentence)), data.begin() + kErrorStatusSize);
+  const bool to_service = failure.group != 0;
+  const std::size_t head = kErrorStatusSize + (to_service ? sizeof failure.group : 0);
+  std::vector<std::byte> data(head + failure.sentence.size());
+  store_le(data.data(), static_cast<std::uint16_t>(failure.status | (to_service ? kErrorGroupBit : 0)));
+  if (to_service) store_le(data.data() + kErrorStatusSize, failure.group);
+  std::ranges::copy(std::as_bytes(std::span(failure.sentence)), data.begin() + static_cast<std::ptrdiff_t>(head));
   return data;
 }
 

@@ -83,7 +83,10 @@ std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data);
 struct Failure {
   std::uint16_t status = 0;
   std::string_view sentence;
+  std::uint32_t group = 0;  ///< of the service that the stream leads to; 0 and not written: to a node
 };
+/// In the status as written: a group id follows it.
+inline constexpr std::uint16_t kErrorGroupBit = 0x8000;
 /// Nothing: too short.
 [[nodiscard]] std::optional<Failure> decode_failure(std::span<const std::byte> data);
 [[nodiscard]] std::vector<std::byte> encode_failure(const Failure& failure);

@@ -228,6 +228,26 @@ TEST_F(NodeTest, ClosingAnswersEverybody) {
   node.close();
 }
 
+TEST_F(NodeTest, WhoSendsTooMuchToAServiceIsTold) {
+  NodeOptions options;
+  options.name = "robot";
+  options.hub = hub_.url();
+  options.message_bytes_max = 10;
+  const Node robot = Node::join(options).or_throw();
+  const Queue queue = robot.accept("drive").or_throw();
+  const Node viewer = join();
+  SendOptions synchronized;
+  synchronized.window = 2;
+  const Sender drive = viewer.sender_to_service("robot/drive", synchronized).or_throw();
+  drive.send("ten bytes.", kWait).or_throw();
+  drive.send("and eleven.", kWait).or_throw();
+  EXPECT_TRUE(drive.settle(kWait).is(Status::not_delivered));
+  EXPECT_EQ(drive.counts().acknowledged, 1u);
+  EXPECT_EQ(drive.counts().loss_reason, LossReason::refused);
+  EXPECT_NE(drive.counts().loss.find("at most 10 bytes"), std::string::npos) << drive.counts().loss;
+  EXPECT_EQ(queue.receive(kWait)->text(), "ten bytes.");
+}
+
 TEST_F(NodeTest, TellsWhenTheHubIsGone) {
   const Node node = join();
   SendOptions options;
