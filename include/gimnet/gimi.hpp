@@ -106,13 +106,20 @@ class Sender {
   std::shared_ptr<gimi::SendStream> stream_;
 };
 
-/// An own service that provides data. Copies are the same service; with the last one it ends.
+/// How long Publisher::publish() waits if nobody says otherwise: a loop that steers something must not stand still for
+/// as long as its hub is away, and what it would have said is old by then.
+inline constexpr Timeout kPublishTimeout{1000};
+
+/// An own service that provides data. Copies are the same service; with the last one it ends, which asks the hub and
+/// waits for its answer, a second at most.
 class Publisher {
  public:
   /// Sends 0 bytes to 1 GiB to all subscribers; slow ones are not waited for. Without subscribers nothing leaves the
-  /// process, but of a retained service. Waits while the connection is broken, where that is resumed, and while the own
-  /// send queue is full. Errors: refused (the hub did not take the service again), not_connected, too_large, closed.
-  Outcome<void> publish(BytesView data, More more = More::no) const;
+  /// process, but of a retained service. Waits while the connection is broken, where that is resumed, while the own
+  /// send queue is full, and while another thread publishes. Errors: timeout (nothing was sent; subscribers may count
+  /// it as missed), refused (the hub did not take the service again), not_connected, too_large, closed.
+  Outcome<void> publish(BytesView data, Timeout timeout = kPublishTimeout, More more = More::no) const;
+  Outcome<void> publish(BytesView data, More more) const { return publish(data, kPublishTimeout, more); }
   /// How many there are, as the hub told last.
   [[nodiscard]] std::size_t subscribers() const;
   /// Waits until there are that many. Errors: timeout, closed.

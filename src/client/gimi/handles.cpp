@@ -24,7 +24,9 @@ SendCounts Sender::counts() const { return stream_->counts(); }
 Peer Sender::peer() const { return stream_->to(); }
 const std::string& Sender::service() const { return stream_->service(); }
 
-Outcome<void> Publisher::publish(BytesView data, More more) const { return service_->publish(data, more); }
+Outcome<void> Publisher::publish(BytesView data, Timeout timeout, More more) const {
+  return service_->publish(data, timeout, more);
+}
 std::size_t Publisher::subscribers() const { return service_->subscribers(); }
 Outcome<void> Publisher::wait_for_subscribers(std::size_t count, Timeout timeout) const {
   return service_->wait_for_subscribers(count, timeout);

@@ -4,14 +4,21 @@
 
 namespace gimnet::gimi {
 
-Outcome<void> PublishedService::publish(BytesView data, More more) {
+Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More more) {
+  const std::int64_t deadline = deadline_after(timeout);
   Envelope envelope{0, NIF_GROUP, NIF_POLICY_DEFAULT, options_.lane, options_.key, 0, 0};
   if (options_.delivery == Delivery::latest) envelope.policy = NIF_LATEST;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
   std::uint32_t sequence = 0;
   {
     const MutexLock lock(mutex_);
-    while (sending_ && !end_) changed_.wait(mutex_);
+    while (sending_ && !end_) {
+      if (is_over(deadline)) {
+        return Failure{Status::timeout,
+                       "not published by " + full_name_ + ": another thread published there for all of the time given"};
+      }
+      static_cast<void>(changed_.wait_until(mutex_, deadline));
+    }
     if (end_) return end_.failure("publish " + full_name_);
     if (group_ == 0) {
       return Failure{Status::refused, "cannot publish " + full_name_ +
@@ -25,8 +32,8 @@ Outcome<void> PublishedService::publish(BytesView data, More more) {
     envelope.to = group_;
     sending_ = true;
   }
-  const nif_status status =
-      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0}, options_.timestamp, data, NIF_FOREVER);
+  const nif_status status = uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0},
+                                             options_.timestamp, data, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name());
   const MutexLock lock(mutex_);
   sending_ = false;

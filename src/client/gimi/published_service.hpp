@@ -21,7 +21,7 @@ class PublishedService {
   [[nodiscard]] const std::string& name() const { return name_; }
   /// As it is now; without the node's name while the node has none.
   [[nodiscard]] std::string full_name() GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Outcome<void> publish(BytesView data, More more) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> publish(BytesView data, Timeout timeout, More more) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t subscribers() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);

@@ -107,7 +107,8 @@ class RobotPort final : public GimiPort {
   }
 
   std::optional<Error> publish(Service service, std::span<const std::byte> payload) override {
-    const Outcome<void> outcome = publishers_[static_cast<std::size_t>(service)].publish(payload);
+    // However long the hub is away: what both ends show at the end counts every message.
+    const Outcome<void> outcome = publishers_[static_cast<std::size_t>(service)].publish(payload, kForever);
     if (!outcome && is_final(outcome.failure())) return Error{outcome.failure().sentence};
     return std::nullopt;
   }

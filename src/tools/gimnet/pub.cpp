@@ -98,7 +98,8 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
         next_ns += period_ns;
         retaining.look_at(line);
         unheard.before_line(publisher.subscribers());
-        if (auto sent = publisher.publish(line, period_ns == 0 && input.has_line() ? More::yes : More::no); !sent) {
+        if (auto sent = publisher.publish(line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
+            !sent) {
           return sent;
         }
         unheard.after_line(publisher.subscribers());

@@ -76,7 +76,7 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
   }
 
   void expect_published(const Publisher& publisher, std::uint32_t group) {
-    publisher.publish(publisher.name()).or_throw();
+    publisher.publish(publisher.name(), kForever).or_throw();
     const test::Taken taken = next();
     EXPECT_EQ(taken.data, publisher.name());
     EXPECT_EQ(taken.frame.dst, group) << publisher.name();
@@ -193,10 +193,28 @@ TEST_P(MovedOwnServices, ComeBackAfterAHubThatRefusedThem) {
   const Publisher odometry = advertise("odom", kFirst);
   const Publisher map = advertise("map", kSecond);
   come_back<ns::Advertise>({{"odom", 0}, {"map", 0}});
-  EXPECT_TRUE(odometry.publish("x").is(Status::refused));
+  EXPECT_TRUE(odometry.publish("x", kForever).is(Status::refused));
   come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
   expect_published(odometry, kSecond);
   expect_published(map, kFirst);
+  close_node();
+}
+
+// As a loop that steers a robot would: nobody may keep it.
+TEST_P(MovedOwnServices, KeepNobodyWaitingForLongerThanItWants) {
+  const Publisher odometry = advertise("odom", kFirst);
+  hub_.close();
+  hub_ = fake_.admit(nif::test::make_welcome());
+  std::uint16_t declared = 0;
+  ASSERT_TRUE(hub_.next_request<ns::Advertise>(declared));  // until it is answered nobody knows where to send
+  EXPECT_TRUE(odometry.publish("x", kNoWait).is(Status::timeout));
+  EXPECT_TRUE(odometry.publish("x").is(Status::timeout)) << "nor for ever by itself";
+  std::thread waiting([&] { odometry.publish("at last", kForever, More::no).or_throw(); });
+  EXPECT_TRUE(odometry.publish("x", kNoWait).is(Status::timeout)) << "nor for the other thread";
+  hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 1}, declared));
+  waiting.join();
+  EXPECT_EQ(next().data, "at last");
+  EXPECT_EQ(odometry.published(), 1u);
   close_node();
 }
 

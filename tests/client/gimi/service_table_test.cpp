@@ -32,7 +32,7 @@ TEST_F(Services, WhatIsPublishedComesToAllSubscribers) {
   const Subscription one = first.subscribe("robot/odom").or_throw();
   const Subscription two = second.subscribe("robot/odom").or_throw();
   odometry.wait_for_subscribers(2, kWait).or_throw();
-  odometry.publish("pose").or_throw();
+  odometry.publish("pose", kForever).or_throw();
   for (const Subscription& subscription : {one, two}) {
     const auto message = subscription.receive(kWait);
     ASSERT_TRUE(message);
@@ -53,7 +53,7 @@ TEST_F(Services, ASubscriptionMayComeFirst) {
   const Publisher publisher = robot.advertise("odom").or_throw();
   odometry.wait_until_exists(kWait).or_throw();
   publisher.wait_for_subscribers(1, kWait).or_throw();
-  publisher.publish("pose").or_throw();
+  publisher.publish("pose", kForever).or_throw();
   EXPECT_EQ(odometry.receive(kWait)->text(), "pose");
 }
 
@@ -64,7 +64,7 @@ TEST_F(Services, ASubscriptionSurvivesItsProvider) {
     const Node robot = join("robot");
     const Publisher publisher = robot.advertise("odom").or_throw();
     publisher.wait_for_subscribers(1, kWait).or_throw();
-    publisher.publish(text).or_throw();
+    publisher.publish(text, kForever).or_throw();
     EXPECT_EQ(odometry.receive(kWait)->text(), text);
   }
   EXPECT_TRUE(eventually([&] { return !odometry.exists(); }));
@@ -77,7 +77,7 @@ TEST_F(Services, WhatWasPublishedBeforeLeavingStillComes) {
     const Node robot = join("robot");
     const Publisher publisher = robot.advertise("odom").or_throw();
     publisher.wait_for_subscribers(1, kWait).or_throw();
-    for (int i = 0; i < 500; ++i) publisher.publish(std::to_string(i)).or_throw();
+    for (int i = 0; i < 500; ++i) publisher.publish(std::to_string(i), kForever).or_throw();
     robot.drain(kWait).or_throw();
   }
   for (int i = 0; i < 500; ++i) ASSERT_EQ(odometry.receive(kWait)->text(), std::to_string(i));
@@ -108,10 +108,10 @@ TEST_F(Services, UnsubscribingEndsTheMessages) {
     publisher.wait_for_subscribers(1, kWait).or_throw();
   }
   EXPECT_TRUE(eventually([&] { return publisher.subscribers() == 0; }));
-  publisher.publish("to nobody").or_throw();
+  publisher.publish("to nobody", kForever).or_throw();
   const Subscription again = viewer.subscribe("robot/odom").or_throw();
   publisher.wait_for_subscribers(1, kWait).or_throw();
-  publisher.publish("to somebody").or_throw();
+  publisher.publish("to somebody", kForever).or_throw();
   EXPECT_EQ(again.receive(kWait)->text(), "to somebody");
   EXPECT_EQ(publisher.published(), 2u);
 }
@@ -251,7 +251,7 @@ TEST_F(Services, OnlyWhatGivesDataCanBeSubscribed) {
   early.wait_until_exists(kWait).or_throw();
   EXPECT_FALSE(early.accepts());
   drive.wait_for_subscribers(1, kWait).or_throw();
-  drive.publish("gives").or_throw();
+  drive.publish("gives", kForever).or_throw();
   EXPECT_EQ(early.receive(kWait)->text(), "gives");
 }
 
@@ -275,7 +275,7 @@ TEST_F(Services, ManyThreadsSubscribeAndPublish) {
       const Publisher publisher = robot.advertise(name).or_throw();
       const Subscription subscription = viewer.subscribe("robot/" + name).or_throw();
       publisher.wait_for_subscribers(1, kWait).or_throw();
-      for (int n = 0; n < 50; ++n) publisher.publish(name).or_throw();
+      for (int n = 0; n < 50; ++n) publisher.publish(name, kForever).or_throw();
       for (int n = 0; n < 50; ++n) EXPECT_EQ(subscription.receive(kWait)->text(), name);
     });
   }

@@ -73,7 +73,7 @@ TEST_F(WatchTableTest, AServiceFollowsTheNewNameOfItsNode) {
   new_name.wait_until_exists(kWait).or_throw();
   // The provider learns the new group id a moment after everybody else; what it sends until then reaches nobody.
   EXPECT_TRUE(eventually([&] {
-    odometry.publish("under the new name").or_throw();
+    odometry.publish("under the new name", kForever).or_throw();
     return new_name.try_receive().has_value();
   }));
   EXPECT_FALSE(old_name.exists());
