@@ -30,7 +30,8 @@
 // replaced by another connection of its session, or does not reconnect) everything answers Status::refused or, without
 // reconnecting, Status::not_connected, and the sentence says why; what was received before still comes.
 // Times: all that wait take a Timeout in ms and wait for at most that; kForever has no limit, kNoWait does not wait.
-// Callbacks: there are none. Received messages wait in queues, which the program empties when it has time.
+// Only the end of a handle waits without one, a second at most: Node::close(), and the last Publisher, Subscription or
+// Watch. Callbacks: there are none. Received messages wait in queues, which the program empties when it has time.
 
 namespace gimnet {
 
@@ -134,7 +135,7 @@ class Publisher {
 };
 
 /// A subscription to somebody's service. It survives that the provider ends and comes back. Copies are the same
-/// subscription; with the last one it ends.
+/// subscription; with the last one it ends, as a Publisher does.
 class Subscription {
  public:
   /// As Queue::receive() and Queue::try_receive().

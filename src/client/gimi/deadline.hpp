@@ -9,6 +9,9 @@
 
 namespace gimnet::gimi {
 
+/// How long the end of a handle of the program waits for the hub's answer.
+inline constexpr std::int32_t kLeaveTimeoutMs = 1000;
+
 /// When a wait ends, as steady_now_ns(); INT64_MAX: never.
 [[nodiscard]] inline std::int64_t deadline_after(Timeout timeout) {
   // Waits of a year and more have no end, so that no sum overflows.

@@ -130,10 +130,12 @@ Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout) 
 }
 
 Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout timeout) {
+  const std::int64_t deadline = deadline_after(timeout);
   std::vector<ConnectionRecord> records;
   proto::ctrl::Connections request;
   for (;;) {
-    const auto page = ask<proto::ctrl::ConnectionsAnswer>(node, request, "ask the hub for its connections", timeout);
+    const auto page = ask<proto::ctrl::ConnectionsAnswer>(node, request, "ask the hub for its connections",
+                                                          Timeout{nif_timeout_until(deadline)});
     if (!page) return page.failure();
     for (const auto& found : page->connections) {
       if (found.node <= request.after) return records;  // a hub that goes round in circles is not followed

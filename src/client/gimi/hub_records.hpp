@@ -18,7 +18,7 @@ namespace gimnet::gimi {
                                                                 Timeout timeout);
 [[nodiscard]] Outcome<HubRecord> ask_hub(nif_node* node, Timeout timeout);
 [[nodiscard]] Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout);
-/// All pages; `timeout` for each.
+/// All pages; `timeout` for them together.
 [[nodiscard]] Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout timeout);
 
 [[nodiscard]] Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout);

@@ -9,8 +9,6 @@
 namespace gimnet::gimi {
 namespace {
 
-constexpr std::int32_t kLeaveTimeoutMs = 1000;
-
 nif_service description_of(const std::string& name, MessageKey key, const std::string& metadata) {
   nif_service service{};
   service.struct_size = sizeof service;

@@ -8,8 +8,6 @@
 namespace gimnet::gimi {
 namespace {
 
-constexpr std::int32_t kLeaveTimeoutMs = 1000;
-
 WatchEvent event_of(const nif_incoming& in) {
   const nif_watched& told = *in.watched;
   WatchEvent event;
