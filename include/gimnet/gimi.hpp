@@ -29,6 +29,7 @@
 // Node; when it is closed they answer Status::closed. Where no connection will come any more (the node was kicked, or
 // replaced by another connection of its session, or does not reconnect) everything answers Status::refused or, without
 // reconnecting, Status::not_connected, and the sentence says why; what was received before still comes.
+// Moving: what was moved from may only be destroyed or assigned to; a Node may be closed, too.
 // Times: all that wait take a Timeout in ms and wait for at most that; kForever has no limit, kNoWait does not wait.
 // Only the end of a handle waits without one, a second at most: Node::close(), and the last Publisher, Subscription or
 // Watch. Callbacks: there are none. Received messages wait in queues, which the program empties when it has time.
@@ -160,7 +161,8 @@ class Subscription {
 };
 
 /// What there is and what changes under a pattern of names. What is not taken waits at the hub, which tells a watch
-/// that is too far behind all from the start again. Copies are the same watch; with the last one it ends.
+/// that is too far behind all from the start again. Copies are the same watch; with the last one it ends, as a
+/// Publisher does.
 class Watch {
  public:
   /// Takes the next event. Waits if there is none. Errors: timeout, closed.
@@ -242,8 +244,9 @@ class Node {
   Outcome<void> send(Peer to, BytesView data, const SendOptions& options = {}, Timeout timeout = kForever) const;
   Outcome<void> send(std::string_view to, BytesView data, const SendOptions& options = {},
                      Timeout timeout = kForever) const;
-  /// Writes what More::yes held back.
-  void flush() const;
+  /// Writes what More::yes held back. Does not wait. Errors: not_connected, refused (no connection will come any more),
+  /// closed.
+  Outcome<void> flush() const;
   /// Waits until everything sent so far was given to the kernel and, where resume is on, confirmed by the hub.
   Outcome<void> drain(Timeout timeout = kForever) const;
 
@@ -330,6 +333,7 @@ class Node {
 
  private:
   explicit Node(std::shared_ptr<gimi::Core> core) : core_(std::move(core)) {}
+  [[nodiscard]] gimi::Core& core() const;
   std::shared_ptr<gimi::Core> core_;
 };
 

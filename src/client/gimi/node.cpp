@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/check.hpp"
 #include "client/gimi/core.hpp"
 #include "client/gimi/deadline.hpp"
 #include "client/gimi/hub_records.hpp"
@@ -41,11 +42,16 @@ void Node::close() {
   if (core_) core_->close();
 }
 
-Peer Node::peer() const { return Peer{nif_id(core_->node())}; }
-NodeState Node::state() const { return core_->state(); }
+gimi::Core& Node::core() const {
+  GIMNET_CHECK(core_ != nullptr);
+  return *core_;
+}
+
+Peer Node::peer() const { return Peer{nif_id(core().node())}; }
+NodeState Node::state() const { return core().state(); }
 
 Outcome<Sender> Node::sender(Peer to, const SendOptions& options) const {
-  auto stream = core_->streams().stream(to, options);
+  auto stream = core().streams().stream(to, options);
   if (!stream) return stream.failure();
   return Sender({core_, *stream});
 }
@@ -69,8 +75,8 @@ Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOp
   if (service->direction != Direction::accepts) {
     return Failure{Status::not_found, "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
   }
-  auto stream = core_->services().follow(name, timeout, [&](const gimi::ServicePlace& place) {
-    return core_->streams().service_stream(name, place, options);
+  auto stream = core().services().follow(name, timeout, [&](const gimi::ServicePlace& place) {
+    return core().streams().service_stream(name, place, options);
   });
   if (!stream) return stream.failure();
   return Sender({core_, *stream});
@@ -88,42 +94,46 @@ Outcome<void> Node::send(std::string_view to, BytesView data, const SendOptions&
   return stream->send(data, timeout);
 }
 
-void Node::flush() const { static_cast<void>(nif_flush(core_->node())); }
+Outcome<void> Node::flush() const {
+  const nif_status status = nif_flush(core().node());
+  if (status != NIF_OK) return failure_of(status, "write what was held back");
+  return {};
+}
 
 Outcome<void> Node::drain(Timeout timeout) const {
-  const nif_status status = nif_drain(core_->node(), nif_timeout(timeout));
+  const nif_status status = nif_drain(core().node(), nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "write what waits");
   return {};
 }
 
 Queue Node::queue(MessageKey key, const QueueOptions& options) const {
-  return Queue({core_, &core_->inbox().queue(key, &options)});
+  return Queue({core_, &core().inbox().queue(key, &options)});
 }
 
 Outcome<Message> Node::receive(MessageKey key, Timeout timeout) const {
-  return core_->inbox().receive(core_->inbox().queue(key, nullptr), timeout);
+  return core().inbox().receive(core().inbox().queue(key, nullptr), timeout);
 }
 
-Outcome<Message> Node::receive(Timeout timeout) const { return core_->inbox().receive_any(timeout); }
-std::uint64_t Node::dropped() const { return core_->inbox().dropped(); }
-LostCounts Node::lost() const { return core_->lost(); }
+Outcome<Message> Node::receive(Timeout timeout) const { return core().inbox().receive_any(timeout); }
+std::uint64_t Node::dropped() const { return core().inbox().dropped(); }
+LostCounts Node::lost() const { return core().lost(); }
 
 Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options, Timeout timeout) const {
-  auto service = core_->services().advertise(core_->state().name, std::string(name), options, timeout);
+  auto service = core().services().advertise(core().state().name, std::string(name), options, timeout);
   if (!service) return service.failure();
   return Publisher({*service, [core = core_](gimi::PublishedService* done) { core->services().withdraw(*done); }});
 }
 
 Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options, Timeout timeout) const {
   Queue made = queue(options.key, options.queue);
-  auto accepted = core_->services().accept(core_->state().name, std::string(name), options, timeout);
+  auto accepted = core().services().accept(core().state().name, std::string(name), options, timeout);
   if (!accepted) return accepted.failure();
   return made;
 }
 
 Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options, Timeout timeout,
                                       const PaceOptions& pace) const {
-  auto service = core_->services().subscribe(std::string(full_name), options, pace, timeout);
+  auto service = core().services().subscribe(std::string(full_name), options, pace, timeout);
   if (!service) return service.failure();
   return Subscription(
       {*service, [core = core_](gimi::SubscribedService* done) { core->services().unsubscribe(*done); }});
@@ -131,21 +141,21 @@ Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOpt
 
 Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {
   const std::string text(name);
-  const nif_status status = nif_register(core_->node(), text.c_str(), nullptr, nif_timeout(timeout));
+  const nif_status status = nif_register(core().node(), text.c_str(), nullptr, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "take the name '" + text + "'");
-  core_->on_renamed();
+  core().on_renamed();
   return {};
 }
 
 Outcome<void> Node::give_name_back(Timeout timeout) const {
-  const nif_status status = nif_unregister(core_->node(), nif_timeout(timeout));
+  const nif_status status = nif_unregister(core().node(), nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "give the name back");
-  core_->on_renamed();
+  core().on_renamed();
   return {};
 }
 
 Outcome<Watch> Node::watch(std::string_view pattern, const WatchOptions& options, Timeout timeout) const {
-  auto begun = core_->watches().watch(std::string(pattern), options, timeout);
+  auto begun = core().watches().watch(std::string(pattern), options, timeout);
   if (!begun) return begun.failure();
   return Watch({begun->queue.get(),
                 [core = core_, begun = *begun](gimi::WatchQueue*) { core->watches().unwatch(begun.number); }});
@@ -155,53 +165,53 @@ Outcome<Peer> Node::find(std::string_view name, Timeout timeout) const {
   if (const auto id = Peer::parse(name)) return *id;
   Peer peer;
   const std::string text(name);
-  const nif_status status = nif_resolve(core_->node(), text.c_str(), &peer.id, nif_timeout(timeout));
+  const nif_status status = nif_resolve(core().node(), text.c_str(), &peer.id, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "find the node '" + text + "'");
   return peer;
 }
 
 Outcome<std::string> Node::name_of(Peer peer, Timeout timeout) const {
   std::string name(NIF_NAME_BYTES_MAX + 1, '\0');
-  const nif_status status = nif_reverse(core_->node(), peer.id, name.data(), nif_timeout(timeout));
+  const nif_status status = nif_reverse(core().node(), peer.id, name.data(), nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "find the name of " + peer.text());
   name.resize(name.find('\0'));
   return name;
 }
 
 Outcome<std::vector<NodeRecord>> Node::nodes(std::string_view pattern, Timeout timeout) const {
-  return gimi::list_nodes(core_->node(), std::string(pattern), timeout);
+  return gimi::list_nodes(core().node(), std::string(pattern), timeout);
 }
 Outcome<std::vector<ServiceRecord>> Node::services(std::string_view pattern, Timeout timeout) const {
-  return gimi::list_services(core_->node(), std::string(pattern), timeout);
+  return gimi::list_services(core().node(), std::string(pattern), timeout);
 }
-Outcome<HubRecord> Node::hub(Timeout timeout) const { return gimi::ask_hub(core_->node(), timeout); }
+Outcome<HubRecord> Node::hub(Timeout timeout) const { return gimi::ask_hub(core().node(), timeout); }
 Outcome<std::vector<ShardCounts>> Node::hub_counters(Timeout timeout) const {
-  return gimi::ask_counters(core_->node(), timeout);
+  return gimi::ask_counters(core().node(), timeout);
 }
 Outcome<std::vector<ConnectionRecord>> Node::hub_connections(Timeout timeout) const {
-  return gimi::ask_connections(core_->node(), timeout);
+  return gimi::ask_connections(core().node(), timeout);
 }
 
 Outcome<std::vector<RouteRecord>> Node::hub_routes(Timeout timeout) const {
-  return gimi::ask_routes(core_->node(), timeout);
+  return gimi::ask_routes(core().node(), timeout);
 }
 
 Outcome<void> Node::kick(Peer node, std::string_view reason, Timeout timeout) const {
-  return gimi::kick(core_->node(), node, reason, timeout);
+  return gimi::kick(core().node(), node, reason, timeout);
 }
 Outcome<void> Node::reassign(Peer node, Peer new_id, Timeout timeout) const {
-  return gimi::reassign(core_->node(), node, new_id, timeout);
+  return gimi::reassign(core().node(), node, new_id, timeout);
 }
-Outcome<void> Node::drain_hub(Timeout timeout) const { return gimi::drain_hub(core_->node(), timeout); }
+Outcome<void> Node::drain_hub(Timeout timeout) const { return gimi::drain_hub(core().node(), timeout); }
 Outcome<std::vector<HubChange>> Node::reload_hub(Timeout timeout) const {
-  return gimi::reload_hub(core_->node(), timeout);
+  return gimi::reload_hub(core().node(), timeout);
 }
 Outcome<std::string> Node::set_hub_log_level(std::string_view level, Timeout timeout) const {
-  return gimi::set_hub_log_level(core_->node(), level, timeout);
+  return gimi::set_hub_log_level(core().node(), level, timeout);
 }
 
 Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) const {
-  return core_->ping(to, timeout, lane, echo);
+  return core().ping(to, timeout, lane, echo);
 }
 
 }  // namespace gimnet

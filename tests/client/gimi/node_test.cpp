@@ -248,6 +248,16 @@ TEST_F(NodeTest, WhoSendsTooMuchToAServiceIsTold) {
   EXPECT_EQ(queue.receive(kWait)->text(), "ten bytes.");
 }
 
+TEST_F(NodeTest, WhatWasMovedFromMayBeClosed) {
+  Node node = join("robot");
+  Node other = std::move(node);
+  EXPECT_EQ(other.state().name, "robot");
+  node.close();  // NOLINT(bugprone-use-after-move): that is what is tried
+  EXPECT_TRUE(other.flush());
+  other.close();
+  EXPECT_TRUE(other.flush().is(Status::closed));
+}
+
 TEST_F(NodeTest, TellsWhenTheHubIsGone) {
   const Node node = join();
   SendOptions options;
