@@ -6,6 +6,7 @@
 
 #include "client/gimi/deadline.hpp"
 #include "client/gimi/uplink.hpp"
+#include "client/nif/answer_status.hpp"
 #include "proto/control/ctrl.hpp"
 
 namespace gimnet::gimi {
@@ -18,21 +19,6 @@ proto::bitestream::Writer body_of(const Request& request) {
   return body;
 }
 
-Status status_of(std::uint16_t wire) {
-  switch (static_cast<proto::Status>(wire)) {
-    case proto::Status::denied:
-      return Status::denied;
-    case proto::Status::not_found:
-      return Status::not_found;
-    case proto::Status::taken:
-      return Status::taken;
-    case proto::Status::bad_request:
-      return Status::bad_argument;
-    default:
-      return Status::refused;
-  }
-}
-
 /// Asks the hub and reads its answer.
 template <class Answer, class Request>
 Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing, Timeout timeout) {
@@ -43,7 +29,8 @@ Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& d
   if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
   if (reply->status != 0) {
-    return Failure{status_of(reply->status), "cannot " + doing + ": " + reply->sentence};
+    const auto wire = static_cast<proto::Status>(reply->status);
+    return Failure{status_of(nif::status_of(wire)), "cannot " + doing + ": " + reply->sentence};
   }
   proto::Fields fields({static_cast<const std::byte*>(reply->content), reply->size}, Answer::kName);
   Answer answer = Answer::read(fields);
