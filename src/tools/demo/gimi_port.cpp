@@ -179,8 +179,8 @@ Result<std::unique_ptr<NodePort>> connect_robot(const PortOptions& options) {
 
 Result<std::unique_ptr<NodePort>> connect_viewer(const PortOptions& options) {
   NodeOptions joining;
-  // Several viewers may look at one robot.
-  joining.name = fmt::format("viewer-{}", ::getpid());
+  // Without a name: several viewers, on as many computers, may look at one robot.
+  joining.resume = true;
   joining.hub = options.hub_url;
   joining.description = "the demo's viewer and driver";
   Outcome<Node> node = Node::join(joining);
