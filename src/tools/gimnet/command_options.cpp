@@ -118,7 +118,8 @@ void add_echo(CLI::App& app, Options& options) {
       ->check(not_empty());
   echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1")
       ->check(CLI::Range(std::uint32_t{1}, kSyncWindowMax));
-  echo.add_option("--depth", options.pace.depth, "newest messages that the hub holds meanwhile, 1 to 64, default 1")
+  echo.add_option("--depth", options.pace.depth,
+                  "newest messages that the hub holds meanwhile, 1 to 4096, of most hubs to 64, default 1")
       ->check(CLI::Range(std::uint32_t{1}, kDepthMax));
   echo.add_option("--rate", options.pace.rate_hz, "messages a second at most, 0.001 to 1000, default all")
       ->check(within(0.001, 1e3));
