@@ -179,7 +179,8 @@ void bitestream_put_time(bitestream_writer* writer, bitestream_key key, int64_t 
 
 void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type, const void* elements,
                           size_t count) {
-  const bool legal = is_array(type) && is_known_type(type) && count <= BITESTREAM_VALUE_BYTES_MAX;
+  // By division: a product could begin anew at 0 where size_t has 32 bits.
+  const bool legal = is_array(type) && is_known_type(type) && count <= BITESTREAM_VALUE_BYTES_MAX / unit_size(type);
   if (!legal) {
     set_status(writer, BITESTREAM_BAD_VALUE);
     return;
