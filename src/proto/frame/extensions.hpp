@@ -75,7 +75,6 @@ struct TraceSlot {
 /// A TRACE as it arrived. Valid until: the frame's bytes change.
 class TraceView {
  public:
-  TraceView() = default;
   /// REQUIRES: a value of 4 + 24 n bytes.
   explicit TraceView(std::span<const std::byte> value) : value_(value) {}
   [[nodiscard]] std::size_t slots() const { return (value_.size() - kTraceHeadSize) / kTraceSlotSize; }
