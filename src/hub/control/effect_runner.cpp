@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "hub/control/change_log.hpp"
 #include "hub/shard/control_frame.hpp"
 #include "proto/control/ns_register.hpp"
 
@@ -29,6 +30,7 @@ void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
         [&](const auto& one) {
           using One = std::remove_cvref_t<decltype(one)>;
           if constexpr (std::is_same_v<One, NodeNoted> || std::is_same_v<One, ServiceNoted>) {
+            log_change(one, parts_.membership, parts_.facts.id);
             parts_.watches.note(one, parts_.membership, now);
           } else {
             run(one);
@@ -76,6 +78,7 @@ void EffectRunner::run(const SessionEnded& effect) {
 }
 
 void EffectRunner::run(const RenumberDue& effect) {
+  log_change(effect, parts_.membership, parts_.facts.id);
   parts_.watches.connection_ended(effect.former);
   parts_.shards.send(
       effect.place.shard,
