@@ -185,12 +185,14 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
 #ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});
 #endif
-  effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name.str(), {}});
-  effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
-  services_.node_renumbered(former, index, effects);
+  // Who hears of the new id may send to it at once: by then no frame goes to the connection on which the node has the
+  // old one.
   effects.emplace_back(RenumberDue{session.place, former, index,
                                    "an administrator gave this node the id " + to_string(sessions_.node_id(session)) +
                                        "; come back with the token"});
+  effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name.str(), {}});
+  effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
+  services_.node_renumbered(former, index, effects);
   return std::nullopt;
 }
 

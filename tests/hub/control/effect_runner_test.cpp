@@ -1,0 +1,63 @@
+#include "hub/control/effect_runner.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/log.hpp"
+#include "proto/control/ctrl.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/hub/control/support/test_conductor.hpp"
+
+// The order of what the conductor publishes and tells is part of its meaning: who hears of an id may use it at once.
+
+namespace gimnet::hub {
+namespace {
+
+using ::testing::ElementsAre;
+namespace ns = proto::ns;
+
+class EffectRunnerTest : public ::testing::Test, protected TestConductor {
+ protected:
+  EffectRunnerTest() { set_log_level(LogLevel::off); }
+  ~EffectRunnerTest() override { set_log_level(LogLevel::info); }
+
+  /// The event that this command sends.
+  template <class Event>
+  static std::optional<Event> event_in(const ShardCommand& command) {
+    const auto* sent = std::get_if<SendControlCommand>(&command);
+    if (sent == nullptr || proto::split_control(payload_of(*sent))->header.operation != Event::kOperation) return {};
+    return *proto::decode<Event>(payload_of(*sent));
+  }
+};
+
+TEST_F(EffectRunnerTest, AProviderHearsOfAnIdOnceTheOneWhoGetsItWasToldToComeBack) {
+  const Node robot = join("robot");
+  const Node viewer = join("viewer");
+  may_administer = true;
+  proto::Hello hello;
+  hello.role = proto::Role::admin;
+  const Node admin = join(hello);
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"}));
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"}));
+  const auto wanted = make_id<NodeId>(kHub, 900);
+  std::vector<std::string> order;
+  shards.on_send = [&](const ShardCommand& command) {
+    if (std::holds_alternative<RenumberCommand>(command)) {
+      EXPECT_TRUE(nodes.find(900).exists());
+      EXPECT_TRUE(nodes.find(index_of(viewer.id)).is_renumbered());
+      order.emplace_back("renumber");
+    }
+    if (const auto joined = event_in<ns::SubscriberJoined>(command); joined && joined->node == wanted) {
+      order.emplace_back("joined");
+    }
+  };
+  proto::ctrl::Reassign reassign;
+  reassign.node = viewer.id;
+  reassign.new_node = wanted;
+  ASSERT_TRUE(ask<proto::ctrl::ReassignAnswer>(admin, reassign, proto::Kind::ctrl));
+  EXPECT_THAT(order, ElementsAre("renumber", "joined"))
+      << "else a frame to the new id reaches the connection on which the node goes by the old one";
+}
+
+}  // namespace
+}  // namespace gimnet::hub
