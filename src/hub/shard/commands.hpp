@@ -21,8 +21,9 @@
 // before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send, and
 // once more with the AttachCommand of a node that may not have read it; it publishes a group before it sends the
 // PaceCommand of a member, and that before any answer; it sends a RenumberCommand before it names the new id to anybody
-// else. So commands that wait are carried out before mail that came after them: a frame neither finds its recipient
-// unattached, or on a connection on which it has another id, nor overtakes the event about it.
+// else, and publishes a group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
+// carried out before mail that came after them: a frame neither finds its recipient unattached, or on a connection on
+// which it has another id, nor overtakes the event about it.
 //
 // The other way round a shard's mail to other shards and its events to the conductor may overtake each other. Where the
 // conductor takes something away that such mail needs, a group, it fences first (hub/control/group_endings.hpp).

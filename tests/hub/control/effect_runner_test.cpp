@@ -59,5 +59,28 @@ TEST_F(EffectRunnerTest, AProviderHearsOfAnIdOnceTheOneWhoGetsItWasToldToComeBac
       << "else a frame to the new id reaches the connection on which the node goes by the old one";
 }
 
+TEST_F(EffectRunnerTest, WhoMaySendToAServiceHearsOfItsGroupOnceThatIsThere) {
+  const Node robot = join("robot");
+  const Node sender = join("sender");
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(sender, ns::Subscribe{"robot/cmd"}));
+  std::vector<bool> there;
+  shards.on_send = [&](const ShardCommand& command) {
+    if (const auto moved = event_in<ns::ServiceMoved>(command)) {
+      there.push_back(groups.find(index_of(moved->new_group)) != nullptr);
+    }
+  };
+  ns::Advertise offer;
+  offer.service = "cmd";
+  offer.direction = ns::Direction::accepts;
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  EXPECT_THAT(there, ElementsAre(true)) << "else the first message, sent at once, is for no group";
+  offer.message_type = 5;
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  EXPECT_THAT(there, ElementsAre(true, true)) << "the same where it moves";
+  offer.direction = ns::Direction::provides;
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  EXPECT_THAT(there, ElementsAre(true, true, false)) << "what it provides comes to who was told";
+}
+
 }  // namespace
 }  // namespace gimnet::hub

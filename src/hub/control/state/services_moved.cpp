@@ -42,8 +42,12 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
     effects.emplace_back(
         ServiceNoted{ChangeKind::withdrawn, old_group, service.provider, std::string{topic.full_name}});
   }
+  // Who is told may send at once to a group that accepts data; of one that provides, messages come at once to whoever
+  // may have to be told.
+  const bool accepts = static_cast<proto::ns::Direction>(service.terms.direction) == proto::ns::Direction::accepts;
+  if (accepts) effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
-  effects.emplace_back(GroupChanged{service.group});
+  if (!accepts) effects.emplace_back(GroupChanged{service.group});
   for (const std::uint32_t subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
 }
