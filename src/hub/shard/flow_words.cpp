@@ -17,9 +17,11 @@ void send_flow(ShardState& state, Connection& connection, const proto::flow::Mes
 void send_confirm(ShardState& state, Connection& connection) {
   ResumeState& resume = *connection.resume;
   if (resume.taken == resume.taken_told) return;
+  // Without room it is said with what is taken next, at the next PING, or with keep-alive.
+  if (!push_flow(state, connection, proto::flow::Confirm{resume.taken})) return;
   resume.taken_told = resume.taken;
   resume.bytes_since_told = 0;
-  send_flow(state, connection, proto::flow::Confirm{resume.taken});
+  state.recipients.mark_dirty(connection);
 }
 
 /// One PING is under way at a time, so that a service that moves all the time costs one a round trip.

@@ -155,6 +155,35 @@ TEST(Keeper, ConfirmsWhatItTookWhenAsked) {
   EXPECT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1)) << "nothing new to confirm";
 }
 
+TEST(Keeper, SaysAConfirmLaterThatFoundNoRoom) {
+  Limits limits;
+  limits.control_bytes = 16 * 1024;
+  for (const bool asks : {true, false}) {
+    HubRig rig(1, limits);
+    FakeNode& a = rig.join(0, {.resume = true});
+    FakeNode& b = rig.join(0);
+    a.pipe.set_room(0);
+    for (int i = 0; i < 2'000; ++i) rig.send_flow(a, proto::flow::Ping{});
+    rig.send(a, b.id.value(), "one");
+    rig.send_flow(a, proto::flow::Ping{});
+    rig.settle();
+    EXPECT_THAT(b.frames, SizeIs(1));
+    a.pipe.set_room(MemoryPeer::kAll);
+    rig.settle();
+    EXPECT_GE(a.flow().size(), 400u) << "as many as there is room for";
+    EXPECT_LT(a.flow().size(), 2'000u);
+    EXPECT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(0));
+    if (asks) {
+      rig.send_flow(a, proto::flow::Ping{});
+    } else {
+      rig.pass_ms(1'100);
+    }
+    rig.settle();
+    ASSERT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1)) << "asks " << asks;
+    EXPECT_EQ(a.flow_of<proto::flow::Confirm>()[0].count, 1u);
+  }
+}
+
 TEST(Keeper, ConfirmsAtAQuarterOfThePeersBuffer) {
   HubRig rig;
   FakeNode& a = rig.join(0, {.resume = true, .resume_bytes = 4'000});
