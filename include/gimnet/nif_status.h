@@ -33,7 +33,7 @@ typedef enum nif_status {
   NIF_NO_MEMORY = 21,        /**< Out of memory or descriptors in this process. */
   NIF_IN_CALLBACK = 22,      /**< The call would wait for the library's own thread, which is inside the callback. */
   NIF_FORKED = 23,           /**< The handle belongs to the parent process. */
-  NIF_BUFFER_TOO_SMALL = 24, /**< The caller's buffer is too small; the size needed was stored. */
+  NIF_BUFFER_TOO_SMALL = 24, /**< Reserved: no call answers it. */
   NIF_SYSTEM = 25,           /**< The operating system refused; the sentence says what. */
   NIF_NO_HOST = 26           /**< No address is known for the host in the hub's URL. Is its name right? */
 } nif_status;
