@@ -15,7 +15,7 @@ from support.wire import (FLAG_KEYED, FLAG_REPORT, GOODBYE, LINK, NS, OPENING, R
                           frame, hello, number, text)
 
 RESOLVE = 3
-AWAY = 3  # the reason of a REPORT
+NO_SUCH_NODE, AWAY = 1, 3  # reasons of a REPORT
 
 
 def resolve(client, name):
@@ -80,6 +80,27 @@ class Restart(unittest.TestCase):
         # J was killed with the hub; started again, it has its id and name, too.
         start_recv(self, hub, "J")
         self.assertEqual(id_of(hub, "J"), j_id)
+
+    def test_one_that_was_given_a_high_id_is_away_until_it_is_back(self):
+        hub = Hub(self)
+        k = start_recv(self, hub, "K")
+        peer = Client(self, hub).join("peer")
+        given = run_gimnet(f"unix:{hub.socket_path}", "ctl", "reassign", "K", "7.900000")
+        self.assertEqual(given.code, 0, given.err)
+        wait_until(lambda: any(node["id"] == "7.900000" and node["connected"] for node in hub.nodes()), "K as 7.900000")
+        k.signal(signal.SIGSTOP)
+        self.kill(hub)
+        hub = hub.again(self)
+        again = Client(self, hub).join("peer", token=peer.welcome[2])
+        # What was handed out before the restart decides, not where: the index beside it was nobody's.
+        for target, reason in ((node_id("7.900000"), AWAY), (node_id("7.900001"), NO_SUCH_NODE)):
+            again.send(again.frame(target, b"?", flags=FLAG_REPORT))
+            self.assertEqual(again.next_where(lambda got: got.kind == REPORT).payload[0], reason, hex(target))
+        k.signal(signal.SIGCONT)
+        self.assertEqual(id_of(hub, "K"), node_id("7.900000"))
+        again.send(message(again, node_id("7.900000"), 1, b"still you"))
+        wait_until(lambda: k.out == b"still you\n", "the message at K")
+        hub.expect_ledger(self, accepted=again.frames_sent, delivered=1, dropped={"away": 1, "no_such_node": 1})
 
     def test_restarts_do_not_use_up_what_was_handed_out(self):
         hub = Hub(self)

@@ -53,6 +53,14 @@ std::uint64_t epoch_of(const HubStart& start) {
   return epoch != 0 ? epoch : 1;
 }
 
+/// Those whose ids were handed out before a restart, or may have been, wherever REASSIGN put them.
+void expect_all(const IndexSet& used, NodeTable& nodes) {
+  const std::size_t end = 8 * used.bytes().size();
+  for (std::uint32_t index = 1; index < end; ++index) {
+    if (used.contains(index)) nodes.expect(index);
+  }
+}
+
 }  // namespace
 
 Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring)
@@ -66,7 +74,7 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
       runner_({facts_, wiring_.shards, membership_, watches_, publisher_, keeper_}),
       returns_published_(membership_.sessions().returns_until().has_value()) {
   GIMNET_CHECK(wiring_.shards.shards() == facts_.shards);
-  if (returns_published_) wiring_.tables.nodes.expect_returns_below(wiring_.start.nodes.first);
+  if (returns_published_) expect_all(wiring_.start.nodes.used, wiring_.tables.nodes);
 }
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
@@ -257,7 +265,7 @@ void Conductor::tick(milliseconds now) {
   if (returns_published_ && membership_.sessions().returns_expected_for(now) <= milliseconds{0}) {
     // What those of before the restart had is used no more.
     if (membership_.keeping_due(now)) effects.emplace_back(StateDue{});
-    wiring_.tables.nodes.expect_returns_below(0);
+    wiring_.tables.nodes.expect_nobody();
     returns_published_ = false;
   }
   runner_.carry_out(effects, now);

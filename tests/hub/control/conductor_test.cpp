@@ -310,19 +310,21 @@ class SecondStartTest : public ::testing::Test, protected TestConductor {
   static HubStart second_start() {
     HubStart start{{}, {4'097, IndexPool::kBlock}, {4'097, IndexPool::kBlock}};
     start.state.boot = 2;
+    for (const std::uint32_t index : {1u, 4'096u, 900'000u}) start.nodes.used.insert(index);
     return start;
   }
 };
 
 TEST_F(SecondStartTest, NodesThatAreNotBackAreAwayForAGraceTime) {
   const std::chrono::milliseconds end = facts().started + std::chrono::milliseconds{limits.grace_ms};
-  EXPECT_TRUE(nodes.may_return(4'096));
+  EXPECT_TRUE(nodes.may_return(4'096) && nodes.may_return(900'000)) << "wherever REASSIGN had put them";
+  EXPECT_FALSE(nodes.may_return(4'000)) << "nobody had it";
   EXPECT_EQ(index_of(join("Z").id), 4'097u);
   EXPECT_EQ(conductor.next_deadline(), end);
   conductor.tick(end - 1ms);
   EXPECT_TRUE(nodes.may_return(4'096));
   conductor.tick(end);
-  EXPECT_FALSE(nodes.may_return(4'096));
+  for (const std::uint32_t index : {4'096u, 900'000u}) EXPECT_FALSE(nodes.may_return(index)) << index;
   EXPECT_EQ(conductor.next_deadline(), std::nullopt);
 }
 

@@ -27,8 +27,9 @@ inline constexpr std::uint32_t kSlotsMax = 1u << 24;
 /// The most shards that a hub can have: as many as bits in a set of them.
 inline constexpr std::size_t kShardsMax = 64;
 
-/// Node index to place, for the nodes of this hub: a flat array of 2^20 words in memory that the kernel hands out
-/// page by page. Thread safety: one writer (the conductor), any number of readers; reads are wait-free.
+/// Node index to place, for the nodes of this hub: a flat array of 2^20 words, and a bit for each, in memory that the
+/// kernel hands out page by page. Thread safety: one writer (the conductor), any number of readers; reads are
+/// wait-free.
 class NodeTable {
  public:
   NodeTable();
@@ -45,13 +46,13 @@ class NodeTable {
     return unpack(words_[index].load(std::memory_order_acquire));  // pairs with the release store in publish()
   }
 
-  /// Nodes with a lower index may be on their way back to a hub that was restarted: for them nobody is `away`, not
-  /// unknown. 0: nobody is expected. Index 0 is the hub itself.
-  void expect_returns_below(std::uint32_t index) {
-    returns_below_.store(index, std::memory_order_relaxed);  // relaxed: words a reason, decides nothing
-  }
+  /// That node may be on its way back to a hub that was restarted: until it is there, or expect_nobody(), it is
+  /// `away`, not unknown. REQUIRES: 0 < index < 2^20.
+  void expect(std::uint32_t index);
+  void expect_nobody();
   [[nodiscard]] bool may_return(std::uint32_t index) const {
-    return index > 0 && index < returns_below_.load(std::memory_order_relaxed);  // relaxed: as above
+    // relaxed: words a reason, decides nothing
+    return (expected_[index / 64].load(std::memory_order_relaxed) >> (index % 64) & 1) != 0;
   }
 
   /// The shards (a bit set) on which a node lives.
@@ -72,10 +73,11 @@ class NodeTable {
 
   /// Returns how many there are now.
   std::uint32_t change_count(ShardIndex shard, int change);
+  void change_expected(std::uint32_t index, bool expected);
 
   std::atomic<std::uint64_t>* words_;
+  std::atomic<std::uint64_t>* expected_;  ///< a bit for each index, in the same memory
   std::atomic<std::uint64_t> shards_{0};
-  std::atomic<std::uint32_t> returns_below_{0};
   std::array<std::atomic<std::uint32_t>, kShardsMax> nodes_by_shard_{};
 };
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace gimnet::hub {
 namespace {
 
@@ -45,14 +47,25 @@ TEST(NodeTable, KnowsTheShardsWithNodes) {
 
 TEST(NodeTable, KnowsWhoMayComeBack) {
   NodeTable table;
+  const std::vector<std::uint32_t> expected{1, 63, 64, 4'096, 900'000, kEveryIndex - 1};
   EXPECT_FALSE(table.may_return(1));
-  table.expect_returns_below(4'097);
-  EXPECT_TRUE(table.may_return(1));
-  EXPECT_TRUE(table.may_return(4'096));
-  EXPECT_FALSE(table.may_return(4'097));
-  EXPECT_FALSE(table.may_return(0)) << "the hub itself";
-  table.expect_returns_below(0);
-  EXPECT_FALSE(table.may_return(1));
+  for (const std::uint32_t index : expected) table.expect(index);
+  for (const std::uint32_t index : expected) EXPECT_TRUE(table.may_return(index)) << index;
+  for (const std::uint32_t index : {0u, 2u, 62u, 65u, 4'095u, 4'097u, 899'999u, kEveryIndex - 2, kEveryIndex}) {
+    EXPECT_FALSE(table.may_return(index)) << index;
+  }
+  table.expect_nobody();
+  for (const std::uint32_t index : expected) EXPECT_FALSE(table.may_return(index)) << index;
+}
+
+TEST(NodeTable, WhoCameBackAndLeftIsNotExpected) {
+  NodeTable table;
+  table.expect(7);
+  table.expect(8);
+  table.publish(7, {ShardIndex{0}, ConnectionSlot{1}, 1});
+  table.publish(7, {});
+  EXPECT_FALSE(table.may_return(7));
+  EXPECT_TRUE(table.may_return(8));
 }
 
 }  // namespace
