@@ -29,6 +29,7 @@ enum class Happening : std::uint8_t {
   former_group_kept,
   last_goodbye_told,
   grace_expired,
+  grace_put_off,
   goodbye,
   crash,
   vanished,

@@ -187,6 +187,12 @@ void HubLife::take_event(std::size_t shard) {
   after_step();
 }
 
+void HubLife::stood_still(milliseconds time) {
+  setting_.trace.note("conductor: stood still for {a} ms", static_cast<std::uint64_t>(time.count()));
+  conductor_.stood_still(time, setting_.agenda.now_ms());
+  model_.stood_still(time, setting_.agenda.now_ms());
+}
+
 void HubLife::tick() {
   const bool garbage = conductor_.has_garbage();
   const milliseconds now = setting_.agenda.now_ms();

@@ -34,6 +34,8 @@ class HubLife {
   [[nodiscard]] std::optional<proto::Goodbye> admit(const Newcomer& newcomer, std::uint64_t number);
   void take_event(std::size_t shard);
   void tick();
+  /// The conductor looks at its clock so much later than it was to.
+  void stood_still(milliseconds time);
   /// The hub is to end: nobody is let in any more, and everybody is told to go.
   void drain();
   [[nodiscard]] bool drains() const { return drains_; }

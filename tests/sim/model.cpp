@@ -257,6 +257,18 @@ void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
   session.away_order = ++orders_;
 }
 
+void Model::stood_still(milliseconds time, milliseconds now) {
+  const milliseconds latest = now + milliseconds{limits_.grace_ms};
+  const auto put_off = [&](milliseconds& until) { until = std::min(until + time, latest); };
+  for (auto& [index, session] : sessions_) {
+    const bool was_over = session.away_until <= now;
+    put_off(session.away_until);
+    if (!session.connected && was_over && session.away_until > now) census_.add(Happening::grace_put_off);
+    put_off(session.declare_until);
+  }
+  put_off(past_.returns_until);
+}
+
 void Model::ticked(milliseconds now) {
   std::vector<std::uint32_t> over;
   for (const auto& [index, session] : sessions_) {

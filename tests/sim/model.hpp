@@ -160,6 +160,7 @@ class Model final : public Witness {
   void heard(const hub::HeardEvent& event);
   void detached(const hub::DetachedEvent& event, milliseconds now);
   void ticked(milliseconds now);
+  void stood_still(milliseconds time, milliseconds now);
   /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.
   void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
   /// The hub keeps that on its disk, in the midst of a step.

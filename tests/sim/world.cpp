@@ -193,6 +193,7 @@ void World::want_conductor(Time delay) {
 
 void World::conductor_turn() {
   if (down_) return;
+  look_whether_it_stood();
   enum class Choice { clock, newcomer, event, watches };
   std::vector<Choice> choices;
   const std::vector<std::size_t> shards = life_->shards().with_events();
@@ -239,12 +240,22 @@ void World::admit() {
   network_.close_by_hub(newcomer.wire);
 }
 
-/// As the conductor's loop does it (hub/control/conductor_loop.cpp).
+// As the conductor's loop does it (hub/control/conductor_loop.cpp).
+
+void World::look_whether_it_stood() {
+  if (!clock_) return;
+  const milliseconds stood = setting_.agenda.now_ms() - std::chrono::duration_cast<milliseconds>(*clock_);
+  if (stood <= hub::Conductor::kLookEvery) return;
+  clock_ = setting_.agenda.now();
+  life_->stood_still(stood);
+}
+
 void World::arm_clock() {
   std::optional<milliseconds> deadline = life_->conductor().next_deadline();
   const milliseconds collect = setting_.agenda.now_ms() + 20ms;
   if (life_->conductor().has_garbage() && (!deadline || collect < *deadline)) deadline = collect;
   if (!deadline) return;
+  deadline = std::min(*deadline, setting_.agenda.now_ms() + hub::Conductor::kLookEvery);
   const Time time = *deadline + 1ms;
   if (clock_ && *clock_ <= time) return;
   clock_ = time;

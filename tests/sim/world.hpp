@@ -59,6 +59,7 @@ class World {
   /// One thing that the conductor does, out of those that wait for it.
   void conductor_turn();
   void admit();
+  void look_whether_it_stood();
   void arm_clock();
   void live();
   void converge();

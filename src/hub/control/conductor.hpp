@@ -55,6 +55,14 @@ class Conductor final : private Administration {
 
   void on_event(ShardEvent event, std::chrono::milliseconds now);
 
+  /// As long as something runs out, tick() is to be called so often: from a call that comes later than that one sees
+  /// that the hub stood still (stopped, or without a processor), and for how long.
+  static constexpr std::chrono::milliseconds kLookEvery{100};
+  /// It did for so long until now: times in which nodes come back run no further by it. To be said before events are
+  /// taken.
+  void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now) {
+    membership_.stood_still(time, now);
+  }
   /// Ends what is overdue and frees what is no longer looked at.
   void tick(std::chrono::milliseconds now);
   /// When tick() has something to do; nothing while nothing runs out.

@@ -84,6 +84,7 @@ struct ConductorLoop::Impl {
 
   void open(Door& door) {
     if (stopping) return;
+    look_whether_it_stood();
     const milliseconds moment = now();
     const auto after =
         door.acceptor.accept_some([this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
@@ -128,6 +129,7 @@ struct ConductorLoop::Impl {
 
   void watch_strangers() {
     strangers_watch.wait([this] {
+      look_whether_it_stood();
       serve_strangers();
       serve_watches();
       arm_timer();
@@ -137,6 +139,7 @@ struct ConductorLoop::Impl {
   }
 
   void take_events() {
+    look_whether_it_stood();
     wiring.inbox.waker().awake();
     wiring.inbox.drain(kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
     serve_watches();
@@ -182,11 +185,14 @@ struct ConductorLoop::Impl {
     };
     sooner(strangers.next_deadline());
     if (wiring.conductor.has_garbage()) sooner(now() + kCollectEvery);
-    if (!deadline || (armed && *armed <= *deadline)) return;
+    if (!deadline) return;
+    sooner(now() + Conductor::kLookEvery);
+    if (armed && *armed <= *deadline) return;
     armed = deadline;
     timer.expires_after(std::max(*deadline - now(), milliseconds{0}) + milliseconds{1});
     timer.async_wait([this](const error_code& error) {
       if (error) return;
+      look_whether_it_stood();
       armed.reset();
       wiring.conductor.tick(now());
       strangers.tick(now());
@@ -194,6 +200,15 @@ struct ConductorLoop::Impl {
       arm_timer();
       end_if_all_left();
     });
+  }
+
+  /// Before anything is judged by the clock: what peers sent while the hub stood still lies there unread.
+  void look_whether_it_stood() {
+    const milliseconds moment = now();
+    if (!armed || moment - *armed <= Conductor::kLookEvery) return;
+    const milliseconds stood = moment - std::exchange(*armed, moment);
+    wiring.conductor.stood_still(stood, moment);
+    strangers.stood_still(stood, moment);
   }
 
   void watch_signals() {
@@ -249,7 +264,7 @@ struct ConductorLoop::Impl {
   Watch strangers_watch;
   Watch inbox_watch;
   asio::steady_timer timer;
-  std::optional<milliseconds> armed;  ///< when the timer fires
+  std::optional<milliseconds> armed;  ///< when the timer fires, or is seen to have been late
   std::optional<asio::steady_timer> drain_deadline;
   asio::signal_set signals;
   asio::signal_set reloads;

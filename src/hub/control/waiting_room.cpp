@@ -112,10 +112,17 @@ bool WaitingRoom::serve(milliseconds now) {
   return count == kBatch;
 }
 
+void WaitingRoom::stood_still(milliseconds time, milliseconds now) {
+  const auto put_off = [time](Peers& peers, milliseconds latest) {
+    for (Peer& peer : peers) peer.deadline = std::min(peer.deadline + time, latest);  // nothing began later than now
+  };
+  put_off(waiting_, now + milliseconds{limits_.handshake_ms});
+  put_off(leaving_, now + milliseconds{limits_.farewell_ms});
+}
+
 void WaitingRoom::tick(milliseconds now) {
   while (!waiting_.empty() && waiting_.front().deadline <= now) {
-    turn_away(waiting_.front(),
-              {GoodbyeCode::hello_timeout, "no HELLO within " + std::to_string(limits_.handshake_ms) + " ms"}, now);
+    end_waiting(waiting_.front(), "no HELLO within " + std::to_string(limits_.handshake_ms) + " ms", now);
   }
   while (!leaving_.empty() && leaving_.front().deadline <= now) remove(leaving_.front());
   keep_leaving_few();

@@ -42,7 +42,9 @@ class WaitingRoom {
   [[nodiscard]] Acceptor::Room give_way_to(const Stranger& newcomer);
   /// Reads what strangers said, one batch. True: there may be more.
   bool serve(std::chrono::milliseconds now);
-  /// Ends those whose time is over.
+  /// The hub stood still for so long until now, and read nothing: so much more time have those who wait or leave.
+  void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
+  /// Ends those whose time is over, but judges whose HELLO is there by now.
   void tick(std::chrono::milliseconds now);
   /// Refuses everybody, as at the end of the hub: nobody enters any more, and each of those who leave has its time.
   void dismiss_all(const proto::Goodbye& goodbye, std::chrono::milliseconds now);

@@ -157,6 +157,37 @@ TEST_F(WaitingRoomTest, AHelloThatDripsDoesNotMoveItsDeadline) {
   EXPECT_EQ(room_.waiting(), 0u);
 }
 
+TEST_F(WaitingRoomTest, WhoseHelloIsThereAtItsDeadlineIsJudged) {
+  enter().send(opening_and(hello("robot")));
+  Peer& half = enter();
+  const std::vector<std::byte> bytes = opening_and(hello("late"));
+  half.send(std::span{bytes}.first(bytes.size() / 2));
+  enter().close();
+  room_.tick(5s);
+  EXPECT_EQ(admitted_.size(), 1u);
+  EXPECT_TRUE(timed_out(half));
+  EXPECT_EQ(room_.waiting(), 0u);
+  EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 1u);
+}
+
+TEST_F(WaitingRoomTest, WhoWaitsOrLeavesHasItsTimeAgainWhereTheHubStoodStill) {
+  enter(0s);
+  enter(1s).send(opening_and(hello("unwelcome")));
+  serve(1s);  // it may leave until 2 s
+  enter(61s);
+  room_.stood_still(60s, 61s);
+  EXPECT_EQ(room_.next_deadline(), 62s);
+  room_.tick(62s - 1ms);
+  EXPECT_EQ(room_.leaving(), 1u);
+  room_.tick(62s);
+  EXPECT_EQ(room_.leaving(), 0u);
+  room_.tick(65s - 1ms);
+  EXPECT_EQ(room_.waiting(), 2u);
+  room_.tick(65s);
+  EXPECT_EQ(room_.waiting(), 1u);
+  EXPECT_EQ(room_.next_deadline(), 66s) << "what began after that has its time, and no more";
+}
+
 TEST_F(WaitingRoomTest, WhoHangsUpIsForgotten) {
   Peer& peer = enter();
   peer.close();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <deque>
 #include <utility>
@@ -28,6 +29,12 @@ class DueList {
   [[nodiscard]] const Note& front() const { return notes_.front(); }
   /// REQUIRES: not empty.
   void pop_front() { notes_.pop_front(); }
+  /// All are due later by that, at the latest at `latest`: in the same order. REQUIRES: Note::until says when it is
+  /// due.
+  template <class Time>
+  void put_off(Time by, Time latest) {
+    for (Note& note : notes_) note.until = std::min(note.until + by, latest);
+  }
   [[nodiscard]] auto begin() { return notes_.begin(); }
   [[nodiscard]] auto end() { return notes_.end(); }
 

@@ -65,6 +65,10 @@ void IndexPool::give_back(std::uint32_t index, std::chrono::milliseconds now) {
 
 bool IndexPool::held(std::uint32_t index) const { return taken_.contains(index) && !rests_until_.contains(index); }
 
+void IndexPool::put_off_returns(std::chrono::milliseconds by, std::chrono::milliseconds latest) {
+  returns_until_ = std::min(returns_until_ + by, latest);
+}
+
 std::optional<std::chrono::milliseconds> IndexPool::waits_for_returns(std::chrono::milliseconds now) const {
   if (unused() > 0 || now >= returns_until_) return std::nullopt;
   return returns_until_ - now;

@@ -50,6 +50,8 @@ class IndexPool {
   [[nodiscard]] std::uint32_t held() const { return held_; }
   /// Was it handed out, or may it have been before a restart, and was not forgotten since?
   [[nodiscard]] bool used(std::uint32_t index) const { return used_.contains(index); }
+  /// Those of before a restart may come back for so much longer, at the latest until `latest`.
+  void put_off_returns(std::chrono::milliseconds by, std::chrono::milliseconds latest);
   /// How long newcomers have to wait for those of before a restart, since all indices are used; nothing: it is not
   /// that.
   [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(std::chrono::milliseconds now) const;
@@ -85,7 +87,7 @@ class IndexPool {
   const std::chrono::milliseconds resting_time_;
   const std::uint32_t first_;
   const bool keeps_nothing_;
-  const std::chrono::milliseconds returns_until_;
+  std::chrono::milliseconds returns_until_;
   std::uint64_t position_ = 0;      ///< of the one to look at next; index_at() tells which that is
   std::uint64_t end_;               ///< granted are the positions from there to here, no more than there are indices
   std::uint32_t granted_left_ = 0;  ///< of those, how many are not used

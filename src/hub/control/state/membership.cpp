@@ -209,6 +209,13 @@ std::string Membership::why_taken(NodeId node, milliseconds now) const {
   return "the id " + id + " rests, since a node had it a moment ago; choose another one, or try again in a minute";
 }
 
+void Membership::stood_still(milliseconds time, milliseconds now) {
+  const milliseconds latest = now + milliseconds{limits_.grace_ms};
+  sessions_.stood_still(time, now);
+  services_.group_indices().put_off_returns(time, latest);
+  redeclaring_.put_off(time, latest);
+}
+
 void Membership::tick(milliseconds now, Effects& effects) {
   while (Session* expired = sessions_.next_expired(now)) end(*expired, now, effects);
   while (!redeclaring_.empty() && redeclaring_.front().until <= now) {

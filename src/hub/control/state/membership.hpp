@@ -88,6 +88,9 @@ class Membership {
   /// Names taken from now on are final at once, as on a hub that is the whole network, or wait for name_decided().
   void decide_names(NameStanding standing) { standing_ = standing; }
 
+  /// The hub stood still for so long until now, and nobody could come back or declare anything: what would have run out
+  /// meanwhile has its time again. To be said before tick().
+  void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
   /// Ends what is overdue.
   void tick(std::chrono::milliseconds now, Effects& effects);
   /// When tick() has something to do; nothing while nothing runs out.

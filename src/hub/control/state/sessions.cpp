@@ -138,6 +138,16 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
            sessions_.size(), [this](const Away& each) { return !still_away(each); });
 }
 
+void Sessions::stood_still(milliseconds time, milliseconds now) {
+  const milliseconds latest = now + milliseconds{limits_.grace_ms};  // nothing began later than now
+#ifndef GIMNET_BUG_GRACE_GOES_ON_WITHOUT_THE_HUB
+  away_named_.put_off(time, latest);
+  away_nameless_.put_off(time, latest);
+#endif
+  if (returns_until_) returns_until_ = std::min(*returns_until_ + time, latest);
+  indices_.put_off_returns(time, latest);
+}
+
 bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
   if (!indices_.take_free(index, now)) return false;
   const std::uint32_t former = session.index;

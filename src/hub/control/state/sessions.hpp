@@ -142,6 +142,8 @@ class Sessions {
   [[nodiscard]] std::chrono::milliseconds returns_expected_for(std::chrono::milliseconds now) const {
     return returns_until_ ? *returns_until_ - now : std::chrono::milliseconds{0};
   }
+  /// The hub stood still for so long, and nobody could come back: grace times, and the time after a restart, did, too.
+  void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
   /// Under which index a node goes on that had this one: the same, unless renumber() gave it another.
   [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
   /// The indices that the session's node had before.
@@ -195,7 +197,7 @@ class Sessions {
   const HubId hub_;
   const Placement placement_;
   const Secret secret_;
-  const std::optional<std::chrono::milliseconds> returns_until_;
+  std::optional<std::chrono::milliseconds> returns_until_;
   SessionNumber last_number_;
   IndexPool indices_;
   NumberFloor floor_;

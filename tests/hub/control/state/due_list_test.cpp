@@ -31,6 +31,19 @@ TEST(DueList, KeepsAsManyVoidNotesAsItMayAndForgetsThemWithOneMore) {
   EXPECT_EQ(std::vector<int>(notes.begin(), notes.end()), (std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
 }
 
+TEST(DueList, PutsAllOffInTheirOrderAndNoneTooFar) {
+  struct Due {
+    int until;
+  };
+  DueList<Due> notes;
+  for (const int until : {3, 5, 9}) notes.add({until}, 3, [](const Due&) { return false; });
+  notes.put_off(4, 10);
+  for (const int until : {7, 9, 10}) {
+    EXPECT_EQ(notes.front().until, until);
+    notes.pop_front();
+  }
+}
+
 // A node that comes and goes a million times in no time.
 TEST(DueList, StaysSmallHoweverManyBecomeVoid) {
   Notes notes;

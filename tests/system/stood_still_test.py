@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+"""The hub's process stands still for longer than its timers (SIGSTOP) and goes on: what peers did meanwhile counts."""
+
+import pathlib
+import signal
+import time
+import unittest
+
+from support.processes import Hub
+from support.waiting import wait_until
+from support.wire import NS, OPENING, WELCOME, Client, hello, text
+
+ADVERTISE = 7
+TIME_S = 8
+
+
+def stop(hub):
+    """Returns when none of its threads runs any more."""
+    hub.process.signal(signal.SIGSTOP)
+    threads = pathlib.Path(f"/proc/{hub.process.popen.pid}/task")
+
+    def stands():
+        return all((thread / "stat").read_text().rsplit(")", 1)[1].split()[0] == "T" for thread in threads.iterdir())
+    wait_until(stands, "a hub that stands still")
+
+
+class Stopped(unittest.TestCase):
+    def test_who_says_hello_or_comes_back_meanwhile_is_not_too_late(self):
+        hub = Hub(self, "--limit", f"grace_ms={TIME_S * 1000}", "--limit", f"handshake_ms={TIME_S * 1000}", "--limit",
+                  "silent_ms=600000")
+        while True:
+            began = time.monotonic()
+            provider = Client(self, hub).join("K")
+            group = provider.ask(NS, ADVERTISE, text(3, "odom"))[3]
+            provider.socket.close()
+            wait_until(lambda: any(node["name"] == "K" and not node["connected"] for node in hub.nodes()), "K away")
+            stranger = Client(self, hub)
+            Client(self, hub).join()  # the hub takes them in order: it has the stranger, who has said nothing yet
+            stop(hub)
+            if time.monotonic() - began < TIME_S / 4:
+                break
+            hub.process.signal(signal.SIGCONT)  # too slow a moment to say that nothing had run out before it stood
+        stranger.send(OPENING + hello("S"))
+        again = Client(self, hub)
+        again.send(OPENING + hello("K", token=provider.welcome[2]))
+        wait_until(lambda: time.monotonic() - began > TIME_S + 1, "the end of all times")
+        hub.process.signal(signal.SIGCONT)
+        self.assertEqual(stranger.first_answer().operation, WELCOME)
+        answer = again.first_answer()
+        self.assertEqual((answer.operation, answer.dst), (WELCOME, provider.id))
+        # Its session was not over, nor its service: that is where its subscribers know it.
+        again.id = answer.dst
+        self.assertEqual(again.ask(NS, ADVERTISE, text(3, "odom"))[3], group)
+
+
+if __name__ == "__main__":
+    unittest.main()
