@@ -314,9 +314,11 @@ class Node {
   // ---- changing the hub, for those who joined as administrators; everybody else is denied
 
   /// Ends the session of a node, which is told `reason` (at most 256 bytes) and does not come back by itself; its token
-  /// counts for nothing from then on. Errors: not_found, denied, bad_argument (this node itself).
-  Outcome<void> kick(Peer node, std::string_view reason = {}, Timeout timeout = Timeout{5000}) const;
-  /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument.
+  /// counts for nothing from then on. Answers with what the hub cannot promise (its disk is full, and it would forget
+  /// that at a restart), as a rule nothing. Errors: not_found, denied, bad_argument (this node itself).
+  Outcome<std::string> kick(Peer node, std::string_view reason = {}, Timeout timeout = Timeout{5000}) const;
+  /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument, limit (the hub
+  /// cannot keep that over a restart: its disk is full).
   Outcome<void> reassign(Peer node, Peer new_id, Timeout timeout = Timeout{5000}) const;
   /// The hub writes what waits, says goodbye to everybody, and ends.
   Outcome<void> drain_hub(Timeout timeout = Timeout{5000}) const;

@@ -83,6 +83,7 @@ enum class Happening : std::uint8_t {
   renumbered_came_back,
   renumbered_to_taken,
   renumbered_to_awaited,
+  renumbering_not_kept,
   renumbered_while_awaiting,
   named_by_former_id,
   configuration_changed,

@@ -74,6 +74,7 @@ HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& st
                                           std::string error = keep(state);
                                           kept_ = error.empty();
                                           if (kept_) model_.kept(state, setting_.agenda.now_ms());
+                                          if (!kept_) model_.keeping_failed();
                                           return error;
                                         },
                                         {},

@@ -165,6 +165,8 @@ class Model final : public Witness {
   void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
   /// The hub keeps that on its disk, in the midst of a step.
   void kept(const hub::HubState& state, milliseconds now);
+  /// It could not, in the midst of a step.
+  void keeping_failed() { keeping_failed_ = true; }
   /// The step is over; `kept`: so is what it brought.
   void step_over(bool kept);
   /// The hub drains from now on: nobody is let in.
@@ -317,6 +319,7 @@ class Model final : public Witness {
   std::map<std::uint32_t, Moved> moved_;  ///< by former index
   std::set<std::uint32_t> unkept_;        ///< indices that were not granted, given while nothing can be kept
   std::set<std::uint32_t> unkept_groups_;
+  bool keeping_failed_ = false;  ///< in this step
   bool few_nodes_left_ = false;  ///< when the last step was over: newcomers may be refused
   bool few_groups_left_ = false;
   std::set<std::uint32_t> forgotten_nodes_;  ///< given in this life, and not kept as used any more

@@ -81,6 +81,8 @@ void Model::judge_reassign(const Asked& asked) {
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);
   }
+  const Status said = proto::peek_status(asked.answer);
+  if (keeping_failed_ && said == Status::limit) return census_.add(Happening::renumbering_not_kept);
   require_status(asked, Status::done, Checker::ids);
   if (awaiting) census_.add(Happening::renumbered_while_awaiting);
   census_.add(sessions_.at(index).connected ? Happening::renumbered : Happening::renumbered_away);
@@ -114,7 +116,7 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
     tell_provider(full_name, index, false);
   }
   rest(resting_ids_, index, now);
-  give_node(to, false);
+  give_node(to, true);  // or the hub had refused it
   renumbered_.emplace_back(index, to);
 }
 

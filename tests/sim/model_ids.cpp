@@ -65,6 +65,7 @@ void Model::kept(const hub::HubState& state, milliseconds now) {
 }
 
 void Model::step_over(bool kept) {
+  keeping_failed_ = false;
   if (kept) unkept_.clear();
   if (kept) unkept_groups_.clear();
   few_nodes_left_ = past_.nodes.few_left();

@@ -110,6 +110,29 @@ class Ctl(Case):
         hub.expect_ledger(self, accepted=lambda: receiving.sent() + sending.sent() + lost.sent(),
                           delivered=lambda: receiving.got() + sending.got(), dropped={"renumbered": lost.sent})
 
+    def test_where_the_state_cannot_be_written_no_id_is_given_and_a_kick_says_what_it_cannot_promise(self):
+        hub = self.hub()
+        receiver = start_recv(self, hub, "B")
+        before = self.id_of(hub, "B")
+        in_the_way = pathlib.Path(hub.state, "state.new")
+        in_the_way.mkdir()  # whoever runs the test
+        refused = self.ctl("reassign", "B", "7.900000")
+        self.assertEqual(refused.code, 1, refused.err)
+        for part in ("7.900000", "cannot write the hub's state", "try again"):
+            self.assertIn(part, refused.err)
+        self.assertEqual(self.id_of(hub, "B"), before)
+        in_the_way.rmdir()
+        self.assertEqual(self.ctl("reassign", "B", "7.900000").code, 0)
+        wait_until(lambda: any(node["id"] == "7.900000" and node["connected"] for node in hub.nodes()), "B as 7.900000")
+        in_the_way.mkdir()
+        kicked = self.ctl("kick", "B")
+        self.assertEqual((kicked.code, kicked.out), (0, b"kicked 7.900000\n"))
+        self.assertIn("cannot write the hub's state", kicked.err)
+        self.assertEqual(receiver.wait(), 3)
+        in_the_way.rmdir()
+        start_recv(self, hub, "B")
+        self.assertEqual(self.ctl("kick", "B").err, "")
+
     def test_only_administrators_change_and_everybody_reads(self):
         hub = self.hub()
         start_recv(self, hub, "B")

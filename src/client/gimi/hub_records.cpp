@@ -147,11 +147,11 @@ Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout) {
   return routes;
 }
 
-Outcome<void> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout) {
+Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout) {
   const proto::ctrl::Kick request{NodeId{peer.id}, std::string(reason)};
   const auto answer = ask<proto::ctrl::KickAnswer>(node, request, "kick " + peer.text(), timeout);
   if (!answer) return answer.failure();
-  return {};
+  return answer->remark;
 }
 
 Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout) {

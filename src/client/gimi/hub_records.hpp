@@ -24,7 +24,7 @@ namespace gimnet::gimi {
 [[nodiscard]] Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout);
 
 // For administrators.
-[[nodiscard]] Outcome<void> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout);
+[[nodiscard]] Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout);
 [[nodiscard]] Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout);
 [[nodiscard]] Outcome<void> drain_hub(nif_node* node, Timeout timeout);
 [[nodiscard]] Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout);

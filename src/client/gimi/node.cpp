@@ -196,7 +196,7 @@ Outcome<std::vector<RouteRecord>> Node::hub_routes(Timeout timeout) const {
   return gimi::ask_routes(core().node(), timeout);
 }
 
-Outcome<void> Node::kick(Peer node, std::string_view reason, Timeout timeout) const {
+Outcome<std::string> Node::kick(Peer node, std::string_view reason, Timeout timeout) const {
   return gimi::kick(core().node(), node, reason, timeout);
 }
 Outcome<void> Node::reassign(Peer node, Peer new_id, Timeout timeout) const {

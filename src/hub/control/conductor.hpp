@@ -104,6 +104,7 @@ class Conductor final : private Administration {
 
   void want_drain() override { drain_wanted_ = true; }
   void log_level_set(LogLevel level) override;
+  std::string keep_state(std::chrono::milliseconds now) override { return keeper_.keep_at_once(membership_, now); }
 
   // Immutable after construction
   const HubFacts facts_;

@@ -11,7 +11,12 @@ constexpr milliseconds kAgainAfter{1'000};
 }  // namespace
 
 void StateKeeper::keep(Membership& membership, milliseconds now) {
-  if (!keep_ || (again_at_ && *again_at_ > now)) return;
+  if (again_at_ && *again_at_ > now) return;
+  static_cast<void>(keep_at_once(membership, now));
+}
+
+std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) {
+  if (!keep_) return {};
   const Durable durable = membership.durable(now);
   HubState state = state_;
   state.node_mark = durable.nodes.mark;
@@ -21,17 +26,18 @@ void StateKeeper::keep(Membership& membership, milliseconds now) {
   state.groups_used = durable.groups.used;
 #endif
   state.kicked = durable.kicked;
-  if (const std::string error = keep_(state); !error.empty()) {
+  if (std::string error = keep_(state); !error.empty()) {
     log_error(
         error +
-        "; the hub goes on, but soon gives no ids to newcomers, and forgets at a restart whom it kicked and which "
-        "ids it gave to others");
+        "; the hub goes on, but soon gives no ids to newcomers, none by REASSIGN, and forgets at a restart whom it "
+        "kicked");
     again_at_ = now + kAgainAfter;
-    return;
+    return error;
   }
   again_at_.reset();
   state_ = std::move(state);
   membership.state_kept(durable);
+  return {};
 }
 
 }  // namespace gimnet::hub

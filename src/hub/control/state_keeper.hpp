@@ -21,6 +21,8 @@ class StateKeeper {
 
   /// Keeps what `membership` says now, and tells it so; nothing while it waits to try again.
   void keep(Membership& membership, std::chrono::milliseconds now);
+  /// The same, also while it waits: for somebody who is told what came of it. Why it could not be kept, or "".
+  [[nodiscard]] std::string keep_at_once(Membership& membership, std::chrono::milliseconds now);
 
   /// When to try again; nothing if all is kept.
   [[nodiscard]] std::optional<std::chrono::milliseconds> again_at() const { return again_at_; }

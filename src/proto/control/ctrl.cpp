@@ -183,6 +183,9 @@ Kick Kick::read(Fields& fields) {
   return kick;
 }
 
+void KickAnswer::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, remark, kSentenceBytesMax); }
+KickAnswer KickAnswer::read(Fields& fields) { return {fields.text(3, "remark", kSentenceBytesMax)}; }
+
 void Reassign::write(bitestream::Writer& writer) const {
   writer.put_u32(3, node.value());
   writer.put_u32(4, new_node.value());

@@ -191,8 +191,9 @@ struct Kick {
 struct KickAnswer {
   static constexpr std::uint16_t kOperation = answer_of(Operation::kick);
   static constexpr const char* kName = "answer to KICK";
-  void write(bitestream::Writer&) const {}
-  [[nodiscard]] static KickAnswer read(Fields&) { return {}; }
+  std::string remark;  ///< what the hub cannot promise; "": nothing
+  void write(bitestream::Writer& writer) const;
+  [[nodiscard]] static KickAnswer read(Fields& fields);
   friend bool operator==(const KickAnswer&, const KickAnswer&) = default;
 };
 

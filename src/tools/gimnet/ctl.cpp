@@ -88,7 +88,10 @@ ExitCode kick(Session& session) {
   const CtlOptions& ctl = session.options().ctl;
   const auto peer = session.find(ctl.node);
   if (!peer) return session.code();
-  return done(session, session.node().kick(*peer, ctl.reason), "kicked " + peer->text());
+  const auto remark = session.node().kick(*peer, ctl.reason);
+  if (!remark) return session.fail(remark.failure());
+  if (!remark->empty()) say(*remark);
+  return done(session, {}, "kicked " + peer->text());
 }
 
 ExitCode reassign(Session& session) {

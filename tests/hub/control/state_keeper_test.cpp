@@ -57,9 +57,21 @@ TEST_F(StateKeeperTest, TriesAgainAfterASecondAndNotBefore) {
   EXPECT_EQ(keeper_.again_at(), std::nullopt);
 }
 
+TEST_F(StateKeeperTest, WhoIsToldTheOutcomeNeedNotWaitForTheNextTry) {
+  error_ = "the disk is full";
+  keeper_.keep(membership_, 1s);
+  EXPECT_EQ(keeper_.keep_at_once(membership_, 1s), error_);
+  EXPECT_EQ(kept_.size(), 2u);
+  EXPECT_EQ(keeper_.again_at(), 2s);
+  error_.clear();
+  EXPECT_EQ(keeper_.keep_at_once(membership_, 1s), "");
+  EXPECT_EQ(keeper_.again_at(), std::nullopt);
+}
+
 TEST_F(StateKeeperTest, AHubThatKeepsNothingGoesOn) {
   StateKeeper none({}, nullptr);
   none.keep(membership_, 1s);
+  EXPECT_EQ(none.keep_at_once(membership_, 1s), "");
   EXPECT_EQ(none.again_at(), std::nullopt);
 }
 

@@ -66,6 +66,14 @@ TEST(CtrlMessages, ThatChangeTheHubAreAsTheVectorsSay) {
   expect_answer("ctrl/log_level_answer", 8, SetLogLevelAnswer{"info"});
 }
 
+TEST(CtrlMessages, AKickMayBeAnsweredWithARemark) {
+  const KickAnswer answer{"it forgets that at a restart"};
+  const Payload payload = encode_answer(answer, 3);
+  const auto read = decode_answer<KickAnswer>(payload);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(*read, answer);
+}
+
 TEST(CtrlMessages, EachRequestHasAName) {
   for (std::uint16_t operation = 1; operation < kRequestsEnd; ++operation)
     EXPECT_NE(operation_name(operation), nullptr);

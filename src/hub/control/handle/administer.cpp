@@ -24,6 +24,11 @@ Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) 
 
 std::string by_whom(const Session& admin) { return admin.origin.transport.str() + " " + admin.origin.address.str(); }
 
+Membership::KeepNow keep_now(const HandlerContext& context) {
+  if (context.administration == nullptr) return {};
+  return [administration = context.administration, now = context.now] { return administration->keep_state(now); };
+}
+
 Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& request, const ctrl::Kick& wanted) {
   const auto session = find_node(context, wanted.node);
   if (!session) return session.error();
@@ -33,9 +38,12 @@ Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& r
   const std::string who = title(context.membership.sessions().node_id(**session), **session);
   const std::string why = wanted.reason.empty() ? "" : ": " + wanted.reason;
   log_warning(who + " was kicked by " + by_whom(request.session) + why);
-  context.membership.kick(**session, "an administrator ended this session" + why + "; ask them before you come back",
-                          context.now, context.effects);
-  return ctrl::KickAnswer{};
+  const std::string failure = context.membership.kick(
+      **session, "an administrator ended this session" + why + "; ask them before you come back", context.now,
+      context.effects, keep_now(context));
+  if (failure.empty()) return ctrl::KickAnswer{};
+  return ctrl::KickAnswer{"if the hub ends now it forgets that it kicked " + who +
+                          ", which then may come back: " + failure};
 }
 
 Result<ctrl::ReassignAnswer, Refusal> reassign(HandlerContext& context, const Request& request,
@@ -52,7 +60,9 @@ Result<ctrl::ReassignAnswer, Refusal> reassign(HandlerContext& context, const Re
     return Refusal{Status::bad_request, "that is you: an administrator's own id cannot change while it asks"};
   }
   const std::string who = title(context.membership.sessions().node_id(**session), **session);
-  if (auto failure = context.membership.renumber(**session, *index, context.now, context.effects)) return *failure;
+  if (auto failure = context.membership.renumber(**session, *index, context.now, context.effects, keep_now(context))) {
+    return *failure;
+  }
   log_warning(who + " has the id " + to_string(context.membership.sessions().node_id(**session)) + " now, by " +
               by_whom(request.session));
   return ctrl::ReassignAnswer{};

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "hub/control/hub_facts.hpp"
@@ -26,6 +27,8 @@ class Administration {
   /// The hub ends as at SIGTERM, once the answer is on its way.
   virtual void want_drain() = 0;
   virtual void log_level_set(LogLevel level) = 0;
+  /// Keeps what has to outlive the hub, at once. Why that was not possible, or "".
+  [[nodiscard]] virtual std::string keep_state(std::chrono::milliseconds now) = 0;
 };
 
 /// What handlers work on. Valid until: the handler returns.

@@ -47,6 +47,12 @@ bool IndexPool::take_free(std::uint32_t index, std::chrono::milliseconds now) {
   return true;
 }
 
+void IndexPool::let_go(std::uint32_t index) {
+  GIMNET_CHECK(held(index) && held_ > 0);
+  --held_;
+  taken_.erase(index);
+}
+
 bool IndexPool::take_back(std::uint32_t index) {
   if (index == 0 || index > most_ || held(index)) return false;
   rests_until_.erase(index);

@@ -42,6 +42,8 @@ class IndexPool {
   [[nodiscard]] std::optional<std::uint32_t> take(std::chrono::milliseconds now);
   /// That index, granted or not, if nobody holds it and it does not rest.
   [[nodiscard]] bool take_free(std::uint32_t index, std::chrono::milliseconds now);
+  /// Nobody was told of that index, which take_free() gave: it need not rest, but stays used. REQUIRES: it is held.
+  void let_go(std::uint32_t index);
   /// That index, if nobody holds it: for its former holder, for whom it need not rest.
   [[nodiscard]] bool take_back(std::uint32_t index);
   /// REQUIRES: the index is held.
@@ -52,6 +54,8 @@ class IndexPool {
   [[nodiscard]] bool used(std::uint32_t index) const { return used_.contains(index); }
   /// Those of before a restart may come back for so much longer, at the latest until `latest`.
   void put_off_returns(std::chrono::milliseconds by, std::chrono::milliseconds latest);
+  /// Are there used ones that were not kept as used yet? A start that goes on from what was kept could hand them out.
+  [[nodiscard]] bool unkept() const { return unkept_ && !keeps_nothing_; }
   /// How long newcomers have to wait for those of before a restart, since all indices are used; nothing: it is not
   /// that.
   [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(std::chrono::milliseconds now) const;

@@ -123,13 +123,20 @@ void Membership::name_decided(Session& session, const NameDecision& decision, mi
   effects.emplace_back(NameDecided{session.index, name, decision.confirmed, decision.holder, decision.sentence});
 }
 
-void Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects) {
+std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects,
+                             const KeepNow& keep) {
 #ifndef GIMNET_BUG_KICKED_TOKEN_HONOURED
   sessions_.remember_kicked(session);
 #endif
-  effects.emplace_back(StateDue{});
+  std::string failure;
+  if (keep) {
+    failure = keep();
+  } else {
+    effects.emplace_back(StateDue{});
+  }
   effects.emplace_back(CloseDue{session.place, GoodbyeCode::kicked, sentence});
   end(session, now, effects);
+  return failure;
 }
 
 bool Membership::keeping_due(milliseconds now) const {
@@ -145,14 +152,13 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
-std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index, milliseconds now,
-                                                   Effects& effects) {
+std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index, milliseconds now,
+                                                   const KeepNow& keep) {
   if (index == kHubIndex || index >= kEveryIndex) {
     return proto::Refusal{proto::Status::bad_request,
                           "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
   }
-  const std::uint32_t former = session.index;
-  if (index == former) {
+  if (index == session.index) {
     return proto::Refusal{proto::Status::taken, "this node has the id " + to_string(sessions_.node_id(session)) +
                                                     " already; choose a free one"};
   }
@@ -168,10 +174,23 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
 #else
   const bool awaited = false;
 #endif
-  if (awaited || !sessions_.renumber(session, index, now)) {
-    return proto::Refusal{proto::Status::taken,
-                          why_taken(make_id<NodeId>(hub_of(sessions_.node_id(session)), index), now)};
-  }
+  const NodeId node = make_id<NodeId>(hub_of(sessions_.node_id(session)), index);
+  IndexPool& indices = sessions_.indices();
+  if (awaited || !indices.take_free(index, now)) return proto::Refusal{proto::Status::taken, why_taken(node, now)};
+  if (!keep || !indices.unkept()) return std::nullopt;
+  const std::string failure = keep();
+  if (failure.empty()) return std::nullopt;
+  indices.let_go(index);
+  return proto::Refusal{proto::Status::limit, "the hub cannot keep that a node has the id " + to_string(node) +
+                                                  ", and would give it to another one after a restart: " + failure +
+                                                  "; mend that and try again"};
+}
+
+std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index, milliseconds now,
+                                                   Effects& effects, const KeepNow& keep) {
+  if (auto failure = take_for(session, index, now, keep)) return failure;
+  const std::uint32_t former = session.index;
+  sessions_.renumber(session, index, now);
   if (keeping_due(now)) effects.emplace_back(StateDue{});
   const NameStanding standing =
       directory_.is_provisional(session.name) ? NameStanding::provisional : NameStanding::final;

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,15 +55,20 @@ class Membership {
   /// for what it sent, else its grace time begins. REQUIRES: connected.
   void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now, Effects& effects);
 
-  /// Ends the session for good: its id and name are free, its token counts as none, also after a restart. `sentence`
-  /// tells its node who did it and what to do.
-  void kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects);
+  /// Keeps durable() where it outlives the hub, at once: "", or why it could not. None: a StateDue among the effects
+  /// asks for it.
+  using KeepNow = std::function<std::string()>;
+  /// Ends the session for good: its id and name are free, its token counts as none, also after a restart, unless the
+  /// answer says why not. `sentence` tells its node who did it and what to do.
+  std::string kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects,
+                   const KeepNow& keep = {});
 
   /// The session's node goes on under another index, with name, services, subscriptions and token. Errors: taken (held,
-  /// at rest, or perhaps that of a node that has not come back since a restart), bad_request (no index of a node).
-  /// nullopt: done.
+  /// at rest, or perhaps that of a node that has not come back since a restart), bad_request (no index of a node),
+  /// limit (it cannot be kept, and the hub could give the index to another node after a restart). nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> renumber(Session& session, std::uint32_t index,
-                                                       std::chrono::milliseconds now, Effects& effects);
+                                                       std::chrono::milliseconds now, Effects& effects,
+                                                       const KeepNow& keep = {});
 
   /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
   /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
@@ -115,6 +121,9 @@ class Membership {
   /// The session that the request is for: the one whose token it shows, or a new one.
   [[nodiscard]] Result<Joined, proto::Goodbye> session_for(const JoinRequest& request, const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now, Effects& effects);
+  /// Takes an index for a session that there is. Errors: as of renumber().
+  [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, std::uint32_t index,
+                                                       std::chrono::milliseconds now, const KeepNow& keep);
   /// Why that id cannot be given to another node.
   [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
   /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.

@@ -148,8 +148,8 @@ void Sessions::stood_still(milliseconds time, milliseconds now) {
   indices_.put_off_returns(time, latest);
 }
 
-bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
-  if (!indices_.take_free(index, now)) return false;
+void Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
+  GIMNET_CHECK(indices_.held(index) && !sessions_.contains(index));
   const std::uint32_t former = session.index;
   renumbered_.erase(index);
   for (auto& [earlier, moved] : renumbered_) {
@@ -171,7 +171,6 @@ bool Sessions::renumber(Session& session, std::uint32_t index, milliseconds now)
   session.number = ++last_number_;
   floor_.raise(index, session.number);
   indices_.give_back(former, now);
-  return true;
 }
 
 std::uint32_t Sessions::present_index(std::uint32_t index) const {

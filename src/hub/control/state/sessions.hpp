@@ -132,9 +132,9 @@ class Sessions {
   /// The same, also after a restart, for as long as limits.kicked_tokens allows.
   void remember_kicked(const Session& session);
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
-  /// The session goes on under another index; the former one rests, and leads here until somebody else has it.
-  /// False: the index is held, rests, or is none.
-  [[nodiscard]] bool renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
+  /// The session goes on under another index, which indices() gave; the former one rests, and leads here until somebody
+  /// else has it.
+  void renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
   /// Until when nodes that were here before a restart may still be on their way back, each under an index that counts
   /// as used. Nothing: there were none.
   [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const { return returns_until_; }

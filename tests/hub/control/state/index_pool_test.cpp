@@ -117,6 +117,34 @@ TEST(IndexPool, WhatIsTakenBeyondTheGrantedHasToBeKept) {
   EXPECT_TRUE(pool.keeping_due(0ms));
 }
 
+TEST(IndexPool, WhatIsLetGoDoesNotRestAndStaysUsed) {
+  IndexPool pool(100'000, 1s, {1, IndexPool::kBlock});
+  ASSERT_TRUE(pool.take_free(60'000, 0ms));
+  EXPECT_TRUE(pool.unkept());
+  pool.let_go(60'000);
+  EXPECT_EQ(pool.held(), 0u);
+  EXPECT_TRUE(pool.used(60'000));
+  EXPECT_TRUE(pool.unkept()) << "until it is kept";
+  ASSERT_TRUE(pool.take_free(60'000, 0ms));
+  keep(pool);
+  EXPECT_FALSE(pool.unkept());
+}
+
+TEST(IndexPool, OfAPoolThatKeepsNothingNothingIsUnkept) {
+  IndexPool pool(100'000, 1s);
+  ASSERT_TRUE(pool.take_free(60'000, 0ms));
+  EXPECT_FALSE(pool.unkept());
+}
+
+TEST(IndexPool, ReturnsArePutOff) {
+  IndexPool pool(100'000, 40s, {60'001, 0, all_from_to(1, 100'000)}, 30s);
+  EXPECT_EQ(pool.waits_for_returns(30s), std::nullopt);
+  pool.put_off_returns(60s, 80s);
+  EXPECT_EQ(pool.waits_for_returns(30s), 50s);
+  EXPECT_FALSE(pool.keeping_due(80s - 1ms));
+  EXPECT_TRUE(pool.keeping_due(80s));
+}
+
 TEST(IndexPool, ForgetsWhoIsGoneWhenFewAreLeftAndNobodyMayReturn) {
   IndexPool pool(100'000, 40s, {60'001, 0, all_from_to(1, 60'000)}, 30s);
   ASSERT_TRUE(pool.take_back(1));
