@@ -1,6 +1,8 @@
 #include "hub/config/reloader.hpp"
 
+#include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/log.hpp"
@@ -9,7 +11,22 @@ namespace gimnet::hub {
 
 Reloading Reloader::read_again() {
   Reloading reloading;
-  ReadConfiguration read = read_configuration(sources_, {.faults_max = kReloadFaultsMax});
+  std::optional<ReadConfiguration> found;
+  try {
+    found = reader_.read(sources_, {.faults_max = kReloadFaultsMax});
+  } catch (const std::system_error& error) {
+    reloading.faults.push_back("cannot begin to read the configuration: " + error.code().message() +
+                               "; raise the limit on threads (ulimit -u), or let other programs go");
+    return reloading;
+  }
+  if (!found) {
+    const std::string where = sources_.file.empty() ? "" : " (" + sources_.file + ")";
+    reloading.faults.push_back("the configuration" + where +
+                               " could not be read in time: the disk does not answer; "
+                               "mend that, or keep it on a disk of this machine, and try again");
+    return reloading;
+  }
+  ReadConfiguration& read = *found;
   for (const Fault& fault : read.faults) reloading.faults.push_back(fault.line());
   reloading.more_faults = read.more_faults;
   if (!reloading.faults.empty()) return reloading;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "hub/config/config_reader.hpp"
 #include "hub/config/settings.hpp"
 #include "hub/config/sources.hpp"
 #include "hub/control/reloading.hpp"
@@ -12,15 +13,17 @@ inline constexpr std::size_t kReloadFaultsMax = 100;
 /// Knows where a running hub's configuration came from and what of it is in force. Thread safety: one thread.
 class Reloader {
  public:
-  Reloader(ConfigSources sources, HubOptions in_force) : sources_(std::move(sources)), in_force_(std::move(in_force)) {}
+  Reloader(ConfigSources sources, HubOptions in_force, ConfigReader reader = ConfigReader{})
+      : reader_(std::move(reader)), sources_(std::move(sources)), in_force_(std::move(in_force)) {}
 
-  /// Reads everything again. With faults nothing changes; without, what may change while a hub runs is in force from
-  /// now on for the next comparison.
+  /// Reads everything again. With faults nothing changes, one of which is a disk that does not answer; without, what
+  /// may change while a hub runs is in force from now on for the next comparison.
   [[nodiscard]] Reloading read_again();
   /// The log level was set by other means.
   void note_log_level(LogLevel level) { in_force_.log_level = level; }
 
  private:
+  ConfigReader reader_;
   ConfigSources sources_;
   HubOptions in_force_;
 };
