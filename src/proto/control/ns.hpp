@@ -275,7 +275,9 @@ struct UnsubscribeAnswer {
 
 // Events
 
-/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells, at most.
+/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells, at most. A provider
+/// can have a new group hundreds of times a second while a subscriber is away; of what waited for it then the latest
+/// counts, and a program that starts again comes under a new group once a start.
 inline constexpr std::size_t kGroupsBetweenMax = 6;
 
 /// To subscribers, before the first frame under a new group id.

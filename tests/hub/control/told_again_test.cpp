@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
@@ -78,6 +80,27 @@ TEST_F(ToldAgainTest, WhatMovedWhileTheNodeWasAway) {
   EXPECT_THAT(events[0].between, ElementsAre(between));
   EXPECT_TRUE(events[0].again);
   EXPECT_NE(attach().told_move, 0u);
+}
+
+TEST_F(ToldAgainTest, OfTheGroupsInBetweenTheLatestAreToldAsManyAsTheLimitSays) {
+  hub_.detach(viewer_);
+  std::vector<GroupId> between;
+  while (between.size() < ns::kGroupsBetweenMax)
+    between.push_back(advertise(6 + static_cast<std::uint32_t>(between.size())));
+  GroupId present = advertise(50);
+  come_back();
+  ASSERT_EQ(told().size(), 1u);
+  EXPECT_EQ(told()[0].old_group, first_);
+  EXPECT_EQ(told()[0].between, between);
+  EXPECT_EQ(told()[0].new_group, present);
+  hub_.detach(viewer_);
+  between.erase(between.begin());
+  between.push_back(std::exchange(present, advertise(51)));
+  come_back();
+  ASSERT_EQ(told().size(), 1u);
+  EXPECT_EQ(told()[0].old_group, first_) << "which it surely knows";
+  EXPECT_EQ(told()[0].between, between);
+  EXPECT_EQ(told()[0].new_group, present);
 }
 
 TEST_F(ToldAgainTest, WhatMayHaveBeenLostWithTheConnection) {

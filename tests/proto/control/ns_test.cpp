@@ -63,6 +63,19 @@ TEST(NsMessages, ListRecordsAsTheVectorsSay) {
   expect_answer("ns/services_answer", 6, services);
 }
 
+TEST(NsMessages, AMoveTellsOfAsManyGroupsInBetweenAsTheLimitSays) {
+  ServiceMoved moved{"robot/odom", kGroup, GroupId{0x00700006}, 3};
+  for (std::uint32_t i = 0; i < kGroupsBetweenMax; ++i) moved.between.emplace_back(0x00700010 + i);
+  const auto read = decode<ServiceMoved>(encode(moved));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(*read, moved);
+  moved.between.emplace_back(0x00700030u);
+  const auto refused = decode<ServiceMoved>(encode(moved));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().sentence.find("more than 6 groups in between"), std::string::npos)
+      << refused.error().sentence;
+}
+
 TEST(NsMessages, EventsAreAsTheVectorsSay) {
   expect_request("ns/service_moved", 0,
                  ServiceMoved{"robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest});

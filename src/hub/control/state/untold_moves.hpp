@@ -13,9 +13,9 @@ namespace gimnet::hub {
 /// Thread safety: none. Limits: one entry a subscriber; kBetweenMax groups.
 class UntoldMoves {
  public:
-  /// Groups between the one that a subscriber knows and the present one that are told. A provider may change its
-  /// service as often as it likes while a subscriber is away; messages of groups before these come untold, and a
-  /// subscriber drops what it was not told of.
+  /// Groups between the one that a subscriber knows and the present one that are told: the latest. A provider may
+  /// change its service as often as it likes while a subscriber is away, and all that is kept and told of it would grow
+  /// by that. Messages of groups before these come untold; a subscriber drops what it was not told of, and counts it.
   static constexpr std::size_t kBetweenMax = 6;
 
   struct Untold {
