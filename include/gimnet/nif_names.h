@@ -138,7 +138,9 @@ typedef struct nif_pace {
  *  subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
 nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms);
 
-/** The same with a pace; NULL: none. Also NIF_BAD_REQUEST: a number beyond the hub's limit. */
+/** The same with a pace; NULL: none. Of a service that is subscribed already this changes it; where the hub could not
+ * be told within the time given, it is with the next connection. Also NIF_BAD_REQUEST: a number beyond the hub's limit.
+ */
 nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
                                nif_subscription* subscription, int32_t timeout_ms);
 

@@ -87,10 +87,19 @@ void Declarations::add_subscription(const proto::ns::Subscribe& subscription, Gr
   subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group});
 }
 
-bool Declarations::begin_subscription(const std::string& full_name) {
+std::optional<Declarations::Former> Declarations::begin_subscription(const proto::ns::Subscribe& request) {
   const MutexLock lock(mutex_);
-  const auto found = subscriptions_.find(full_name);
-  return found != subscriptions_.end() && std::exchange(found->second.ended, false);
+  const auto found = subscriptions_.find(request.name);
+  if (found == subscriptions_.end()) return std::nullopt;
+  return Former{std::exchange(found->second.request, request), std::exchange(found->second.ended, false)};
+}
+
+void Declarations::give_up_subscription(const Former& former, bool heard) {
+  const MutexLock lock(mutex_);
+  const auto found = subscriptions_.find(former.request.name);
+  if (found == subscriptions_.end()) return;
+  if (heard) found->second.request = former.request;
+  found->second.ended |= former.ended;
 }
 
 bool Declarations::end_subscription(const std::string& full_name) {

@@ -36,8 +36,17 @@ class Declarations {
   /// The hub does not have the group (any more) that end_service() named.
   void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
   void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
-  /// As begin_service(), of a subscription.
-  [[nodiscard]] bool begin_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
+  /// What there was of a subscription that the program begins or changes.
+  struct Former {
+    proto::ns::Subscribe request;
+    bool ended = false;
+  };
+  /// The program is about to subscribe to a service. One that is subscribed already is declared by the new terms from
+  /// now on, and one that ended is not ended any more. Nothing: there was none.
+  [[nodiscard]] std::optional<Former> begin_subscription(const proto::ns::Subscribe& request) GIMNET_EXCLUDES(mutex_);
+  /// The hub did not take what was begun. `heard`: it said so, and what there was goes on; else it may have taken it,
+  /// and is asked with the next connection, unless the subscription had ended.
+  void give_up_subscription(const Former& former, bool heard) GIMNET_EXCLUDES(mutex_);
   /// The subscription ends: it is declared no more, and the hub is told with the next connection if
   /// finish_subscription() does not come before. False: there is none, or it ended already.
   bool end_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);

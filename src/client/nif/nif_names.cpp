@@ -244,14 +244,15 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     }
     ns::SubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
-    const bool ended = found.declarations().begin_subscription(full_name);
+    const auto former = found.declarations().begin_subscription(request);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "subscribe", full_name, deadline);
       if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
       return asked;
     });
     if (status != NIF_OK) {
-      if (ended) found.declarations().end_subscription(full_name);
+      const bool heard = status != NIF_TIMEOUT && status != NIF_NOT_CONNECTED;
+      if (former) found.declarations().give_up_subscription(*former, heard);
       return status;
     }
     if (subscription != nullptr) {

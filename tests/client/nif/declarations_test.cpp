@@ -280,6 +280,38 @@ TEST(Declarations, UnsubscribeWhatTheyJustSubscribeAgain) {
   expect_nothing_declared(connected);
 }
 
+TEST(Declarations, SubscribeAgainByThePaceThatTheProgramWantedLast) {
+  for (const bool refused : {false, true}) {
+    FakeHub hub;
+    Connected connected = with_broken_subscription(hub);
+    nif_node* const node = connected.node.get();
+    const nif_pace pace{sizeof pace, 2, 0, 0.0};
+    if (!refused) {
+      EXPECT_EQ(nif_subscribe_paced(node, "peer/scan", &pace, nullptr, 0), NIF_NOT_CONNECTED);
+    }
+    for (int i = 0; i < 2; ++i) {
+      connected.hub = hub.admit(make_welcome(kResumeBytes));
+      std::uint16_t number = 0;
+      const auto request = connected.hub.next_request<proto::ns::Subscribe>(number);
+      ASSERT_TRUE(request);
+      EXPECT_EQ(request->window, refused ? 0u : 2u);
+      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+      settle(connected);
+      std::thread asking([&] {
+        const nif_status status = nif_subscribe_paced(node, "peer/scan", &pace, nullptr, NIF_FOREVER);
+        EXPECT_EQ(status, refused ? NIF_LIMIT : NIF_OK);
+      });
+      const auto asked = connected.hub.next_request<proto::ns::Subscribe>(number);
+      EXPECT_TRUE(asked && asked->window == 2);
+      const proto::ControlHeader header{proto::ns::Subscribe::kOperation, number};
+      connected.hub.send_control(proto::Kind::ns, refused ? proto::encode_refusal(header, {proto::Status::limit, "no"})
+                                                          : proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+      asking.join();
+      connected.hub.close();
+    }
+  }
+}
+
 TEST(Declarations, UnsubscribeNothingBehindASubscriptionThatBeginsAnew) {
   FakeHub hub;
   Connected connected = with_broken_subscription(hub);
