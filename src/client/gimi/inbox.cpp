@@ -38,6 +38,27 @@ MessageQueue& Inbox::add_queue(const QueueOptions& options) {
   return queues_.emplace_back(*this, options, bytes_max_);
 }
 
+void Inbox::close(MessageQueue& queue) {
+  News news;
+  {
+    const MutexLock lock(mutex_);
+    queue.close();
+    news = news_of(queue);
+  }
+  tell(news);
+}
+
+void Inbox::remove(MessageQueue& queue) {
+  const MutexLock lock(mutex_);
+  if (refusing_ == &queue) refusing_ = nullptr;
+  queues_.remove_if([&queue](const MessageQueue& each) { return &each == &queue; });
+}
+
+std::size_t Inbox::queues() {
+  const MutexLock lock(mutex_);
+  return queues_.size();
+}
+
 bool Inbox::push(MessageQueue& queue, Message& message, Receipt* receipt) {
   if (queue.refuses()) {
     refusing_ = &queue;

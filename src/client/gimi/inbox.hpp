@@ -23,7 +23,7 @@ class Receipt {
   ~Receipt() = default;
 };
 
-/// All queues of a node. Thread safety: any thread. Queues live as long as the inbox.
+/// All queues of a node. Thread safety: any thread. Queues live as long as the inbox, but for those of subscriptions.
 class Inbox {
  public:
   /// Keys for which nobody asked that get a queue.
@@ -41,8 +41,13 @@ class Inbox {
 
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
-  /// A queue for a subscription.
+  /// A queue for a subscription, until remove().
   MessageQueue& add_queue(const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// Nobody takes messages out of it any more: what waits there is dropped, and what comes, until set() opens it again.
+  void close(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+  /// REQUIRES: add_queue() made it, and nobody uses it any more.
+  void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
 
   /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
   [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_EXCLUDES(mutex_);

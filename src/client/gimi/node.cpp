@@ -135,8 +135,11 @@ Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOpt
                                       const PaceOptions& pace) const {
   auto service = core().services().subscribe(std::string(full_name), options, pace, timeout);
   if (!service) return service.failure();
-  return Subscription(
-      {*service, [core = core_](gimi::SubscribedService* done) { core->services().unsubscribe(*done); }});
+  gimi::ServiceTable::Subscribed subscribed = *service;
+  gimi::SubscribedService* const handle = subscribed.get();
+  return Subscription({handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) mutable {
+                         core->services().unsubscribe(std::move(subscribed));
+                       }});
 }
 
 Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {

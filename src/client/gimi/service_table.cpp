@@ -105,23 +105,29 @@ void ServiceTable::withdraw(PublishedService& service) {
   static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
 }
 
-SubscribedService& ServiceTable::entry(const std::string& full_name, const QueueOptions& options) {
+ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name, const QueueOptions& options) {
   const auto place = subscribed_.find(full_name);
-  if (place != subscribed_.end()) return *place->second;
-  auto service = std::make_unique<SubscribedService>(full_name, inbox_.add_queue(options));
+  if (place != subscribed_.end()) return place->second;
+  auto service = std::make_shared<SubscribedService>(full_name, inbox_, options);
   if (end_) service->end(end_);
-  return *subscribed_.emplace(full_name, std::move(service)).first->second;
+  return subscribed_.emplace(full_name, std::move(service)).first->second;
+}
+
+std::size_t ServiceTable::subscriptions() {
+  const MutexLock lock(mutex_);
+  return subscribed_.size();
 }
 
 /// A former group leads to the service until as many younger ones came: the event that a provider left may overtake
 /// what it published.
-void ServiceTable::set_place(SubscribedService& service, const ServicePlace& place) {
+void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& place) {
   // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8), and the present one.
   constexpr std::size_t kGroups = proto::ns::kGroupsBetweenMax + 2;
+  SubscribedService& service = *subscribed;
   service.place = place;
   service.on_place(place);
   if (place.group == 0) return;
-  subscribed_by_group_[place.group] = &service;  // also a former one again, which was another service's meanwhile
+  subscribed_by_group_[place.group] = subscribed;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
   service.groups.push_back(place.group);
   if (service.groups.size() <= kGroups) return;
@@ -131,67 +137,83 @@ void ServiceTable::set_place(SubscribedService& service, const ServicePlace& pla
 
 void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group) {
   const auto place = subscribed_by_group_.find(group);
-  if (place != subscribed_by_group_.end() && place->second == &service) subscribed_by_group_.erase(place);
+  if (place != subscribed_by_group_.end() && place->second.get() == &service) subscribed_by_group_.erase(place);
 }
 
-nif_status ServiceTable::ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms) {
+nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace, std::int32_t timeout_ms) {
   nif_subscription found{};
   const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
-  const nif_status status = nif_subscribe_paced(uplink_.node(), service.name().c_str(), &wanted, &found, timeout_ms);
+  const nif_status status = nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
   const MutexLock lock(mutex_);
   set_place(service, {found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS});
   return NIF_OK;
 }
 
-Outcome<SubscribedService*> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
-                                                    const PaceOptions& pace, Timeout timeout) {
+Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
+                                                          const PaceOptions& pace, Timeout timeout) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
-  SubscribedService* service = nullptr;
+  Subscribed service;
   {
     const MutexLock lock(mutex_);
-    service = &entry(full_name, options);
+    service = entry(full_name, options);
     service->read = true;
   }
   inbox_.set(service->queue(), options);
   if (service->handles == 0) {
-    const nif_status status = ask(*service, pace, nif_timeout(timeout));
+    const nif_status status = ask(service, pace, nif_timeout(timeout));
     if (status != NIF_OK) {
       auto failure = failure_of(status, "subscribe " + full_name);
-      const MutexLock lock(mutex_);
-      service->read = false;
+      give_up(service);
       return failure;
     }
   }
   ++service->handles;
   // It may have been subscribed before, to know where it is or when it was another one.
   if (!service->accepts()) return service;
-  leave(*service);
+  leave(service);
   return Failure{Status::not_found,
                  "cannot subscribe to '" + full_name + "': it takes data and gives none; send to it"};
 }
 
-void ServiceTable::unsubscribe(SubscribedService& service) {
+void ServiceTable::unsubscribe(Subscribed service) {
   const MutexLock turn(asking_);
   leave(service);
 }
 
-void ServiceTable::leave(SubscribedService& service) {
-  if (--service.handles != 0) return;
+void ServiceTable::leave(const Subscribed& service) {
+  if (--service->handles != 0) return;
+  stop_reading(*service);
+  // Where the hub is not told in time, because of a break, NIF tells it with the next connection.
+  if (service->followed) {
+    static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
+    return;
+  }
+  static_cast<void>(nif_unsubscribe(uplink_.node(), service->name().c_str(), kLeaveTimeoutMs));
+  forget_unused(service);
+}
+
+/// It could not be subscribed.
+void ServiceTable::give_up(const Subscribed& service) {
+  stop_reading(*service);
+  if (service->followed) static_cast<void>(ask(service, {}, 0));  // as before: without a pace
+  forget_unused(service);
+}
+
+void ServiceTable::stop_reading(SubscribedService& service) {
   {
     const MutexLock lock(mutex_);
     service.read = false;
   }
-  if (service.followed) {
-    static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
-    return;
-  }
-  static_cast<void>(nif_unsubscribe(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
+  inbox_.close(service.queue());
+}
+
+void ServiceTable::forget_unused(const Subscribed& service) {
+  if (service->handles != 0 || service->followed) return;
   const MutexLock lock(mutex_);
-  service.place = {};
-  service.on_place({});
-  end_groups(service);
+  end_groups(*service);
+  subscribed_.erase(service->name());
 }
 
 /// What is still on its way of a subscription that ended is no loss.
@@ -207,14 +229,18 @@ void ServiceTable::end_groups(SubscribedService& service) {
 Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout, const MakeStream& make) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
-  SubscribedService* service = nullptr;
+  Subscribed service;
   {
     const MutexLock lock(mutex_);
-    service = &entry(full_name, {1, AtFullQueue::overwrite_oldest});
+    service = entry(full_name, {1, AtFullQueue::overwrite_oldest});
   }
   if (service->handles == 0 && !service->followed) {
-    const nif_status status = ask(*service, {}, nif_timeout(timeout));
-    if (status != NIF_OK) return failure_of(status, "send to " + full_name);
+    const nif_status status = ask(service, {}, nif_timeout(timeout));
+    if (status != NIF_OK) {
+      auto failure = failure_of(status, "send to " + full_name);
+      forget_unused(service);
+      return failure;
+    }
   }
   service->followed = true;
   ServicePlace place;
@@ -254,7 +280,7 @@ ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
     if (open_ != 0) return Place::not_yet;
     const auto known = subscribed_.find(full_name);
     if (known == subscribed_.end()) return Place::unknown;
-    set_place(*known->second, place);
+    set_place(known->second, place);
   }
   on_moved_(full_name, place);
   return Place::found;

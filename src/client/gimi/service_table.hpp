@@ -20,8 +20,8 @@
 
 namespace gimnet::gimi {
 
-/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread. What was subscribed
-/// or advertised once stays in the table until the node is closed, so that messages on their way find it.
+/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread. What was advertised
+/// once stays in the table until the node is closed; a subscription goes with its last handle.
 class ServiceTable {
  public:
   /// `on_moved` is called without a lock, from the library's thread, for each service that is somewhere else now.
@@ -37,11 +37,14 @@ class ServiceTable {
                                      Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
   void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
 
-  [[nodiscard]] Outcome<SubscribedService*> subscribe(const std::string& full_name, const QueueOptions& options,
-                                                      const PaceOptions& pace, Timeout timeout)
+  using Subscribed = std::shared_ptr<SubscribedService>;
+  [[nodiscard]] Outcome<Subscribed> subscribe(const std::string& full_name, const QueueOptions& options,
+                                              const PaceOptions& pace, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
-  void unsubscribe(SubscribedService& service) GIMNET_EXCLUDES(asking_, mutex_);
+  void unsubscribe(Subscribed service) GIMNET_EXCLUDES(asking_, mutex_);
+  /// Services that are subscribed or sent to now.
+  [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_);
 
   /// Begins a stream to a service: `make` is called once with where it is; what changes then comes to on_moved(), for
   /// as long as the node lives.
@@ -57,7 +60,7 @@ class ServiceTable {
   enum class Place : std::uint8_t { found, unknown, not_yet, unwanted };
   struct Found {
     Place place = Place::unknown;
-    SubscribedService* service = nullptr;
+    Subscribed service;
   };
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
@@ -81,12 +84,15 @@ class ServiceTable {
   [[nodiscard]] std::optional<Failure> obstacle(const std::string& own_name, const std::string& name)
       GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) { return open_ != 0 ? Place::not_yet : Place::unknown; }
-  [[nodiscard]] SubscribedService& entry(const std::string& full_name, const QueueOptions& options)
-      GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status ask(SubscribedService& service, const PaceOptions& pace, std::int32_t timeout_ms)
+  [[nodiscard]] Subscribed entry(const std::string& full_name, const QueueOptions& options) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status ask(const Subscribed& service, const PaceOptions& pace, std::int32_t timeout_ms)
       GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  void leave(SubscribedService& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  void set_place(SubscribedService& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
+  void leave(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void give_up(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void stop_reading(SubscribedService& service) GIMNET_EXCLUDES(mutex_);
+  /// Takes it out of the table, unless somebody reads it or sends there.
+  void forget_unused(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  void set_place(const Subscribed& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
   void end_groups(SubscribedService& service) GIMNET_REQUIRES(mutex_);
   void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
 
@@ -104,8 +110,8 @@ class ServiceTable {
   /// Those that were not withdrawn; also one that the hub did not take again, which has no group.
   std::map<std::string, PublishedService*, std::less<>> published_by_name_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
-  std::map<std::string, std::unique_ptr<SubscribedService>, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
-  std::map<std::uint32_t, SubscribedService*> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::string, Subscribed, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::uint32_t, Subscribed> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);
   std::deque<std::uint32_t> ended_groups_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: kEndedGroupsMax
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };

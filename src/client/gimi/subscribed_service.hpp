@@ -8,6 +8,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/inbox.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -15,11 +16,14 @@
 namespace gimnet::gimi {
 
 /// A service of another node that this one subscribed, to read it or to know where it is, and the queue of its
-/// messages. Thread safety: any thread.
+/// messages. Thread safety: any thread. Lifetime: the inbox outlives it.
 class SubscribedService {
  public:
-  SubscribedService(std::string full_name, MessageQueue& queue)
-      : name_(std::make_shared<const std::string>(std::move(full_name))), queue_(queue) {}
+  SubscribedService(std::string full_name, Inbox& inbox, const QueueOptions& options)
+      : name_(std::make_shared<const std::string>(std::move(full_name))), queue_(inbox.add_queue(options)) {}
+  ~SubscribedService() { queue_.inbox().remove(queue_); }
+  SubscribedService(const SubscribedService&) = delete;
+  SubscribedService& operator=(const SubscribedService&) = delete;
 
   [[nodiscard]] const std::shared_ptr<const std::string>& shared_name() const { return name_; }
   [[nodiscard]] const std::string& name() const { return *name_; }

@@ -65,6 +65,25 @@ TEST_F(InboxTest, WakesWhoWaits) {
   EXPECT_EQ(got, 6u);
 }
 
+TEST_F(InboxTest, AQueueThatNobodyReadsAnyMoreHoldsNobodyUp) {
+  const QueueOptions options{1, AtFullQueue::stop_reading};
+  MessageQueue& queue = inbox_.add_queue(options);
+  Message first = make_message("x", 1);
+  Message second = make_message("x", 2);
+  EXPECT_TRUE(inbox_.put(queue, first, nullptr));
+  EXPECT_FALSE(inbox_.put(queue, second, nullptr));
+  inbox_.close(queue);
+  EXPECT_EQ(rooms_, 1);
+  EXPECT_TRUE(inbox_.put(queue, second, nullptr));
+  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout)) << "what waited and what came is dropped";
+  inbox_.set(queue, options);
+  Message third = make_message("x", 3);
+  EXPECT_TRUE(inbox_.put(queue, third, nullptr));
+  EXPECT_EQ(inbox_.try_receive(queue)->sequence(), 3u);
+  inbox_.remove(queue);
+  EXPECT_EQ(inbox_.queues(), 0u);
+}
+
 TEST_F(InboxTest, ClosingEndsAllWaits) {
   MessageQueue& queue = inbox_.queue({1, 0}, nullptr);
   std::thread one([&] { EXPECT_TRUE(inbox_.receive(queue, kForever).is(Status::closed)); });

@@ -1,0 +1,138 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "client/gimi/service_table.hpp"
+#include "proto/control/ns.hpp"
+#include "tests/client/gimi/support/made_message.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+
+// What is left of a subscription whose last handle was dropped.
+
+namespace gimnet::gimi {
+namespace {
+
+namespace ns = proto::ns;
+
+constexpr std::uint32_t kGroup = (7u << 20) | 11;
+constexpr const char* kName = "robot/drive";
+
+class LeftSubscriptions : public testing::Test {
+ protected:
+  LeftSubscriptions() { uplink_.open(connected_.node.get()); }
+  ~LeftSubscriptions() override { connected_.hub.close(); }
+
+  /// Answers the next SUBSCRIBE, which has to ask for that window.
+  void answer_subscribe(std::uint32_t window, proto::Status status = proto::Status::done) {
+    std::uint16_t number = 0;
+    const auto request = connected_.hub.next_request<ns::Subscribe>(number);
+    ASSERT_TRUE(request);
+    EXPECT_EQ(request->window, window);
+    ns::SubscribeAnswer answer;
+    answer.group = GroupId{kGroup};
+    const proto::ControlHeader header{ns::Subscribe::kOperation, number};
+    connected_.hub.send_control(proto::Kind::ns, status == proto::Status::done
+                                                     ? proto::encode_answer(answer, number)
+                                                     : proto::encode_refusal(header, {status, "no"}));
+  }
+  ServiceTable::Subscribed subscribe(const std::string& name = kName) {
+    ServiceTable::Subscribed made;
+    PaceOptions pace;
+    pace.window = 2;
+    std::thread asking([&] { made = table_.subscribe(name, {}, pace, kForever).or_throw(); });
+    answer_subscribe(2);
+    asking.join();
+    return made;
+  }
+  /// The last handle of the name.
+  void leave(ServiceTable::Subscribed service) {
+    std::thread leaving([&] { table_.unsubscribe(std::move(service)); });
+    std::uint16_t number = 0;
+    ASSERT_TRUE(connected_.hub.next_request<ns::Unsubscribe>(number));
+    connected_.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::UnsubscribeAnswer{}, number));
+    leaving.join();
+  }
+  void follow() {
+    static_cast<void>(table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
+      EXPECT_EQ(place.group, kGroup);
+      return Failure{Status::closed, "no stream is needed here"};
+    }));
+  }
+
+  nif::test::FakeHub hub_;
+  nif::test::Connected connected_ =
+      nif::test::connect_to(hub_, nif::test::default_options("viewer"), nif::test::make_welcome());
+  Uplink uplink_;
+  Inbox inbox_{1, 1 << 20, [] {}};
+  ServiceTable table_{uplink_, inbox_, [](const std::string&, const ServicePlace&) {}};
+};
+
+TEST_F(LeftSubscriptions, NothingOfAsManyNamesAsAProgramLikes) {
+  for (int i = 0; i < 100; ++i) {
+    ServiceTable::Subscribed service = subscribe("robot/s" + std::to_string(i));
+    EXPECT_EQ(table_.subscriptions(), 1u);
+    EXPECT_EQ(inbox_.queues(), 1u);
+    leave(std::move(service));
+    EXPECT_EQ(table_.subscriptions(), 0u);
+    EXPECT_EQ(inbox_.queues(), 0u);
+  }
+}
+
+TEST_F(LeftSubscriptions, AllAsLongAsThereIsAHandle) {
+  ServiceTable::Subscribed first = subscribe();
+  ServiceTable::Subscribed second = table_.subscribe(kName, {}, {}, kForever).or_throw();
+  table_.unsubscribe(std::move(first));
+  EXPECT_EQ(table_.subscriptions(), 1u);
+  EXPECT_EQ(table_.subscribed(kGroup).service, second);
+  leave(std::move(second));
+  EXPECT_EQ(table_.subscriptions(), 0u);
+  EXPECT_EQ(table_.subscribed(kGroup).place, ServiceTable::Place::unwanted) << "what is still on its way is no loss";
+}
+
+TEST_F(LeftSubscriptions, NothingOfOneThatTheHubRefused) {
+  std::thread asking([&] { EXPECT_FALSE(table_.subscribe(kName, {}, {}, kForever)); });
+  answer_subscribe(0, proto::Status::limit);
+  asking.join();
+  EXPECT_EQ(table_.subscriptions(), 0u);
+  EXPECT_EQ(inbox_.queues(), 0u);
+}
+
+// The library's thread has found where a message belongs, and the program leaves.
+TEST_F(LeftSubscriptions, AMessageThatIsJustComingHasAQueueStillAndIsDropped) {
+  ServiceTable::Subscribed service = subscribe();
+  ServiceTable::Subscribed found = table_.subscribed(kGroup).service;
+  leave(std::move(service));
+  EXPECT_EQ(table_.subscriptions(), 0u);
+  Message message = test::make_message("x");
+  EXPECT_TRUE(inbox_.put(found->queue(), message, nullptr));
+  EXPECT_FALSE(inbox_.try_receive(found->queue()));
+  EXPECT_EQ(inbox_.queues(), 1u);
+  found.reset();
+  EXPECT_EQ(inbox_.queues(), 0u);
+}
+
+TEST_F(LeftSubscriptions, OneThatIsSentToIsFollowedWithoutAPace) {
+  ServiceTable::Subscribed service = subscribe();
+  follow();
+  std::thread leaving([&] { table_.unsubscribe(std::move(service)); });
+  answer_subscribe(0);
+  leaving.join();
+  EXPECT_EQ(table_.subscriptions(), 1u);
+}
+
+TEST_F(LeftSubscriptions, WhatEndedDuringABreakIsToldWithTheNextConnection) {
+  ServiceTable::Subscribed service = subscribe();
+  follow();
+  connected_.hub.close();
+  while (nif::test::info_of(connected_.node.get()).connected != 0) std::this_thread::yield();
+  table_.unsubscribe(std::move(service));  // which gives up waiting
+  connected_.hub = hub_.admit(nif::test::make_welcome());
+  answer_subscribe(0);
+  EXPECT_EQ(table_.subscriptions(), 1u);
+}
+
+}  // namespace
+}  // namespace gimnet::gimi
