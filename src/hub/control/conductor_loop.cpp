@@ -20,7 +20,6 @@ using boost::system::error_code;
 using std::chrono::milliseconds;
 using Descriptor = asio::posix::stream_descriptor;
 
-constexpr std::size_t kEventsABatch = 256;
 constexpr milliseconds kCollectEvery{20};
 /// The shards end by themselves at the deadline of DrainCommand; this is for one that does not.
 constexpr milliseconds kDrainMargin{1'000};
@@ -98,17 +97,20 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// What the shards told before this HELLO was sent holds already: a name that was given back is free.
+  /// What the shards told before this HELLO was sent holds already, however much that is: a name that was given back
+  /// is free.
   std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello) {
-    const std::size_t events = stopping ? 0 : kEventsABatch;  // draining ends in take_events()
-    wiring.inbox.drain(events, [this](ShardEvent event) {
-      if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
-        leaving.push_back(std::move(farewell->transport));  // the waiting room is busy with this stranger
-      } else {
-        wiring.conductor.on_event(std::move(event), now());
-      }
-    });
+    // Draining ends in take_events().
+    if (!stopping) wiring.inbox.drain_present([this](ShardEvent&& event) { take_event_in_admit(std::move(event)); });
     return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
+  }
+
+  void take_event_in_admit(ShardEvent event) {
+    if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
+      leaving.push_back(std::move(farewell->transport));  // the waiting room is busy with this stranger
+    } else {
+      wiring.conductor.on_event(std::move(event), now());
+    }
   }
 
   /// Who has said HELLO is not one of those who make way.
@@ -141,7 +143,7 @@ struct ConductorLoop::Impl {
   void take_events() {
     look_whether_it_stood();
     wiring.inbox.waker().awake();
-    wiring.inbox.drain(kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
+    wiring.inbox.drain(ControlInbox::kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
     serve_watches();
     arm_timer();
     if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
