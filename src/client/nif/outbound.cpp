@@ -51,18 +51,23 @@ bool Outbound::write_once() {
   return false;
 }
 
+/// Also where nothing was written: detach() waits for the writer, and drain() does where the queue is empty already.
+void Outbound::end_writing() {
+  writing_ = false;
+  notify_waiting();
+}
+
 void Outbound::write_rounds(bool by_library) {
   writing_ = true;
   // What came during the write of a burst is gathered again, after a look at what can be read.
   const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
   while (rounds < rounds_max && state_ == State::connected && write_once()) ++rounds;
-  writing_ = false;
+  end_writing();
   last_write_ns_ = steady_now_ns();
   const bool more = rounds == rounds_max && !queue_.all_written();
   // The library's thread sees for itself that the kernel is full: waking it would only make it try again at once.
   if (more || (!by_library && (full_ || broken_))) wake_library();
-  if (state_ != State::connected) changed_.notify_all();  // detach() waits for the writer
 }
 
 void Outbound::write_pending(bool writable) {
@@ -246,6 +251,11 @@ void Outbound::forget_group(std::uint32_t group) {
   moves_.forget(group);
 }
 
+std::uint32_t Outbound::waiting() {
+  const MutexLock lock(mutex_);
+  return waiting_;
+}
+
 std::uint32_t Outbound::id() {
   const MutexLock lock(mutex_);
   return id_;
@@ -280,7 +290,7 @@ bool Outbound::write_last() {
       goodbye_.clear();
     }
   } while (write_once());
-  writing_ = false;
+  end_writing();
   return !broken_ && !queue_.all_written();
 }
 

@@ -57,6 +57,8 @@ class Outbound {
   /// Waits until connected. NIF_OK, or why it will not be.
   [[nodiscard]] nif_status wait_connected(Deadline deadline) GIMNET_EXCLUDES(mutex_);
   void add_counters(nif_counters& counters) GIMNET_EXCLUDES(mutex_);
+  /// Threads that wait in one of these calls at this moment.
+  [[nodiscard]] std::uint32_t waiting() GIMNET_EXCLUDES(mutex_);
 
   // The library's thread.
   /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is impossible, and it is not
@@ -154,6 +156,7 @@ class Outbound {
   [[nodiscard]] bool gather_burst() GIMNET_REQUIRES(mutex_);
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
+  void end_writing() GIMNET_REQUIRES(mutex_);
   void wake_library() GIMNET_REQUIRES(mutex_);
   void notify_waiting() GIMNET_REQUIRES(mutex_);
 

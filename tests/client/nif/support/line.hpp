@@ -1,0 +1,71 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include "client/nif/outbound.hpp"
+#include "client/nif/platform.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+
+namespace gimnet::nif::test {
+
+/// The sending half of a node on a socket of its own, and that socket's other end. The test is the library's thread.
+struct Line {
+  explicit Line(const Session& session = session_of(false)) { attach(session); }
+
+  static Session session_of(bool resume) {
+    Session session;
+    session.id = kOwnId;
+    session.frame_bytes_max = 65'536;
+    session.resume = resume;
+    return session;
+  }
+
+  void attach(const Session& session) {
+    std::array<int, 2> ends{};
+    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), 0);
+    socket = Socket(ends[0]);
+    peer = Socket(ends[1]);
+    EXPECT_TRUE(outbound.attach(socket, session));
+  }
+
+  [[nodiscard]] nif_status send(std::string_view payload, Deadline deadline = 0) {
+    nif_outgoing message = NIF_OUTGOING_INIT;
+    message.to = kPeerId;
+    return send(message, payload, deadline);
+  }
+  [[nodiscard]] nif_status send(nif_outgoing message, std::string_view payload, Deadline deadline) {
+    const nif_bytes part = {payload.data(), payload.size()};
+    message.parts = &part;
+    message.part_count = 1;
+    Outgoing outgoing;
+    EXPECT_FALSE(outgoing.read(message));
+    return outbound.send(outgoing, deadline);
+  }
+
+  /// The library's thread was asked to write.
+  [[nodiscard]] bool woken() const { return wait_for(Socket(), false, false, wake, 0).woken; }
+
+  /// What was written by now.
+  [[nodiscard]] std::vector<std::byte> read() {
+    std::vector<std::byte> all;
+    std::array<std::byte, 4096> some;
+    for (;;) {
+      const IoResult result = peer.read(some);
+      if (result.state != IoResult::State::done) return all;
+      all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(result.bytes));
+    }
+  }
+
+  WakeSignal wake;
+  Outbound outbound{{}, wake};
+  Socket socket;
+  Socket peer;
+};
+
+}  // namespace gimnet::nif::test
