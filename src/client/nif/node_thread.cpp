@@ -19,6 +19,18 @@ constexpr std::int64_t kRedialNs = 5'000'000'000;
 
 thread_local constinit const Node* t_node = nullptr;
 
+/// While it lives the program's callback may be running.
+class InCallbacks {
+ public:
+  explicit InCallbacks(Outbound& outbound) : outbound_(outbound) { outbound_.begin_callbacks(); }
+  ~InCallbacks() { outbound_.end_callbacks(); }
+  InCallbacks(const InCallbacks&) = delete;
+  InCallbacks& operator=(const InCallbacks&) = delete;
+
+ private:
+  Outbound& outbound_;
+};
+
 }  // namespace
 
 bool Node::in_callback() const { return t_node == this; }
@@ -156,13 +168,14 @@ void Node::call_back() {
   if (options_.callback == nullptr) return;
   if (held_ && deliver_calls_.load() == held_at_) return;
   held_ = false;
-  std::size_t count = in_hand_.size();
-  while (!held_ && !closing_.load() && count == in_hand_.size()) {
-    count = received_.take(in_hand_);
-    outbound_.set_library_busy(true);
+  std::size_t count = closing_.load() ? 0 : received_.take(in_hand_);
+  if (count == 0) return;
+  const InCallbacks in_callbacks(outbound_);  // for all of them: between two batches nothing is written
+  while (count > 0) {
     const std::span<const Item> taken(in_hand_.data(), count);
     received_.give_back(taken.subspan(call_back_with(taken)));
-    outbound_.set_library_busy(false);
+    const bool more = !held_ && !closing_.load() && count == in_hand_.size();
+    count = more ? received_.take(in_hand_) : 0;
   }
 }
 

@@ -45,7 +45,10 @@ bool Outbound::write_once() {
   bytes_sent_ += result.bytes;
   queue_.commit(result.bytes);
   if (result.bytes > 0) notify_waiting();
-  if (result.bytes == offered) return true;
+  if (result.bytes == offered) {
+    full_ = false;  // a callback's time is not waited for: see write_or_leave()
+    return true;
+  }
   broken_ = result.state == IoResult::State::failed;
   full_ = !broken_;
   return false;
@@ -62,10 +65,11 @@ void Outbound::write_rounds(bool by_library) {
   // What came during the write of a burst is gathered again, after a look at what can be read.
   const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
-  while (rounds < rounds_max && state_ == State::connected && write_once()) ++rounds;
+  // While the library's thread is in a callback nobody else would write the rest.
+  while ((rounds < rounds_max || in_callbacks_) && state_ == State::connected && write_once()) ++rounds;
   end_writing();
   last_write_ns_ = steady_now_ns();
-  const bool more = rounds == rounds_max && !queue_.all_written();
+  const bool more = rounds >= rounds_max && !queue_.all_written();
   // The library's thread sees for itself that the kernel is full: waking it would only make it try again at once.
   if (more || (!by_library && (full_ || broken_))) wake_library();
 }
@@ -76,6 +80,18 @@ void Outbound::write_pending(bool writable) {
   if (state_ != State::connected || writing_ || broken_ || (full_ && !writable)) return;
   full_ = false;
   write_rounds(true);
+}
+
+void Outbound::begin_callbacks() {
+  const MutexLock lock(mutex_);
+  in_callbacks_ = true;
+  // Not gathered, since what is left behind one write would wait for the program.
+  if (wake_raised_ && state_ == State::connected && !writing_ && !full_ && !broken_) write_rounds(false);
+}
+
+void Outbound::end_callbacks() {
+  const MutexLock lock(mutex_);
+  in_callbacks_ = false;
 }
 
 Outbound::Wants Outbound::wants() {

@@ -82,8 +82,10 @@ class Outbound {
     std::int64_t last_write_ns = 0;
   };
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
-  /// While a callback of the program runs, senders do not leave writing to the library's thread.
-  void set_library_busy(bool busy) { library_busy_.store(busy, std::memory_order_relaxed); }  // see library_busy_
+  /// The program's callback is called from now on, until end_callbacks(): nothing is left to the library's thread
+  /// meanwhile, and what was left to it before is written now.
+  void begin_callbacks() GIMNET_EXCLUDES(mutex_);
+  void end_callbacks() GIMNET_EXCLUDES(mutex_);
   /// Sends the last message of a retained service, of which the hub may know nothing, behind what waits in its lane,
   /// unless a newer one goes on that had begun. Does not wait for room.
   void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
@@ -188,10 +190,9 @@ class Outbound {
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
   bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
   bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool in_callbacks_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the library's thread cannot write
   std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t quick_sends_ GIMNET_GUARDED_BY(mutex_) = 0;
-  /// No partner: a sender that sees it late leaves a message to a callback that has just begun, as with any lock.
-  std::atomic<bool> library_busy_{false};
   /// Written under the lock, read by gather_burst() without.
   std::atomic<std::uint64_t> appended_bytes_{0};
 

@@ -70,7 +70,7 @@ bool Outbound::gather_burst() {
 void Outbound::write_or_leave(bool more) {
   if (state_ != State::connected || writing_ || broken_) return;
   if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
-  if (!library_busy_.load(std::memory_order_relaxed)) {       // see there
+  if (!in_callbacks_) {
     if (full_) return;                                        // the library's thread waits for the kernel
     if (wake_raised_ && quick_sends_ == kQuickSends) return;  // it comes, and takes this along
     if (in_burst()) {

@@ -56,6 +56,20 @@ std::vector<std::string> send_burst(Line& line) {
   return sent;
 }
 
+TEST(Outbound, WhatWasLeftToTheLibrarysThreadIsWrittenBeforeACallback) {
+  Line line;
+  const std::vector<std::string> sent = send_burst(line);
+  line.outbound.begin_callbacks();
+  EXPECT_EQ(payloads(line.read()), std::vector<std::string>{sent.back()});
+  // And nothing is left to it while it cannot write, however fast it comes.
+  const OwnClock standing([now_ns = steady_now_ns()] { return now_ns; });
+  for (const std::string text : {"a", "b", "c", "d", "e", "f"}) {
+    EXPECT_EQ(line.send(text), NIF_OK);
+    EXPECT_EQ(payloads(line.read()), std::vector<std::string>{text});
+  }
+  line.outbound.end_callbacks();
+}
+
 /// The library's thread gathers a burst that somebody else has written already, and ends without a write of its own.
 TEST(Outbound, DrainHearsOfAWriterThatHadNothingToWrite) {
   Line line;
