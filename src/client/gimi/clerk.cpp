@@ -66,16 +66,20 @@ void Clerk::attend(bool at_once) {
   work_.notify_one();
 }
 
-void Clerk::wait_for_work(std::int64_t& tick_at) {
-  while (due_.empty() && !stopping_) {
+void Clerk::wait_for_work(std::int64_t& tick_at, bool paused) {
+  const std::int64_t retry_at = paused ? steady_now_ns() + kRetryNs : INT64_MAX;
+  for (;;) {
     if (!ticking_) {
       tick_at = INT64_MAX;
     } else if (tick_at == INT64_MAX) {
       tick_at = steady_now_ns() + kTickNs;
     }
     if (std::exchange(hurry_, false)) tick_at = 0;
-    if (steady_now_ns() >= tick_at) return;
-    static_cast<void>(work_.wait_until(mutex_, tick_at));
+    // The streams are looked after however many ACKs are due, or wait for their way.
+    if (!due_.empty() || (stopping_ && !paused)) return;
+    const std::int64_t until = std::min(tick_at, retry_at);
+    if (steady_now_ns() >= until) return;
+    static_cast<void>(work_.wait_until(mutex_, until));
   }
 }
 
@@ -87,11 +91,7 @@ void Clerk::run() {
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      if (paused.empty()) {
-        wait_for_work(tick_at);
-      } else {
-        static_cast<void>(work_.wait_until(mutex_, steady_now_ns() + kRetryNs));
-      }
+      wait_for_work(tick_at, !paused.empty());
       if (stopping_ && give_up_at == INT64_MAX) give_up_at = steady_now_ns() + kLastAcksNs;
       if (stopping_ && due_.empty() && (paused.empty() || steady_now_ns() >= give_up_at)) return;
       due.swap(due_);

@@ -35,7 +35,8 @@ class Clerk {
     Lane lane;
   };
   void run();
-  void wait_for_work(std::int64_t& tick_at) GIMNET_REQUIRES(mutex_);
+  /// `paused`: an ACK is to be tried again.
+  void wait_for_work(std::int64_t& tick_at, bool paused) GIMNET_REQUIRES(mutex_);
   /// Keeps in `due` what could not be sent because the hub has paused its way.
   void send_due(std::vector<Due>& due);
 
