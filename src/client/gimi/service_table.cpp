@@ -187,6 +187,7 @@ void ServiceTable::leave(const Subscribed& service) {
   stop_reading(*service);
   // Where the hub is not told in time, because of a break, NIF tells it with the next connection.
   if (service->followed) {
+    const Asking asking(*this);                            // for what is told behind the answer
     static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
     return;
   }

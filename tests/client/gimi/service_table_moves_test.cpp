@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "client/gimi/service_table.hpp"
 #include "proto/control/link.hpp"
@@ -273,6 +274,40 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustAdvertised) {
   EXPECT_EQ(table.on_own_service_moved("odom", {kSecond, 99}), ServiceTable::Place::unknown) << "of an earlier one";
   EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::found);
   EXPECT_EQ(odometry->group(), kSecond);
+  connected.hub.close();
+}
+
+/// A program that has read a service goes on sending to it: the hub is asked once more, now without a pace.
+TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
+  nif::test::FakeHub hub;
+  nif::test::Connected connected = nif::test::connect_to(hub, nif::test::default_options(), nif::test::make_welcome());
+  Uplink uplink;
+  uplink.open(connected.node.get());
+  Inbox inbox(1, 1 << 20, [] {});
+  ServiceTable table(uplink, inbox, [](const std::string&, const ServicePlace&) {});
+  const auto answer_one = [&](std::uint32_t group, const auto& meanwhile) {
+    std::uint16_t number = 0;
+    ASSERT_TRUE(connected.hub.next_request<ns::Subscribe>(number));
+    meanwhile();
+    ns::SubscribeAnswer answer;
+    answer.group = GroupId{group};
+    connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
+  };
+  std::thread asking([&] {
+    auto service = table.subscribe("robot/odom", {}, {}, kForever).or_throw();
+    static_cast<void>(table.follow("robot/odom", kForever, [](const ServicePlace&) {
+      return Outcome<SendStream*>(Failure{Status::denied, "there is nothing to send"});
+    }));
+    table.unsubscribe(std::move(service));
+  });
+  answer_one(kFirst, [] {});
+  nif_incoming moved{};
+  moved.text = "robot/odom";
+  moved.group = kSecond;
+  answer_one(kFirst, [&] { EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::not_yet); });
+  asking.join();
+  EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::found);
+  EXPECT_EQ(table.subscribed(kSecond).place, ServiceTable::Place::unwanted);
   connected.hub.close();
 }
 
