@@ -23,7 +23,18 @@ class ChunkPool {
   static constexpr std::size_t kChunkBytes = 128 * 1024;
 
   /// An empty chunk of at least `bytes`; null: no memory.
-  [[nodiscard]] std::shared_ptr<Chunk> take(std::size_t bytes) {
+  [[nodiscard]] std::shared_ptr<Chunk> take(std::size_t bytes) noexcept {
+    try {
+      return find_or_make(bytes);
+    } catch (const std::bad_alloc&) {
+      return nullptr;
+    }
+  }
+
+ private:
+  static constexpr std::size_t kKept = 16;
+
+  [[nodiscard]] std::shared_ptr<Chunk> find_or_make(std::size_t bytes) {
     if (bytes <= kChunkBytes && !chunks_.empty() && chunks_.front().use_count() == 1) {
       std::shared_ptr<Chunk> chunk = std::move(chunks_.front());
       chunks_.pop_front();
@@ -37,8 +48,6 @@ class ChunkPool {
     return chunk;
   }
 
- private:
-  static constexpr std::size_t kKept = 16;
   std::deque<std::shared_ptr<Chunk>> chunks_;  ///< the one handed out longest ago is first. Limit: kKept
 };
 

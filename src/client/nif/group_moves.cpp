@@ -23,8 +23,8 @@ void GroupMoves::forget(std::uint32_t group) {
   std::erase_if(last_, [group](const auto& entry) { return entry.second == group; });
 }
 
-void GroupMoves::leave(const Outgoing& message) {
-  std::erase_if(waiting_, [&message](const Waiting& waiting) { return waiting.message == &message; });
+GroupMoves::Turn::~Turn() {
+  std::erase_if(moves_.waiting_, [this](const Waiting& waiting) { return waiting.message == &message_; });
 }
 
 void GroupMoves::redirect_known(Outgoing& message) const {

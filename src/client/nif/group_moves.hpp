@@ -32,9 +32,20 @@ class GroupMoves {
   }
   /// The hub refuses the service whose group that is or was.
   [[nodiscard]] bool refuses(std::uint32_t group) const;
-  /// It waits; add() redirects it until leave().
-  void enter(Outgoing& message) { waiting_.push_back({&message, false}); }
-  void leave(const Outgoing& message);
+  /// A message that waits: while this lives, add() redirects it.
+  class Turn {
+   public:
+    Turn(GroupMoves& moves, Outgoing& message) : moves_(moves), message_(message) {
+      moves_.waiting_.push_back({&message, false});
+    }
+    ~Turn();
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    GroupMoves& moves_;
+    const Outgoing& message_;
+  };
 
  private:
   struct Waiting {

@@ -71,6 +71,7 @@ void Node::turn() {
   if (reading && !was_reading_) last_heard_ns_ = steady_now_ns();
   was_reading_ = reading;
   const Outbound::Wants wants = outbound_.wants();
+  if (wants.no_memory) throw std::bad_alloc();  // see run()
   if (wants.broken) {
     disconnect("the connection to the hub broke while writing", proto::GoodbyeCode::done);
     return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <new>
 
 #include "proto/frame/fragmenter.hpp"
 
@@ -33,6 +34,15 @@ void Outbound::wake_library() {
 
 /// One gathered write. False: nothing waits, or the kernel takes no more.
 bool Outbound::write_once() {
+  try {
+    return write_gathered();
+  } catch (const std::bad_alloc&) {
+    broken_ = no_memory_ = true;  // whose message it was has its answer: the connection ends
+    return false;
+  }
+}
+
+bool Outbound::write_gathered() {
   const auto pieces = queue_.gather();
   if (pieces.empty()) return false;
   std::size_t offered = 0;
@@ -96,7 +106,7 @@ void Outbound::end_callbacks() {
 
 Outbound::Wants Outbound::wants() {
   const MutexLock lock(mutex_);
-  return {full_ && !writing_, broken_, last_write_ns_};
+  return {full_ && !writing_, broken_, no_memory_, last_write_ns_};
 }
 
 /// Copies a frame into the queue under the id that the node has now.
@@ -135,60 +145,6 @@ bool Outbound::post_data(std::span<const std::byte> frame, std::uint8_t lane) {
   count_appended(kBurstBytes);
   write_or_leave(false);
   return true;
-}
-
-std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& session) {
-  const MutexLock lock(mutex_);
-  std::uint64_t missing = 0;
-  if (session.resumed) {
-    const auto skipped = queue_.resume_from(session.hub_taken);
-    if (!skipped) return std::nullopt;
-    missing = *skipped;
-    lost_ |= missing > 0;
-    // What was queued under an id that the node does not have any more, which the hub need not remember.
-    if (session.id != id_) queue_.set_source(session.id);
-  } else {
-    lost_ |= queue_.retained_bytes() > 0;
-    queue_.restart(session.id);
-    ++epochs_;
-  }
-  queue_.set_resume(session.resume);
-  id_ = session.id;
-  frame_bytes_max_ = session.frame_bytes_max;
-  pauses_.clear();
-  socket_ = &socket;
-  asked_ = false;
-  full_ = false;
-  broken_ = false;
-  last_write_ns_ = steady_now_ns();
-  if (missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, missing})) return std::nullopt;
-  // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes in.
-  if (state_ != State::ended) state_ = State::connected;
-  changed_.notify_all();
-  return missing;
-}
-
-void Outbound::detach(bool again) {
-  const MutexLock lock(mutex_);
-  if (state_ == State::connected) state_ = State::away;
-  while (writing_) static_cast<void>(wait(kNever));
-  socket_ = nullptr;
-  full_ = false;
-  queue_.disconnect();
-  pauses_.clear();
-  if (!again || !queue_.resume()) {
-    lost_ |= !queue_.all_written() || queue_.parked_bytes() > 0 || queue_.retained_bytes() > 0;
-    static_cast<void>(queue_.drop_all());
-  }
-  changed_.notify_all();
-}
-
-void Outbound::end(const Failure& failure) {
-  const MutexLock lock(mutex_);
-  if (state_ == State::ended && failure.status != NIF_CLOSED) return;
-  state_ = State::ended;
-  end_ = failure;
-  changed_.notify_all();
 }
 
 void Outbound::follow_retained(const std::string& service, std::uint32_t group) {
@@ -259,7 +215,13 @@ std::uint64_t Outbound::set_declaring(bool declaring) {
 void Outbound::move_group(const GroupMoves::Move& move) {
   const MutexLock lock(mutex_);
   moves_.add(move);
-  if (move.former != 0 && move.now != 0 && queue_.release_group(move.former, move.now)) write_or_leave(false);
+  if (move.former == 0 || move.now == 0) return;
+  try {
+    if (queue_.release_group(move.former, move.now)) write_or_leave(false);
+  } catch (const std::bad_alloc&) {
+    no_memory_ = true;
+    throw;
+  }
 }
 
 void Outbound::forget_group(std::uint32_t group) {
@@ -287,27 +249,6 @@ void Outbound::on_resume(const proto::flow::Target& target) {
   const MutexLock lock(mutex_);
   pauses_.resume(target);
   notify_waiting();
-}
-
-void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
-  const MutexLock lock(mutex_);
-  if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
-  goodbye_.assign(goodbye.begin(), goodbye.end());
-}
-
-bool Outbound::write_last() {
-  const MutexLock lock(mutex_);
-  while (writing_) static_cast<void>(wait(kNever));
-  if (socket_ == nullptr || broken_) return false;
-  writing_ = true;
-  do {
-    if (queue_.all_written() && !goodbye_.empty()) {
-      static_cast<void>(put_frame(queue_.append_control(goodbye_.size()), goodbye_));
-      goodbye_.clear();
-    }
-  } while (write_once());
-  end_writing();
-  return !broken_ && !queue_.all_written();
 }
 
 bool Outbound::on_confirm(std::uint64_t count) {

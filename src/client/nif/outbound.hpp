@@ -62,9 +62,10 @@ class Outbound {
 
   // The library's thread.
   /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is impossible, and it is not
-  /// attached.
+  /// attached. May throw std::bad_alloc, as may move_group(): then detach() must follow.
   [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session) GIMNET_EXCLUDES(mutex_);
-  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket any more.
+  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket any more. After
+  /// Wants::no_memory nothing is kept for the next one.
   void detach(bool again) GIMNET_EXCLUDES(mutex_);
   /// No connection will come any more: what waits answers with this.
   void end(const Failure& failure) GIMNET_EXCLUDES(mutex_);
@@ -77,8 +78,9 @@ class Outbound {
   [[nodiscard]] bool write_last() GIMNET_EXCLUDES(mutex_);
   /// What to wait for.
   struct Wants {
-    bool writable = false;  ///< the kernel was full
-    bool broken = false;    ///< a write failed
+    bool writable = false;   ///< the kernel was full
+    bool broken = false;     ///< a write failed
+    bool no_memory = false;  ///< because there was no memory for it
     std::int64_t last_write_ns = 0;
   };
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
@@ -158,6 +160,8 @@ class Outbound {
   [[nodiscard]] bool gather_burst() GIMNET_REQUIRES(mutex_);
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool write_gathered() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::optional<std::uint64_t> take_up(const Session& session) GIMNET_REQUIRES(mutex_);
   void end_writing() GIMNET_REQUIRES(mutex_);
   void wake_library() GIMNET_REQUIRES(mutex_);
   void notify_waiting() GIMNET_REQUIRES(mutex_);
@@ -189,6 +193,7 @@ class Outbound {
   bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
   bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
+  bool no_memory_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the queue is not in order: only drop_all() is right
   bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
   bool in_callbacks_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the library's thread cannot write
   std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <new>
 #include <string>
 #include <thread>
 #include <utility>
@@ -81,11 +82,13 @@ void Outbound::write_or_leave(bool more) {
   write_rounds(false);
 }
 
-/// Writes in this thread if there is something to write and nobody else does. True: it did.
+/// Writes in this thread if there is something to write and nobody else does. True: it tried, without the lock, so that
+/// everything may be different now.
 bool Outbound::write_here() {
   if (state_ != State::connected || writing_ || full_ || broken_ || queue_.all_written()) return false;
+  const std::uint64_t before = write_calls_;
   write_rounds(false);
-  return true;
+  return write_calls_ != before;
 }
 
 nif_status Outbound::not_connected() const {
@@ -147,10 +150,8 @@ nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size, co
   if (!message.is_group()) return wait_until_it_may_go(message, frame_size, own, deadline);
   moves_.redirect(message);
   if (!moves_.refuses(message.parts().header.dst) && may_go(message, frame_size, own)) return NIF_OK;
-  moves_.enter(message);
-  const nif_status status = wait_until_it_may_go(message, frame_size, own, deadline);
-  moves_.leave(message);
-  return status;
+  const GroupMoves::Turn turn(moves_, message);
+  return wait_until_it_may_go(message, frame_size, own, deadline);
 }
 
 nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own,
@@ -246,7 +247,12 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
       .windowed = message.parts().header.kind == proto::Kind::unicast && message.size() > proto::kWindowDefault,
       .window = proto::SendWindow(0, message.size())};
   in_progress_.emplace(message.stream(), &progress);
-  const nif_status status = send_pieces(message, progress, deadline);
+  nif_status status = NIF_NO_MEMORY;
+  try {
+    status = send_pieces(message, progress, deadline);
+  } catch (const std::bad_alloc&) {
+    status = fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
+  }
   in_progress_.erase(message.stream());
   notify_waiting();
   return status;

@@ -56,9 +56,10 @@ void ParkedFrames::set_source(std::uint32_t src) {
   }
 }
 
-std::uint64_t ParkedFrames::drop() {
+std::uint64_t ParkedFrames::drop() noexcept {
   std::uint64_t frames = 0;
-  for (const FrameRun& run : std::exchange(runs_, {})) frames += run.frames;
+  for (const FrameRun& run : runs_) frames += run.frames;
+  runs_.clear();
   bytes_ = 0;
   return frames;
 }

@@ -25,7 +25,7 @@ class ParkedFrames {
   std::size_t give_back(std::uint32_t former, std::uint32_t now, Lanes& lanes);
   void set_source(std::uint32_t src);
   /// Returns how many frames there were.
-  std::uint64_t drop();
+  std::uint64_t drop() noexcept;
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 

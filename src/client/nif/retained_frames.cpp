@@ -7,10 +7,12 @@
 namespace gimnet::nif {
 
 void RetainedFrames::written(FrameRun run, bool keep) {
-  next_ += run.frames;
-  if (!keep) return;
-  frames_ += run.frames;
-  bytes_ += run.size();
+  const std::uint32_t frames = run.frames;
+  const std::size_t bytes = run.size();
+  if (!keep) {
+    next_ += frames;
+    return;
+  }
   // Not across lanes: without a resume each run goes back into its own.
   const bool extends = !runs_.empty() && runs_.back().lane == run.lane && runs_.back().chunk == run.chunk &&
                        runs_.back().end == run.begin;
@@ -20,6 +22,9 @@ void RetainedFrames::written(FrameRun run, bool keep) {
   } else {
     runs_.push_back(std::move(run));
   }
+  next_ += frames;
+  frames_ += frames;
+  bytes_ += bytes;
   if (confirmed_ > first()) drop_front(std::min(confirmed_, next_) - first());
 }
 

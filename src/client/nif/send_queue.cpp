@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <new>
 #include <utility>
 
 #include "base/check.hpp"
@@ -13,6 +14,16 @@ namespace {
 constexpr std::size_t kTurnBytes = 16 * 1024;
 /// A lane that waited while this much went is next: 1/16 of the bytes.
 constexpr std::size_t kPassedOverMax = 15 * kTurnBytes;
+
+/// False: no memory, and nothing changed.
+bool push(ParkedFrames::Runs& runs, FrameRun run) noexcept {
+  try {
+    runs.push_back(std::move(run));
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
 
 }  // namespace
 
@@ -31,7 +42,7 @@ bool SendQueue::has_room(std::size_t frame_size) {
   return retained_.make_room(unsent_bytes_ + frame_size) || (retained_.bytes() == 0 && unsent_bytes_ == 0);
 }
 
-SendQueue::Place SendQueue::allocate(std::size_t size) {
+SendQueue::Place SendQueue::allocate(std::size_t size) noexcept {
   if (!open_chunk_ || open_chunk_->capacity - open_chunk_->used < size) {
     auto fresh = pool_.take(size);
     if (!fresh) return {};
@@ -42,50 +53,59 @@ SendQueue::Place SendQueue::allocate(std::size_t size) {
   return {open_chunk_, begin};
 }
 
-std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) {
+std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) noexcept {
   GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
   Place place = allocate(size);
   if (!place.chunk) return {};
   Runs& runs = lanes_[lane];
   std::byte* memory = place.chunk->memory.get() + place.begin;
-  unsent_bytes_ += size;
   const bool extends = !runs.empty() && runs.back().chunk == place.chunk && runs.back().end == place.begin &&
                        runs.back().sort == FrameRun::Sort::data;
   if (extends) {
     runs.back().end += size;
     ++runs.back().frames;
-  } else {
-    runs.push_back({std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::data});
+  } else if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::data})) {
+    return {};
   }
+  unsent_bytes_ += size;
   return {memory, size};
 }
 
-std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t size, const LatestStream& stream) {
+std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t size,
+                                              const LatestStream& stream) noexcept {
   GIMNET_CHECK(lane < lanes_.size() && size >= proto::kHeaderSize);
   Place place = allocate(size);
   if (!place.chunk) return {};
   const std::span<std::byte> memory{place.chunk->memory.get() + place.begin, size};
-  unsent_bytes_ += size;
   if (const auto older = latest_.find(stream); older != latest_.end()) {
     FrameRun& run = *older->second;
-    unsent_bytes_ -= run.size();
+    unsent_bytes_ = unsent_bytes_ - run.size() + size;
     run.chunk = std::move(place.chunk);
     run.begin = place.begin;
     run.end = place.begin + size;
     ++frames_replaced_;
     return memory;
   }
-  lanes_[lane].push_back({std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::latest});
-  latest_.emplace(stream, &lanes_[lane].back());
+  Runs& runs = lanes_[lane];
+  if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::latest}))
+    return {};
+  try {
+    latest_.emplace(stream, &runs.back());
+  } catch (const std::bad_alloc&) {
+    runs.pop_back();
+    return {};
+  }
+  unsent_bytes_ += size;
   return memory;
 }
 
-std::span<std::byte> SendQueue::append_control(std::size_t size) {
+std::span<std::byte> SendQueue::append_control(std::size_t size) noexcept {
   Place place = allocate(size);
   if (!place.chunk) return {};
   std::byte* memory = place.chunk->memory.get() + place.begin;
+  FrameRun run{std::move(place.chunk), place.begin, place.begin + size, 1, 0, FrameRun::Sort::control};
+  if (!push(control_, std::move(run))) return {};
   unsent_bytes_ += size;
-  control_.push_back({std::move(place.chunk), place.begin, place.begin + size, 1, 0, FrameRun::Sort::control});
   return {memory, size};
 }
 
@@ -268,9 +288,13 @@ bool SendQueue::release_group(std::uint32_t former, std::uint32_t now) {
   return bytes > 0;
 }
 
-std::uint64_t SendQueue::drop_all() {
-  disconnect();
+std::uint64_t SendQueue::drop_all() noexcept {
   std::uint64_t frames = parked_.drop();
+  for (const FrameRun& run : staged_) frames += run.counted() ? run.frames : 0;
+  staged_.clear();
+  staged_bytes_ = 0;
+  first_written_ = 0;
+  control_.clear();
   for (const FrameRun& run : resend_) frames += run.frames;
   resend_.clear();
   for (Runs& runs : lanes_) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 namespace gimnet::nif::test {
 namespace {
 
@@ -58,7 +60,9 @@ TEST(GroupMoves, AMessageThatWaitsGoesWithTheServiceThatHadItsGroup) {
   Message first(1);
   Message second(2);
   Message stays(3);
-  for (Message* message : {&first, &second, &stays}) moves.enter(message->outgoing);
+  std::optional<GroupMoves::Turn> first_turn(std::in_place, moves, first.outgoing);
+  const GroupMoves::Turn second_turn(moves, second.outgoing);
+  const GroupMoves::Turn third_turn(moves, stays.outgoing);
   for (int round = 0; round < 2; ++round) {
     moves.begin();
     moves.add({.former = 3, .now = 3});
@@ -74,7 +78,7 @@ TEST(GroupMoves, AMessageThatWaitsGoesWithTheServiceThatHadItsGroup) {
   EXPECT_TRUE(moves.refuses(stays.group())) << "though another one has the group by now";
   EXPECT_FALSE(moves.refuses(3));
   EXPECT_EQ(first.group(), 3u);
-  moves.leave(first.outgoing);
+  first_turn.reset();
   moves.begin();
   moves.add({.former = 3, .now = 9});
   moves.add({.former = 2, .now = 8});

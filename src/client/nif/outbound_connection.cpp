@@ -1,0 +1,102 @@
+#include <new>
+
+#include "client/nif/outbound.hpp"
+
+// A connection comes, breaks, or is left for good.
+
+namespace gimnet::nif {
+
+/// The queue goes on, or begins anew. As attach().
+std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
+  std::uint64_t missing = 0;
+  if (session.resumed) {
+    const auto skipped = queue_.resume_from(session.hub_taken);
+    if (!skipped) return std::nullopt;
+    missing = *skipped;
+    lost_ |= missing > 0;
+    // What was queued under an id that the node does not have any more, which the hub need not remember.
+    if (session.id != id_) queue_.set_source(session.id);
+  } else {
+    lost_ |= queue_.retained_bytes() > 0;
+    queue_.restart(session.id);
+    ++epochs_;
+  }
+  queue_.set_resume(session.resume);
+  return missing;
+}
+
+std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& session) {
+  const MutexLock lock(mutex_);
+  std::optional<std::uint64_t> missing;
+  try {
+    missing = take_up(session);
+  } catch (const std::bad_alloc&) {
+    no_memory_ = true;
+    throw;
+  }
+  if (!missing) return std::nullopt;
+  id_ = session.id;
+  frame_bytes_max_ = session.frame_bytes_max;
+  pauses_.clear();
+  socket_ = &socket;
+  asked_ = false;
+  full_ = false;
+  broken_ = false;
+  last_write_ns_ = steady_now_ns();
+  if (*missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing})) return std::nullopt;
+  // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes in.
+  if (state_ != State::ended) state_ = State::connected;
+  changed_.notify_all();
+  return missing;
+}
+
+void Outbound::detach(bool again) {
+  const MutexLock lock(mutex_);
+  if (state_ == State::connected) state_ = State::away;
+  while (writing_) static_cast<void>(wait(kNever));
+  socket_ = nullptr;
+  full_ = false;
+  pauses_.clear();
+  try {
+    if (!no_memory_) queue_.disconnect();
+  } catch (const std::bad_alloc&) {
+    no_memory_ = true;
+  }
+  if (!again || !queue_.resume() || no_memory_) {
+    lost_ |= no_memory_ || !queue_.all_written() || queue_.parked_bytes() > 0 || queue_.retained_bytes() > 0;
+    static_cast<void>(queue_.drop_all());
+    no_memory_ = false;
+  }
+  changed_.notify_all();
+}
+
+void Outbound::end(const Failure& failure) {
+  const MutexLock lock(mutex_);
+  if (state_ == State::ended && failure.status != NIF_CLOSED) return;
+  state_ = State::ended;
+  end_ = failure;
+  changed_.notify_all();
+}
+
+void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) {
+  const MutexLock lock(mutex_);
+  if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
+  goodbye_.assign(goodbye.begin(), goodbye.end());
+}
+
+bool Outbound::write_last() {
+  const MutexLock lock(mutex_);
+  while (writing_) static_cast<void>(wait(kNever));
+  if (socket_ == nullptr || broken_) return false;
+  writing_ = true;
+  do {
+    if (queue_.all_written() && !goodbye_.empty()) {
+      static_cast<void>(put_frame(queue_.append_control(goodbye_.size()), goodbye_));
+      goodbye_.clear();
+    }
+  } while (write_once());
+  end_writing();
+  return !broken_ && !queue_.all_written();
+}
+
+}  // namespace gimnet::nif

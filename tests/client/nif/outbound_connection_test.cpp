@@ -1,0 +1,56 @@
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "tests/client/nif/support/frames.hpp"
+#include "tests/client/nif/support/line.hpp"
+
+namespace gimnet::nif::test {
+namespace {
+
+/// A message that stays in the queue.
+nif_status hold(Line& line, const char* payload) {
+  nif_outgoing message = NIF_OUTGOING_INIT;
+  message.to = kPeerId;
+  message.flags = NIF_FLAG_MORE;
+  return line.send(message, payload, 0);
+}
+
+TEST(OutboundConnection, WithoutResumeWhatWaitsAtABreakIsLostAndDrainTellsOnce) {
+  Line line;
+  EXPECT_EQ(hold(line, "lost"), NIF_OK);
+  line.outbound.detach(true);
+  EXPECT_EQ(line.outbound.drain(0), NIF_NOT_CONNECTED);
+  line.attach(Line::session_of(false));
+  EXPECT_EQ(line.outbound.drain(0), NIF_NOT_CONNECTED);
+  EXPECT_EQ(line.outbound.drain(0), NIF_OK);
+  EXPECT_TRUE(line.read().empty());
+}
+
+TEST(OutboundConnection, WithResumeItGoesToTheNextConnection) {
+  Line line(Line::session_of(true));
+  EXPECT_EQ(hold(line, "kept"), NIF_OK);
+  line.outbound.detach(true);
+  line.attach(Line::session_of(true));
+  EXPECT_EQ(line.outbound.flush(), NIF_OK);
+  EXPECT_EQ(payloads(line.read()), std::vector<std::string>{"kept"});
+}
+
+TEST(OutboundConnection, GoodbyeIsTheLastWord) {
+  Line line;
+  EXPECT_EQ(hold(line, "message"), NIF_OK);
+  proto::FrameHeader header;
+  header.kind = proto::Kind::link;
+  const std::vector<std::byte> goodbye = frame_of(header, "goodbye");
+  line.outbound.begin_leaving(5, goodbye);
+  EXPECT_FALSE(line.outbound.write_last());
+  const std::vector<std::string> said = payloads(line.read());
+  ASSERT_EQ(said.size(), 3u) << "a CONFIRM before them";
+  EXPECT_EQ(said[1], "message");
+  EXPECT_EQ(said[2], "goodbye");
+}
+
+}  // namespace
+}  // namespace gimnet::nif::test
