@@ -44,7 +44,7 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
   }
   // Who is told may send at once to a group that accepts data; of one that provides, messages come at once to whoever
   // may have to be told.
-  const bool accepts = static_cast<proto::ns::Direction>(service.terms.direction) == proto::ns::Direction::accepts;
+  const bool accepts = service.terms.direction == proto::ns::Direction::accepts;
   if (accepts) effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
   if (!accepts) effects.emplace_back(GroupChanged{service.group});
