@@ -27,6 +27,7 @@ enum class Happening : std::uint8_t {
   restored_after_grace,
   restored_after_restart,
   former_group_kept,
+  former_group_unproven,
   last_goodbye_told,
   grace_expired,
   grace_put_off,

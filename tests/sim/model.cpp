@@ -167,7 +167,6 @@ void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32
     session.number = hello.new_session;
     session.token_number = verdict.former ? verdict.former->number : ++past_.token_numbers;
     session.joined = now;
-    session.came_back = verdict.former.has_value();
     std::uint64_t& least = least_[index];
     least = std::max(least, session.token_number);
     return census_.add(Happening::joined);
@@ -176,7 +175,6 @@ void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32
   census_.add(session.connected ? Happening::came_back_replacing : Happening::came_back);
   if (!former(index).empty()) census_.add(Happening::renumbered_came_back);
   ++session.life;
-  session.came_back = true;
   session.declares = true;
   session.declare_until = now + milliseconds{limits_.grace_ms};
   session.declare_order = ++orders_;

@@ -69,11 +69,21 @@ struct GivenIds {
   [[nodiscard]] bool few_left() const { return kEveryIndex - 1 - old < 1'000; }
 };
 
+/// A proof that a service had a group, as the hub gave it out.
+struct GivenProof {
+  std::vector<std::byte> proof;
+  std::string full_name;
+  std::uint64_t forgettings = 0;  ///< of groups, until then
+};
+
 /// What outlives the hub: tokens that nodes hold, and the indices that it must not give to newcomers any more.
 struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
   GivenIds nodes;
   GivenIds groups;
+  std::map<std::uint32_t, std::vector<GivenProof>> proofs;  ///< by group index
+  std::uint64_t group_forgettings = 0;
+  hub::IndexSet groups_outlasting;  ///< in use at the last one
   std::vector<Kicked> kicked;
   std::uint64_t token_numbers = 0;  ///< given so far
   milliseconds returns_until{};     ///< nodes of the past may come back under their ids
@@ -104,7 +114,6 @@ class Model final : public Witness {
     std::string identity;
     milliseconds token_expiry{};  ///< since 1970
     std::set<std::uint32_t> watches;
-    bool came_back = false;
     milliseconds joined{};
     milliseconds away_until{};     ///< while it is not connected
     std::uint64_t away_order = 0;  ///< who went first
@@ -230,6 +239,13 @@ class Model final : public Witness {
   void take_new_index(std::uint32_t index, milliseconds now);
   /// `granted`: that was kept before.
   void give_node(std::uint32_t index, bool granted);
+  void keep_forgettings(const hub::HubState& state, milliseconds now);
+  void give_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof);
+  /// Does the proof count that says so?
+  [[nodiscard]] bool counts(std::uint32_t group, const GivenProof& proof) const;
+  [[nodiscard]] bool is_proven(const std::string& full_name, const proto::ns::Advertise& terms) const;
+  /// Can any service prove that the group is its own?
+  [[nodiscard]] bool is_somebodys(std::uint32_t group) const;
   [[nodiscard]] bool rests(const std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
                            milliseconds now) const;
   void take_name(std::uint32_t index, const std::string& name, milliseconds now);
@@ -318,12 +334,13 @@ class Model final : public Witness {
   std::map<std::uint32_t, milliseconds> resting_groups_;
   std::map<std::uint32_t, Moved> moved_;  ///< by former index
   std::set<std::uint32_t> unkept_;        ///< indices that were not granted, given while nothing can be kept
-  std::set<std::uint32_t> unkept_groups_;
-  bool keeping_failed_ = false;  ///< in this step
-  bool few_nodes_left_ = false;  ///< when the last step was over: newcomers may be refused
+  bool keeping_failed_ = false;           ///< in this step
+  bool few_nodes_left_ = false;           ///< when the last step was over: newcomers may be refused
   bool few_groups_left_ = false;
   std::set<std::uint32_t> forgotten_nodes_;  ///< given in this life, and not kept as used any more
   std::set<std::uint32_t> forgotten_groups_;
+  std::uint64_t forgettings_ = 0;  ///< of groups, when the last step was over
+  hub::IndexSet outlasting_;
   Renumbered renumbered_;
   std::optional<hub::Limits> configuration_;
   std::vector<DueEvent> due_;

@@ -1,5 +1,7 @@
 #include "tests/sim/model.hpp"
 
+#include <algorithm>
+
 // Which ids the hub may give out: the reference model's part.
 
 namespace gimnet::sim {
@@ -60,14 +62,59 @@ void Model::kept(const hub::HubState& state, milliseconds now) {
   };
   look_at(past_.nodes, state.nodes_used, nodes_given_, forgotten_nodes_, Happening::ids_forgotten,
           [&](std::uint32_t index) { return sessions_.contains(index) || rests(resting_ids_, index, now); });
+  keep_forgettings(state, now);
   look_at(past_.groups, state.groups_used, groups_given_, forgotten_groups_, Happening::groups_forgotten,
           [&](std::uint32_t index) { return groups_.contains(index) || rests(resting_groups_, index, now); });
+}
+
+void Model::keep_forgettings(const hub::HubState& state, milliseconds now) {
+  if (state.group_forgettings == past_.group_forgettings) return;
+  require(state.group_forgettings == past_.group_forgettings + 1 && now >= past_.returns_until, Checker::ids,
+          "groups are forgotten that services may come back to");
+  for (const auto& [group, topic] : groups_) {
+    require(state.groups_outlasting.contains(group), Checker::ids, "a group is forgotten that a service has");
+  }
+  past_.group_forgettings = state.group_forgettings;
+  past_.groups_outlasting = state.groups_outlasting;
+}
+
+void Model::give_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof) {
+  require(!proof.empty(), Checker::answers, "ADVERTISE is answered without a proof");
+  std::vector<GivenProof>& given = past_.proofs[group];
+  for (const GivenProof& other : given) {
+    if (other.proof != proof) continue;
+    return require(other.full_name == full_name && other.forgettings == forgettings_, Checker::answers,
+                   "two services have the same proof, or one of them an old one");
+  }
+  given.push_back({proof, full_name, forgettings_});
+}
+
+bool Model::counts(std::uint32_t group, const GivenProof& proof) const {
+  const std::uint64_t age = forgettings_ - proof.forgettings;
+  return age == 0 || (age == 1 && outlasting_.contains(group));
+}
+
+bool Model::is_proven(const std::string& full_name, const proto::ns::Advertise& terms) const {
+  const std::uint32_t group = index_of(terms.former_group);
+  const auto given = past_.proofs.find(group);
+  if (given == past_.proofs.end()) return false;
+  return std::ranges::any_of(given->second, [&](const GivenProof& each) {
+    return each.proof == terms.former_proof && each.full_name == full_name && counts(group, each);
+  });
+}
+
+bool Model::is_somebodys(std::uint32_t group) const {
+  const auto given = past_.proofs.find(group);
+  if (given == past_.proofs.end()) return false;
+  return std::ranges::any_of(given->second, [&](const GivenProof& each) { return counts(group, each); });
 }
 
 void Model::step_over(bool kept) {
   keeping_failed_ = false;
   if (kept) unkept_.clear();
-  if (kept) unkept_groups_.clear();
+  // What is answered in a step was decided before anything is kept in it.
+  if (forgettings_ != past_.group_forgettings) outlasting_ = past_.groups_outlasting;
+  forgettings_ = past_.group_forgettings;
   few_nodes_left_ = past_.nodes.few_left();
   few_groups_left_ = past_.groups.few_left();
 }
@@ -78,7 +125,7 @@ Past Model::past() const {
     if (!unkept_.contains(index) && !forgotten_nodes_.contains(index)) past.nodes.given.insert(index);
   }
   for (const std::uint32_t index : groups_given_) {
-    if (!unkept_groups_.contains(index) && !forgotten_groups_.contains(index)) past.groups.given.insert(index);
+    if (!forgotten_groups_.contains(index)) past.groups.given.insert(index);
   }
   return past;
 }

@@ -145,9 +145,9 @@ void Model::judge_advertise(const Asked& asked) {
   require(answer.has_value() && answer->subscribers == subscribers(full_name), Checker::answers,
           "ADVERTISE is answered with a wrong number of subscribers");
   session.provides[full_name] = session.life;
-  if (needs_group) {
-    return open_group(asked, full_name, index_of(answer->group), *offer);
-  }
+  if (needs_group) open_group(asked, full_name, index_of(answer->group), *offer);
+  give_proof(index_of(answer->group), full_name, answer->proof);
+  if (needs_group) return;
   require(index_of(answer->group) == known->group, Checker::answers,
           "a service that is advertised again changes its group");
   topics_.at(full_name).service->terms = *offer;
@@ -158,13 +158,15 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
   const auto free = [&](std::uint32_t index) {
     return index != 0 && !groups_.contains(index) && !rests(resting_groups_, index, asked.now);
   };
-  const std::uint32_t former = asked.session.came_back ? index_of(terms.former_group) : 0;
-  const bool fresh = service(full_name) == nullptr;
-  if (fresh && free(former)) {
+  const std::uint32_t former = index_of(terms.former_group);
+  const bool claims = service(full_name) == nullptr && free(former);
+  if (claims && is_proven(full_name, terms)) {
     census_.add(Happening::former_group_kept);
     require(group == former, Checker::answers, "a service that came back does not get its former group");
   } else {
+    if (claims) census_.add(Happening::former_group_unproven);
     require(!past_.groups.contains(group), Checker::ids, "a new service gets a group given out before the restart");
+    require(!is_somebodys(group), Checker::ids, "a new service gets a group that another one can prove to have had");
   }
   require(!groups_.contains(group), Checker::ids, "a service gets the group of another one");
   require(!rests(resting_groups_, group, asked.now), Checker::ids, "a service gets a group that rests");
@@ -185,7 +187,6 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
   groups_[group] = &*entry;
   groups_given_.push_back(group);
   forgotten_groups_.erase(group);
-  if (group == former) unkept_groups_.insert(group);
   tell_moved(full_name, old_group, group, terms);
 }
 

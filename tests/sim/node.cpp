@@ -352,6 +352,8 @@ void SimNode::declare_again() {
     if (registered_.empty()) continue;
     ns::Advertise offer = what.offer;
     offer.former_group = what.group;
+    offer.former_proof = what.proof;
+    if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof)) spoil_proof(offer);
     ask(offer, about(service, offer));
   }
   for (const auto& [full_name, before] : subscribed) {

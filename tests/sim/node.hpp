@@ -48,6 +48,7 @@ class SimNode {
   struct Provided {
     proto::ns::Advertise offer;
     GroupId group;
+    std::vector<std::byte> proof{};  ///< that the service has the group
   };
   [[nodiscard]] const std::map<std::string, Provided>& provides() const { return provides_; }  ///< by service
   struct Subscribed {
@@ -104,6 +105,7 @@ class SimNode {
   void dial();
   [[nodiscard]] proto::Hello hello(std::string& identity);
   void spoil_token(proto::Hello& hello, std::string& identity);
+  void spoil_proof(proto::ns::Advertise& offer);
   bool break_something();
   void fall(bool unseen);
   void hang();

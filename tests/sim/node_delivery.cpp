@@ -23,11 +23,29 @@ void SimNode::advertise(const std::string& service, bool anew) {
   const auto known = provides_.find(service);
   if (known != provides_.end()) offer = known->second.offer;
   offer.former_group = GroupId{};
+  offer.former_proof.clear();
+  if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof)) spoil_proof(offer);
   if (anew) offer.message_type = static_cast<std::uint32_t>(around_.setting.random.below(4));
   offer.metadata = around_.setting.random.chance(500) ? "about it" : "";
   if (anew || known == provides_.end()) draw_delivery(offer);
   if (!registered_.empty()) tell_others(registered_ + "/" + service);
   ask(offer, about(service, offer));
+}
+
+/// It claims the group of another service, or cannot prove that it had the one that it claims.
+void SimNode::spoil_proof(ns::Advertise& offer) {
+  Random& random = around_.setting.random;
+  for (const auto& [full_name, subscribed] : subscribes_) {
+    if (subscribed.group == GroupId{} || random.chance(500)) continue;
+    offer.former_group = subscribed.group;
+    break;
+  }
+  if (offer.former_proof.empty() || random.chance(500)) {
+    offer.former_proof.assign(random.below(3) * 8, std::byte{0x5A});
+  } else {
+    const std::uint64_t bit = random.below(8 * offer.former_proof.size());
+    offer.former_proof[bit / 8] ^= std::byte{1} << (bit % 8);
+  }
 }
 
 /// So that somebody subscribes to it: sometimes in the place of another one.

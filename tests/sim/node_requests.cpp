@@ -156,7 +156,10 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
       }
       break;
     case ns::Advertise::kOperation:
-      if (done) provides_[asked.subject] = {asked.offer, proto::decode_answer<ns::AdvertiseAnswer>(payload)->group};
+      if (done) {
+        const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(payload);
+        provides_[asked.subject] = {asked.offer, answer->group, answer->proof};
+      }
       break;
     case ns::Withdraw::kOperation:
       if (done) {

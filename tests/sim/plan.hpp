@@ -36,6 +36,7 @@ struct Plan {
   std::uint64_t flood = 0;
   // Thousandths of other occasions
   std::uint64_t bad_token = 0;          ///< of HELLOs
+  std::uint64_t bad_proof = 0;          ///< of ADVERTISEs: a former group that is another's, or is not proven
   std::uint64_t lost_token = 0;         ///< of crashes
   std::uint64_t rename = 0;             ///< of HELLOs
   std::uint64_t slow_reader = 0;        ///< of nodes
@@ -62,7 +63,7 @@ struct Fault {
   std::string_view name;
   std::uint64_t Plan::* likelihood;
 };
-inline constexpr std::array<Fault, 27> kFaults = {{
+inline constexpr std::array<Fault, 28> kFaults = {{
     {"hub_kills", &Plan::hub_kills},
     {"hub_drains", &Plan::hub_drains},
     {"crash", &Plan::crash},
@@ -74,6 +75,7 @@ inline constexpr std::array<Fault, 27> kFaults = {{
     {"administers", &Plan::administers},
     {"flood", &Plan::flood},
     {"bad_token", &Plan::bad_token},
+    {"bad_proof", &Plan::bad_proof},
     {"lost_token", &Plan::lost_token},
     {"rename", &Plan::rename},
     {"slow_reader", &Plan::slow_reader},

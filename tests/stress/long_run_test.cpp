@@ -63,6 +63,7 @@ class LongRun : public ::testing::Test {
     std::vector<std::byte> token;
     TestConductor::Node node;
     GroupId group;
+    std::vector<std::byte> proof;
     bool connected = false;
   };
 
@@ -92,9 +93,11 @@ class LongRun : public ::testing::Test {
   void declare(Member& member) {
     proto::ns::Advertise service{.service = "data"};
     service.former_group = member.group;
+    service.former_proof = member.proof;
     const auto offered = hub_.ask<proto::ns::AdvertiseAnswer>(member.node, service);
     ASSERT_TRUE(offered) << offered.error().sentence;
     member.group = offered->group;
+    member.proof = offered->proof;
     // Of one that is there, of one that may not be, and of a name that nobody has.
     for (const std::size_t other : {random_() % kNodes, random_() % kNodes, kNodes + random_() % 50}) {
       const auto wanted = hub_.ask<proto::ns::SubscribeAnswer>(

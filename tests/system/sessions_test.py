@@ -11,11 +11,14 @@ import unittest
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.proxy import Proxy
 from support.waiting import wait_until
-from support.wire import (FLAG_KEYED, FLAG_REPORT, GOODBYE, LINK, NS, OPENING, REPORT, WELCOME, Client, Closed, control,
-                          frame, hello, number, text)
+from support.wire import (FLAG_KEYED, FLAG_REPORT, GOODBYE, GROUP, LINK, NS, OPENING, REPORT, SERVICE, WELCOME, Client,
+                          Closed, control, frame, hello, number, text, value)
 
-RESOLVE = 3
-NO_SUCH_NODE, AWAY = 1, 3  # reasons of a REPORT
+RESOLVE, ADVERTISE, SUBSCRIBE = 3, 7, 10
+ACCEPTS = text(3, "drive") + number(6, 2, 1)  # a service that takes data
+# Nobody is silent too long: who does not read here does not answer PING either.
+PATIENT = ("--limit", "silent_ms=3000000", "--limit", "keep_alive_ms=600000")
+NO_SUCH_NODE, AWAY, NOT_ALLOWED, NO_SUCH_GROUP = 1, 3, 9, 13  # the reasons of REPORTs
 
 
 def resolve(client, name):
@@ -134,6 +137,42 @@ class Restart(unittest.TestCase):
         provider.popen.stdin.flush()
         wait_until(lambda: watcher.out.endswith(b"go on\n"), "the message at the subscriber")
         hub.expect_ledger(self, accepted=1, delivered=1)
+
+
+    def test_a_group_is_its_owners_whoever_comes_first(self):
+        hub = Hub(self, *PATIENT)
+        owner, thief, peer = Client(self, hub).join("V"), Client(self, hub).join("M"), Client(self, hub).join("P")
+        drive, odom = owner.ask(NS, ADVERTISE, ACCEPTS), owner.ask(NS, ADVERTISE, text(3, "odom"))
+        own = thief.ask(NS, ADVERTISE, text(3, "drive"))
+        peer.ask(NS, SUBSCRIBE, text(3, "V/odom"))
+        self.kill(hub)
+        hub = hub.again(self)
+        # M and P are back before V.
+        thief = Client(self, hub).join("M", token=thief.welcome[2])
+        peer = Client(self, hub).join("P", token=peer.welcome[2])
+        peer.ask(NS, SUBSCRIBE, text(3, "V/odom"))
+        stolen = [thief.ask(NS, ADVERTISE, body + number(9, 4, group[3]) + proof)[3]
+                  for group, body, proof in ((drive, ACCEPTS, value(12, 0, own[5])),
+                                             (odom, text(3, "odom"), b""))]
+        self.assertFalse({drive[3], odom[3], own[3]} & set(stolen), "M has a group that was given before")
+        self.assertEqual(len(set(stolen)), 2)
+        for group in (drive[3], odom[3]):
+            thief.send(thief.frame(group, b"as if of V", kind=GROUP, flags=FLAG_REPORT))
+            self.assertEqual(thief.next_where(lambda got: got.kind == REPORT).payload[0], NO_SUCH_GROUP)
+        peer.send(peer.frame(drive[3], b"for V", kind=SERVICE, flags=FLAG_REPORT))
+        self.assertEqual(peer.next_where(lambda got: got.kind == REPORT).payload[0], NO_SUCH_GROUP)
+        owner = Client(self, hub).join("V", token=owner.welcome[2])
+        for before, body in ((drive, ACCEPTS), (odom, text(3, "odom"))):
+            now = owner.ask(NS, ADVERTISE, body + number(9, 4, before[3]) + value(12, 0, before[5]))
+            self.assertEqual((now[3], now[5]), (before[3], before[5]))
+        peer.send(peer.frame(drive[3], b"for V", kind=SERVICE))
+        self.assertEqual(owner.next_data().payload, b"for V")
+        thief.send(thief.frame(odom[3], b"as if of V", kind=GROUP, flags=FLAG_REPORT))
+        self.assertEqual(thief.next_where(lambda got: got.kind == REPORT).payload[0], NOT_ALLOWED)
+        owner.send(owner.frame(odom[3], b"of V", kind=GROUP))
+        got = peer.next_data()
+        self.assertEqual((got.src, got.payload), (owner.id, b"of V"))
+        hub.expect_ledger(self, accepted=6, delivered=2, dropped={"no_such_group": 3, "not_allowed": 1})
 
 
 class Programs(unittest.TestCase):

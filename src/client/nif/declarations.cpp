@@ -28,7 +28,7 @@ void Declarations::enter_group(Service& service, GroupId group) {
   service.group = service.last_group = group;
 }
 
-void Declarations::add_service(const proto::ns::Advertise& service, GroupId group) {
+void Declarations::add_service(const proto::ns::Advertise& service, GroupId group, std::vector<std::byte> proof) {
   const MutexLock lock(mutex_);
   Service& own = services_[service.service];
   if (!same_stream(own.request, service)) {
@@ -36,6 +36,7 @@ void Declarations::add_service(const proto::ns::Advertise& service, GroupId grou
     own.last_due = false;
   }
   own.request = service;
+  own.proof = std::move(proof);
   enter_group(own, group);
   outbound_.move_group({.former = 0, .now = group.value()});
   own.ended = false;
@@ -188,6 +189,7 @@ bool Declarations::declare_service(const std::string& service) {
   if (own.ended && !own.asked) return withdraw_service(service, own.group);
   proto::ns::Advertise request = own.request;
   request.former_group = own.group;
+  request.former_proof = own.proof;
   const auto handler = [this, service, round = round_](const proto::Payload& payload) {
     if (round == round_) on_advertised(service, payload);
   };
@@ -269,6 +271,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     if (found != services_.end()) {
       provides = found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
       former = std::exchange(found->second.group, group);
+      found->second.proof = answer ? answer->proof : std::vector<std::byte>{};
       found->second.asked = false;
       changed = former != group && !found->second.ended;
       if (found->second.ended && group == GroupId{}) {

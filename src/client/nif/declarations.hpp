@@ -25,7 +25,9 @@ class Declarations {
   Declarations(RequestTable& requests, Outbound& outbound, CreditBook& credits)
       : requests_(requests), outbound_(outbound), credits_(credits) {}
 
-  void add_service(const proto::ns::Advertise& service, GroupId group) GIMNET_EXCLUDES(mutex_);
+  /// `proof`: what the hub gave with the group, which the next connection shows to get it again.
+  void add_service(const proto::ns::Advertise& service, GroupId group, std::vector<std::byte> proof)
+      GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
   /// The program is about to advertise a service of that name: one that ended is not withdrawn any more. True: there is
   /// such a one, which ends again where the hub does not take the new one.
@@ -72,6 +74,7 @@ class Declarations {
   struct Service {
     proto::ns::Advertise request;
     GroupId group;
+    std::vector<std::byte> proof{};  ///< of that group
     GroupId last_group;     ///< while the hub refuses it: the one that it had before, unless another one has that
     bool last_due = false;  ///< retained, and the hub may not have the last message
     bool asked = false;     ///< an ADVERTISE of the library has no answer yet, on this connection or for ever

@@ -175,7 +175,7 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     const bool ended = found.declarations().begin_service(request.service);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "advertise", request.service, deadline);
-      if (asked == NIF_OK) found.declarations().add_service(request, answer.group);
+      if (asked == NIF_OK) found.declarations().add_service(request, answer.group, std::move(answer.proof));
       return asked;
     });
     if (status != NIF_OK) {

@@ -25,6 +25,8 @@ std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) 
   state.nodes_used = durable.nodes.used;
   state.groups_used = durable.groups.used;
 #endif
+  state.group_forgettings = durable.groups.forgettings;
+  state.groups_outlasting = durable.groups.outlasting;
   state.kicked = durable.kicked;
   if (std::string error = keep_(state); !error.empty()) {
     log_error(

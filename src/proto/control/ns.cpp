@@ -178,6 +178,7 @@ void Advertise::write(bitestream::Writer& writer) const {
   if (former_group.value() != 0) writer.put_u32(9, former_group.value());
   if (window != 0) writer.put_u32(10, window);
   if (retain) writer.put_bool(11, retain);
+  if (!former_proof.empty()) writer.put_opaque(12, former_proof);
 }
 Advertise Advertise::read(Fields& fields) {
   Advertise advertise;
@@ -190,17 +191,20 @@ Advertise Advertise::read(Fields& fields) {
   advertise.former_group = read_id<GroupId>(fields, 9, "former group id");
   advertise.window = fields.number<std::uint32_t>(10, "window", 0);
   advertise.retain = fields.flag(11, "retain", false);
+  advertise.former_proof = fields.opaque(12, "proof of the former group", kGroupProofBytesMax);
   return advertise;
 }
 
 void AdvertiseAnswer::write(bitestream::Writer& writer) const {
   writer.put_u32(3, group.value());
   writer.put_u32(4, subscribers);
+  if (!proof.empty()) writer.put_opaque(5, proof);
 }
 AdvertiseAnswer AdvertiseAnswer::read(Fields& fields) {
   AdvertiseAnswer answer;
   answer.group = read_required_id<GroupId>(fields, 3, "group id");
   answer.subscribers = fields.number<std::uint32_t>(4, "number of subscribers", 0);
+  answer.proof = fields.opaque(5, "proof of the group", kGroupProofBytesMax);
   return answer;
 }
 

@@ -52,6 +52,8 @@ enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// Records of one page, if the request does not say.
 inline constexpr std::uint32_t kPageRecordsDefault = 256;
+/// The longest proof of a group that a node keeps for a hub, and shows to it; a hub of today writes 16 bytes.
+inline constexpr std::size_t kGroupProofBytesMax = 64;
 
 // RESOLVE: which node has that name?
 
@@ -148,9 +150,10 @@ struct Advertise {
   Direction direction = Direction::provides;
   Delivery delivery = Delivery::stream;
   std::string metadata;
-  GroupId former_group;      ///< from before a reconnect; 0: none
-  std::uint32_t window = 0;  ///< n of delivery sync(n)
-  bool retain = false;       ///< the hub keeps the last message for new subscribers
+  GroupId former_group;                   ///< from before a reconnect; 0: none
+  std::uint32_t window = 0;               ///< n of delivery sync(n)
+  bool retain = false;                    ///< the hub keeps the last message for new subscribers
+  std::vector<std::byte> former_proof{};  ///< of former_group, at most kGroupProofBytesMax
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Advertise read(Fields& fields);
   friend bool operator==(const Advertise&, const Advertise&) = default;
@@ -161,6 +164,7 @@ struct AdvertiseAnswer {
   static constexpr const char* kName = "answer to ADVERTISE";
   GroupId group;
   std::uint32_t subscribers = 0;
+  std::vector<std::byte> proof{};  ///< opaque: that the service had the group, to show when it comes back
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static AdvertiseAnswer read(Fields& fields);
   friend bool operator==(const AdvertiseAnswer&, const AdvertiseAnswer&) = default;

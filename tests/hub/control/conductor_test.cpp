@@ -338,26 +338,6 @@ TEST_F(ConductorTest, ATokenIsForItsIdentityOnly) {
   EXPECT_NE(join(hello).id, robot.id);
 }
 
-TEST_F(ConductorTest, AServiceGetsItsFormerGroupWhereItsProviderCameBack) {
-  const Node robot = join("robot");
-  ns::Advertise odom{.service = "odom"};
-  odom.former_group = make_id<GroupId>(kHub, 900);
-  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(robot, odom)->group), 1u) << "a newcomer had none";
-  detach(robot);
-  proto::Hello hello;
-  hello.token = robot.welcome.token;
-  const Node back = join(hello);
-  ns::Advertise scan{.service = "scan"};
-  scan.former_group = make_id<GroupId>(kHub, 901);
-  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, scan)->group), 901u);
-  ns::Advertise camera{.service = "camera"};
-  camera.former_group = make_id<GroupId>(kHub, 901);
-  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, camera)->group), 2u) << "held by another service";
-  ns::Advertise foreign{.service = "foreign"};
-  foreign.former_group = make_id<GroupId>(HubId{8}, 902);
-  EXPECT_EQ(index_of(ask<ns::AdvertiseAnswer>(back, foreign)->group), 3u) << "another hub's";
-}
-
 TEST_F(ConductorTest, ClosesWhoAsksTooOftenForWhatIsOfNoUse) {
   limits.oddities_burst = 3;
   limits.oddities_per_s = 10;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "proto/control/names.hpp"
 #include "tests/proto/control/support/ns_vectors.hpp"
@@ -16,6 +17,14 @@ using test::expect_request;
 constexpr NodeId kNode{0x00700012};
 constexpr GroupId kGroup{0x00700005};
 
+std::vector<std::byte> proof() {
+  std::vector<std::byte> bytes;
+  for (const int each : {0x48, 0x9e, 0x85, 0xf2, 0x6b, 0x35, 0xf3, 0x25, 0x37, 0x09, 0x1b, 0xea, 0x2e, 0x1f, 0x33, 0}) {
+    bytes.push_back(static_cast<std::byte>(each));
+  }
+  return bytes;
+}
+
 TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/resolve", 1, Resolve{"robot/base"});
   expect_answer("ns/resolve_answer", 1, ResolveAnswer{kNode});
@@ -25,6 +34,10 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/advertise", 4,
                  Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta", kGroup});
   expect_answer("ns/advertise_answer", 4, AdvertiseAnswer{kGroup, 2});
+  Advertise again{"odom", 3, 1, Direction::provides, Delivery::latest, "", kGroup};
+  again.former_proof = proof();
+  expect_request("ns/advertise_again", 15, again);
+  expect_answer("ns/advertise_again_answer", 15, AdvertiseAnswer{kGroup, 2, proof()});
   expect_request("ns/withdraw", 5, Withdraw{kGroup});
   expect_answer("ns/withdraw_answer", 5, WithdrawAnswer{});
   expect_request("ns/services", 6, Services{});

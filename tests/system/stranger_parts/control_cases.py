@@ -1,9 +1,10 @@
 """Sections 8 and 9 of docs/protocol.md: names, services, administration."""
 
+import signal
 import struct
 
-from stranger_parts.bitestream import F64, TEXT, U16, U8, every, fields, put
-from stranger_parts.case import Case
+from stranger_parts.bitestream import F64, OPAQUE, TEXT, U16, U8, every, fields, put
+from stranger_parts.case import PATIENT, Case
 from stranger_parts.client import (CTRL, F_EXT, F_FRAGMENT, F_KEYED, F_REPORT, FLOW, LATEST, LINK, NS, Denied, Refused,
                                    u32)
 
@@ -42,6 +43,25 @@ class Names(Case):
         left = robot.event(34)
         self.assertEqual((left[3], left[4], left.get(5, 0)), (group, viewer.id, 0))
         robot.ask(NS, 8, u32(3, group))
+
+    def test_a_service_has_its_group_again_after_its_hub_was_killed_if_it_proves_it(self):
+        hub = self.hub(*PATIENT)
+        robot, other = self.stranger(hub, "robot"), self.stranger(hub, "other")
+        before, others = robot.advertise("scan"), other.advertise("scan")
+        self.assertEqual((len(before[5]), len(others[5])), (16, 16))
+        hub.process.signal(signal.SIGKILL)
+        hub.process.wait()
+        hub = hub.again(self)
+        other = self.stranger(hub, "other", token=other.welcome[2])
+        former = u32(9, before[3])
+        for service, proof in (("a", b""), ("b", put(12, OPAQUE, before[5])), ("scan", put(12, OPAQUE, others[5]))):
+            self.assertNotIn(other.advertise(service, former=former, proof=proof)[3], (before[3], others[3]))
+        robot = self.stranger(hub, "robot", token=robot.welcome[2])
+        after = robot.advertise("scan", former=former, proof=put(12, OPAQUE, before[5]))
+        self.assertEqual((after[3], after[5]), (before[3], before[5]))
+        with self.assertRaises(Denied) as denied:
+            robot.advertise("odom", former=former, proof=put(12, OPAQUE, bytes(65)))
+        self.assertEqual(denied.exception.args[0], 2)
 
     def test_a_subscriber_is_told_that_a_service_takes_data(self):
         hub = self.hub()

@@ -88,6 +88,12 @@ void ControlRun::ask_services(Choices& input) {
   }
 }
 
+/// Mostly what its provider would show, without taking anything of the input.
+std::vector<std::byte> ControlRun::some_proof(std::uint32_t group) {
+  if (group % 8 == 7) return {};
+  return group % 8 == 6 ? reference_.latest_proof() : reference_.proof_of(group);
+}
+
 void ControlRun::advertise(Choices& input) {
   ns::Advertise offer;
   offer.service = some_service(input);
@@ -100,6 +106,7 @@ void ControlRun::advertise(Choices& input) {
   if (offer.delivery == ns::Delivery::sync || (terms & 0x70) == 0x10) offer.window = input.below(10);
   offer.metadata = some_metadata(input);
   offer.former_group = some_group(input);
+  offer.former_proof = some_proof(index_of(offer.former_group));
   ask(input, Kind::ns, offer);
 }
 

@@ -55,6 +55,7 @@ class ControlRun {
 
   [[nodiscard]] NodeId some_node(Choices& input) const;
   [[nodiscard]] GroupId some_group(Choices& input) const;
+  [[nodiscard]] std::vector<std::byte> some_proof(std::uint32_t group);
   [[nodiscard]] hub::Reloading some_configuration(Choices& input) const;
   void advertise(Choices& input);
   void subscribe(Choices& input);

@@ -139,7 +139,6 @@ std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachComman
   if (verdict.session != 0) {
     Session& session = sessions_.at(verdict.session);
     ++session.life;
-    session.came_back = true;
     session.declare_until = hub.now + milliseconds{limits_.grace_ms};
     return verdict.session;
   }
@@ -153,7 +152,6 @@ std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachComman
   Session& session = sessions_[id];
   session.index = index;
   session.number = verdict.former ? verdict.former->number : ++numbers_;
-  session.came_back = verdict.former.has_value();
   session.joined = hub.now;
   by_index_[index] = id;
   nodes_given_.insert(index);

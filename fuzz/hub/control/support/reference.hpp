@@ -41,7 +41,6 @@ class Reference {
     std::string identity;
     std::string token_name;
     milliseconds token_expiry{};
-    bool came_back = false;
     milliseconds joined{};
     milliseconds away_until{};  ///< while it is not connected
     std::uint64_t away_order = 0;
@@ -90,6 +89,9 @@ class Reference {
 
   [[nodiscard]] const std::map<std::uint64_t, Session>& sessions() const { return sessions_; }
   [[nodiscard]] const std::map<std::uint32_t, std::string>& groups() const { return groups_; }
+  /// A proof that was given for a group: of those for that index, and of all, the latest. Empty: none was.
+  [[nodiscard]] const std::vector<std::byte>& proof_of(std::uint32_t group) { return latest_proofs_[group]; }
+  [[nodiscard]] const std::vector<std::byte>& latest_proof() const { return latest_proof_; }
   [[nodiscard]] const hub::Limits& limits() const { return limits_; }
   [[nodiscard]] LogLevel level() const { return level_; }
   [[nodiscard]] bool drain_wanted() const { return drain_wanted_; }
@@ -145,6 +147,8 @@ class Reference {
 
   // Services
   [[nodiscard]] std::optional<Terms> pace_of(const Topic& topic, std::uint64_t subscriber) const;
+  void note_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof);
+  [[nodiscard]] bool is_proven(const std::string& full_name, const proto::ns::Advertise& terms) const;
   void open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                   const proto::ns::Advertise& terms);
   void withdraw(const std::string& full_name, milliseconds now);
@@ -218,6 +222,9 @@ class Reference {
   std::map<std::uint32_t, Moved> moved_;          ///< by the index that a session had before
   std::map<std::uint32_t, std::uint64_t> least_;  ///< index: sessions of a lower number are over for good
   std::map<std::vector<std::byte>, Token> tokens_;
+  std::map<std::vector<std::byte>, std::pair<std::uint32_t, std::string>> proofs_;  ///< of which group and full name
+  std::map<std::uint32_t, std::vector<std::byte>> latest_proofs_;                   ///< by group
+  std::vector<std::byte> latest_proof_;
   std::set<std::uint32_t> nodes_given_;
   std::set<std::uint32_t> groups_given_;
   std::uint64_t ids_ = 0;

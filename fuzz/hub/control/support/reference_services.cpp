@@ -146,6 +146,7 @@ void Reference::on_advertise(const Asked& asked) {
   const auto answer = proto::decode_answer<ns::AdvertiseAnswer>(asked.answer);
   FUZZ_MUST(answer && answer->subscribers == topic.subscribers.size());
   FUZZ_MUST(hub_of(answer->group) == ControlHub::kHub);
+  note_proof(index_of(answer->group), full_name, answer->proof);
   asked.session.provides[full_name] = asked.session.life;
   if (!topic.service || !same_stream(topic.service->terms, *offer)) {
     return open_group(asked, full_name, index_of(answer->group), *offer);
@@ -157,6 +158,19 @@ void Reference::on_advertise(const Asked& asked) {
   topic.service->terms = *offer;
 }
 
+void Reference::note_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof) {
+  FUZZ_MUST(!proof.empty());
+  // No two services have the same, nor one for two groups; one for the same group has, as nothing is forgotten here.
+  const auto [given, fresh] = proofs_.try_emplace(proof, group, full_name);
+  FUZZ_MUST(fresh || given->second == std::pair(group, full_name));
+  latest_proofs_[group] = latest_proof_ = proof;
+}
+
+bool Reference::is_proven(const std::string& full_name, const ns::Advertise& terms) const {
+  const auto given = proofs_.find(terms.former_proof);
+  return given != proofs_.end() && given->second == std::pair(own_index(terms.former_group), full_name);
+}
+
 void Reference::open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                            const ns::Advertise& terms) {
   const auto free = [&](std::uint32_t index) {
@@ -164,9 +178,10 @@ void Reference::open_group(const Asked& asked, const std::string& full_name, std
            is_free(resting_groups_, index, asked.hub.now);
   };
   Topic& topic = topics_.at(full_name);
-  const std::uint32_t former = asked.session.came_back ? own_index(terms.former_group) : 0;
-  if (!topic.service && free(former)) FUZZ_MUST(group == former);
-  FUZZ_MUST(free(group));
+  const std::uint32_t former = own_index(terms.former_group);
+  const bool back = !topic.service && free(former) && is_proven(full_name, terms);
+  if (back) FUZZ_MUST(group == former);
+  FUZZ_MUST(free(group) && (back || !groups_given_.contains(group)));
   const std::uint32_t old_group = topic.service ? topic.service->group : 0;
   if (old_group != 0) leave_group(full_name, asked.hub.now);
   topic.service = Service{group, asked.id, terms};

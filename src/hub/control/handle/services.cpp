@@ -85,12 +85,12 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   if (!context.membership.services().provides(session.index, full_name, terms)) {
     if (auto refusal = count_declaration(context, session)) return *refusal;
   }
-  // Only a session that came back had a group before; to anybody else it would be a way to pick one.
-  const std::uint32_t former = session.came_back ? own_index(context.facts, offer.former_group).value_or(0) : 0;
+  const Services::FormerGroup former{own_index(context.facts, offer.former_group).value_or(0), offer.former_proof};
   const auto done =
       context.membership.services().advertise(session.index, full_name, terms, context.now, context.effects, former);
   if (!done) return done.error();
-  return ns::AdvertiseAnswer{group_id(context, done->group), done->subscribers};
+  return ns::AdvertiseAnswer{
+      group_id(context, done->group), done->subscribers, {done->proof.begin(), done->proof.end()}};
 }
 
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {

@@ -25,13 +25,15 @@ struct HubState {
   std::uint32_t group_mark = 1;           ///< the same for groups
   IndexSet nodes_used;                    ///< node indices that the next start must not hand out
   IndexSet groups_used;                   ///< the same for groups
+  std::uint64_t group_forgettings = 0;    ///< how often used groups were forgotten
+  IndexSet groups_outlasting;             ///< those that were in use the last time; all of them are used
   std::vector<SessionToken> kicked;       ///< not honoured any more
   friend bool operator==(const HubState&, const HubState&) = default;
 };
 
 inline constexpr std::size_t kKickedMax = 65'536;
 /// The longest legal file.
-inline constexpr std::size_t kHubStateBytesMax = 88 + kKickedMax * 24 + 2 * IndexSet::bytes_max(kIndexMost) + 32;
+inline constexpr std::size_t kHubStateBytesMax = 104 + kKickedMax * 24 + 3 * IndexSet::bytes_max(kIndexMost) + 32;
 
 [[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
 /// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is wrong with it, as

@@ -29,7 +29,7 @@ Places places_for(const JoinRequest& request) {
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
     : limits_(limits),
       sessions_(options, limits),
-      services_(options.hub, limits, options.groups, options.returns_until.value_or(milliseconds{0})) {}
+      services_(options.hub, limits, options.groups, options.returns_until.value_or(milliseconds{0}), options.secret) {}
 
 Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request, milliseconds now,
                                                             Effects& effects) {

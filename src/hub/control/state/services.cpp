@@ -54,12 +54,43 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
   return pace;
 }
 
-Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until)
-    : hub_(hub), limits_(limits), group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
+Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until,
+                   const Secret& secret)
+    : hub_(hub),
+      limits_(limits),
+      secret_(secret),
+      group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
+
+GroupGrant Services::grant_of(std::uint32_t group, std::string_view full_name) const {
+  return {hub_, group, full_name, group_indices_.forgettings()};
+}
+
+/// Between two forgettings one service at most is given a group anew, so that of the proofs of one such time all are
+/// right. One from the time before is right where the group was in use at the forgetting: then nobody got it since.
+/// Any other one loses: another service may have got the group.
+bool Services::is_proven(const FormerGroup& former, std::string_view full_name) const {
+#ifdef GIMNET_BUG_FORMER_GROUP_UNPROVEN
+  return former.group != 0 && !full_name.empty();
+#else
+  GroupGrant grant = grant_of(former.group, full_name);
+  if (proves(former.proof, grant, secret_)) return true;
+  if (grant.forgettings == 0 || !group_indices_.outlasted_forgetting(former.group)) return false;
+  --grant.forgettings;
+  return proves(former.proof, grant, secret_);
+#endif
+}
+
+std::optional<std::uint32_t> Services::take_group(const FormerGroup& former, std::string_view full_name,
+                                                  milliseconds now) {
+  if (former.group != 0 && is_proven(former, full_name) && group_indices_.take_free(former.group, now)) {
+    return former.group;
+  }
+  return group_indices_.take(now);
+}
 
 Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t provider, std::string_view full_name,
                                                                  const ServiceTerms& terms, milliseconds now,
-                                                                 Effects& effects, std::uint32_t former_group) {
+                                                                 Effects& effects, const FormerGroup& former) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   const auto known = topics_.find(full_name);
   const bool provided = known != topics_.end() && known->second.service.has_value();
@@ -80,8 +111,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
   Topic& entry = topic(full_name);
   if (provided) find_topic(node.provides, entry)->life = node.life;
   if (!provided || !same_stream(entry.service->terms, terms)) {
-    const bool former = !provided && group_indices_.take_free(former_group, now);
-    const std::optional<std::uint32_t> group = former ? former_group : group_indices_.take(now);
+    const std::optional<std::uint32_t> group = take_group(provided ? FormerGroup{} : former, full_name, now);
     if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
     if (!group) {
       forget_if_unused(entry);
@@ -102,7 +132,9 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
     entry.service->terms.metadata = terms.metadata;
     effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
-  return Advertised{entry.service->group, static_cast<std::uint32_t>(entry.subscribers.size())};
+  const std::uint32_t group = entry.service->group;
+  return Advertised{group, static_cast<std::uint32_t>(entry.subscribers.size()),
+                    write_group_proof(grant_of(group, full_name), secret_)};
 }
 
 std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::uint32_t group, milliseconds now,

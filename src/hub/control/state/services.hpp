@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -13,6 +14,7 @@
 
 #include "base/result.hpp"
 #include "hub/control/state/effects.hpp"
+#include "hub/control/state/group_proof.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/untold_moves.hpp"
 #include "hub/limits.hpp"
@@ -62,21 +64,31 @@ class Services {
   /// In the order of names, which no choice of names can make slow, and which finds at once all that begin alike.
   using Topics = std::map<std::string, Topic, std::less<>>;
 
-  /// Until `returns_until` providers of before a restart may come back.
-  Services(HubId hub, const Limits& limits, const IndexRange& groups = {},
-           std::chrono::milliseconds returns_until = {});
+  /// Until `returns_until` providers of before a restart may come back. `secret` proves who had a group.
+  Services(HubId hub, const Limits& limits, const IndexRange& groups = {}, std::chrono::milliseconds returns_until = {},
+           const Secret& secret = {});
 
   struct Advertised {
     std::uint32_t group = 0;
     std::uint32_t subscribers = 0;
+    GroupProof proof{};  ///< for FormerGroup, from now on
+  };
+  /// The group that a service had before its hub or its session came back, as its provider says; 0: none.
+  struct FormerGroup {
+    std::uint32_t group = 0;
+    std::span<const std::byte> proof{};
   };
   /// A provider that advertises again what it provides keeps the group; if more than the metadata differs it gets a
-  /// new one, which its subscribers are told before it is published. `former_group`: the one that the service had
-  /// before the hub or the session came back, 0: none; it gets that if nobody has or had it since. Errors: bad_request,
-  /// taken, limit.
+  /// new one, which its subscribers are told before it is published. A service that it begins gets the `former` group
+  /// if the proof is right, nobody else got it since, and nobody has it now. Errors: bad_request, taken, limit.
   [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider, std::string_view full_name,
                                                              const ServiceTerms& terms, std::chrono::milliseconds now,
-                                                             Effects& effects, std::uint32_t former_group = 0);
+                                                             Effects& effects, const FormerGroup& former);
+  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider, std::string_view full_name,
+                                                             const ServiceTerms& terms, std::chrono::milliseconds now,
+                                                             Effects& effects) {
+    return advertise(provider, full_name, terms, now, effects, FormerGroup{});
+  }
   /// Errors: not_found, denied. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> withdraw(std::uint32_t provider, std::uint32_t group,
                                                        std::chrono::milliseconds now, Effects& effects);
@@ -134,6 +146,12 @@ class Services {
   Topic& topic(std::string_view full_name);
   void forget_if_unused(Topic& topic);
   void forget_if_idle(std::uint32_t node);
+  [[nodiscard]] GroupGrant grant_of(std::uint32_t group, std::string_view full_name) const;
+  /// Was it that service that was given the group last?
+  [[nodiscard]] bool is_proven(const FormerGroup& former, std::string_view full_name) const;
+  /// For a service that begins: the group that it had, or a new one.
+  [[nodiscard]] std::optional<std::uint32_t> take_group(const FormerGroup& former, std::string_view full_name,
+                                                        std::chrono::milliseconds now);
   void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
   static void end_group(const Topic& topic, Effects& effects);
   static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
@@ -148,6 +166,7 @@ class Services {
 
   const HubId hub_;
   const Limits& limits_;
+  const Secret secret_;
   IndexPool group_indices_;
   Topics topics_;
   std::map<std::uint32_t, Topic*> groups_;

@@ -4,6 +4,7 @@
 
 #include "base/check.hpp"
 #include "base/endian.hpp"
+#include "hub/control/state/mac_text.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -18,29 +19,12 @@ constexpr std::size_t kExpiryAt = 16;
 constexpr std::size_t kMacAt = 24;
 static_assert(kMacAt + std::tuple_size_v<Digest> == kSessionTokenBytes);
 
-/// Keeps this use of the secret apart from any other.
 constexpr std::string_view kPurpose = "GIMnet session token";
 
-void append(std::vector<std::byte>& to, std::string_view text) {
-  // The length goes before it, so that no two holders give the same bytes.
-  std::byte length[sizeof(std::uint32_t)];
-  store_le(length, static_cast<std::uint32_t>(text.size()));
-  to.insert(to.end(), std::begin(length), std::end(length));
-  const auto bytes = std::as_bytes(std::span{text});
-  to.insert(to.end(), bytes.begin(), bytes.end());
-}
-
 Digest mac_of(std::span<const std::byte> clear, const TokenHolder& holder, const Secret& secret) {
-  std::vector<std::byte> text;
-  text.reserve(512);
-  append(text, kPurpose);
-  std::byte hub[sizeof(std::uint16_t)];
-  store_le(hub, holder.hub.value());
-  text.insert(text.end(), std::begin(hub), std::end(hub));
-  append(text, holder.name);
-  append(text, holder.identity);
-  text.insert(text.end(), clear.begin(), clear.end());
-  return hmac_sha256(secret, text);
+  MacText text(kPurpose);
+  text.add_number(holder.hub.value()).add(holder.name).add(holder.identity).add_bytes(clear);
+  return hmac_sha256(secret, text.bytes());
 }
 
 }  // namespace

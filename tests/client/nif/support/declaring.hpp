@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "gimnet/nif_names.h"
 #include "proto/control/ns.hpp"
@@ -39,6 +40,17 @@ inline void answer_advertise(FakeConnection& hub, const std::string& name, std::
   hub.send_control(proto::Kind::ns, group != 0
                                         ? proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number)
                                         : proto::encode_refusal(header, {proto::Status::limit, "no more"}));
+}
+
+/// The next request is ADVERTISE of `odom`, which had that group and shows that proof; `answer` is what it gets.
+inline void expect_claim(FakeConnection& hub, std::uint32_t group, const std::vector<std::byte>& proof,
+                         const proto::ns::AdvertiseAnswer& answer) {
+  std::uint16_t number = 0;
+  const auto request = hub.next_request<proto::ns::Advertise>(number);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->former_group, GroupId{group});
+  EXPECT_EQ(request->former_proof, proof);
+  hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
 }
 
 inline void advertise(Connected& connected, const char* name, std::uint32_t group, bool retain,

@@ -102,7 +102,7 @@ TEST_F(ServiceRequestsTest, BadTermsAreRefused) {
             Status::bad_request);
 }
 
-TEST_F(ServiceRequestsTest, AReturningNodeGetsItsFormerGroup) {
+TEST_F(ServiceRequestsTest, AReturningNodeFindsItsServiceWhereItWas) {
   const Node robot = join("robot");
   const auto before = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"});
   detach(robot);
@@ -110,7 +110,39 @@ TEST_F(ServiceRequestsTest, AReturningNodeGetsItsFormerGroup) {
   hello.token = robot.welcome.token;
   const Node back = join(hello);
   const auto after = ask<ns::AdvertiseAnswer>(back, ns::Advertise{.service = "odom", .former_group = before->group});
-  EXPECT_EQ(after->group, before->group);
+  EXPECT_EQ(after->group, before->group) << "while the session is there nothing has to be proven";
+}
+
+TEST_F(ServiceRequestsTest, AfterARestartAServiceGetsItsFormerGroupIfItProvesThatItHadIt) {
+  const auto odom = ask<ns::AdvertiseAnswer>(join("robot"), ns::Advertise{.service = "odom"});
+  ASSERT_TRUE(odom);
+  EXPECT_EQ(index_of(odom->group), 1u);
+  EXPECT_EQ(odom->proof.size(), 16u);
+  HubStart start;
+  start.groups = {100, IndexPool::kBlock};
+  TestConductor after(Placement::spread, start);
+  const auto claim = [&](const Node& node, const char* service, const ns::AdvertiseAnswer& before) {
+    const ns::Advertise offer{.service = service, .former_group = before.group, .former_proof = before.proof};
+    const auto answer = after.ask<ns::AdvertiseAnswer>(node, offer);
+    EXPECT_TRUE(answer);
+    return answer ? index_of(answer->group) : 0;
+  };
+  EXPECT_EQ(claim(after.join("thief"), "odom", *odom), 100u) << "its full name is another one";
+  const Node robot = after.join("robot");
+  EXPECT_EQ(claim(robot, "scan", *odom), 101u) << "another service";
+  EXPECT_EQ(claim(robot, "map", {odom->group, 0}), 102u) << "no proof";
+  EXPECT_EQ(claim(robot, "odom", {make_id<GroupId>(HubId{8}, 1), 0, odom->proof}), 103u) << "another hub's group";
+  ASSERT_TRUE(after.ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(kHub, 103)}));
+  EXPECT_EQ(claim(robot, "odom", *odom), 1u) << "no token is needed";
+}
+
+TEST_F(ServiceRequestsTest, AProofThatIsTooLongIsABadRequest) {
+  const Node robot = join("robot");
+  ns::Advertise offer{.service = "odom", .former_group = make_id<GroupId>(kHub, 9)};
+  offer.former_proof.resize(ns::kGroupProofBytesMax);
+  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  offer.former_proof.resize(ns::kGroupProofBytesMax + 1);
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
 }
 
 TEST_F(ServiceRequestsTest, SubscribingTellsTheTerms) {

@@ -32,6 +32,16 @@ TEST(IndexSet, HoldsWhatWasInsertedAndNotErased) {
   EXPECT_EQ(set.size(), 2u);
 }
 
+TEST(IndexSet, IsWithinAnotherThatHasAllOfIt) {
+  EXPECT_TRUE(set_of({}).is_within(set_of({})));
+  EXPECT_TRUE(set_of({9}).is_within(set_of({1, 9, 700})));
+  EXPECT_FALSE(set_of({1, 9}).is_within(set_of({9})));
+  EXPECT_FALSE(set_of({1, 700}).is_within(set_of({1, 9})));
+  IndexSet shrunk = set_of({1, 700});
+  shrunk.erase(700);
+  EXPECT_TRUE(shrunk.is_within(set_of({1})));
+}
+
 TEST(IndexSet, BytesEndWithTheHighestIndex) {
   EXPECT_TRUE(IndexSet{}.bytes().empty());
   EXPECT_THAT(set_of({1, 9}).bytes(), ElementsAre(std::byte{2}, std::byte{2}));

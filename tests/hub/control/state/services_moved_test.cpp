@@ -22,7 +22,8 @@ class ServicesMovedTest : public ::testing::Test {
     terms.message_type = type;
     terms.delivery = proto::ns::Delivery::sync;
     terms.window = 3;
-    const auto done = services_.advertise(kRobot, name, terms, now_, effects_, former_group);
+    const GroupProof proof = write_group_proof({HubId{7}, former_group, name}, {});
+    const auto done = services_.advertise(kRobot, name, terms, now_, effects_, {former_group, proof});
     EXPECT_TRUE(done);
     return done ? done->group : 0;
   }
