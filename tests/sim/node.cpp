@@ -285,9 +285,10 @@ void SimNode::sees_the_end(const WirePointer& wire) {
   if (wire_ == wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
-    // Without a word the hub is not there; it may be soon. A bad name it says in error only.
+    // Without a word the hub is not there; it may be soon. A bad name or role it says in error only.
     const GoodbyeCode told = link().told.value_or(GoodbyeCode::draining);
-    const bool soon_again = refused && (told == GoodbyeCode::draining || told == GoodbyeCode::bad_name);
+    const bool in_error = told == GoodbyeCode::bad_name || told == GoodbyeCode::not_allowed;
+    const bool soon_again = refused && (told == GoodbyeCode::draining || in_error);
     lose_connection();
     // Half of those who were kicked show their token all the same.
     if (std::exchange(was_kicked_, false) && around_.setting.random.chance(500)) forget_life();
