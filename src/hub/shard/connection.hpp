@@ -61,7 +61,6 @@ struct Connection : Recipient {
   bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
   bool draining = false;        ///< closes once everything is written
   bool tell_heard = false;      ///< the conductor waits for the first that is heard of it
-  bool large_frames = false;    ///< are what its last read brought
   std::uint32_t attachment = 0;
   std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;  ///< that are unanswered

@@ -15,11 +15,6 @@ namespace {
 /// Where a newcomer sends to shows when it is read: so much of it, also where some shard has too much to do.
 constexpr std::uint64_t kFirstReadBytes = 4 * 1024;
 
-/// Frames that are larger than this on average gain nothing from coming many at a time, and are still in the cache when
-/// they are written if no more than kLargeFramesReadBytes of them lie between (perf/findings.md).
-constexpr std::uint64_t kLargeFrameBytes = 8 * 1024;
-constexpr std::uint64_t kLargeFramesReadBytes = 64 * 1024;
-
 template <class Word>
 Word word_of(const Mail& mail) {
   Word word;
@@ -40,10 +35,7 @@ std::uint64_t Reader::share() const {
   const std::uint64_t accepted_before = state_.tally.accepted;
   deliveries_end_ = state_.router.deliveries() + share();
   const bool open = process(connection, received);
-  const std::uint64_t accepted = state_.tally.accepted - accepted_before;
-  connection.outbox.counters()->accepted.add(accepted);
-  const auto bytes = static_cast<std::uint64_t>(received.end - received.begin);
-  if (!connection.tail.rest) connection.large_frames = bytes >= kLargeFrameBytes * (accepted + 1);
+  connection.outbox.counters()->accepted.add(state_.tally.accepted - accepted_before);
   state_.fanout.post_all();
   const std::uint64_t posted = state_.fanout.take_posted();
   if (!open) return;
@@ -54,9 +46,7 @@ std::uint64_t Reader::share() const {
 void Reader::read(Connection& connection) {
   state_.egress.owner.check_here();
   if (connection.tail.rest) return;
-  std::uint64_t most = state_.limits.turn_bytes;
-  if (connection.large_frames) most = std::min(most, kLargeFramesReadBytes);
-  if (state_.receive_buffer.many_rests()) most = kFirstReadBytes;
+  std::uint64_t most = state_.receive_buffer.many_rests() ? kFirstReadBytes : state_.limits.turn_bytes;
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
     if (connection.posted_shards != kAllShards) return wait_for_room(connection);
     most = kFirstReadBytes;

@@ -71,30 +71,6 @@ TEST(Reader, CarriesTheLargestFrameAndRefusesOneByteMore) {
   EXPECT_TRUE(a.pipe.transport_gone());
 }
 
-// Large frames are written on while they are still in the cache; of small ones as many as may come at a time.
-TEST(Reader, TakesLessAtATimeOfLargeFrames) {
-  HubRig rig;
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(0);
-  const auto read_in_a_turn = [&] {
-    const std::uint64_t before = rig.sum(&ShardCounters::received_bytes);
-    rig.turn();
-    b.read();
-    return rig.sum(&ShardCounters::received_bytes) - before;
-  };
-  const auto write = [&](std::size_t payload) {
-    const std::vector<std::byte> one = HubRig::frame(a, b.id.value(), std::string(payload, 'x'));
-    for (std::size_t size = 0; size < 600'000; size += one.size()) rig.write(a, one);
-  };
-  write(32'768);
-  EXPECT_GT(read_in_a_turn(), 65'536u) << "nothing was known about its frames";
-  EXPECT_LE(read_in_a_turn(), 65'536u);
-  rig.settle();
-  write(1'024);
-  EXPECT_LE(read_in_a_turn(), 65'536u) << "the last ones were large";
-  EXPECT_GT(read_in_a_turn(), 65'536u);
-}
-
 TEST(Reader, ClosesForALengthThatClaimsFourGiB) {
   for (const std::uint32_t length : {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
     HubRig rig;
