@@ -1,12 +1,12 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <variant>
 
+#include "base/standard_streams.hpp"
 #include "hub/config/options.hpp"
 #include "hub/hub.hpp"
 
@@ -22,20 +22,32 @@ void raise_descriptor_limit() {
   static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
 }
 
+/// What was asked for goes to standard output, what is wrong to standard error.
+int show(const hub::CommandLineEnding& ending) {
+  if (ending.exit_code != 0) {
+    std::fputs(ending.text.c_str(), stderr);
+    return ending.exit_code;
+  }
+  const std::string why = write_standard_output(ending.text);
+  if (why.empty()) return 0;
+  std::fprintf(stderr, "tcphub: cannot write to standard output: %s\n", why.c_str());
+  return 1;
+}
+
 int run(const hub::CommandLine& line) {
   const hub::HubOptions& options = line.configuration.options;
   set_log_level(options.log_level);
   set_log_rates({options.limits.log_lines_per_s, options.limits.peer_log_lines_per_s});
   for (const std::string& warning : line.warnings) log_warning(warning);
   raise_descriptor_limit();
-  std::signal(SIGPIPE, SIG_IGN);
   const auto hub = hub::Hub::start(options, line.sources);
   if (!hub) {
     std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
     return 1;
   }
-  std::printf("ready %s\n", (*hub)->addresses().c_str());
-  std::fflush(stdout);
+  if (const std::string why = write_standard_output("ready " + (*hub)->addresses() + "\n"); !why.empty()) {
+    log_warning("the ready line cannot be written to standard output: " + why);
+  }
   (*hub)->run();
   return 0;
 }
@@ -43,12 +55,11 @@ int run(const hub::CommandLine& line) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  hold_standard_descriptors();
+  have_failed_writes_told();
   try {
     const auto parsed = hub::parse_command_line(argc, argv, ::environ);
-    if (const auto* ending = std::get_if<hub::CommandLineEnding>(&parsed)) {
-      std::fputs(ending->text.c_str(), ending->exit_code == 0 ? stdout : stderr);
-      return ending->exit_code;
-    }
+    if (const auto* ending = std::get_if<hub::CommandLineEnding>(&parsed)) return show(*ending);
     return run(std::get<hub::CommandLine>(parsed));
   } catch (const std::exception& error) {
     // Start-up only: out of memory or descriptors before anything was served.

@@ -1,12 +1,14 @@
 #include <cstdio>
 #include <span>
 
+#include "base/standard_streams.hpp"
 #include "tools/demo/options.hpp"
 #include "tools/demo/run.hpp"
 #include "tools/demo/stop_signal.hpp"
 
 int main(int count, char** words) {
   using namespace gimnet::demo;
+  gimnet::hold_standard_descriptors();
   const std::span<const char* const> all(words, static_cast<std::size_t>(count));
   const gimnet::Result<Options> options = parse_options(all.empty() ? all : all.subspan(1));
   if (!options) {

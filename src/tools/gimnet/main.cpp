@@ -2,6 +2,7 @@
 #include <exception>
 #include <variant>
 
+#include "base/standard_streams.hpp"
 #include "tools/gimnet/command_line.hpp"
 #include "tools/gimnet/commands.hpp"
 
@@ -55,6 +56,8 @@ ExitCode show(const CommandLineEnding& ending) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  gimnet::hold_standard_descriptors();
+  gimnet::have_failed_writes_told();
   try {
     const auto parsed = parse_command_line(argc, argv);
     if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {

@@ -38,7 +38,6 @@ sigset_t watched_signals() {
 StopSignal::StopSignal() : descriptor_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   const sigset_t set = watched_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
   watcher_ = std::thread([this] { watch(); });
 }
 
