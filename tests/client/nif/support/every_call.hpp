@@ -47,14 +47,18 @@ inline constexpr std::array<Call, 30> kCalls{{
     {"nif_receive",
      [](nif_node* node) {
        nif_incoming in{};
-       return nif_receive(node, &in, 0);
+       const nif_status status = nif_receive(node, &in, 0);
+       if (status == NIF_OK) nif_release(&in);
+       return status;
      },
      [](nif_node* node) { return nif_receive(node, nullptr, 0); }, false},
     {"nif_receive_many",
      [](nif_node* node) {
        nif_incoming in{};
        std::size_t count = 0;
-       return nif_receive_many(node, &in, 1, &count, 0);
+       const nif_status status = nif_receive_many(node, &in, 1, &count, 0);
+       if (status == NIF_OK) nif_release(&in);
+       return status;
      },
      [](nif_node* node) { return nif_receive_many(node, nullptr, 1, nullptr, 0); }, false},
     {"nif_deliver", nif_deliver, nullptr, false},
