@@ -30,11 +30,6 @@ if(GIMNET_FUZZ)
   target_compile_options(gimnet_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-if(GIMNET_PLANTED_BUG)
-  string(TOUPPER "${GIMNET_PLANTED_BUG}" _bug)
-  target_compile_definitions(gimnet_options INTERFACE GIMNET_BUG_${_bug}=1)
-endif()
-
 find_program(GIMNET_CCACHE ccache)
 if(GIMNET_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${GIMNET_CCACHE})
