@@ -96,6 +96,7 @@ class PacedWorld final : public fuzzing::ShardWorld {
   void publish_members(bool subscribed) {
     GroupMembers& made = *paced_members_.emplace_back(std::make_unique<GroupMembers>());
     made.provider = node_[0].id;
+    made.provider_place = {ShardIndex{0}, node_[0].session.slot, node_[0].session.generation};
     made.retain = retain_;
     made.by_shard.resize(1);
     if (subscribed) made.paced_by_shard = {{{node_[1].session.slot, node_[1].session.generation}}};

@@ -57,6 +57,7 @@ class ShardWorld {
       attach(node_[i], true);
     }
     members_.provider = node_[0].id;
+    members_.provider_place = {ShardIndex{0}, node_[0].session.slot, node_[0].session.generation};
     members_.accepts = true;
     members_.by_shard.push_back({{node_[1].session.slot, node_[1].session.generation}});
     static_cast<void>(groups_.exchange(kGroupIndex, &members_));

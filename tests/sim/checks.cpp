@@ -239,6 +239,7 @@ void Checks::node_table() const {
 bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topic) const {
   if (topic == nullptr || members == nullptr) return topic == nullptr && members == nullptr;
   if (index_of(members->provider) != topic->service->provider) return false;
+  if (!(members->provider_place == subject_.nodes.find(topic->service->provider))) return false;
   if (members->accepts != (topic->service->terms.direction == proto::ns::Direction::accepts)) return false;
   std::size_t count = 0;
   for (const auto& list : members->by_shard) count += list.size();

@@ -160,7 +160,7 @@ void SimShards::ask_start(std::size_t index, const Seat& seat, Pace& pace) {
   if (members == nullptr) return;  // the subscription is about to end
   const ShardIndex self{static_cast<std::uint8_t>(index)};
   const hub::GroupStart start{group, seat.session.slot, seat.session.generation, pace.counts.start_ticket, self};
-  const std::size_t provider = members->provider_shard.value();
+  const std::size_t provider = members->provider_place.shard.value();
   if (provider == index) return on_start_wanted(index, start);
   setting_.census.add(Happening::start_across_shards);
   post(provider, {.kind = hub::MailKind::start_wanted, .frame = {}, .start = start});

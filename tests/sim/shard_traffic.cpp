@@ -156,19 +156,23 @@ void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
 }
 
 void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t node, bool handed_over) {
-  const std::uint64_t meant = witness_->session_of(node);
   const NodePlace place = parts_.nodes.find(node);
   if (!place.exists()) {
     setting_.census.add(Happening::unicast_to_departed);
     return;
   }
-  if (place.shard.value() != index) {
+  to_place(index, frame, {place, witness_->session_of(node)}, handed_over);
+}
+
+void SimShards::to_place(std::size_t index, const Bytes& frame, const To& to, bool handed_over) {
+  const std::size_t shard = to.place.shard.value();
+  if (shard != index) {
     if (handed_over) return;
     setting_.census.add(Happening::unicast_across_shards);
-    return post(place.shard.value(), {.frame = frame});
+    return post(shard, {.frame = frame});
   }
-  Seat* seat = find(index, place.slot, place.generation);
-  if (seat != nullptr) deliver(index, *seat, frame, meant);
+  Seat* seat = find(index, to.place.slot, to.place.generation);
+  if (seat != nullptr) deliver(index, *seat, frame, to.session);
 }
 
 void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over) {
@@ -224,7 +228,7 @@ void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_o
   const GroupMembers* members = parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
   if (members == nullptr || members->ends()) return;
   if (!members->accepts) return setting_.census.add(Happening::service_frame_refused);
-  to_node(index, frame, index_of(members->provider), handed_over);
+  to_place(index, frame, {members->provider_place, witness_->session_of(index_of(members->provider))}, handed_over);
 }
 
 void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {

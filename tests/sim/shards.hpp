@@ -167,6 +167,11 @@ class SimShards final : public hub::ShardProxy {
 
   void route(std::size_t shard, const Bytes& frame, bool handed_over);
   void to_node(std::size_t shard, const Bytes& frame, std::uint32_t index, bool handed_over);
+  struct To {
+    hub::NodePlace place;
+    std::uint64_t session = 0;  ///< which is meant
+  };
+  void to_place(std::size_t shard, const Bytes& frame, const To& to, bool handed_over);
   void to_group(std::size_t shard, const Bytes& frame, bool handed_over);
   void to_provider(std::size_t shard, const Bytes& frame, bool handed_over);
   void to_paced(std::size_t shard, const Bytes& frame, const hub::MemberList<hub::PacedMember>& members);

@@ -6,6 +6,11 @@
 #include "proto/control/ns.hpp"
 
 namespace gimnet::hub {
+namespace {
+NodePlace node_place(const Session& session) {
+  return {session.place.shard, session.place.slot, session.place.generation};
+}
+}  // namespace
 
 TablePublisher::TablePublisher(HubId hub, std::size_t shards, const Tables& tables)
     : hub_(hub), shards_(shards), tables_(tables) {}
@@ -18,7 +23,7 @@ void TablePublisher::publish_node(std::uint32_t index, const Membership& members
   const Session* session = membership.sessions().find(index);
   NodePlace place;
   if (session != nullptr) {
-    place = NodePlace{session->place.shard, session->place.slot, session->place.generation};
+    place = node_place(*session);
   } else if (membership.sessions().present_index(index) != index) {
     place = NodePlace::renumbered();
   }
@@ -32,7 +37,7 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     const Session* provider = membership.sessions().find(topic->service->provider);
     GIMNET_CHECK(provider != nullptr);
     members->provider = make_id<NodeId>(hub_, topic->service->provider);
-    members->provider_shard = provider->place.shard;
+    members->provider_place = node_place(*provider);
     members->by_shard.resize(shards_);
 #ifndef GIMNET_BUG_RETAIN_NOT_PUBLISHED
     members->retain = topic->service->terms.retain;
@@ -66,7 +71,7 @@ bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscribe
 NodePlace TablePublisher::place_of(std::uint32_t node, const Membership& membership) const {
   const Session* session = membership.sessions().find(node);
   if (session == nullptr) return tables_.nodes.find(node);
-  return {session->place.shard, session->place.slot, session->place.generation};
+  return node_place(*session);
 }
 
 void TablePublisher::put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber,
@@ -84,7 +89,7 @@ std::optional<ShardIndex> TablePublisher::end_group(std::uint32_t index) {
   const auto found = published_.find(index);
   if (found == published_.end()) return std::nullopt;
   const GroupMembers& before = *found->second;
-  const ShardIndex provider_shard = before.provider_shard;
+  const ShardIndex provider_shard = before.provider_place.shard;
   const auto is_elsewhere = [provider_shard](const auto& by_shard) {
     for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
       if (shard != provider_shard.value() && !by_shard[shard].empty()) return true;

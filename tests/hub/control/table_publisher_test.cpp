@@ -49,7 +49,7 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   publisher_.publish_group(1, membership_);
   ASSERT_NE(groups_.find(1), nullptr);
   EXPECT_EQ(groups_.find(1)->provider, make_id<NodeId>(HubId{7}, robot.index));
-  EXPECT_EQ(groups_.find(1)->provider_shard, robot.place.shard);
+  EXPECT_EQ(groups_.find(1)->provider_place, (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
   ASSERT_EQ(groups_.find(1)->by_shard.size(), 2u);
   subscribe(viewer, "robot/odom");
   publisher_.publish_group(1, membership_);

@@ -316,39 +316,6 @@ TEST(Attacher, ABrokenTransportIsToldToTheConductor) {
   EXPECT_EQ(rig.sum(&ShardCounters::connections), 0u);
 }
 
-// The tables say so first, then its shard hears of it; frames under the former id are on their way all the time.
-TEST(Attacher, ARenumberedProvidersFramesAreAllDelivered) {
-  constexpr testing::FrameSpec kGroup{.kind = proto::Kind::group};
-  HubRig rig(2);
-  FakeNode& provider = rig.join(0, kResume);
-  FakeNode& near = rig.join(0);
-  FakeNode& far = rig.join(1);
-  FakeNode& stranger = rig.join(0);
-  rig.publish_group(5, provider.id, {&near, &far});
-  const FakeNode former = provider;
-  const auto say = [&](const std::string& text) {
-    rig.write(provider, HubRig::frame(former, HubRig::group(5), text, kGroup));
-    rig.turn_shard(0);
-  };
-  say("handed over before");
-  rig.nodes().publish(400, {provider.shard, provider.session.slot, provider.session.generation});
-  rig.nodes().publish(index_of(provider.id), NodePlace::renumbered());
-  provider.id = make_id<NodeId>(rig.hub(), 400);
-  say("read before the group says so");
-  rig.publish_group(5, provider.id, {&near, &far});
-  say("read before the shard hears of it");
-  rig.command(0, RenumberCommand{provider.session, provider.id, "another id"});
-  rig.settle();
-  for (const FakeNode* each : {&near, &far}) {
-    EXPECT_THAT(each->texts(), ElementsAre("handed over before", "read before the group says so",
-                                           "read before the shard hears of it"));
-  }
-  EXPECT_EQ(rig.ledger().dropped, 0u);
-  rig.send(stranger, HubRig::group(5), "not the provider", kGroup);
-  rig.settle();
-  EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
-}
-
 /// A pipe whose descriptor no poller takes: epoll refuses regular files.
 class UnpollableTransport final : public Transport {
  public:

@@ -104,7 +104,10 @@ void Reference::compare_tables(const ControlHub& hub) const {
 
 void Reference::compare_group(const hub::GroupMembers& members, const Topic& topic) const {
   const Service& service = *topic.service;
-  FUZZ_MUST(members.provider == id_of(sessions_.at(service.provider).index));
+  const Session& provider = sessions_.at(service.provider);
+  FUZZ_MUST(members.provider == id_of(provider.index));
+  const hub::NodePlace& place = members.provider_place;
+  FUZZ_MUST((Seat{place.shard.value(), place.slot.value(), place.generation} == provider.seat));
   FUZZ_MUST(members.retain == service.terms.retain);
   FUZZ_MUST(members.accepts == (service.terms.direction == ns::Direction::accepts));
   Members plain;

@@ -199,7 +199,8 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
   for (Redeclaring& due : redeclaring_) {
     if (due.index == former && due.generation == session.place.generation) due.index = index;
   }
-  // The new id leads to the node before the old one says that it moved.
+  // The new id leads to the node before the old one says that it moved. Its groups may be published at any time: what
+  // is sent to them goes by places (docs/architecture.md, "Another id").
   effects.emplace_back(NodeChanged{index});
 #ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});

@@ -156,8 +156,8 @@ void RetainedMessages::ask_start(PacedSubscription& subscription) {
   const Recipient& recipient = subscription.recipient();
   const GroupStart start{subscription.group(), recipient.slot, recipient.generation, subscription.start_ticket,
                          fanout_.self()};
-  if (members->provider_shard == fanout_.self()) return on_start_wanted(start);
-  fanout_.post_word(members->provider_shard, mail_about(MailKind::start_wanted, start));
+  if (members->provider_place.shard == fanout_.self()) return on_start_wanted(start);
+  fanout_.post_word(members->provider_place.shard, mail_about(MailKind::start_wanted, start));
 }
 
 /// nullptr: it has asked for a later start since, or ended, and so, perhaps, has the group, whose id is another's now.

@@ -6,6 +6,7 @@
 
 #include "base/ids.hpp"
 #include "hub/data/route/member_list.hpp"
+#include "hub/data/route/node_table.hpp"
 
 namespace gimnet::hub {
 
@@ -29,7 +30,9 @@ struct PacedMember {
 /// shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
-  ShardIndex provider_shard;  ///< constant while the group lives, whatever id its provider has
+  /// Where its provider's session lives: constant while the group lives, whatever id the provider has. Frames to and of
+  /// the service go by it and not by the id, of which the node table may know more or less than this (Router).
+  NodePlace provider_place;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<MemberList<GroupMember>> by_shard;
   /// Those of which the shard paces what they get; empty if there are none.

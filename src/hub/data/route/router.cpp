@@ -74,10 +74,8 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max, std::
   }
 }
 
-void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over) {
-  if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
-  const NodePlace place = nodes_.find(index_of(node));
-  if (!place.exists()) return drop(run, why_absent(node));
+inline void Router::to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
+                             bool handed_over) {
   if (place.shard != fanout_.self()) {
     // A frame that was handed over here and would have to go on is for a node that left meanwhile.
     if (handed_over) return drop(run, proto::DropReason::no_such_node);
@@ -86,6 +84,13 @@ void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId no
   Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
   if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
   fanout_.deliver(*recipient, run, header, Handover{});
+}
+
+void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over) {
+  if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
+  const NodePlace place = nodes_.find(index_of(node));
+  if (!place.exists()) return drop(run, why_absent(node));
+  to_place(run, header, place, handed_over);
 }
 
 proto::DropReason Router::why_absent(NodeId node) const {
@@ -105,19 +110,20 @@ const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader&
   return members;
 }
 
-/// Its session here has not heard of its new id yet, and neither has the node.
-bool Router::still_goes_by(NodeId node, const proto::FrameHeader& header) const {
-  const NodePlace place = place_of(node);
-  if (!place.exists() || place.shard != fanout_.self()) return false;
+/// Does the frame come from the provider under another id than the group knows? Its session here has not heard of its
+/// new id yet, and neither has the node.
+bool Router::provider_goes_by(const GroupMembers& members, NodeId source) const {
+  const NodePlace& place = members.provider_place;
+  if (members.ends() || place.shard != fanout_.self()) return false;
   const Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
-  return recipient != nullptr && recipient->node == NodeId{header.src};
+  return recipient != nullptr && recipient->node == source;
 }
 
 void Router::to_group(const Run& run, const proto::FrameHeader& header, bool handed_over) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   // What was handed over was looked at by the shard that took it in; its provider may have been renumbered since.
-  if (!handed_over && members->provider != NodeId{header.src} && !still_goes_by(members->provider, header)) {
+  if (!handed_over && members->provider != NodeId{header.src} && !provider_goes_by(*members, NodeId{header.src})) {
     return drop(run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
@@ -180,12 +186,14 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
   }
 }
 
+/// By the provider's place: by its id a frame would be lost where this turn sees a group of before REASSIGN and the
+/// node table of after it, in whatever order the two are published.
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   if (members->ends()) return drop(run, proto::DropReason::no_such_group);
   if (!members->accepts) return drop(run, proto::DropReason::not_allowed);
-  to_node(run, header, members->provider, handed_over);
+  to_place(run, header, members->provider_place, handed_over);
 }
 
 /// A LIST frame while it goes to its recipients on this shard.

@@ -81,7 +81,8 @@ class Router {
  private:
   void dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
-  [[nodiscard]] bool still_goes_by(NodeId node, const proto::FrameHeader& header) const;
+  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place, bool handed_over);
+  [[nodiscard]] bool provider_goes_by(const GroupMembers& members, NodeId source) const;
   void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
                                        const MemberList<PacedMember>& here);

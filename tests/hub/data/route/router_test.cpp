@@ -175,6 +175,21 @@ TEST_F(RouterTest, ServiceGoesToTheProvider) {
   EXPECT_EQ(dropped(DropReason::no_such_group), 1u);
 }
 
+// Whatever a turn sees first of REASSIGN: the group of before it, the node table of after it.
+TEST_F(RouterTest, ServiceGoesToAProviderThatIsRenumberedJustNow) {
+  const Recipient& here = rig.add_here(2);
+  rig.publish_group(5, 2, {}, {}, true);
+  rig.nodes.publish(2, NodePlace::renumbered());
+  rig.route(kHub | 5, {"request"}, {.kind = Kind::service});
+  EXPECT_FALSE(here.outbox.empty());
+  rig.add_there(3);
+  rig.publish_group(5, 3, {}, {}, true);
+  rig.nodes.publish(3, NodePlace::renumbered());
+  rig.route(kHub | 5, {"one", "two"}, {.kind = Kind::service});
+  EXPECT_THAT(rig.take_mail(), ElementsAre(2u));
+  EXPECT_EQ(dropped(DropReason::renumbered), 0u);
+}
+
 TEST_F(RouterTest, ServiceIsRefusedWhereTheServiceOnlyProvides) {
   const Recipient& provider = rig.add_here(2);
   rig.add_there(3);

@@ -45,6 +45,7 @@ class RouteRig {
                      const std::vector<std::uint32_t>& there, bool accepts = false) {
     members.accepts = accepts;
     members.provider = make_id<NodeId>(HubId{7}, provider);
+    members.provider_place = nodes.find(provider);
     members.by_shard.assign(2, {});
     for (const std::uint32_t member : here) members.by_shard[0].put({ConnectionSlot{member}, member});
     for (const std::uint32_t member : there) members.by_shard[1].put({ConnectionSlot{member}, member});

@@ -195,8 +195,7 @@ void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std
 }
 
 void HubRig::publish(std::uint32_t index, std::unique_ptr<GroupMembers> group) {
-  const NodePlace provider = nodes_.find(index_of(group->provider));
-  if (provider.exists()) group->provider_shard = provider.shard;
+  group->provider_place = nodes_.find(index_of(group->provider));
   static_cast<void>(groups_.exchange(index, group.get()));
   members_.push_back(std::move(group));
 }
