@@ -113,13 +113,14 @@ TEST(GimiError, HasAStatusAndASentence) {
 }
 
 TEST(GimiError, NamesTheServiceOfAStreamThatLeadsToOne) {
-  const auto data = encode_failure({6, "too large", (7u << 20) | 5});
+  const auto payload = payload_of("gimi/error_service");
+  const auto data = to_bytes(parse_message(payload)->data);
   const auto failure = decode_failure(data);
   ASSERT_TRUE(failure);
   EXPECT_EQ(failure->status, 6);
   EXPECT_EQ(failure->group, (7u << 20) | 5);
   EXPECT_EQ(failure->sentence, "too large");
-  EXPECT_EQ(data.size(), 2u + 4u + 9u);
+  EXPECT_EQ(encode_failure(*failure), data);
   EXPECT_TRUE(decode_failure(std::span(data).first(6)));
   EXPECT_FALSE(decode_failure(std::span(data).first(5)));
 }
