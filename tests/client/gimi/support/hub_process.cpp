@@ -48,7 +48,7 @@ HubProcess::HubProcess(const std::vector<std::string>& arguments) {
   ::close(pipe[0]);
   constexpr std::string_view kReady = "ready ";
   EXPECT_TRUE(line.starts_with(kReady)) << "tcphub said: " << line;
-  if (line.starts_with(kReady)) url_ = line.substr(kReady.size());
+  if (line.starts_with(kReady)) url_ = line.substr(kReady.size(), line.find(' ', kReady.size()) - kReady.size());
 }
 
 void HubProcess::kill() {

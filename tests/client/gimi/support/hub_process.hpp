@@ -11,7 +11,7 @@ namespace gimnet::test {
 /// How long a test waits for what must happen.
 inline constexpr std::chrono::seconds kPatience{20};
 
-/// A tcphub of its own on a free port of loopback. Ends with this.
+/// A tcphub of its own on a free port of loopback, and wherever else `arguments` say. Ends with this.
 class HubProcess {
  public:
   explicit HubProcess(const std::vector<std::string>& arguments = {});
@@ -19,6 +19,7 @@ class HubProcess {
   HubProcess(const HubProcess&) = delete;
   HubProcess& operator=(const HubProcess&) = delete;
 
+  /// On loopback.
   [[nodiscard]] const std::string& url() const { return url_; }
   /// Ends it without a word to anybody.
   void kill();
