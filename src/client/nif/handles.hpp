@@ -8,8 +8,8 @@
 #include "gimnet/nif.h"
 
 // From the handles of the C API to nodes. A handle is a number (slot and generation), so that one that was closed, or
-// never was, is found out instead of followed. A slot's numbers come round after 2^32 handles, after 2^16 where pointers
-// have 32 bits.
+// never was, is found out instead of followed. A slot's numbers come round after 2^32 handles, after 2^16 where
+// pointers have 32 bits.
 
 namespace gimnet::nif {
 

@@ -29,8 +29,8 @@ class Handshake {
 
   enum class State : std::uint8_t { need_more, welcome, goodbye, failed };
 
-  /// `resume`: the HELLO asked for it; `former_hub_epoch`: what it named as the hub's earlier epoch, 0: none. Only where
-  /// it did both may WELCOME say `resumed`.
+  /// `resume`: the HELLO asked for it; `former_hub_epoch`: what it named as the hub's earlier epoch, 0: none. Only
+  /// where it did both may WELCOME say `resumed`.
   Handshake(bool resume, std::uint64_t former_hub_epoch) : resume_(resume), former_hub_epoch_(former_hub_epoch) {}
 
   /// Bytes as they came. REQUIRES: the last call answered need_more, or there was none.

@@ -13,7 +13,6 @@
 namespace gimnet::hub {
 namespace {
 
-
 /// The first index of a block that an earlier hub has hardly used.
 std::uint32_t random_mark() {
   const auto number = static_cast<std::uint32_t>(random_bits());

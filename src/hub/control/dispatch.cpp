@@ -56,9 +56,9 @@ constexpr std::array kTable{
 Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
 
 proto::Payload handle_unknown(HandlerContext&, const Request& request) {
-  return proto::encode_refusal(request.header,
-                               {proto::Status::not_supported,
-                                "this hub has no operation " + std::to_string(request.header.operation)});
+  return proto::encode_refusal(
+      request.header,
+      {proto::Status::not_supported, "this hub has no operation " + std::to_string(request.header.operation)});
 }
 
 }  // namespace
