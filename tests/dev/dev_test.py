@@ -3,6 +3,7 @@
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -90,12 +91,32 @@ class Door(unittest.TestCase):
         self.assert_refuses("bench", "router", "mailbox", saying="usage: ./dev bench")
         self.assert_refuses("fuzz", "nonsense", saying="no fuzz target 'nonsense'")
         self.assert_refuses("fuzz", "nif_receive", "soon", saying="'soon' is not a number")
+        for seconds in ("0", "00", "-1", "1000000000", "18446744073709551616"):
+            self.assert_refuses("fuzz", "nif_receive", seconds, saying=f"'{seconds}' is not a number of seconds from 1 to 999999999")
+            self.assert_refuses("fuzz", "--planted", seconds, saying=f"'{seconds}' is not a number")
         self.assert_refuses("fuzz", "nif_receive", "1", "2", saying="usage: ./dev fuzz")
         self.assert_refuses("lint", "src", saying="lint takes no arguments")
         self.assert_refuses("format", "src", saying="format takes no arguments")
         self.assert_refuses("perf", "--fast", saying="unrecognized arguments: --fast")
         self.assert_refuses("perf", "--hel", saying="unrecognized arguments: --hel")
         self.assert_refuses("perf", "--only", "nonsense", saying="invalid choice: 'nonsense'")
+
+    def test_demo_refuses_what_is_none_of_its_arguments_before_it_builds(self):
+        for arguments in (["--foo"], ["--seconds", "5", "foo"], ["--log=x", "view"], ["view", "--ascii", "--foo=1"], ["*"], [""]):
+            with self.subTest(arguments=arguments):
+                self.assert_refuses("demo", *arguments, saying=f"demo: there is no argument '{arguments[-1]}'")
+        self.assert_refuses("demo", "--ascii", "--seconds", saying="demo: --seconds needs a value behind it")
+
+    def test_demo_builds_for_all_arguments_of_its_usage(self):
+        usage = re.search(r'R"\((.*?)\)"', (ROOT / "src/tools/demo/options.cpp").read_text(encoding="utf-8"), re.S)[1]
+        lines = re.findall(r"^  (--.*?)  ", usage, re.M)
+        self.assertGreater(len(lines), 6)
+        for arguments in ([], ["robot"], ["view"], ["--log", "--foo"], ["--log=--foo"], *(line.replace(",", "").split() for line in lines)):
+            if "--help" in arguments:
+                continue
+            with self.subTest(arguments=arguments):
+                _, calls = self.dev("demo", *arguments)
+                self.assertTrue([call for call in calls if call.startswith("cmake --build")], calls)
 
     def test_fuzz_without_a_target_lists_them(self):
         process, calls = self.dev("fuzz")
