@@ -169,6 +169,19 @@ class Sizes(unittest.TestCase):
                 self.assertEqual((sent.code, receiver.wait()), (0, 0), sent.err)
                 self.assertEqual(receiver.out_size, limit + 1, "the payload and a newline")
 
+    def test_a_line_that_the_receiver_does_not_take(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B", "--max-size", "100000")
+        lines = b"one\ntwo\n" + b"x" * (2 << 20) + b"\n" + b"late\n" * 1000
+        sent = run_gimnet(hub, "send", "B", "--json", data=lines)
+        self.assertEqual(sent.code, 1)
+        self.assertEqual(json.loads(sent.out), {"sent": 2, "acknowledged": 2, "lost": 0, "waiting": 0})
+        for words in ("it is larger than it takes (`gimnet recv` takes larger ones with --max-size)",
+                      "of 2 messages before it 2 were acknowledged, and nothing behind it was sent"):
+            self.assertIn(words, sent.err)
+        receiver.end()
+        self.assertEqual(receiver.out.splitlines(), [b"one", b"two"])
+
     def test_a_file_that_the_receiver_does_not_take(self):
         hub = Hub(self)
         receiver = start_recv(self, hub, "B", "--max-size", "100000")

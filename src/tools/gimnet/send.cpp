@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstring>
 #include <string>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "tools/gimnet/commands.hpp"
@@ -28,6 +29,12 @@ Outcome<void> check_readable(const std::string& path) {
   return cannot_read(path, errno);
 }
 
+Outcome<void> send_one(const Sender& sender, BytesView message, More more) {
+  auto sent = sender.send(message, kForever, more);
+  if (sent || sent.failure().status != Status::too_large || message.size() > kMessageBytesMax) return sent;
+  return Failure{Status::too_large, sent.failure().sentence + " (`gimnet recv` takes larger ones with --max-size)"};
+}
+
 Outcome<void> send_file(const Sender& sender, const std::string& path) {
   const auto content = FileContent::read(path, kMessageBytesMax);
   if (!content) return content.failure();
@@ -36,22 +43,26 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
     return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) + ": " +
            std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
   });
-  if (auto sent = sender.send(content->bytes()); !sent) return sent;
+  if (auto sent = send_one(sender, content->bytes(), More::no); !sent) return sent;
   return sender.settle();
 }
 
-/// Waits for the fate of what was sent before a loss, and answers with the loss.
-Outcome<void> settle_loss(const Sender& sender) {
+/// What of the input was not sent.
+enum class Unsent : std::uint8_t { nothing, rest, line_and_rest };
+
+/// Waits for the fate of what was sent before a loss, or before a message that could not be sent, and answers with
+/// that.
+Outcome<void> settle_before(const Sender& sender, Outcome<void> unsent) {
   auto settled = sender.settle();
+  if (!unsent && sender.counts().lost == 0) return unsent;
   return settled ? Failure{Status::not_delivered, "messages were lost"} : settled;
 }
 
-/// `rest`: input is left that was not sent.
-Outcome<void> send_lines(Session& session, const Sender& sender, bool& rest) {
+Outcome<void> send_lines(Session& session, const Sender& sender, Unsent& unsent) {
   ConnectionWatch watch(session.node());
   LineInput input(STDIN_FILENO, session.stop().descriptor(),
                   [&] { return watch.goes_on() && sender.counts().lost == 0; });
-  rest = true;
+  unsent = Unsent::rest;
   const Progress progress([&] {
     const SendCounts counts = sender.counts();
     return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) + " acknowledged";
@@ -60,18 +71,19 @@ Outcome<void> send_lines(Session& session, const Sender& sender, bool& rest) {
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
-        if (auto sent = sender.send(line, kForever, input.has_line() ? More::yes : More::no); !sent) {
-          return sender.counts().lost != 0 ? settle_loss(sender) : sent;
+        if (auto sent = send_one(sender, line, input.has_line() ? More::yes : More::no); !sent) {
+          if (sender.counts().lost == 0) unsent = Unsent::line_and_rest;
+          return settle_before(sender, std::move(sent));
         }
         break;
       case LineInput::State::failed:
         return cannot_read("standard input", input.error());
       case LineInput::State::given_up:
-        return sender.counts().lost != 0 ? settle_loss(sender) : Session::gone();
+        return sender.counts().lost != 0 ? settle_before(sender, {}) : Session::gone();
       case LineInput::State::stopped:
         return {};
       case LineInput::State::end:
-        rest = false;
+        unsent = Unsent::nothing;
         return {};
     }
   }
@@ -85,14 +97,24 @@ void print(Session& session, const SendCounts& counts) {
   session.output().write(json.str() + "\n");
 }
 
+std::string acknowledged_words(const SendCounts& counts) {
+  return std::to_string(counts.acknowledged) + (counts.acknowledged == 1 ? " was" : " were");
+}
+
 /// Why not all arrived: what the stream knows says more than the call that failed after it.
-Failure reason(const Session& session, const SendCounts& counts, bool rest, Failure failure) {
-  if (counts.lost == 0) return failure;
+Failure reason(const Session& session, const SendCounts& counts, Unsent unsent, Failure failure) {
   const std::string& target = session.options().target;
-  return {Status::not_delivered,
-          std::to_string(counts.lost) + " of " + std::to_string(counts.sent) + " messages were not acknowledged by " +
-              target + ": " + loss_words(counts, target) + "; " + std::to_string(counts.acknowledged) +
-              (counts.acknowledged == 1 ? " was" : " were") + (rest ? ", and the rest of the input was not sent" : "")};
+  if (counts.lost == 0) {
+    if (unsent == Unsent::line_and_rest) {
+      failure.sentence += "; of " + std::to_string(counts.sent) + " messages before it " + acknowledged_words(counts) +
+                          " acknowledged, and nothing behind it was sent";
+    }
+    return failure;
+  }
+  return {Status::not_delivered, std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
+                                     " messages were not acknowledged by " + target + ": " +
+                                     loss_words(counts, target) + "; " + acknowledged_words(counts) +
+                                     (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent")};
 }
 
 /// It was the id of nobody: as a name that nobody has.
@@ -120,14 +142,14 @@ ExitCode run_send(Session& session) {
   stream.end_at_loss = true;
   const auto sender = session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
-  bool rest = false;
-  auto sent = options.file.empty() ? send_lines(session, *sender, rest) : send_file(*sender, options.file);
+  Unsent unsent = Unsent::nothing;
+  auto sent = options.file.empty() ? send_lines(session, *sender, unsent) : send_file(*sender, options.file);
   if (sent && !session.stopped()) sent = sender->settle();
   const SendCounts counts = sender->counts();
   print(session, counts);
   if (sent) return session.finish();
   session.output().flush();
-  const ExitCode code = session.fail(reason(session, counts, rest, sent.failure()));
+  const ExitCode code = session.fail(reason(session, counts, unsent, sent.failure()));
   if (session.stopped()) return code;
   return nobody_there(counts) ? ExitCode::not_found : ExitCode::failed;
 }
