@@ -17,7 +17,7 @@
 //
 //     gimnet::Node node("robot");                             // joins by the hub of this machine, or of GIMNET_HUB
 //     auto odometry = node.advertise("odom").or_throw();      // robot/odom
-//     odometry.publish("x 1.0 y 2.0");
+//     odometry.publish("x 1.0 y 2.0").or_throw();
 //
 //     gimnet::Node node("viewer");
 //     auto odometry = node.subscribe("robot/odom").or_throw();  // need not exist yet

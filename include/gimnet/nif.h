@@ -10,7 +10,7 @@
  *     if (nif_connect(&options, &node) != NIF_OK) { puts(nif_error_text()); return 1; }
  *     nif_send_to(node, peer, "hi", 2);
  *     nif_incoming in;
- *     while (nif_receive(node, &in, 1000) == NIF_OK) { ...; nif_release(&in); }
+ *     while (nif_receive(node, &in, 1000) == NIF_OK) { show(&in); nif_release(&in); }
  *     nif_close(node);
  *
  * Threads. Every function may be called from any thread at any time, on one handle from many at once, except where it

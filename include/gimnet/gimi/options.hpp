@@ -23,26 +23,28 @@ inline constexpr std::size_t kQueueMessagesDefault = 64;
 /// Most messages that a queue can be told to keep.
 inline constexpr std::size_t kQueueMessagesMax = std::size_t{1} << 24;
 
+// Every member has an initialiser, so that `{.window = 1}` names what is meant and no compiler misses the others.
+
 /// How to join. Everything has a default that works on one machine.
 struct NodeOptions {
   /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a name, found by its
   /// id only.
-  std::string name;
+  std::string name{};
   /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this machine.
-  std::string hub;
-  std::string description;    ///< for people, at most 256 bytes
+  std::string hub{};
+  std::string description{};  ///< for people, at most 256 bytes
   Timeout timeout{5000};      ///< for joining, in ms
   bool wait_for_hub = false;  ///< dial again until `timeout` if there is no hub yet
   /// Dial again after a break, after a random time below 50 ms, 100 ms ... 1 s. false: a break is the end.
   bool reconnect = true;
   /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed. Default: nodes with a
   /// name.
-  std::optional<bool> resume;
+  std::optional<bool> resume{};
   /// A node with a name that crashed has its id and name again at once: its session token stands in a file of the
   /// user's runtime folder while it lives. false: in memory only.
   bool keep_token = true;
   /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
-  std::optional<std::uint8_t> shard;
+  std::optional<std::uint8_t> shard{};
   /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it. Else: denied.
   bool administrator = false;
   /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped; its sender is told if it
@@ -85,7 +87,7 @@ struct PaceOptions {
 };
 
 struct SendOptions {
-  MessageKey key;
+  MessageKey key{};
   Lane lane = Lane::normal;
   /// 1..kWindowMax: synchronized, at most that many, and kWindowBytesMax of them, are not acknowledged; data do not
   /// pile up on the way, and each receiver sets its own pace. 0: unsynchronized, as fast as the network takes it;
@@ -101,21 +103,20 @@ struct SendOptions {
 
 struct PublishOptions {
   Delivery delivery = Delivery::stream;
-  MessageKey key;
+  MessageKey key{};
   Lane lane = Lane::normal;
   bool timestamp = true;
-  std::string metadata;  ///< for people and tools, at most 4,096 bytes of UTF-8
-  std::uint32_t window =
-      1;  ///< of Delivery::sync: messages that a subscriber may not have taken, 1..1,024 (a hub's limit)
+  std::string metadata{};    ///< for people and tools, at most 4,096 bytes of UTF-8
+  std::uint32_t window = 1;  ///< of Delivery::sync: messages not taken by a subscriber, 1..1,024 (a hub's limit)
   /// The hub keeps the last message, up to 1 MiB, and gives it to each new subscriber first.
   bool retain = false;
 };
 
 /// A service that takes data, such as commands.
 struct AcceptOptions {
-  MessageKey key;        ///< of the messages that it takes
-  QueueOptions queue;    ///< in which they wait
-  std::string metadata;  ///< for people and tools, at most 4,096 bytes of UTF-8
+  MessageKey key{};        ///< of the messages that it takes
+  QueueOptions queue{};    ///< in which they wait
+  std::string metadata{};  ///< for people and tools, at most 4,096 bytes of UTF-8
 };
 
 /// What a watch is about.
