@@ -81,20 +81,40 @@ std::optional<Key> arrow_of(char byte) {
   }
 }
 
-// Length of the escape sequence that `text` begins with; 0 if its end is still to come (ECMA-48, 5.4).
-std::size_t sequence_size(std::string_view text) {
-  if (text.size() < 2) return 0;
-  if (text[1] == 'O') return text.size() < 3 ? 0 : 3;
-  if (text[1] != '[') return 2;
+// What a text that begins with Esc begins with. Its end may be still to come: size 0.
+struct Sequence {
+  std::size_t size = 0;
+  bool whole = false;
+};
+
+// CSI and SS3 (ECMA-48, 5.4 and 8.3.143). A control character is in none of them: it is a key of its own, as is what
+// stands behind an Esc that begins neither.
+Sequence sequence_at_front(std::string_view text) {
+  if (text.size() < 2) return {};
+  if (text[1] != '[' && text[1] != 'O') return {1, false};
   for (std::size_t index = 2; index < text.size(); ++index) {
-    if (text[index] >= '@' && text[index] <= '~') return index + 1;
+    const char byte = text[index];
+    if (byte < ' ' || byte > '~') return {index, false};
+    // F1 to F5 of the Linux console: ESC [ [ A.
+    const bool second_bracket = text[1] == '[' && index == 2 && byte == '[';
+    if (text[1] == 'O' || (byte >= '@' && !second_bracket)) return {index + 1, true};
+    if (index + 1 == kSequenceMax) return {index + 1, false};
   }
-  return text.size() > kSequenceMax ? text.size() : 0;
+  return {};
+}
+
+std::optional<Key> key_of_sequence(std::string_view sequence) {
+  return sequence[2] == '[' ? std::nullopt : arrow_of(sequence.back());
 }
 
 }  // namespace
 
-std::vector<Key> KeyParser::take(std::string_view bytes) {
+std::vector<Key> KeyParser::take(std::string_view bytes, std::int64_t now_ns) {
+  if (!bytes.empty()) {
+    pending_since_ns_ = now_ns;
+  } else if (now_ns - pending_since_ns_ >= kSequencePatience_ns) {
+    pending_.clear();
+  }
   pending_.append(bytes);
   std::vector<Key> keys;
   std::string_view rest = pending_;
@@ -104,11 +124,12 @@ std::vector<Key> KeyParser::take(std::string_view bytes) {
       rest.remove_prefix(1);
       continue;
     }
-    const std::size_t size = sequence_size(rest);
-    if (size == 0) break;
-    const std::optional<Key> key = size >= 3 ? arrow_of(rest[size - 1]) : std::nullopt;
-    if (key) keys.push_back(*key);
-    rest.remove_prefix(size);
+    const Sequence sequence = sequence_at_front(rest);
+    if (sequence.size == 0) break;
+    if (sequence.whole) {
+      if (const std::optional<Key> key = key_of_sequence(rest.substr(0, sequence.size))) keys.push_back(*key);
+    }
+    rest.remove_prefix(sequence.size);
   }
   pending_ = std::string(rest);
   return keys;
