@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <span>
+#include <string>
 
 #include "base/standard_streams.hpp"
 #include "tools/demo/options.hpp"
@@ -9,6 +10,7 @@
 int main(int count, char** words) {
   using namespace gimnet::demo;
   gimnet::hold_standard_descriptors();
+  gimnet::have_failed_writes_told();
   const std::span<const char* const> all(words, static_cast<std::size_t>(count));
   const gimnet::Result<Options> options = parse_options(all.empty() ? all : all.subspan(1));
   if (!options) {
@@ -16,8 +18,7 @@ int main(int count, char** words) {
     return static_cast<int>(ExitCode::kUsage);
   }
   if (options->help) {
-    (void)std::fwrite(usage_text().data(), 1, usage_text().size(), stdout);
-    return 0;
+    return static_cast<int>(show(std::string(usage_text())) ? ExitCode::kGood : ExitCode::kLost);
   }
   // The viewer takes its time to let everything arrive, and then ends the others.
   constexpr unsigned kRobotPatience_s = 1;

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "base/standard_streams.hpp"
 #include "tools/demo/carmen_log.hpp"
 #include "tools/demo/gimi_port.hpp"
 #include "tools/demo/log_player.hpp"
@@ -25,12 +26,12 @@ namespace {
 constexpr Extent kPicture{80, 24};
 
 // fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep the children alive.
-void say(std::FILE* to, const std::string& text) {
-  (void)std::fwrite(text.data(), 1, text.size(), to);
-  (void)std::fflush(to);
+void say(const std::string& text) {
+  (void)std::fwrite(text.data(), 1, text.size(), stderr);
+  (void)std::fflush(stderr);
 }
 
-void complain(const Error& error) { say(stderr, fmt::format("gimnet-demo: {}\n", error.sentence)); }
+void complain(const Error& error) { say(fmt::format("gimnet-demo: {}\n", error.sentence)); }
 
 Result<Robot::SourceMaker> source_maker(const Options& options) {
   if (!options.log.empty()) {
@@ -70,12 +71,18 @@ std::optional<Error> unusable_input(const Options& options) {
   return maker ? std::nullopt : std::optional(maker.error());
 }
 
-void print_summary(const Viewer& viewer, const TerminalStyle& style, bool interactive) {
-  if (!interactive) say(stdout, viewer.last_picture(kPicture) + "\n");
-  say(stdout, summary_text(viewer.monitor(), viewer.record(), style.utf8));
+[[nodiscard]] bool show_summary(const Viewer& viewer, const TerminalStyle& style, bool interactive) {
+  const std::string picture = interactive ? "" : viewer.last_picture(kPicture) + "\n";
+  return show(picture + summary_text(viewer.monitor(), viewer.record(), style.utf8));
 }
 
 }  // namespace
+
+bool show(const std::string& text) {
+  const std::string why = write_standard_output(text);
+  if (!why.empty()) complain(Error{fmt::format("cannot write to standard output: {}", why)});
+  return why.empty();
+}
 
 ExitCode run_robot(const Options& options) {
   Result<Robot::SourceMaker> maker = source_maker(options);
@@ -88,7 +95,8 @@ ExitCode run_robot(const Options& options) {
     complain(port.error());
     return ExitCode::kNoNetwork;
   }
-  say(stdout, "ready\n");
+  // Who reads it goes on without it, or does not: the robot is there.
+  (void)show("ready\n");
   Robot robot(**port, std::move(*maker));
   while (stop_signal() == 0) {
     if (const std::optional<Error> error = robot.step()) {
@@ -129,14 +137,14 @@ ExitCode run_viewer(const Options& options) {
   viewing.seconds = options.seconds;
   viewing.autopilot = drives_itself(options, terminal.get());
   viewing.style = style_for(options, terminal.get());
-  if (!interactive) viewing.on_progress = [](const std::string& line) { say(stderr, line + "\n"); };
+  if (!interactive) viewing.on_progress = [](const std::string& line) { say(line + "\n"); };
   const TerminalStyle style = viewing.style;
   Viewer viewer(**port, terminal.get(), std::move(viewing));
   const std::optional<Error> error = viewer.run();
   terminal.reset();
   if (error) complain(*error);
   if (error && !viewer.monitor().info()) return ExitCode::kLost;
-  print_summary(viewer, style, interactive);
+  if (!show_summary(viewer, style, interactive)) return ExitCode::kLost;
   return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood : ExitCode::kLost;
 }
 

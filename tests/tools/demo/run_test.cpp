@@ -128,6 +128,18 @@ TEST_F(RunTest, ClosesDownWhereNobodyReadsAnyMore) {
   EXPECT_EQ(files_left(), 1);
 }
 
+TEST_F(RunTest, SaysThatItsSummaryCouldNotBeWritten) {
+  const std::string program = folder_of_this_program() + "/gimnet-demo";
+  for (const char* words : {" --seconds 0.5 >/dev/full", " --help >/dev/full", " --help >&-"}) {
+    Result<ChildProcess> shell =
+        ChildProcess::start({"the shell", {"/bin/sh", "-c", program + words + "; echo $? >&2"}, folder_ / "err"});
+    ASSERT_TRUE(shell);
+    EXPECT_EQ(shell->wait(kPatience_ns), 0);
+    EXPECT_THAT(said(), HasSubstr("gimnet-demo: cannot write to standard output: ")) << words;
+    EXPECT_THAT(said(), testing::EndsWith("\n1\n")) << words;
+  }
+}
+
 TEST_F(RunTest, SaysThatTheHubEndedAndWhatWasHeardBefore) {
   Result<ChildProcess> demo = start({"--seconds", "86400"});
   ASSERT_TRUE(demo);
