@@ -80,11 +80,12 @@ std::string driver_text(const Monitor& monitor, const ScreenState& state) {
 void draw_robot_figures(Column& column, const Monitor& monitor, const ScreenState& state) {
   const bool bumped = monitor.odometry() && monitor.odometry()->bumped;
   column.heading("ROBOT", bumped ? "at a wall" : driver_text(monitor, state), bumped ? Ink::kWarn : Ink::kDim);
-  const Odometry odometry = monitor.odometry().value_or(Odometry{});
-  column.row("x, y", fmt::format("{:.2f}", odometry.pose.x_m), fmt::format("{:.2f} m", odometry.pose.y_m));
-  column.row("heading", "", fmt::format("{:.0f}°", degrees(odometry.pose.heading_rad)));
-  column.row("speed", fmt::format("{:.2f} m/s", odometry.twist.linear_mps),
-             fmt::format("{:.0f}°/s", degrees(odometry.twist.angular_radps)));
+  const Pose pose = monitor.pose().value_or(Pose{});
+  const Twist twist = monitor.odometry().value_or(Odometry{}).twist;
+  column.row("x, y", fmt::format("{:.2f}", pose.x_m), fmt::format("{:.2f} m", pose.y_m));
+  column.row("heading", "", fmt::format("{:.0f}°", degrees(pose.heading_rad)));
+  column.row("speed", fmt::format("{:.2f} m/s", twist.linear_mps),
+             fmt::format("{:.0f}°/s", degrees(twist.angular_radps)));
 }
 
 void draw_stream_figures(Column& column, const Monitor& monitor, std::int64_t now_ns) {
@@ -142,12 +143,13 @@ void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state
 }
 
 void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
-  const Odometry odometry = monitor.odometry().value_or(Odometry{});
+  const Pose pose = monitor.pose().value_or(Pose{});
+  const Twist twist = monitor.odometry().value_or(Odometry{}).twist;
   const int column = area.corner.column + 1;
   int row = area.corner.row;
   canvas.text({column, row++},
-              fmt::format("{:.2f} {:.2f} m  {:.0f}°  {:.2f} m/s  {}", odometry.pose.x_m, odometry.pose.y_m,
-                          degrees(odometry.pose.heading_rad), odometry.twist.linear_mps, driver_text(monitor, state)),
+              fmt::format("{:.2f} {:.2f} m  {:.0f}°  {:.2f} m/s  {}", pose.x_m, pose.y_m, degrees(pose.heading_rad),
+                          twist.linear_mps, driver_text(monitor, state)),
               Ink::kPlain);
   canvas.text({column, row++},
               fmt::format("odom {:.0f} Hz  scan {:.0f} Hz  p50 {}  p99 {}",

@@ -80,7 +80,7 @@ Box widened(const Box& box, const Point& point) {
 }  // namespace
 
 View choose_view(const Monitor& monitor, const MapChoice& choice, Extent extent) {
-  const Point robot = monitor.odometry() ? position(monitor.odometry()->pose) : Point{};
+  const Point robot = position(monitor.pose().value_or(Pose{}));
   View view;
   if (monitor.plan()) {
     view = Plot::fitted({{0.0, 0.0}, {monitor.plan()->width_m(), monitor.plan()->height_m()}}, extent);
@@ -104,7 +104,7 @@ void draw_map(Plot& plot, const Monitor& monitor, const MapChoice& choice) {
     plot.line(trail[index], trail[index + 1], Ink::kTrail);
   }
   if (monitor.scan()) draw_scan(plot, *monitor.scan());
-  if (monitor.odometry()) draw_robot(plot, monitor.odometry()->pose);
+  if (monitor.pose()) draw_robot(plot, *monitor.pose());
 }
 
 void draw_scale(Canvas& canvas, Place place, const View& view) {

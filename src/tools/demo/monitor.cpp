@@ -57,6 +57,11 @@ void Monitor::take(const RobotInfo& message, std::int64_t) {
   info_ = message;
 }
 
+std::optional<Pose> Monitor::pose() const {
+  if (odometry_) return odometry_->pose;
+  return scan_ ? std::optional(scan_->pose) : std::nullopt;
+}
+
 void Monitor::sent(const DriveCommand& message, std::int64_t now_ns) {
   drive_stream_.take(message.stamp.number, now_ns);
 }

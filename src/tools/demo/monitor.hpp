@@ -50,6 +50,8 @@ class Monitor {
   [[nodiscard]] std::int64_t start_ns() const { return start_ns_; }
   [[nodiscard]] const std::optional<Odometry>& odometry() const { return odometry_; }
   [[nodiscard]] const std::optional<PlacedScan>& scan() const { return scan_; }
+  /// Where the robot is, by its odometry; by its last scan, if it has none: a log may hold only one of them.
+  [[nodiscard]] std::optional<Pose> pose() const;
   [[nodiscard]] const std::optional<RobotInfo>& info() const { return info_; }
   [[nodiscard]] const std::optional<HubCounters>& hub() const { return hub_; }
   /// The hall, where the robot sent one.

@@ -33,7 +33,6 @@ void Viewer::take(const NodePort::Event& event) {
   if (event.service == Service::kOdometry) {
     if (const std::optional<Odometry> message = decode_odometry(event.payload)) {
       monitor_.take(*message, now_ns);
-      if (first_heard_ns_ == 0) first_heard_ns_ = now_ns;
       good = true;
     }
   } else if (event.service == Service::kScan) {
@@ -48,6 +47,7 @@ void Viewer::take(const NodePort::Event& event) {
     }
   }
   if (!good) monitor_.garbled();
+  if (first_heard_ns_ == 0 && monitor_.pose()) first_heard_ns_ = now_ns;
 }
 
 void Viewer::press(Key key, std::int64_t now_ns) {
@@ -103,7 +103,7 @@ void Viewer::draw(std::int64_t now_ns) {
 void Viewer::report_progress(std::int64_t now_ns) {
   if (!options_.on_progress || now_ns < next_progress_ns_ || first_heard_ns_ == 0) return;
   next_progress_ns_ = now_ns + kProgressPeriod_ns;
-  const Pose pose = monitor_.odometry()->pose;
+  const Pose pose = monitor_.pose().value_or(Pose{});
   options_.on_progress(
       fmt::format("{:>6.1f} s  odom {:5.1f} Hz  scan {:5.1f} Hz  p50 {}  p99 {}  at {:.2f} {:.2f} m  dropped {}",
                   static_cast<double>(now_ns - first_heard_ns_) * 1e-9, monitor_.odometry_stream().rate.rate_hz(now_ns),

@@ -18,7 +18,7 @@ namespace gimnet::demo {
 
 /// How the viewer runs.
 struct ViewerOptions {
-  /// Ends after so many seconds from the first odometry.
+  /// Ends after so many seconds from the first odometry or scan.
   std::optional<double> seconds;
   /// A course drives from the beginning.
   bool autopilot = false;

@@ -96,6 +96,18 @@ TEST_F(RunTest, PlaysALog) {
   EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
 }
 
+TEST_F(RunTest, PlaysALogThatHoldsOnlyScans) {
+  std::string log;
+  for (int step = 0; step < 20; ++step) {
+    const std::string stamp = std::to_string(step * 0.02);
+    log += "FLASER 3 1 2 1 5 6 0 5 6 0 " + stamp + " host " + stamp + "\n";
+  }
+  const TemporaryFile file(log, false);
+  const Outcome outcome = run({"--log", file.path(), "--seconds", "60"});
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
+}
+
 TEST_F(RunTest, ASignalEndsItWithASummaryAndNothingIsLeft) {
   ASSERT_EQ(::setenv("TMPDIR", folder_.path().c_str(), 1), 0);
   Result<ChildProcess> demo = start({});

@@ -99,6 +99,29 @@ TEST_F(ViewerTest, WithoutAUserItEndsWithTheLog) {
   EXPECT_EQ(viewer.monitor().odometry_stream().received, 3U);
 }
 
+TEST_F(ViewerTest, ARobotThatOnlyScansIsHeard) {
+  RobotLog log;
+  log.records.resize(100);
+  for (std::size_t index = 0; index < log.records.size(); ++index) {
+    log.records[index].due_s = 0.1 * static_cast<double>(index);
+    log.records[index].ranges_m = {1.0F};
+    log.records[index].pose = {3.0, 4.0, 0.0};
+  }
+  Robot player(network_.robot, [log](std::int64_t now_ns) {
+    return std::make_unique<LogPlayer>(log, LogPlayer::Start{"a.log", 1.0, now_ns});
+  });
+  network_.viewer.when_idle = [&player] { EXPECT_FALSE(player.step()); };
+  std::string progress;
+  options_.on_progress = [&](const std::string& line) { progress += line; };
+  Viewer viewer(network_.viewer, nullptr, options_);
+  ASSERT_FALSE(viewer.run());
+  EXPECT_THAT(complaints_about(viewer.monitor(), viewer.record()), IsEmpty());
+  EXPECT_THAT(progress, HasSubstr("at 3.00 4.00 m"));
+  // The time was over, not the log.
+  EXPECT_LT(viewer.monitor().scan_stream().received, 10U);
+  EXPECT_THAT(viewer.last_picture({80, 24}), HasSubstr("3.00   4.00 m"));
+}
+
 TEST_F(ViewerTest, ARobotOfOthersIsNotToldToFinish) {
   options_.own_robot = false;
   options_.seconds = 0.2;
