@@ -83,6 +83,10 @@ class Frames(HostileInput):
                 self.assertEqual(report.payload[0], reason)
                 self.assertEqual(report.payload[8:16], struct.pack("<II", 1, dst))
                 self.expect(f"dropped.{names[reason]}")
+        for node, reason in ((client.id + 1000, no_such_node), (8 << 20 | 1, no_route)):
+            client.send(client.frame(1, struct.pack("<I", node) + b"x", kind=LIST, flags=FLAG_REPORT))
+            self.assertEqual(client.next_where(lambda got: got.kind == REPORT).payload[0], reason)
+            self.expect(f"dropped.{names[reason]}")
 
     def test_a_second_hello(self):
         self.closed_as("malformed", hello())

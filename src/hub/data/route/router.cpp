@@ -230,7 +230,7 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, bool hand
     ++outcomes;
   }
   if (const std::uint32_t foreign = header.dst - listed.list.count; foreign != 0) {
-    drop_listed(listed, foreign, proto::DropReason::no_such_node);
+    drop_listed(listed, foreign, proto::DropReason::no_route);
     outcomes += foreign;
   }
   if (shards != 0) {
