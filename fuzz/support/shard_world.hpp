@@ -106,6 +106,7 @@ class ShardWorld {
     }
     turn();
     FUZZ_MUST(counters_.queued.value() == 0);
+    FUZZ_MUST(counters_.gap_frames.value() <= kGapFramesMost);
     // The slab that is read into may have been kept by a frame that is gone; the next read finds out.
     FUZZ_MUST(shard_->state().pool.pinned_bytes() <= kBufferRoom + kSlabReadBytes + 16 + limits_.frame_bytes);
   }

@@ -16,6 +16,8 @@
 namespace gimnet::hub {
 namespace {
 
+// A reader of STATISTICS takes sums for numbers with a sign.
+static_assert(kGapFramesMost <= std::uint64_t{INT64_MAX} / kShardsMax);
 static_assert(kShardCountMax <= kShardsMax);  // as many as the tables and sets of shards have room for
 
 /// Nobody asked for the default socket: a place for it that cannot be used, as in the environment of a session that has

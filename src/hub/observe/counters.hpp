@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -16,6 +17,11 @@ class Counter {
     // relaxed: only the owner writes, and readers want a recent number, not an order.
     value_.store(value_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
   }
+  /// No further than `most`: for numbers that a node only claims.
+  void add_within(std::uint64_t n, std::uint64_t most) {
+    const std::uint64_t now = value_.load(std::memory_order_relaxed);  // relaxed: as in add()
+    store(now < most ? now + std::min(n, most - now) : now);
+  }
   void subtract(std::uint64_t n) {
     // relaxed: as in add().
     value_.store(value_.load(std::memory_order_relaxed) - n, std::memory_order_relaxed);
@@ -31,6 +37,10 @@ class Counter {
  private:
   std::atomic<std::uint64_t> value_{0};
 };
+
+/// What gap_frames of one shard stays within: a node may claim to have let go of as many frames as there are numbers,
+/// and what is asked for the sums of all shards takes them for numbers with a sign.
+inline constexpr std::uint64_t kGapFramesMost = std::uint64_t{1} << 56;
 
 /// What one shard did. The ledger: accepted + copies = delivered + dropped + queued, per frame and recipient.
 /// Thread safety: written by its shard only, read by anybody.
@@ -72,7 +82,7 @@ struct alignas(64) ShardCounters {
   Counter reports;
   Counter held_reads;      ///< times a sender that ignored PAUSE was not read
   Counter untaken_frames;  ///< read at the hub's end and left to their senders: not accepted, not confirmed
-  Counter gap_frames;      ///< let go at a resume and announced with SKIP
+  Counter gap_frames;      ///< let go at a resume and announced with SKIP; at most kGapFramesMost
   Counter resumed;
   Counter lane0_demoted;  ///< frames
   Counter bad_credits;    ///< CREDITs for no subscription of the node, or with a total that cannot be

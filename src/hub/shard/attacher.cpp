@@ -111,7 +111,7 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   // A count that cannot be: this peer's life is not the one that we know.
   if (!rewind.possible) return false;
   state_.counters.resumed.add(1);
-  state_.counters.gap_frames.add(rewind.lost);
+  state_.counters.gap_frames.add_within(rewind.lost, kGapFramesMost);
   state_.tally.delivered += rewind.confirmed;
   connection.outbox.counters()->delivered.add(rewind.confirmed);
   connection.outbox.count_dropped(rewind.lost);

@@ -239,7 +239,7 @@ bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
   if (const auto* pong = std::get_if<proto::flow::Pong>(&*message)) on_pong(connection, *pong);
   if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
-  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) on_skip(connection, *skip);
+  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) return on_skip(connection, *skip);
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
     if (!state_.pacer.on_credit(connection, credit->group, credit->taken)) return take_bad_credit(connection);
   }
@@ -284,11 +284,18 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
   state_.recipients.mark_dirty(connection);
 }
 
-void Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
-  if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return;
-  if (connection.draining) return;  // what stands before it may not have been taken, nor may it be confirmed with it
-  connection.resume->taken += skip.count;
-  state_.counters.gap_frames.add(skip.count);
+bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
+  if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
+  if (connection.draining)
+    return true;  // what stands before it may not have been taken, nor may it be confirmed with it
+  std::uint64_t& taken = connection.resume->taken;
+  if (skip.count > UINT64_MAX - 1 - std::min(taken, UINT64_MAX - 1)) {
+    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+                  "SKIP for more frames than there can be");
+  }
+  taken += skip.count;
+  state_.counters.gap_frames.add_within(skip.count, kGapFramesMost);
+  return true;
 }
 
 bool Reader::handle_link(Connection& connection, const proto::RunView& view) {

@@ -57,7 +57,8 @@ class Reader {
   /// False: it was one too many, and the connection was closed.
   [[nodiscard]] bool take_bad_credit(Connection& connection);
   void on_confirm(Connection& connection, const proto::flow::Confirm& confirm);
-  void on_skip(Connection& connection, const proto::flow::Skip& skip);
+  /// Like refuse() where it does.
+  [[nodiscard]] bool on_skip(Connection& connection, const proto::flow::Skip& skip);
   /// Data frames that it sent, admitted.
   void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);

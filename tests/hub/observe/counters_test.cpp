@@ -20,6 +20,20 @@ TEST(Counter, AddsSubtractsAndKeepsTheHighest) {
   EXPECT_EQ(counter.value(), 1u);
 }
 
+TEST(Counter, StaysWithinABoundThatItIsGiven) {
+  Counter counter;
+  counter.add_within(7, 10);
+  counter.add_within(3, 10);
+  EXPECT_EQ(counter.value(), 10u);
+  counter.add_within(1, 10);
+  counter.add_within(UINT64_MAX, 10);
+  EXPECT_EQ(counter.value(), 10u);
+  counter.add_within(UINT64_MAX, UINT64_MAX);
+  EXPECT_EQ(counter.value(), UINT64_MAX);
+  counter.add_within(1, 10);
+  EXPECT_EQ(counter.value(), UINT64_MAX) << "what is above it stays";
+}
+
 TEST(Tally, PublishesWhatCameSinceTheLastTime) {
   ShardCounters counters;
   Tally tally;

@@ -363,5 +363,30 @@ TEST(Reader, ClosesForCreditsOfNoUseBeyondTheLimit) {
   EXPECT_EQ(rig.sum(&ShardCounters::oddities), 1u);
 }
 
+TEST(Reader, TakesASkipUpToTheLastCountThatThereIs) {
+  HubRig rig;
+  FakeNode& a = rig.join(0, {.resume = true});
+  const auto skip = [&](std::uint64_t count) {
+    rig.send_flow(a, proto::flow::Skip{DropReason::replaced, count});
+    rig.settle();
+  };
+  skip(3);
+  skip(proto::flow::kSkipUnknown);
+  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), 3u);
+  skip(UINT64_MAX - 1 - 3);
+  EXPECT_FALSE(a.goodbye);
+  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), kGapFramesMost);
+  // As the hub tells it where the node comes back.
+  rig.send_flow(a, proto::flow::Ping{});
+  rig.settle();
+  ASSERT_THAT(a.flow_of<proto::flow::Confirm>(), SizeIs(1));
+  EXPECT_EQ(a.flow_of<proto::flow::Confirm>().front().count, UINT64_MAX - 1);
+  skip(1);
+  ASSERT_TRUE(a.goodbye);
+  EXPECT_EQ(a.goodbye->code, GoodbyeCode::malformed);
+  EXPECT_EQ(rig.dropped(DropReason::malformed), 1u);
+  EXPECT_EQ(rig.sum(&ShardCounters::gap_frames), kGapFramesMost);
+}
+
 }  // namespace
 }  // namespace gimnet::hub
