@@ -188,7 +188,7 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
   const std::vector<ListenUrl> urls = addresses_for(options);
   std::vector<std::unique_ptr<Listener>> listeners;
   for (const ListenUrl& url : urls) {
-    Result<std::unique_ptr<Listener>> listener = Listener::open(url);
+    Result<std::unique_ptr<Listener>> listener = Listener::open(url, listeners);
     if (!listener) return listener.error();
     listeners.push_back(std::move(*listener));
   }

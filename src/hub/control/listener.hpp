@@ -1,6 +1,9 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <memory>
+#include <span>
 #include <string>
 
 #include "base/result.hpp"
@@ -14,8 +17,9 @@ class Listener {
  public:
   /// Binds and listens. A port that a killed process left behind is taken over at once; so is a Unix socket's file that
   /// nobody answers on. Errors: a sentence that names the address, what stands in the way (where it can be found out,
-  /// the process), and what to do.
-  [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const ListenUrl& url);
+  /// the process, or which of this hub's `others`), and what to do.
+  [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const ListenUrl& url,
+                                                              std::span<const std::unique_ptr<Listener>> others = {});
 
   ~Listener();
   Listener(const Listener&) = delete;
@@ -24,6 +28,8 @@ class Listener {
   [[nodiscard]] int descriptor() const { return descriptor_; }
   /// With the port that the system chose, if it was to choose one.
   [[nodiscard]] const ListenUrl& url() const { return url_; }
+  /// Both cannot be had: `url` is this address in other words, or one of them is a part of the other.
+  [[nodiscard]] bool overlaps(const ListenUrl& url) const;
 
  private:
   Listener(int descriptor, ListenUrl url) : descriptor_(descriptor), url_(std::move(url)) {}
@@ -32,7 +38,8 @@ class Listener {
 
   const int descriptor_;
   const ListenUrl url_;
-  unsigned long file_ = 0;  ///< inode of the socket's file
+  dev_t device_ = 0;  ///< of the socket's file
+  ino_t file_ = 0;    ///< its inode
 };
 
 }  // namespace gimnet::hub

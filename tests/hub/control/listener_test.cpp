@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <vector>
 
 #include "tests/hub/control/support/folder.hpp"
 
@@ -43,6 +45,74 @@ TEST(Listener, ABusyPortIsNamedWithItsOwner) {
   EXPECT_THAT(second.error().sentence,
               AllOf(HasSubstr((*first)->url().text()), HasSubstr("in use by"),
                     HasSubstr("(process " + std::to_string(::getpid()) + ")"), HasSubstr("another port")));
+}
+
+TEST(Listener, AnAddressThatIsGivenTwiceIsNotBlamedOnAnotherProcess) {
+  const auto twice = [](const std::string& one, const std::string& other) {
+    std::vector<std::unique_ptr<Listener>> others;
+    others.push_back(std::move(*Listener::open(url(one + ":0"))));
+    const ListenUrl bound = others.front()->url();
+    const ListenUrl again = url(other + ":" + std::to_string(bound.port));
+    const auto second = Listener::open(again, others);
+    EXPECT_EQ(second ? "" : second.error().sentence,
+              "cannot listen on " + again.text() + ": the address is given twice: this hub listens there already, as " +
+                  bound.text() + "; leave one of the two out");
+  };
+  twice("tcp://127.0.0.1", "tcp://127.0.0.1");
+  twice("tcp://127.0.0.1", "tcp://0.0.0.0");
+  twice("tcp://0.0.0.0", "tcp://127.0.0.1");
+  if (!Listener::open(url("tcp://[::1]:0"))) GTEST_SKIP() << "no IPv6 here";
+  twice("tcp://[::1]", "tcp://[0:0:0:0:0:0:0:1]");
+  twice("tcp://[::]", "tcp://[::1]");
+  twice("tcp://[::1]", "tcp://[::]");
+}
+
+TEST(Listener, OtherAddressesOfOnePortAreListenedOnTogether) {
+  std::vector<std::unique_ptr<Listener>> others;
+  others.push_back(std::move(*Listener::open(url("tcp://127.0.0.1:0"))));
+  const std::string port = std::to_string(others.front()->url().port);
+  EXPECT_FALSE(others.front()->overlaps(url("tcp://127.0.0.2:" + port)));
+  EXPECT_FALSE(others.front()->overlaps(url("tcp://[::]:" + port)));
+  EXPECT_FALSE(others.front()->overlaps(url("tcp://127.0.0.1:0")));
+  EXPECT_FALSE(others.front()->overlaps(url("unix:/127.0.0.1:" + port)));
+}
+
+TEST(Listener, ASocketFileThatIsGivenTwiceIsNotBlamedOnAnotherProcess) {
+  const TestFolder folder;
+  fs::create_directory_symlink(folder.path(""), folder.path("link"));
+  std::vector<std::unique_ptr<Listener>> others;
+  others.push_back(std::move(*Listener::open(url("unix:" + folder.path("s")))));
+  for (const std::string other : {"s", "/s", "link/s"}) {
+    const auto second = Listener::open(url("unix:" + folder.path(other)), others);
+    ASSERT_FALSE(second) << other;
+    EXPECT_THAT(second.error().sentence, AllOf(HasSubstr("unix:" + folder.path(other) + ": the address is given twice"),
+                                               HasSubstr("as unix:" + folder.path("s") + ";")));
+  }
+  EXPECT_TRUE(Listener::open(url("unix:" + folder.path("t")), others));
+}
+
+TEST(Listener, APlaceThatThisUserMayNotWriteToIsToldWithTheRemedy) {
+  const TestFolder folder;
+  const bool root = ::geteuid() == 0;
+  const auto live = Listener::open(url("unix:" + folder.path("live")));
+  ASSERT_TRUE(live);
+  ASSERT_EQ(::chmod(folder.path("live").c_str(), root ? 0700 : 0), 0);
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0555), 0);
+  if (root) {  // who may write everywhere: it acts for another user
+    ASSERT_EQ(::seteuid(12'345), 0);
+  }
+  const auto made = Listener::open(url("unix:" + folder.path("s")));
+  const auto taken = Listener::open(url("unix:" + folder.path("live")));
+  if (root) {
+    ASSERT_EQ(::seteuid(0), 0);
+  }
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0700), 0);
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().sentence, "cannot listen on unix:" + folder.path("s") +
+                                       ": Permission denied; run tcphub as a user that may write to " +
+                                       fs::path(folder.path("s")).parent_path().string() + ", or choose another path");
+  ASSERT_FALSE(taken);
+  EXPECT_THAT(taken.error().sentence, HasSubstr("in use by a process of another user"));
 }
 
 TEST(Listener, APortWithALingeringConnectionCanBeBoundAgain) {
