@@ -2,6 +2,7 @@
 """Where a hub keeps its state, and what it says when it cannot."""
 
 import os
+import shutil
 import signal
 import socket
 import tempfile
@@ -95,6 +96,25 @@ class Folder(unittest.TestCase):
         os.rename(file, file + ".old")
         anew = PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", state).wait_ready()
         wait_until(lambda: "begins anew" in anew.process.err, "the warning in the log")
+
+    def test_links_and_folders_in_the_place_of_its_files_are_told(self):
+        state = os.path.join(self.path, "state-folder")
+        for name in ("state", "lock"):
+            with self.subTest(name=name):
+                os.mkdir(state, 0o700)
+                os.symlink("elsewhere", os.path.join(state, name))
+                said = PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", state).wait_error()
+                self.assertIn(f"{os.path.join(state, name)}: it is a link, and links are not followed; put a file in its place", said)
+                shutil.rmtree(state)
+        os.mkdir(state, 0o700)
+        os.mkdir(os.path.join(state, "state.new"))
+        said = PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", state).wait_error()
+        self.assertIn(f"{state}/state.new is in the way: it is a folder; remove it", said)
+
+    def test_an_address_that_is_given_twice_is_told(self):
+        one, other = f"unix:{self.path}/hub.sock", f"unix:{self.path}/./hub.sock"
+        said = PlainHub(self, "--listen", one, "--listen", other, "--state-dir", os.path.join(self.path, "state")).wait_error()
+        self.assertIn(f"cannot listen on {other}: the address is given twice: this hub listens there already, as {one};", said)
 
     def test_a_place_that_is_no_folder_is_told(self):
         path = os.path.join(self.path, "file")

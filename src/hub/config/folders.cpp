@@ -8,7 +8,6 @@
 #include <cstdlib>
 
 #include "base/descriptor.hpp"
-
 #include "base/runtime_folder.hpp"
 
 namespace gimnet::hub {
@@ -16,15 +15,39 @@ namespace {
 
 constexpr mode_t kPrivate = 0700;
 
-/// "" when there is a folder at `path` then; `info` describes it.
-std::string make_folder(const std::string& path, struct stat& info) {
+constexpr const char* kElsewhere = "name another place";
+constexpr const char* kStateElsewhere = "name another place with --state-dir";
+
+/// What can be done about a folder that cannot be made or looked at; `elsewhere` can always be done.
+std::string remedy_of(int error, const std::string& path, const std::string& elsewhere) {
+  const std::size_t slash = path.rfind('/');
+  const std::string above = slash == std::string::npos ? "." : slash == 0 ? "/" : path.substr(0, slash);
+  // There are folders in which nothing can be made: /proc.
+  if (error == ENOENT && ::access(above.c_str(), F_OK) != 0) return "; make " + above + " first, or " + elsewhere;
+  if (error == ENOTDIR) return "; a part of " + above + " is no folder: " + elsewhere;
+  if (error == ENAMETOOLONG) return "; " + elsewhere + ", with a shorter path";
+  if (error == EACCES) return "; run tcphub as a user that may write to " + above + ", or " + elsewhere;
+  return "; " + elsewhere;
+}
+
+/// "" when there is something at `path` then; `info` describes it.
+std::string make_folder(const std::string& path, struct stat& info, const char* elsewhere = kElsewhere) {
   if (::mkdir(path.c_str(), kPrivate) != 0 && errno != EEXIST) {
-    const std::string parent = path.substr(0, path.rfind('/'));
-    const std::string remedy = errno == ENOENT ? "; make " + parent + " first, or name another place" : "";
-    return "cannot create the folder " + path + ": " + system_text(errno) + remedy;
+    const int error = errno;
+    return "cannot create the folder " + path + ": " + system_text(error) + remedy_of(error, path, elsewhere);
   }
-  if (::lstat(path.c_str(), &info) != 0) return "cannot use the folder " + path + ": " + system_text(errno);
+  if (::lstat(path.c_str(), &info) != 0) {
+    const int error = errno;
+    return "cannot use the folder " + path + ": " + system_text(error) + remedy_of(error, path, elsewhere);
+  }
   return {};
+}
+
+/// What a link at `path` leads to cannot be looked at.
+std::string broken_link(const std::string& path, int error) {
+  const std::string what = error == ENOENT ? "it is a link to something that does not exist; make that folder"
+                                           : "it is a link, and " + system_text(error) + "; remove it";
+  return "cannot use the folder " + path + ": " + what + ", or " + kStateElsewhere;
 }
 
 }  // namespace
@@ -59,11 +82,11 @@ std::vector<std::string> default_addresses() {
 
 std::string prepare_state_folder(const std::string& path) {
   struct stat info{};
-  if (std::string error = make_folder(path, info); !error.empty()) return error;
-  if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) {
-    return "cannot use the folder " + path + ": " + system_text(errno);
+  if (std::string error = make_folder(path, info, kStateElsewhere); !error.empty()) return error;
+  if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) return broken_link(path, errno);
+  if (!S_ISDIR(info.st_mode)) {
+    return "cannot use " + path + " for state: it is not a folder; remove it, or " + kStateElsewhere;
   }
-  if (!S_ISDIR(info.st_mode)) return "cannot use " + path + " for state: it is not a folder";
   if ((info.st_mode & 0022) != 0) {
     return "cannot use the folder " + path + " for state: other users may write to it; chmod go-w " + path;
   }

@@ -22,6 +22,18 @@ constexpr mode_t kPrivate = 0600;
 constexpr const char* kState = "state";
 constexpr const char* kFresh = "state.new";
 constexpr const char* kLock = "lock";
+constexpr const char* kMakeWritable = "; make the folder one that tcphub may write to";
+constexpr const char* kBeginAnew =
+    "; put a copy of it back, or move it away: the hub then begins anew, and nodes get new ids";
+constexpr const char* kOtherFolder = "; run tcphub as the user whose it is, or give it another folder with --state-dir";
+
+/// Why a file of the folder cannot be opened, and what to do; `otherwise` where the error tells nothing special.
+std::string open_fault(int error, const std::string& otherwise) {
+  if (error == ELOOP) return "it is a link, and links are not followed; put a file in its place, or remove it";
+  if (error == EISDIR) return "it is a folder; remove it";
+  if (error == ENXIO) return "it is not a file; remove it";
+  return system_text(error) + (error == EACCES ? kOtherFolder : otherwise);
+}
 
 /// "" for a regular file of this user that nobody else may look into, or why it is none.
 std::string private_file_fault(int descriptor, const std::string& path) {
@@ -76,6 +88,14 @@ bool write_all(int descriptor, std::span<const std::byte> bytes) {
   return true;
 }
 
+std::string write_fault(const std::string& path, const char* what, int error) {
+  std::string remedy = kMakeWritable;
+  if (error == ENOSPC || error == EDQUOT) remedy = "; free space there";
+  if (error == EFBIG) remedy = "; allow tcphub larger files (ulimit -f, LimitFSIZE=)";
+  if (error == EISDIR) remedy = "; it is a folder: remove it";
+  return "cannot write the hub's state to " + path + "/" + kState + " (" + what + "): " + system_text(error) + remedy;
+}
+
 Error in_use(const std::string& path, int lock) {
   const pid_t holder = holder_of(lock);
   return Error{"the state folder " + path + " is in use by " + (holder > 0 ? process_text(holder) : "another hub") +
@@ -87,17 +107,19 @@ Error in_use(const std::string& path, int lock) {
 Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) {
   if (std::string error = prepare_state_folder(path); !error.empty()) return Error{std::move(error)};
   Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!folder.is_open()) return Error{"cannot use the folder " + path + " for state: " + system_text(errno)};
+  if (!folder.is_open())
+    return Error{"cannot use the folder " + path + " for state: " + open_fault(errno, kOtherFolder)};
   const std::string name = path + "/" + kLock;
   const bool was_used = ::faccessat(folder.get(), kLock, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   Descriptor lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
-  if (!lock.is_open()) return Error{"cannot use the state folder: " + name + ": " + system_text(errno)};
+  if (!lock.is_open()) return Error{"cannot use " + name + ": " + open_fault(errno, kOtherFolder)};
   if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
     if (errno == EWOULDBLOCK) return in_use(path, lock.get());
-    return Error{"cannot lock " + name + ": " + system_text(errno)};
+    return Error{"cannot lock " + name + ": " + system_text(errno) +
+                 "; give tcphub a folder on a disk of this machine with --state-dir"};
   }
   write_holder(lock.get());
   return std::unique_ptr<StateFolder>(new StateFolder(path, folder.release(), lock.release(), was_used));
@@ -113,29 +135,28 @@ Result<std::optional<HubState>> StateFolder::read() const {
   const Descriptor file(::openat(folder_, kState, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!file.is_open()) {
     if (errno == ENOENT) return std::optional<HubState>{};
-    return Error{"cannot read " + name + ": " + system_text(errno)};
+    return Error{"cannot read " + name + ": " + open_fault(errno, kBeginAnew)};
   }
   if (const std::string fault = private_file_fault(file.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   int error = 0;
   const std::optional<std::vector<std::byte>> bytes = read_all(file.get(), error);
-  if (!bytes) return Error{"cannot read " + name + ": " + system_text(error)};
+  if (!bytes) return Error{"cannot read " + name + ": " + system_text(error) + kBeginAnew};
   Result<HubState> state = read_hub_state(*bytes);
   if (!state) {
-    return Error{"cannot use " + name + ": " + state.error().sentence +
-                 "; put a copy of it back, or move it away: the hub then begins anew, and nodes get new ids"};
+    return Error{"cannot use " + name + ": " + state.error().sentence + kBeginAnew};
   }
   return std::optional{std::move(*state)};
 }
 
 std::string StateFolder::write(const HubState& state) {
-  const auto failed = [this](const char* what) {
-    return std::string{"cannot write the hub's state to "} + path_ + "/" + kState + " (" + what +
-           "): " + system_text(errno) + (errno == ENOSPC ? "; free space there" : "");
-  };
+  const auto failed = [this](const char* what) { return write_fault(path_, what, errno); };
   // A file left over by a crash, or a link that somebody put there: never written through.
-  if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) return failed("remove the old one");
+  if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) {
+    const std::string why = errno == EISDIR ? "it is a folder; remove it" : system_text(errno) + kMakeWritable;
+    return "cannot write the hub's state: " + path_ + "/" + kFresh + " is in the way: " + why;
+  }
   const Descriptor file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!file.is_open()) return failed("create");
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");

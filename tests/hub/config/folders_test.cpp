@@ -94,8 +94,44 @@ TEST(Folders, AStateFolderIsCreatedOrUsed) {
   EXPECT_EQ(mode_of(folder.path("state")), 0700u);
   EXPECT_EQ(prepare_state_folder(folder.path("state")), "");
   std::ofstream(folder.path("file")) << "x";
-  EXPECT_THAT(prepare_state_folder(folder.path("file")), HasSubstr("not a folder"));
-  EXPECT_THAT(prepare_state_folder(folder.path("none/state")), HasSubstr("cannot create"));
+  EXPECT_THAT(prepare_state_folder(folder.path("file")), AllOf(HasSubstr("not a folder"), HasSubstr("--state-dir")));
+}
+
+TEST(Folders, AStateFolderThatCannotBeMadeIsToldWithTheRemedy) {
+  const TestFolder folder;
+  std::ofstream(folder.path("file")) << "x";
+  const auto fault = [&](const std::string& name) { return prepare_state_folder(folder.path(name)); };
+  EXPECT_EQ(fault("none/state"), "cannot create the folder " + folder.path("none/state") +
+                                     ": No such file or directory; make " + folder.path("none") +
+                                     " first, or name another place with --state-dir");
+  EXPECT_THAT(fault("file/state"),
+              HasSubstr("; a part of " + folder.path("file") + " is no folder: name another place"));
+  EXPECT_THAT(fault(std::string(256, 'n')), HasSubstr("; name another place with --state-dir, with a shorter path"));
+  EXPECT_THAT(prepare_state_folder("/proc/state"), HasSubstr(": No such file or directory; name another place"));
+  ASSERT_EQ(::symlink(folder.path("nowhere").c_str(), folder.path("dangling").c_str()), 0);
+  EXPECT_EQ(fault("dangling"), "cannot use the folder " + folder.path("dangling") +
+                                   ": it is a link to something that does not exist; make that folder, or name another "
+                                   "place with --state-dir");
+  ASSERT_EQ(::symlink("round", folder.path("round").c_str()), 0);
+  EXPECT_THAT(fault("round"), AllOf(HasSubstr("it is a link, and Too many levels"), HasSubstr("; remove it, or name")));
+}
+
+TEST(Folders, AStateFolderWhereNothingMayBeMadeIsToldWithTheRemedy) {
+  const TestFolder folder;
+  const bool root = ::geteuid() == 0;
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0555), 0);
+  if (root) {  // who may write everywhere: it acts for another user
+    ASSERT_EQ(::seteuid(12'345), 0);
+  }
+  const std::string said = prepare_state_folder(folder.path("state"));
+  const std::string above = folder.path("state").substr(0, folder.path("state").rfind('/'));
+  if (root) {
+    ASSERT_EQ(::seteuid(0), 0);
+  }
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0700), 0);
+  EXPECT_EQ(said, "cannot create the folder " + folder.path("state") +
+                      ": Permission denied; run tcphub as a user that may write to " + above +
+                      ", or name another place with --state-dir");
 }
 
 }  // namespace

@@ -93,7 +93,8 @@ TEST_F(StateFolderTest, FilesThatOthersMayReadOrThatAreNoneAreRefused) {
   EXPECT_THAT(read_fault(), HasSubstr("chmod 600"));
   ASSERT_EQ(::unlink(file("state").c_str()), 0);
   ASSERT_EQ(::symlink("/etc/passwd", file("state").c_str()), 0);
-  EXPECT_THAT(read_fault(), HasSubstr("cannot read"));
+  EXPECT_EQ(read_fault(), "cannot read " + file("state") +
+                              ": it is a link, and links are not followed; put a file in its place, or remove it");
   ASSERT_EQ(::unlink(file("state").c_str()), 0);
   ASSERT_EQ(::mkfifo(file("state").c_str(), 0600), 0);
   EXPECT_THAT(read_fault(), HasSubstr("not a file"));
@@ -110,11 +111,15 @@ TEST_F(StateFolderTest, ALinkIsNotWrittenThrough) {
   EXPECT_TRUE(std::filesystem::is_regular_file(std::filesystem::symlink_status(file("state"))));
 }
 
-TEST_F(StateFolderTest, ALinkIsNoLock) {
+TEST_F(StateFolderTest, ALinkOrAFolderIsNoLock) {
   ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
   ASSERT_EQ(::symlink(folder_.path("elsewhere").c_str(), file("lock").c_str()), 0);
-  EXPECT_THAT(read_fault(), HasSubstr(file("lock")));
+  EXPECT_EQ(read_fault(), "cannot use " + file("lock") +
+                              ": it is a link, and links are not followed; put a file in its place, or remove it");
   EXPECT_FALSE(std::filesystem::exists(folder_.path("elsewhere")));
+  ASSERT_EQ(::unlink(file("lock").c_str()), 0);
+  ASSERT_EQ(::mkdir(file("lock").c_str(), 0700), 0);
+  EXPECT_EQ(read_fault(), "cannot use " + file("lock") + ": it is a folder; remove it");
 }
 
 TEST_F(StateFolderTest, AFolderThatOthersMayWriteToIsRefused) {
@@ -129,8 +134,17 @@ TEST_F(StateFolderTest, WhatCannotBeWrittenLeavesWhatWasThere) {
   ASSERT_TRUE(folder);
   ASSERT_EQ(::mkdir(file("state.new").c_str(), 0700), 0);  // in the way, whoever runs the test
   const std::string error = (*folder)->write(some_state(9));
-  EXPECT_THAT(error, HasSubstr("cannot write the hub's state to " + file("state")));
+  EXPECT_EQ(error, "cannot write the hub's state: " + file("state.new") + " is in the way: it is a folder; remove it");
   EXPECT_EQ((*(*folder)->read())->boot, 3u);
+}
+
+TEST_F(StateFolderTest, AFolderInThePlaceOfTheStateIsTold) {
+  const auto folder = StateFolder::open(path());
+  ASSERT_TRUE(folder);
+  ASSERT_EQ(::mkdir(file("state").c_str(), 0700), 0);
+  EXPECT_THAT((*folder)->write(some_state()),
+              ::testing::AllOf(HasSubstr("cannot write the hub's state to " + file("state")),
+                               HasSubstr("it is a folder: remove it")));
 }
 
 }  // namespace

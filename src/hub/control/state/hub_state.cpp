@@ -193,7 +193,9 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
 }
 
 Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall) {
-  if (found.boot >= kBootMax) return Error{"the hub was started as often as it can be counted"};
+  if (found.boot >= kBootMax)
+    return Error{"the hub was started as often as can be counted (" + std::to_string(kBootMax) +
+                 " times); move it away: the hub then begins anew, and nodes get new ids"};
   HubStart start;
   start.state = found;
   ++start.state.boot;
