@@ -3,10 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "tools/gimnet/command_help.hpp"
 #include "tools/gimnet/help_format.hpp"
@@ -14,27 +15,35 @@
 namespace gimnet::tool {
 namespace {
 
+/// A decimal number from `least` to `most`, of a whole type without a point. CLI11 by itself takes "nan", "0x10" and
+/// " 5", and "010" for 8: what it is left to read is written anew.
+template <class Number>
+CLI::Validator within(Number least, Number most) {
+  return CLI::Validator(
+      [least, most](std::string& word) {
+        Number number{};
+        const char* const end = word.data() + word.size();
+        const auto [read, error] = std::from_chars(word.data(), end, number);
+        const bool fits = error == std::errc{} && read == end && number >= least && number <= most;
+        if (!fits) return std::string("no number within the bounds");
+        if constexpr (std::is_integral_v<Number>) word = std::to_string(number);
+        return std::string();
+      },
+      "");
+}
+
 void add_key(CLI::App& command, Options& options) {
-  command.add_option("--type", options.key.type, "message type, a whole number up to 4294967295, default 0");
-  command.add_option("--instance", options.key.instance,
-                     "instance of the type, a whole number up to 4294967295, default 0");
+  command.add_option("--type", options.key.type, "message type, a whole number up to 4294967295, default 0")
+      ->transform(within(std::uint32_t{0}, UINT32_MAX));
+  command
+      .add_option("--instance", options.key.instance,
+                  "instance of the type, a whole number up to 4294967295, default 0")
+      ->transform(within(std::uint32_t{0}, UINT32_MAX));
 }
 
 // The most that any hub can be told to take (docs/operations.md); what this one takes it says itself.
 constexpr std::uint32_t kSyncWindowMax = 1'000'000;
 constexpr std::uint32_t kDepthMax = 4'096;
-
-/// A number from `least` to `most`; unlike CLI::Range it takes no "nan".
-CLI::Validator within(double least, double most) {
-  const CLI::Validator range = CLI::Range(least, most);
-  return CLI::Validator(
-      [range](std::string& word) {
-        double number = 0.0;
-        const bool read = CLI::detail::lexical_cast(word, number);
-        return read && std::isnan(number) ? "Value " + word + " is no number" : range(word);
-      },
-      "");
-}
 
 void add_lane(CLI::App& command, Options& options) {
   static const std::map<std::string, Lane> kLanes{
@@ -45,9 +54,9 @@ void add_lane(CLI::App& command, Options& options) {
 
 void add_bounds(CLI::App& command, Options& options) {
   command.add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 62));
+      ->transform(within(std::uint64_t{1}, std::uint64_t{1} << 62));
   command.add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
-      ->check(within(0.001, 1e9));
+      ->transform(within(0.001, 1e9));
 }
 
 void add_printing(CLI::App& command, Options& options) {
@@ -69,7 +78,7 @@ void add_recv(CLI::App& app, Options& options) {
   CLI::App& recv = *app.add_subcommand("recv", help::kRecvAbout);
   recv.add_option("--name", options.name, "name of this node, to which others send")->required()->check(not_empty());
   recv.add_option("--max-size", options.bytes_max, "largest message taken, in bytes, 1 to 1073741824, default 67108864")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 30));
+      ->transform(within(std::size_t{1}, std::size_t{1} << 30));
   add_printing(recv, options);
 }
 
@@ -104,9 +113,9 @@ void add_pub(CLI::App& app, Options& options) {
   pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
   pub.add_flag("--stay", options.stay, "go on after the input has ended, until Ctrl-C: the service stays");
   pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
-      ->check(within(0.001, 1e6));
+      ->transform(within(0.001, 1e6));
   pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, 0 to 1000000, default 0")
-      ->check(CLI::Range(std::size_t{0}, std::size_t{1'000'000}));
+      ->transform(within(std::size_t{0}, std::size_t{1'000'000}));
   add_lane(pub, options);
   add_key(pub, options);
 }
@@ -117,12 +126,12 @@ void add_echo(CLI::App& app, Options& options) {
       ->required()
       ->check(not_empty());
   echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1")
-      ->check(CLI::Range(std::uint32_t{1}, kSyncWindowMax));
+      ->transform(within(std::uint32_t{1}, kSyncWindowMax));
   echo.add_option("--depth", options.pace.depth,
                   "newest messages that the hub holds meanwhile, 1 to 4096, of most hubs to 64, default 1")
-      ->check(CLI::Range(std::uint32_t{1}, kDepthMax));
+      ->transform(within(std::uint32_t{1}, kDepthMax));
   echo.add_option("--rate", options.pace.rate_hz, "messages a second at most, 0.001 to 1000, default all")
-      ->check(within(0.001, 1e3));
+      ->transform(within(0.001, 1e3));
   add_printing(echo, options);
 }
 
@@ -132,7 +141,7 @@ void add_meter(CLI::App& app, const char* name, const char* about, Options& opti
       ->required()
       ->check(not_empty());
   meter.add_option("--window", options.window_s, "seconds that a line speaks of, 0.001 to 3600, default 5")
-      ->check(within(0.001, 3600.0));
+      ->transform(within(0.001, 3600.0));
   add_bounds(meter, options);
 }
 
@@ -140,11 +149,11 @@ void add_ping(CLI::App& app, Options& options) {
   CLI::App& ping = *app.add_subcommand("ping", help::kPingAbout);
   ping.add_option("node", options.target, "name or id")->required()->check(not_empty());
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
-      ->check(CLI::Range(1, 1'000'000'000));
+      ->transform(within(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
   ping.add_option("-i,--interval", options.interval_s, "seconds between two, 0 to 3600, default 0.1")
-      ->check(within(0.0, 3600.0));
+      ->transform(within(0.0, 3600.0));
   ping.add_option("-W,--timeout", options.timeout_s, "seconds after which one is lost, 0.001 to 3600, default 1")
-      ->check(within(0.001, 3600.0));
+      ->transform(within(0.001, 3600.0));
   add_lane(ping, options);
 }
 
@@ -178,7 +187,7 @@ void add_commands(CLI::App& app, Options& options) {
   app.add_flag("--json", options.json, "print JSON: one document, or an object a line where there is no end");
   app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
       ->transform(CLI::CheckedTransformer(kColours).description(""));
-  app.add_option("--shard", options.shard, "")->group("");
+  app.add_option("--shard", options.shard, "")->group("")->transform(within(0U, 255U));
   app.set_version_flag("--version", "gimnet " GIMNET_VERSION);
   add_send(app, options);
   add_recv(app, options);

@@ -235,6 +235,24 @@ TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
   EXPECT_NE(refusal({"pub", "a/b", "--delivery", "sync:1000001"}).find("1 to 1000000"), std::string::npos);
   EXPECT_TRUE(options({"pub", "a/b", "--retain", "--stay"}).stay);
 }
+TEST(CommandLine, NumbersAreDecimal) {
+  for (const char* word : {"0x10", " 5", "5 ", "+5", "0b1", "1'0", "1,5", "5k", ""}) {
+    EXPECT_NE(refusal({"pub", "a/b", "--rate", word}), "not refused") << word;
+    EXPECT_NE(refusal({"pub", "a/b", "--wait", word}), "not refused") << word;
+    EXPECT_NE(refusal({"pub", "a/b", "--type", word}), "not refused") << word;
+    EXPECT_NE(refusal({"recv", "--name", "B", "-n", word}), "not refused") << word;
+    EXPECT_NE(refusal({"recv", "--name", "B", "--max-size", word}), "not refused") << word;
+    EXPECT_NE(refusal({"ping", "B", "-c", word}), "not refused") << word;
+    EXPECT_NE(refusal({"--shard", word, "nodes"}), "not refused") << word;
+  }
+  EXPECT_NE(refusal({"send", "B", "--instance", "1.5"}).find("'1.5' is no value for --instance"), std::string::npos);
+  EXPECT_EQ(options({"send", "B", "--type", "010", "--instance", "4294967295"}).key, (MessageKey{10, UINT32_MAX}));
+  EXPECT_NE(refusal({"send", "B", "--type", "4294967296"}).find("is no value for --type"), std::string::npos);
+  EXPECT_EQ(options({"ping", "B", "-c", "010", "-i", "010.5"}).pings, 10u);
+  EXPECT_EQ(options({"ping", "B", "-i", "010.5"}).interval_s, 10.5);
+  EXPECT_EQ(options({"pub", "a/b", "--rate", "1e3"}).rate_hz, 1e3);
+}
+
 
 TEST(CommandLine, HelpEndsWell) {
   const auto parsed = parse({"send", "--help"});
