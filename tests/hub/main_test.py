@@ -118,7 +118,7 @@ class CommandLine(unittest.TestCase):
     def test_a_wrong_command_line_is_told_and_ends_with_2(self):
         for arguments, part in ((("--lisen", "x"), "did you mean --listen?"),
                                 (("--limit", "nodes=0"), "nodes"),
-                                (("--listen", "tcp://0.0.0.0:0"), "needs TLS, or --insecure"),
+                                (("--listen", "tcp://0.0.0.0:0"), "trusted give --insecure"),
                                 (("--shards", "many"), "--shards")):
             refused = run(*arguments)
             self.assertEqual(refused.returncode, 2, arguments)

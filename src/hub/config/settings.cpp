@@ -289,8 +289,11 @@ void complete(Configuration& configuration, Faults& faults) {
   for (std::size_t i = 0; i < options.listen.size(); ++i) {
     if (options.listen[i].is_local() || options.insecure) continue;
     const Fault& where = configuration.listen_places[i];
-    faults.push_back({where.place, "cannot listen on " + options.listen[i].text() + ": an open address needs TLS, or " +
-                                       (where.place.empty() ? "--insecure" : "insecure = true")});
+    const std::string word = where.place.empty() ? "--insecure" : "insecure = true";
+    faults.push_back(
+        {where.place, "cannot listen on " + options.listen[i].text() +
+                          ": other machines could reach it, and nothing that is sent is encrypted; where " +
+                          "all of them are trusted give " + word + ", otherwise listen on 127.0.0.1"});
   }
   const Limits& limits = options.limits;
   if (limits.silent_ms <= limits.keep_alive_ms) {

@@ -82,7 +82,8 @@ TEST(Options, UnderstandsEqualsSigns) { EXPECT_EQ(options({"--hub-id=9", "--limi
 
 TEST(Options, AnOpenAddressNeedsTheWord) {
   EXPECT_EQ(error({"--listen", "tcp://0.0.0.0:7450"}),
-            "tcphub: cannot listen on tcp://0.0.0.0:7450: an open address needs TLS, or --insecure\n");
+            "tcphub: cannot listen on tcp://0.0.0.0:7450: other machines could reach it, and nothing that is sent is "
+            "encrypted; where all of them are trusted give --insecure, otherwise listen on 127.0.0.1\n");
   EXPECT_EQ(options({"--listen", "tcp://0.0.0.0:7450", "--insecure"}).listen.size(), 1u);
   EXPECT_EQ(options({"--insecure", "--listen", "tcp://[::]:7450"}).listen.size(), 1u);
 }

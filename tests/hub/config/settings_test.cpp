@@ -126,7 +126,8 @@ TEST(Settings, AnUnknownKeyIsToldWithTheNearestOne) {
 
 TEST(Settings, AnOpenAddressNeedsTheWord) {
   EXPECT_EQ(fault("listen = ['tcp://127.0.0.1:1', 'tcp://0.0.0.0:7450']"),
-            "f:1:32: cannot listen on tcp://0.0.0.0:7450: an open address needs TLS, or insecure = true");
+            "f:1:32: cannot listen on tcp://0.0.0.0:7450: other machines could reach it, and nothing that is sent "
+            "is encrypted; where all of them are trusted give insecure = true, otherwise listen on 127.0.0.1");
   EXPECT_THAT(read("listen = 'tcp://0.0.0.0:7450'\ninsecure = true").faults, IsEmpty());
   EXPECT_THAT(fault("listen = []"), HasSubstr("leave it out"));
   EXPECT_THAT(fault("listen = ['unix:/a', 'unix:/a']"), HasSubstr("given twice"));
