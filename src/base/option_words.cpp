@@ -13,6 +13,12 @@ std::string fault_of(const std::string& name, std::string_view value, Takes take
          name + "=false";
 }
 
+/// Mostly its own value was forgotten, or a shell variable in its place is not set.
+bool looks_like_option(std::string_view word, const std::function<Takes(std::string_view)>& takes) {
+  if (word.starts_with("--")) return true;
+  return word.starts_with('-') && takes(word.substr(0, word.find('='))) != Takes::unknown;
+}
+
 }  // namespace
 
 std::string wrong_option_word(std::span<const char* const> words, const std::function<Takes(std::string_view)>& takes) {
@@ -23,8 +29,11 @@ std::string wrong_option_word(std::span<const char* const> words, const std::fun
     const std::size_t equals = word.find('=');
     const Takes what = takes(word.substr(0, equals));
     if (equals == std::string_view::npos) {
-      if (what == Takes::value) ++i;  // whatever it looks like
-      continue;
+      if (what != Takes::value) continue;
+      if (++i == words.size() || !looks_like_option(words[i], takes)) continue;
+      const std::string value = escaped(words[i], kQuotedMax);
+      return std::string(word) + " needs a value, and '" + value + "' looks like an option; if it is meant, write " +
+             std::string(word) + (word.starts_with("--") ? "=" : "") + value;
     }
     std::string fault = fault_of(std::string(word.substr(0, equals)), word.substr(equals + 1), what);
     if (!fault.empty()) return fault;

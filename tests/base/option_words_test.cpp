@@ -29,6 +29,17 @@ TEST(OptionWords, AnEmptyValueIsNotTheNextWord) {
   EXPECT_EQ(wrong({"--name", "", "--name=x", "--name=="}), "");
 }
 
+TEST(OptionWords, AnotherOptionIsNoValue) {
+  EXPECT_EQ(wrong({"--name", "--spin"}),
+            "--name needs a value, and '--spin' looks like an option; if it is meant, write --name=--spin");
+  EXPECT_EQ(wrong({"-n", "--name=x"}),
+            "-n needs a value, and '--name=x' looks like an option; if it is meant, write -n--name=x");
+  for (const char* word : {"--", "--other", "--spin=2", "-n", "-n=3"}) EXPECT_NE(wrong({"--name", word}), "") << word;
+  for (const char* word : {"-", "-1", "-.5", "-x", "- no", "spin", "a--b"}) EXPECT_EQ(wrong({"--name", word}), "");
+  EXPECT_EQ(wrong({"--name=--spin", "--name=-n"}), "");
+  EXPECT_EQ(wrong({"--name", "x", "--spin", "-n"}), "") << "that one is missing is for others to say";
+}
+
 TEST(OptionWords, WhatTakesNothingIsGivenNothing) {
   EXPECT_EQ(wrong({"--help"}), "");
   for (const char* word : {"--help=", "--help=true", "--help=false"}) {
@@ -39,7 +50,6 @@ TEST(OptionWords, WhatTakesNothingIsGivenNothing) {
 TEST(OptionWords, OtherWordsAreNotLookedAt) {
   EXPECT_EQ(wrong({}), "");
   EXPECT_EQ(wrong({"spin=2", "--other=2", "--other=", "-"}), "");
-  EXPECT_EQ(wrong({"--name", "--spin=2", "-n", "--spin=3"}), "");
   EXPECT_EQ(wrong({"--", "--spin=2"}), "");
   EXPECT_NE(wrong({"--name=x", "--spin=2"}), "");
   EXPECT_EQ(wrong({"--name"}), "");

@@ -42,6 +42,8 @@ class WrongForTcphub(unittest.TestCase):
             (["--limit"], ["--limit", "frame_bytes"]),
             (["--placement", "hint"], ["--placement", "hnt"]),
             (["--shard", "--shards"], ["--shard", "2"]),
+            (["--shards needs a value: threads"], ["--shards"]),
+            (["--hub-name needs a value", "'--spin'"], ["--hub-name", "--spin"]),
         ):
             with self.subTest(arguments=arguments):
                 self.refused(words, *arguments)
@@ -75,6 +77,8 @@ class WrongForGimnet(unittest.TestCase):
             (["-c,--count", "0"], ["ping", "B", "-c", "0"]),
             (["--lane"], ["send", "B", "--lane", "fast"]),
             (["--nonsense"], ["nodes", "--nonsense"]),
+            (["--name needs a value", "'--raw'"], ["recv", "--name", "--raw"]),
+            (["--rate", "'0x10'"], ["pub", "robot/odom", "--rate", "0x10"]),
         ):
             with self.subTest(arguments=arguments):
                 self.refused(2, words, *arguments)

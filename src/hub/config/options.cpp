@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <span>
 #include <string_view>
 
@@ -95,9 +96,30 @@ std::string help_limits() {
   return text + "\nA reload changes: " + changing + ". The others need a restart.\n";
 }
 
+/// What the option takes, as the first sentence of its help has it.
+std::string what_it_takes(const CLI::Option& option) {
+  std::string takes = option.get_description();
+  takes.erase(std::min(takes.find(". "), takes.size()));
+  std::ranges::replace(takes, '\n', ' ');
+  // An abbreviation stays as it is.
+  const auto is_capital = [](char c) { return std::isupper(static_cast<unsigned char>(c)) != 0; };
+  if (takes.size() > 1 && is_capital(takes[0]) && !is_capital(takes[1])) {
+    takes[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(takes[0])));
+  }
+  return takes;
+}
+
 /// What CLI11 found, in the words of this house.
-std::string syntax_error(const CLI::ParseError& error) {
+std::string syntax_error(const CLI::App& app, const CLI::ParseError& error) {
   std::string what = error.what();
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string& name = option->get_name();
+    if (!what.starts_with(name + ":")) continue;
+    const std::size_t given = option->results().size();
+    what = given > 1 ? name + " is given " + std::to_string(given) + " times: give it once"
+                     : name + " needs a value: " + what_it_takes(*option);
+    break;
+  }
   if (what.empty()) what = error.get_name();
   return what + "; tcphub --help shows what there is";
 }
@@ -197,7 +219,7 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return wrong(syntax_error(error));
+    return wrong(syntax_error(app, error));
   }
   if (raw.help) return CommandLineEnding{0, app.help()};
   if (const std::vector<std::string> extras = app.remaining(); !extras.empty()) {

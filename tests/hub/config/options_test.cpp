@@ -104,9 +104,30 @@ TEST(Options, ErrorsSayWhatWasMeant) {
   EXPECT_THAT(error({"--placement", "hnt"}), HasSubstr("did you mean hint?"));
   EXPECT_THAT(error({"--log-level", "inof"}), HasSubstr("did you mean info?"));
   EXPECT_THAT(error({"robot"}), HasSubstr("'robot'"));
-  EXPECT_THAT(error({"--shards"}), HasSubstr("--shards"));
   EXPECT_THAT(error({"--hub-name", "my hub"}), HasSubstr("--hub-name"));
   EXPECT_THAT(error({"--listen", "tcp://127.0.0.1:1", "--listen", "tcp://127.0.0.1:1"}), HasSubstr("twice"));
+}
+
+TEST(Options, SaysWhatAnOptionTakes) {
+  EXPECT_EQ(error({"--shards"}),
+            "tcphub: --shards needs a value: threads that carry data, 1 to 16; tcphub --help shows what there is\n");
+  for (const char* name :
+       {"--listen", "--hub-id", "--hub-name", "--state-dir", "--limit", "--placement", "--log-level", "--config"}) {
+    EXPECT_THAT(error({"--spin", name}), HasSubstr(std::string("tcphub: ") + name + " needs a value: ")) << name;
+    EXPECT_THAT(error({name, "--spin"}), HasSubstr(std::string(name) + " needs a value, and '--spin' looks like"));
+  }
+  EXPECT_THAT(error({"--shards", "1", "--shards", "2"}), HasSubstr("--shards is given 2 times: give it once"));
+}
+
+TEST(Options, NumbersAreDecimal) {
+  for (const char* word : {"0x2", " 2", "2 ", "+2", "2.0", "1e1", ""}) {
+    EXPECT_THAT(error({"--shards", word}), HasSubstr("give a whole number from 1 to 16")) << word;
+    EXPECT_THAT(error({"--hub-id", word}), HasSubstr("give a whole number from 1 to 4094")) << word;
+    const std::string nodes = std::string("nodes=") + word;
+    EXPECT_THAT(error({"--limit", nodes.c_str()}), HasSubstr("limit nodes cannot be")) << word;
+  }
+  EXPECT_EQ(options({"--shards", "010"}).shards, 10u);
+  EXPECT_EQ(options({"--limit", "nodes=010"}).limits.nodes, 10u);
 }
 
 TEST(Options, LimitsMustFitEachOther) {

@@ -84,7 +84,17 @@ TEST(CommandLine, AFlagIsTrueOrFalse) {
 TEST(CommandLine, AnEmptyValueIsNotTheNextWord) {
   EXPECT_NE(refusal({"recv", "--name=", "--json"}).find("--name is empty: give it a value"), std::string::npos);
   EXPECT_NE(refusal({"--hub=", "nodes"}).find("--hub is empty"), std::string::npos);
-  EXPECT_EQ(options({"ctl", "kick", "a", "--reason", "--json=1"}).ctl.reason, "--json=1");
+  EXPECT_EQ(options({"ctl", "kick", "a", "--reason=--json=1"}).ctl.reason, "--json=1");
+  EXPECT_EQ(options({"ctl", "kick", "a", "--reason", "-hot-"}).ctl.reason, "-hot-");
+}
+
+TEST(CommandLine, AnotherOptionIsNoValue) {
+  EXPECT_EQ(refusal({"recv", "--name", "--raw"}),
+            "gimnet: --name needs a value, and '--raw' looks like an option; if it is meant, write --name=--raw\n"
+            "`gimnet recv --help` shows how it is called.\n");
+  EXPECT_NE(refusal({"ping", "B", "-c", "-i", "1"}).find("-c needs a value, and '-i'"), std::string::npos);
+  EXPECT_NE(refusal({"--hub", "--json", "nodes"}).find("--hub needs a value, and '--json'"), std::string::npos);
+  EXPECT_EQ(options({"recv", "--name=--raw"}).name, "--raw");
 }
 
 TEST(CommandLine, SuggestsWhatANewcomerMeant) {
@@ -225,16 +235,6 @@ TEST(CommandLine, ANumberIsNoNumberIfItSaysSo) {
   }
 }
 
-TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
-  EXPECT_EQ(options({"echo", "a/b", "--window", "1000000", "--depth", "4096"}).pace.depth, 4096u);
-  EXPECT_NE(refusal({"echo", "a/b", "--window", "0"}).find("is no value for --window"), std::string::npos);
-  EXPECT_NE(refusal({"echo", "a/b", "--window", "1000001"}).find("is no value for --window"), std::string::npos);
-  EXPECT_NE(refusal({"echo", "a/b", "--depth", "0"}).find("is no value for --depth"), std::string::npos);
-  EXPECT_NE(refusal({"echo", "a/b", "--depth", "4097"}).find("is no value for --depth"), std::string::npos);
-  EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync:1000000"}).window, 1'000'000u);
-  EXPECT_NE(refusal({"pub", "a/b", "--delivery", "sync:1000001"}).find("1 to 1000000"), std::string::npos);
-  EXPECT_TRUE(options({"pub", "a/b", "--retain", "--stay"}).stay);
-}
 TEST(CommandLine, NumbersAreDecimal) {
   for (const char* word : {"0x10", " 5", "5 ", "+5", "0b1", "1'0", "1,5", "5k", ""}) {
     EXPECT_NE(refusal({"pub", "a/b", "--rate", word}), "not refused") << word;
@@ -253,6 +253,16 @@ TEST(CommandLine, NumbersAreDecimal) {
   EXPECT_EQ(options({"pub", "a/b", "--rate", "1e3"}).rate_hz, 1e3);
 }
 
+TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
+  EXPECT_EQ(options({"echo", "a/b", "--window", "1000000", "--depth", "4096"}).pace.depth, 4096u);
+  EXPECT_NE(refusal({"echo", "a/b", "--window", "0"}).find("is no value for --window"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--window", "1000001"}).find("is no value for --window"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--depth", "0"}).find("is no value for --depth"), std::string::npos);
+  EXPECT_NE(refusal({"echo", "a/b", "--depth", "4097"}).find("is no value for --depth"), std::string::npos);
+  EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync:1000000"}).window, 1'000'000u);
+  EXPECT_NE(refusal({"pub", "a/b", "--delivery", "sync:1000001"}).find("1 to 1000000"), std::string::npos);
+  EXPECT_TRUE(options({"pub", "a/b", "--retain", "--stay"}).stay);
+}
 
 TEST(CommandLine, HelpEndsWell) {
   const auto parsed = parse({"send", "--help"});
