@@ -177,6 +177,7 @@ class Reference {
   void on_advertise(const Asked& asked);
   /// Is there anything wrong with it by itself?
   [[nodiscard]] proto::Status judge_terms(const Asked& asked, const proto::ns::Advertise& offer) const;
+  [[nodiscard]] bool terms_fit(const Asked& asked, const proto::ns::Subscribe& wanted) const;
   [[nodiscard]] proto::Status judge_offer(const Asked& asked, const proto::ns::Advertise& offer);
   void on_withdraw(const Asked& asked);
   void on_subscribe(const Asked& asked);

@@ -118,8 +118,25 @@ Status Reference::judge_terms(const Asked& asked, const ns::Advertise& offer) co
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
-  if (counted && offer.window > limits_.sync_window) return Status::bad_request;
-  return Status::done;
+  if (!counted || offer.window <= limits_.sync_window) return Status::done;
+  // What stands is not held to a limit that was lowered meanwhile.
+  const auto topic = topics_.find(proto::join_service_name(asked.session.name, offer.service));
+  const bool provided = topic != topics_.end() && topic->second.service && topic->second.service->provider == asked.id;
+  const bool stands = provided && topic->second.service->terms.delivery == ns::Delivery::sync &&
+                      topic->second.service->terms.window == offer.window;
+  return stands ? Status::done : Status::bad_request;
+}
+
+bool Reference::terms_fit(const Asked& asked, const ns::Subscribe& wanted) const {
+  const double rate = wanted.rate_hz;
+  const bool has_rate = rate >= 0.001 && rate <= 1e6;
+  if (wanted.depth < 1 || (rate != 0.0 && !has_rate)) return false;
+  Terms stands{0, 0, 0};
+  if (asked.session.subscribes.contains(wanted.name)) stands = topics_.at(wanted.name).subscribers.at(asked.id);
+  const bool rate_fits = rate <= static_cast<double>(limits_.subscription_rate_hz) ||
+                         stands.interval_us == static_cast<std::uint32_t>(std::ceil(1e6 / rate));
+  return (wanted.window <= limits_.sync_window || wanted.window == stands.window) &&
+         (wanted.depth <= limits_.subscription_depth || wanted.depth == stands.depth) && rate_fits;
 }
 
 Status Reference::judge_offer(const Asked& asked, const ns::Advertise& offer) {
@@ -208,10 +225,7 @@ void Reference::on_subscribe(const Asked& asked) {
   const auto wanted = proto::decode<ns::Subscribe>(asked.payload);
   if (!wanted) return require_status(asked.answer, Status::bad_request);
   const double rate = wanted->rate_hz;
-  const bool rate_fits = rate == 0.0 || (rate >= 0.001 && rate <= static_cast<double>(limits_.subscription_rate_hz));
-  const bool fits = wanted->window <= limits_.sync_window && wanted->depth >= 1 &&
-                    wanted->depth <= limits_.subscription_depth && rate_fits;
-  if (!fits) return require_status(asked.answer, Status::bad_request);
+  if (!terms_fit(asked, *wanted)) return require_status(asked.answer, Status::bad_request);
   Session& session = asked.session;
   const Terms wants{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
   const bool fresh = !session.subscribes.contains(wanted->name);

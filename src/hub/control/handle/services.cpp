@@ -24,8 +24,9 @@ proto::Refusal out_of_range(std::string_view what, const std::string& range, std
                                                  std::string{limit} + " bounds it"};
 }
 
-/// What is wrong with how a service wants to be delivered.
-std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer) {
+/// What is wrong with how a service wants to be delivered. A limit that was lowered meanwhile holds for what is new: a
+/// service keeps the n that `standing` has, or it would be gone when its node comes back and repeats it.
+std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer, const ServiceTerms* standing) {
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) {
     return proto::Refusal{Status::bad_request,
@@ -34,31 +35,37 @@ std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise
   if (!counted && offer.window != 0) {
     return proto::Refusal{Status::bad_request, "a window belongs to delivery sync(n): leave one of them out"};
   }
-  if (counted && offer.window > limits.sync_window) {
+  const bool stands = standing != nullptr && standing->window == offer.window;
+  if (counted && offer.window > limits.sync_window && !stands) {
     return out_of_range("n of delivery sync(n)", "1 to " + std::to_string(limits.sync_window), "sync_window");
   }
   return std::nullopt;
 }
 
-Result<SubscriberTerms, proto::Refusal> terms_of(const Limits& limits, const ns::Subscribe& wanted) {
+/// The same of a subscription, as for fault_of().
+Result<SubscriberTerms, proto::Refusal> terms_of(const Limits& limits, const ns::Subscribe& wanted,
+                                                 const std::optional<SubscriberTerms>& standing) {
   constexpr double kRateMin = 0.001;
-  if (wanted.window > limits.sync_window) {
-    return out_of_range("the window of a subscription", "1 to " + std::to_string(limits.sync_window), "sync_window");
-  }
-  if (wanted.depth < 1 || wanted.depth > limits.subscription_depth) {
-    return out_of_range("the depth of a subscription", "1 to " + std::to_string(limits.subscription_depth),
-                        "subscription_depth");
-  }
-  const auto rate_max = static_cast<double>(limits.subscription_rate_hz);
-  // Not a number is neither.
-  if (wanted.rate_hz != 0.0 && !(wanted.rate_hz >= kRateMin && wanted.rate_hz <= rate_max)) {
-    return out_of_range("the maximal rate of a subscription",
-                        "0.001 to " + std::to_string(limits.subscription_rate_hz) + " Hz", "subscription_rate_hz");
-  }
   SubscriberTerms terms;
   terms.window = wanted.window;
   terms.depth = wanted.depth;
-  if (wanted.rate_hz != 0.0) terms.interval_us = static_cast<std::uint32_t>(std::ceil(1e6 / wanted.rate_hz));
+  if (wanted.window > limits.sync_window && !(standing && standing->window == terms.window)) {
+    return out_of_range("the window of a subscription", "1 to " + std::to_string(limits.sync_window), "sync_window");
+  }
+  if (wanted.depth < 1 || (wanted.depth > limits.subscription_depth && !(standing && standing->depth == terms.depth))) {
+    return out_of_range("the depth of a subscription", "1 to " + std::to_string(limits.subscription_depth),
+                        "subscription_depth");
+  }
+  if (wanted.rate_hz == 0.0) return terms;
+  const auto rate_max = static_cast<double>(limits.subscription_rate_hz);
+  // Not a number is neither.
+  const bool has_interval = wanted.rate_hz >= kRateMin;
+  if (has_interval) terms.interval_us = static_cast<std::uint32_t>(std::ceil(1e6 / wanted.rate_hz));
+  const bool stands = standing && terms.interval_us != 0 && standing->interval_us == terms.interval_us;
+  if (!has_interval || (wanted.rate_hz > rate_max && !stands)) {
+    return out_of_range("the maximal rate of a subscription",
+                        "0.001 to " + std::to_string(limits.subscription_rate_hz) + " Hz", "subscription_rate_hz");
+  }
   return terms;
 }
 
@@ -72,7 +79,9 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
     return proto::Refusal{Status::bad_request, "'" + escaped(offer.service, kQuotedMax) +
                                                    "' is no name of a service: one part of A-Z a-z 0-9 . _ -"};
   }
-  if (auto refusal = fault_of(context.limits, offer)) return *refusal;
+  const std::string full_name = proto::join_service_name(session.name, offer.service);
+  const ServiceTerms* const standing = context.membership.services().provided(session.index, full_name);
+  if (auto refusal = fault_of(context.limits, offer, standing)) return *refusal;
   ServiceTerms terms;
   terms.message_type = offer.message_type;
   terms.instance = offer.instance;
@@ -81,8 +90,7 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   terms.metadata = offer.metadata;
   terms.window = offer.delivery == ns::Delivery::sync ? std::max(1u, offer.window) : 0;
   terms.retain = offer.retain;
-  const std::string full_name = proto::join_service_name(session.name, offer.service);
-  if (!context.membership.services().provides(session.index, full_name, terms)) {
+  if (standing == nullptr || *standing != terms) {
     if (auto refusal = count_declaration(context, session)) return *refusal;
   }
   const Services::FormerGroup former{own_index(context.facts, offer.former_group).value_or(0), offer.former_proof};
@@ -145,9 +153,10 @@ proto::Payload handle_services(HandlerContext& context, const Request& request) 
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
   return answer_to<ns::Subscribe>(
       request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
-        const auto terms = terms_of(context.limits, wanted);
+        const auto standing = context.membership.services().subscribed(request.session.index, wanted.name);
+        const auto terms = terms_of(context.limits, wanted, standing);
         if (!terms) return terms.error();
-        if (!context.membership.services().subscribes(request.session.index, wanted.name, *terms)) {
+        if (standing != *terms) {
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
         const auto topic =

@@ -284,18 +284,17 @@ const Topic* Services::find_group(std::uint32_t group) const {
   return found == groups_.end() ? nullptr : found->second;
 }
 
-bool Services::provides(std::uint32_t node, std::string_view full_name, const ServiceTerms& terms) const {
+const ServiceTerms* Services::provided(std::uint32_t node, std::string_view full_name) const {
   const auto known = topics_.find(full_name);
-  if (known == topics_.end() || !known->second.service) return false;
-  const Service& service = *known->second.service;
-  return service.provider == node && service.terms == terms;
+  if (known == topics_.end() || !known->second.service || known->second.service->provider != node) return nullptr;
+  return &known->second.service->terms;
 }
 
-bool Services::subscribes(std::uint32_t node, std::string_view full_name, const SubscriberTerms& terms) const {
+std::optional<SubscriberTerms> Services::subscribed(std::uint32_t node, std::string_view full_name) const {
   const auto known = topics_.find(full_name);
-  if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node)) return false;
+  if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node)) return std::nullopt;
   const auto asked = known->second.terms.find(node);
-  return terms == (asked != known->second.terms.end() ? asked->second : SubscriberTerms{});
+  return asked != known->second.terms.end() ? asked->second : SubscriberTerms{};
 }
 
 std::size_t Services::services_of(std::uint32_t node) const {

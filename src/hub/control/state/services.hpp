@@ -121,9 +121,9 @@ class Services {
   /// Topics with a service, by ascending group index.
   [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
   [[nodiscard]] const Topics& by_name() const { return topics_; }
-  /// Has the node declared exactly that already?
-  [[nodiscard]] bool provides(std::uint32_t node, std::string_view full_name, const ServiceTerms& terms) const;
-  [[nodiscard]] bool subscribes(std::uint32_t node, std::string_view full_name, const SubscriberTerms& terms) const;
+  /// What the node declared of that service; nothing: it has not. The pointer holds until something changes here.
+  [[nodiscard]] const ServiceTerms* provided(std::uint32_t node, std::string_view full_name) const;
+  [[nodiscard]] std::optional<SubscriberTerms> subscribed(std::uint32_t node, std::string_view full_name) const;
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
   [[nodiscard]] IndexPool& group_indices() { return group_indices_; }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 
 #include "base/log.hpp"
@@ -79,7 +80,8 @@ TEST_F(ServiceRequestsTest, ASubscriberMayWantLess) {
   EXPECT_TRUE(wants({})->retain);
   for (const ns::Subscribe& wrong :
        {ns::Subscribe{.window = 1025}, ns::Subscribe{.depth = 0}, ns::Subscribe{.depth = 65},
-        ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = 0.0009}, ns::Subscribe{.rate_hz = -1.0}}) {
+        ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = HUGE_VAL}, ns::Subscribe{.rate_hz = NAN},
+        ns::Subscribe{.rate_hz = 0.0009}, ns::Subscribe{.rate_hz = -1.0}}) {
     const auto answer = wants(wrong);
     ASSERT_FALSE(answer);
     EXPECT_EQ(answer.error().status, Status::bad_request);
@@ -143,6 +145,45 @@ TEST_F(ServiceRequestsTest, AProofThatIsTooLongIsABadRequest) {
   EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
   offer.former_proof.resize(ns::kGroupProofBytesMax + 1);
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
+}
+
+TEST_F(ServiceRequestsTest, WhatStandsOutlivesALoweredLimitAndAReturn) {
+  Node robot = join("robot");
+  ns::Advertise offer{.service = "map", .delivery = ns::Delivery::sync, .window = 5};
+  const ns::Subscribe all{.name = "a/b", .window = 5, .depth = 10, .rate_hz = 300.0};
+  const auto before = ask<ns::AdvertiseAnswer>(robot, offer);
+  ASSERT_TRUE(before);
+  ASSERT_TRUE(ask<ns::SubscribeAnswer>(robot, all));
+  limits.sync_window = 2;
+  limits.subscription_depth = 2;
+  limits.subscription_rate_hz = 2;
+  proto::Hello hello;
+  hello.token = robot.welcome.token;
+  detach(robot);
+  robot = join(hello);
+  const auto after = ask<ns::AdvertiseAnswer>(robot, offer);
+  ASSERT_TRUE(after) << after.error().sentence;
+  EXPECT_EQ(after->group, before->group);
+  EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, all));
+  offer.metadata = "new";
+  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer)) << "n is what it was";
+  const auto with = [&](auto member, auto value) {
+    ns::Subscribe changed = all;
+    changed.*member = value;
+    return ask<ns::SubscribeAnswer>(robot, changed).has_value();
+  };
+  // Each value that changes is held to its limit, the others stand.
+  EXPECT_FALSE(with(&ns::Subscribe::window, 4u));
+  EXPECT_FALSE(with(&ns::Subscribe::depth, 9u));
+  EXPECT_FALSE(with(&ns::Subscribe::rate_hz, 200.0));
+  EXPECT_TRUE(with(&ns::Subscribe::window, 2u));
+  EXPECT_FALSE(with(&ns::Subscribe::window, 5u)) << "it does not stand any more";
+  offer.window = 4;
+  EXPECT_FALSE(ask<ns::AdvertiseAnswer>(robot, offer));
+  const Node other = join("other");
+  offer.window = 5;
+  EXPECT_FALSE(ask<ns::AdvertiseAnswer>(other, offer)) << "it stands for another node";
+  EXPECT_FALSE(ask<ns::SubscribeAnswer>(other, all));
 }
 
 TEST_F(ServiceRequestsTest, SubscribingTellsTheTerms) {
