@@ -132,6 +132,9 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command, 
   closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
   connection.resume.reset();
+  // Nothing of before comes again, under whatever id. Else no later REASSIGN would leave room for one more.
+  connection.ingress.former_nodes = {};
+  connection.former_nodes.clear();
   count_anew(connection);
   if (!command.resume_wanted) return;
   connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);
