@@ -315,7 +315,8 @@ class Node {
 
   /// Ends the session of a node, which is told `reason` (at most 256 bytes) and does not come back by itself; its token
   /// counts for nothing from then on. Answers with what the hub cannot promise (its disk is full, and it would forget
-  /// that at a restart), as a rule nothing. Errors: not_found, denied, bad_argument (this node itself).
+  /// that at a restart), as a rule nothing. Errors: not_found, denied, bad_argument (this node itself, a longer
+  /// reason).
   Outcome<std::string> kick(Peer node, std::string_view reason = {}, Timeout timeout = Timeout{5000}) const;
   /// The node goes on under another id of its hub. Errors: not_found, taken, denied, bad_argument, limit (the hub
   /// cannot keep that over a restart: its disk is full).

@@ -93,6 +93,17 @@ class Ctl(Case):
         start_recv(self, hub, "B")
         self.assertNotEqual(self.id_of(hub, "B"), former)
 
+    def test_a_reason_that_is_too_long_is_refused_and_nobody_kicked(self):
+        hub = self.hub()
+        receiver = start_recv(self, hub, "B")
+        refused = self.ctl("kick", "B", "--reason", "y" * 257)
+        self.assertEqual(refused.code, 2, refused.err)
+        self.assertIn("the reason has 257 bytes, and 256 are the most", refused.err)
+        self.assertIsNotNone(self.id_of(hub, "B"))
+        self.assertEqual(self.ctl("kick", "B", "--reason", "y" * 256).code, 0)
+        self.assertEqual(receiver.wait(), 3)
+        self.assertIn(": " + "y" * 256 + ";", receiver.err)
+
     def test_a_node_goes_on_under_another_id(self):
         hub = self.hub()
         receiving, sending, lost = (Tap(self, hub) for _ in range(3))

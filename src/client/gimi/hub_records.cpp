@@ -148,6 +148,11 @@ Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout) {
 }
 
 Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Timeout timeout) {
+  if (reason.size() > proto::kRemarkBytesMax) {
+    return Failure{Status::bad_argument, "cannot kick " + peer.text() + ": the reason has " +
+                                             std::to_string(reason.size()) + " bytes, and " +
+                                             std::to_string(proto::kRemarkBytesMax) + " are the most; shorten it"};
+  }
   const proto::ctrl::Kick request{NodeId{peer.id}, std::string(reason)};
   const auto answer = ask<proto::ctrl::KickAnswer>(node, request, "kick " + peer.text(), timeout);
   if (!answer) return answer.failure();

@@ -85,7 +85,7 @@ void add_ctl(CLI::App& app, CtlOptions& options) {
   add(ctl, options, kRoutesAbout, CtlAction::routes);
   CLI::App& kick = add(ctl, options, kKickAbout, CtlAction::kick);
   kick.add_option("node", options.node, "name or id")->required()->check(not_empty());
-  kick.add_option("--reason", options.reason, "told to the node and to the log");
+  kick.add_option("--reason", options.reason, "told to the node and to the log, at most 256 bytes");
   CLI::App& reassign = add(ctl, options, kReassignAbout, CtlAction::reassign);
   reassign.add_option("node", options.node, "name or id")->required()->check(not_empty());
   reassign.add_option("new_id", options.new_id, "a free id of the same hub: HUB.NUMBER or NUMBER")
