@@ -34,6 +34,7 @@ std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) 
         "; the hub goes on, but soon gives no ids to newcomers, none by REASSIGN, and forgets at a restart whom it "
         "kicked");
     again_at_ = now + kAgainAfter;
+    membership.state_not_kept();
     return error;
   }
   again_at_.reset();

@@ -82,6 +82,10 @@ std::optional<std::chrono::milliseconds> IndexPool::waits_for_returns(std::chron
   return returns_until_ - now;
 }
 
+bool IndexPool::waits_for_keeping(std::chrono::milliseconds now) const {
+  return keeping_failed_ && granted_left_ == 0 && keeping_due(now);
+}
+
 bool IndexPool::keeping_due(std::chrono::milliseconds now) const {
   if (keeps_nothing_) return false;
   const bool runs_short = granted_left_ < kBlock / 2 && granted_left_ < unused();
@@ -119,7 +123,7 @@ void IndexPool::grant(const Grant& grant) {
   granted_left_ = 0;
   for (std::uint64_t position = position_; position < end_; ++position)
     granted_left_ += used(index_at(position)) ? 0 : 1;
-  unkept_ = false;
+  unkept_ = keeping_failed_ = false;
 }
 
 std::uint32_t IndexPool::index_at(std::uint64_t position) const {

@@ -68,6 +68,9 @@ class IndexPool {
   /// that.
   [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(std::chrono::milliseconds now) const;
 
+  /// Would there be one to give, if next_grant() could be kept?
+  [[nodiscard]] bool waits_for_keeping(std::chrono::milliseconds now) const;
+
   /// What has to be kept where it outlives the hub, and what may be handed out then.
   struct Grant {
     IndexSet used;                  ///< what the next start must not hand out
@@ -83,6 +86,8 @@ class IndexPool {
   [[nodiscard]] Grant next_grant(std::chrono::milliseconds now) const;
   /// That was kept. REQUIRES: next_grant() answered it, and nothing was asked of the pool since.
   void grant(const Grant& grant);
+  /// That could not be kept.
+  void keeping_failed() { keeping_failed_ = true; }
 
  private:
   struct Resting {
@@ -108,9 +113,10 @@ class IndexPool {
   IndexSet taken_;                  ///< held or resting
   IndexSet used_;                   ///< the same, and what was or may have been
   std::uint64_t forgettings_;
-  IndexSet outlasting_;       ///< in use at the last one of these
-  bool unkept_ = false;       ///< something used was neither granted nor kept as used
-  DueList<Resting> resting_;  ///< void: those that were taken back
+  IndexSet outlasting_;          ///< in use at the last one of these
+  bool keeping_failed_ = false;  ///< the last time that it was tried
+  bool unkept_ = false;          ///< something used was neither granted nor kept as used
+  DueList<Resting> resting_;     ///< void: those that were taken back
   std::unordered_map<std::uint32_t, std::chrono::milliseconds> rests_until_;
   std::uint32_t held_ = 0;
 };

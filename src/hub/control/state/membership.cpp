@@ -152,6 +152,11 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
+void Membership::state_not_kept() {
+  sessions_.indices().keeping_failed();
+  services_.group_indices().keeping_failed();
+}
+
 std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index, milliseconds now,
                                                    const KeepNow& keep) {
   if (index == kHubIndex || index >= kEveryIndex) {

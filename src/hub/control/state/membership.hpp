@@ -77,6 +77,8 @@ class Membership {
   [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;
   /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and nothing happened since.
   void state_kept(const Durable& durable);
+  /// It could not be.
+  void state_not_kept();
   /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival is judged as when
   /// it joins. What the node provides is withdrawn, as its full names were the old one's: it advertises anew.
   /// Errors: taken, bad_request. nullopt: done.

@@ -116,7 +116,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
     if (!group) {
       forget_if_unused(entry);
       forget_if_idle(provider);
-      return proto::Refusal{Status::limit, shortage("group ids", group_indices_.waits_for_returns(now))};
+      return proto::Refusal{Status::limit, shortage("group ids", group_indices_, now)};
     }
     if (!provided) node.provides.push_back({&entry, node.life});
     std::uint32_t old_group = 0;

@@ -78,7 +78,7 @@ Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> s
 std::optional<proto::Goodbye> Sessions::id_refusal(milliseconds now) {
   if (indices_.ready(now)) return std::nullopt;
   return proto::Goodbye{proto::GoodbyeCode::hub_full,
-                        shortage("node ids", indices_.waits_for_returns(now)) + ", or connect to another hub"};
+                        shortage("node ids", indices_, now) + ", or connect to another hub"};
 }
 
 Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,

@@ -96,6 +96,18 @@ TEST_F(FullDisk, AKickIsDoneAndSaysThatItMayBeForgotten) {
   EXPECT_EQ(conductor.next_deadline(), std::nullopt);
 }
 
+TEST_F(FullDisk, NewcomersAreToldWhatIsWrong) {
+  for (std::uint32_t left = IndexPool::kBlock - 2; left > 0; --left) ASSERT_FALSE(try_join({})) << left;
+  const auto refused = try_join({});
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, proto::GoodbyeCode::hub_full);
+  EXPECT_THAT(refused->sentence, HasSubstr("cannot write its state"));
+  keep_error.clear();
+  now += 1s;
+  conductor.tick(now);
+  EXPECT_FALSE(try_join({})) << "it is tried again";
+}
+
 TEST_F(FullDisk, AKickThatIsKeptSaysNothing) {
   keep_error.clear();
   const auto answer = kick();
