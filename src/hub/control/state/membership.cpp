@@ -126,13 +126,18 @@ void Membership::name_decided(Session& session, const NameDecision& decision, mi
 std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects,
                              const KeepNow& keep) {
 #ifndef GIMNET_BUG_KICKED_TOKEN_HONOURED
-  sessions_.remember_kicked(session);
+  const bool remembered = sessions_.remember_kicked(session);
+#else
+  constexpr bool remembered = true;
 #endif
   std::string failure;
   if (keep) {
     failure = keep();
   } else {
     effects.emplace_back(StateDue{});
+  }
+  if (failure.empty() && !remembered) {
+    failure = "its limit kicked_tokens is " + std::to_string(limits_.kicked_tokens) + "; make it larger";
   }
   effects.emplace_back(CloseDue{session.place, GoodbyeCode::kicked, sentence});
   end(session, now, effects);
@@ -147,14 +152,14 @@ Durable Membership::durable(milliseconds now) const {
   return {sessions_.indices().next_grant(now), services_.group_indices().next_grant(now), sessions_.kicked()};
 }
 
-void Membership::state_kept(const Durable& durable) {
-  sessions_.indices().grant(durable.nodes);
-  services_.group_indices().grant(durable.groups);
-}
-
 void Membership::state_not_kept() {
   sessions_.indices().keeping_failed();
   services_.group_indices().keeping_failed();
+}
+
+void Membership::state_kept(const Durable& durable) {
+  sessions_.indices().grant(durable.nodes);
+  services_.group_indices().grant(durable.groups);
 }
 
 std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index, milliseconds now,

@@ -111,15 +111,16 @@ Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<
   return session;
 }
 
-void Sessions::remember_kicked(const Session& session) {
+bool Sessions::remember_kicked(const Session& session) {
   spend_token(session);
-  if (limits_.kicked_tokens == 0) return;
-  std::vector<SessionToken> tokens{{session.index, session.number, session.token_expiry}};
+  std::vector<SessionToken> tokens;
   for (const std::uint32_t former : former_indices(session)) {
     tokens.push_back({former, renumbered_.at(former).number, session.token_expiry});
   }
+  tokens.push_back({session.index, session.number, session.token_expiry});
   kicked_.insert(kicked_.end(), tokens.begin(), tokens.end());
   while (kicked_.size() > limits_.kicked_tokens) kicked_.erase(kicked_.begin());
+  return tokens.size() <= limits_.kicked_tokens;
 }
 
 void Sessions::attach(Session& session, milliseconds now) {

@@ -129,8 +129,8 @@ class Sessions {
   void begin_grace(Session& session, std::chrono::milliseconds now);
   /// Tokens of the session count as none from now on.
   void spend_token(const Session& session);
-  /// The same, also after a restart, for as long as limits.kicked_tokens allows.
-  void remember_kicked(const Session& session);
+  /// The same, also after a restart, for as long as limits.kicked_tokens allows. False: it does not allow that now.
+  [[nodiscard]] bool remember_kicked(const Session& session);
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
   /// The session goes on under another index, which indices() gave; the former one rests, and leads here until somebody
   /// else has it.

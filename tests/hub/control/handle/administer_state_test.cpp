@@ -108,6 +108,15 @@ TEST_F(FullDisk, NewcomersAreToldWhatIsWrong) {
   EXPECT_FALSE(try_join({})) << "it is tried again";
 }
 
+TEST_F(FullDisk, AKickThatHasNoRoomToBeRememberedSaysSo) {
+  keep_error.clear();
+  limits.kicked_tokens = 0;
+  const auto answer = kick();
+  ASSERT_TRUE(answer);
+  EXPECT_THAT(answer->remark, HasSubstr("'robot'"));
+  EXPECT_THAT(answer->remark, HasSubstr("kicked_tokens is 0"));
+}
+
 TEST_F(FullDisk, AKickThatIsKeptSaysNothing) {
   keep_error.clear();
   const auto answer = kick();

@@ -155,12 +155,28 @@ TEST_F(SessionsTest, RemembersAsManyKickedOnesAsTheLimitAllows) {
   const std::uint32_t first = create().index;
   for (std::uint32_t index = first; index < first + 3; ++index) {
     if (index > first) create();
-    sessions_.remember_kicked(*sessions_.find(index));
+    EXPECT_TRUE(sessions_.remember_kicked(*sessions_.find(index)));
     sessions_.end(*sessions_.find(index), 0ms);
   }
   ASSERT_EQ(sessions_.kicked().size(), 2u);
   EXPECT_EQ(sessions_.kicked()[0].index, first + 1);
   EXPECT_EQ(sessions_.kicked()[1].index, first + 2);
+}
+
+TEST_F(SessionsTest, SaysWhereNotAllTokensOfAKickedOneHaveRoom) {
+  Session& session = create();
+  sessions_.renew_token(session, 0ms);
+  const std::uint32_t given = session.index + 50;
+  ASSERT_TRUE(sessions_.indices().take_free(given, 0ms));
+  sessions_.renumber(session, given, 0ms);
+  limits_.kicked_tokens = 0;
+  EXPECT_FALSE(sessions_.remember_kicked(session));
+  limits_.kicked_tokens = 1;
+  EXPECT_FALSE(sessions_.remember_kicked(session));
+  ASSERT_EQ(sessions_.kicked().size(), 1u);
+  EXPECT_EQ(sessions_.kicked()[0].index, given) << "the one that it comes with";
+  limits_.kicked_tokens = 2;
+  EXPECT_TRUE(sessions_.remember_kicked(session));
 }
 
 TEST_F(SessionsTest, AFormerIdsTokenIsGoodAsLongAsTheSession) {
