@@ -137,8 +137,8 @@ Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOpt
   if (!service) return service.failure();
   gimi::ServiceTable::Subscribed subscribed = *service;
   gimi::SubscribedService* const handle = subscribed.get();
-  return Subscription({handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) mutable {
-                         core->services().unsubscribe(std::move(subscribed));
+  return Subscription({handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) {
+                         core->services().unsubscribe(subscribed);
                        }});
 }
 

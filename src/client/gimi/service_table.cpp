@@ -177,7 +177,7 @@ Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& ful
                  "cannot subscribe to '" + full_name + "': it takes data and gives none; send to it"};
 }
 
-void ServiceTable::unsubscribe(Subscribed service) {
+void ServiceTable::unsubscribe(const Subscribed& service) {
   const MutexLock turn(asking_);
   leave(service);
 }

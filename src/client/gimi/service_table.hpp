@@ -42,7 +42,7 @@ class ServiceTable {
                                               const PaceOptions& pace, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
-  void unsubscribe(Subscribed service) GIMNET_EXCLUDES(asking_, mutex_);
+  void unsubscribe(const Subscribed& service) GIMNET_EXCLUDES(asking_, mutex_);
   /// Services that are subscribed or sent to now.
   [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_);
 
@@ -92,7 +92,7 @@ class ServiceTable {
   void stop_reading(SubscribedService& service) GIMNET_EXCLUDES(mutex_);
   /// Takes it out of the table, unless somebody reads it or sends there.
   void forget_unused(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  void set_place(const Subscribed& service, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
+  void set_place(const Subscribed& subscribed, const ServicePlace& place) GIMNET_REQUIRES(mutex_);
   void end_groups(SubscribedService& service) GIMNET_REQUIRES(mutex_);
   void forget_group(SubscribedService& service, std::uint32_t group) GIMNET_REQUIRES(mutex_);
 

@@ -153,20 +153,21 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     if (service == nullptr || group == nullptr)
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is NULL");
     nif_service whole;
-    if (auto failure = read_struct(service, whole, "advertise", "nif_service")) return fail(*failure);
-    if (service->direction > NIF_ACCEPTS || service->delivery > NIF_SYNC_DELIVERY) {
+    const nif_service* known = service;
+    if (auto failure = read_struct(known, whole, "advertise", "nif_service")) return fail(*failure);
+    if (known->direction > NIF_ACCEPTS || known->delivery > NIF_SYNC_DELIVERY) {
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: direction or delivery is not one of its enumeration");
     }
-    if (const nif_status status = check_name(service->name, "advertise"); status != NIF_OK) return status;
+    if (const nif_status status = check_name(known->name, "advertise"); status != NIF_OK) return status;
     ns::Advertise request;
-    request.service = service->name;
-    request.message_type = service->message_type;
-    request.instance = service->instance;
-    request.direction = static_cast<ns::Direction>(service->direction);
-    request.delivery = static_cast<ns::Delivery>(service->delivery);
-    request.metadata = service->metadata != nullptr ? service->metadata : "";
-    request.window = service->window;
-    request.retain = service->retain != 0;
+    request.service = known->name;
+    request.message_type = known->message_type;
+    request.instance = known->instance;
+    request.direction = static_cast<ns::Direction>(known->direction);
+    request.delivery = static_cast<ns::Delivery>(known->delivery);
+    request.metadata = known->metadata != nullptr ? known->metadata : "";
+    request.window = known->window;
+    request.retain = known->retain != 0;
     if (!proto::valid_service_name(request.service)) {
       return fail(NIF_BAD_NAME, "cannot advertise '" + request.service + "': a service's name has one part");
     }

@@ -19,8 +19,8 @@ namespace gimnet::nif {
 /// Thread safety: one thread.
 class Outgoing {
  public:
-  /// Errors: NIF_BAD_ARGUMENT, NIF_TOO_LARGE. REQUIRES: `message` and what it points to outlive this.
-  [[nodiscard]] std::optional<Failure> read(const nif_outgoing& message);
+  /// Errors: NIF_BAD_ARGUMENT, NIF_TOO_LARGE. REQUIRES: `given` and what it points to outlive this.
+  [[nodiscard]] std::optional<Failure> read(const nif_outgoing& given);
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
   /// Frame parts without fragment and payload size. Valid until: this goes.

@@ -1,5 +1,6 @@
 #include "client/nif/parked_frames.hpp"
 
+#include <ranges>
 #include <utility>
 
 namespace gimnet::nif {
@@ -39,11 +40,11 @@ void ParkedFrames::take_from(Lanes& lanes) {
 std::size_t ParkedFrames::give_back(std::uint32_t former, std::uint32_t now, Lanes& lanes) {
   std::size_t bytes = 0;
   // From the last on, so that the first is in front.
-  for (auto run = runs_.rbegin(); run != runs_.rend(); ++run) {
-    if (run->first_header().dst != former) continue;
-    run->change_headers([now](proto::FrameHeader& header) { header.dst = now; });
-    bytes += run->size();
-    lanes[run->lane].push_front(run->split(run->size(), run->frames));
+  for (FrameRun& run : std::views::reverse(runs_)) {
+    if (run.first_header().dst != former) continue;
+    run.change_headers([now](proto::FrameHeader& header) { header.dst = now; });
+    bytes += run.size();
+    lanes[run.lane].push_front(run.split(run.size(), run.frames));
   }
   std::erase_if(runs_, [](const FrameRun& run) { return run.frames == 0; });
   bytes_ -= bytes;
