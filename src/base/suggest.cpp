@@ -45,7 +45,8 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
     if (longer - std::min(word.size(), candidate.size()) >= least) continue;  // so many letters differ at least
     const std::size_t distance =
         distance_between(word, candidate, [](char one, char other) { return lower(one) == lower(other); });
-    if (distance < least) {
+    // Where every letter is another one nothing is near: a name of one letter is two steps from any two.
+    if (distance < least && distance < longer) {
       least = distance;
       best = candidate;
     }

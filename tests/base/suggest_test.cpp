@@ -42,6 +42,10 @@ TEST(DidYouMean, IsSilentWhenNothingIsNear) {
   constexpr std::array<std::string_view, 2> kWords{"--listen", "--limit"};
   EXPECT_EQ(did_you_mean("--colour-scheme", kWords), "");
   EXPECT_EQ(did_you_mean("x", {}), "");
+  constexpr std::array<std::string_view, 2> kShort{"B", "hz"};
+  for (const char* word : {"7", "99", "zq", "x"}) EXPECT_EQ(did_you_mean(word, kShort), "") << word;
+  EXPECT_EQ(did_you_mean("b1", kShort), "; did you mean B?");
+  EXPECT_EQ(did_you_mean("h", kShort), "; did you mean hz?");
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ WITH_A_HUB = [
     (NOT_FOUND, ["there is no node 'robto'; did you mean robot?"], ["send", "robto"], b"x\n"),
     (NOT_FOUND, ["there is no node 'nobody'", LIST], ["ping", "nobody"], b""),
     (NOT_FOUND, ["there is no node '7.x'", LIST], ["send", "7.x"], b"x\n"),
+    (NOT_FOUND, ["there is no node '99'; the id is written 7.99; `gimnet nodes` lists"], ["send", "99"], b"x\n"),
     (NOT_FOUND, ["there is no node '9999.1'", LIST], ["send", "9999.1"], b"x\n"),
     (NOT_FOUND, ["not acknowledged by 7.999", "no_such_node: no node has that id"], ["send", "7.999"], b"x\n"),
     (NOT_FOUND, ["not acknowledged by 8.1", "no_route: no hub of that id can be reached"], ["send", "8.1"], b"x\n"),

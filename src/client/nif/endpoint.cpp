@@ -1,5 +1,6 @@
 #include "client/nif/endpoint.hpp"
 
+#include <algorithm>
 #include <charconv>
 
 #include "client/nif/platform.hpp"
@@ -19,10 +20,16 @@ bool is_host(std::string_view text) {
 std::string advice_for(std::string_view url) {
   std::string meant;
   if (url.starts_with('/')) meant = std::string(kUnix) + std::string(url);
-  if (url.find("://") == std::string_view::npos && url.find(':') != std::string_view::npos) {
+  if (url.find('/') == std::string_view::npos && url.find(':') != std::string_view::npos) {
     meant = std::string(kTcp) + std::string(url);
   }
-  if (!meant.empty() && parse_endpoint(meant)) return "did you mean " + meant + "?";
+  // A slash too few, or too many.
+  constexpr std::string_view kScheme = "tcp:/";
+  if (url.starts_with(kScheme)) {
+    meant =
+        std::string(kTcp) + std::string(url.substr(std::min(url.find_first_not_of('/', kScheme.size()), url.size())));
+  }
+  if (!meant.empty() && meant != url && parse_endpoint(meant)) return "did you mean " + meant + "?";
   std::string advice = "give tcp://host:port or unix:/path";
   const std::string_view host = url.starts_with(kTcp) ? url.substr(kTcp.size()) : url;
   if (is_host(host)) {

@@ -66,10 +66,16 @@ std::optional<Peer> Session::find(std::string_view name) {
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
     failure.sentence = "there is no node '" + std::string(name) + "'";
-    failure.sentence += is_service(name) ? service_words(name) : nearest_name("node", name);
+    failure.sentence += is_service(name) ? service_words(name) : id_words(name) + nearest_name("node", name);
   }
   code_ = fail(failure);
   return std::nullopt;
+}
+
+std::string Session::id_words(std::string_view name) {
+  if (name.empty() || name.find_first_not_of("0123456789") != std::string_view::npos) return {};
+  const std::string own = node_->peer().text();
+  return "; the id is written " + own.substr(0, own.find('.') + 1) + std::string(name);
 }
 
 bool Session::is_listed(std::string_view name) {

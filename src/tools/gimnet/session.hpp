@@ -65,6 +65,8 @@ class Session {
   [[nodiscard]] std::optional<ExitCode> settle(Outcome<Node> joined);
   [[nodiscard]] std::string advice(std::string remedy) const;
   [[nodiscard]] bool is_listed(std::string_view name);
+  /// Of a word that is a number: how an id is written; "" of any other.
+  [[nodiscard]] std::string id_words(std::string_view name);
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
   /// A suggestion where names of nodes or services begin with the word; "" if none do.
   [[nodiscard]] std::string wider_pattern(const std::string& kind, const std::string& word);

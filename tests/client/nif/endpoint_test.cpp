@@ -33,6 +33,15 @@ TEST(Endpoint, RefusesWhatItDoesNotUnderstand) {
   }
 }
 
+TEST(Endpoint, SaysWhatWasMeant) {
+  const auto said = [](const char* url) { return parse_endpoint(url).error().sentence; };
+  EXPECT_TRUE(said("127.0.0.1:7450").ends_with("; did you mean tcp://127.0.0.1:7450?"));
+  EXPECT_TRUE(said("tcp:/127.0.0.1:7450").ends_with("; did you mean tcp://127.0.0.1:7450?"));
+  EXPECT_TRUE(said("/run/hub").ends_with("; did you mean unix:/run/hub?"));
+  EXPECT_TRUE(said("http:/h:1").ends_with("; give tcp://host:port or unix:/path")) << said("http:/h:1");
+  EXPECT_TRUE(said("tcp:/").ends_with("; give tcp://host:port or unix:/path")) << said("tcp:/");
+}
+
 TEST(Endpoint, TakesUnixPathsUpToWhatTheSystemTakes) {
   const std::string longest = "/" + std::string(unix_path_max() - 1, 'p');
   EXPECT_TRUE(parse_endpoint("unix:" + longest));
