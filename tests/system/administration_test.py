@@ -48,7 +48,7 @@ class Full(Case):
         nodes = [Client(self, hub).join(name) for name in ("A", "B")]
         refused = run_gimnet(hub, "status")
         self.assertEqual(refused.code, 3, refused.err)
-        self.assertIn("takes 2 nodes", refused.err)
+        self.assertIn("as many nodes as it takes (2); connect to another one, or start it with a larger --limit nodes", refused.err)
         self.sees_and_kicks(nodes[0])
         Client(self, hub).join("C")
 

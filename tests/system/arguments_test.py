@@ -128,6 +128,13 @@ class WrongForGimnet(unittest.TestCase):
         self.assertEqual(tool.code, 2)
         self.assertIn("'7.1': it reads as the id of a node does, NUMBER.NUMBER", tool.err)
 
+    def test_a_pattern_that_is_too_long(self):
+        hub = Hub(self)
+        for pattern, why in (("*/" * 16 + "*", "it has more than 16 parts"), ("x" * 256, "it has more than 255 bytes")):
+            tool = run_gimnet(hub, "services", pattern)
+            self.assertEqual(tool.code, 2)
+            self.assertIn(f"cannot look for '{pattern}': {why}", tool.err)
+
     def test_a_reader_of_the_output_that_went_away_had_enough(self):
         hub = Hub(self)
         reader, writer = os.pipe()

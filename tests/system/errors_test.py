@@ -287,7 +287,7 @@ class Strangers(Tool):
     def test_a_hub_that_is_full(self):
         hub = Hub(self, "--limit", "nodes=1")
         Client(self, hub).join("only")
-        self.expect(NO_CONNECTION, [hub.url, "this hub takes 1 nodes and has them; connect to another one, or start it with a larger"], ["--hub", hub.url, "nodes"])
+        self.expect(NO_CONNECTION, [hub.url, "this hub has as many nodes as it takes (1); connect to another one, or start it with a larger"], ["--hub", hub.url, "nodes"])
 
 
 class SentAway(unittest.TestCase):

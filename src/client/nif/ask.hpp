@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <utility>
 
@@ -41,9 +43,15 @@ inline nif_status check_name(const char* name, const char* what,
 
 inline nif_status check_pattern(const char* pattern) {
   if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
-  return fail(NIF_BAD_NAME, std::string("cannot look for '") + pattern +
-                                "': it is not a pattern: parts are separated by one /, and one is letters, digits, "
-                                "'.', '_', '-', or * for any one part, or ** for any number of them");
+  const std::string text = pattern;
+  std::string fault =
+      "it is not a pattern: parts are separated by one /, and one is letters, digits, '.', '_', '-', or * for any one "
+      "part, or ** for any number of them";
+  if (std::ranges::count(text, '/') >= static_cast<std::ptrdiff_t>(proto::kNamePartsMax)) {
+    fault = "it has more than " + std::to_string(proto::kNamePartsMax) + " parts";
+  }
+  if (text.size() > proto::kNameBytesMax) fault = "it has more than " + std::to_string(proto::kNameBytesMax) + " bytes";
+  return fail(NIF_BAD_NAME, "cannot look for '" + text + "': " + fault);
 }
 
 }  // namespace gimnet::nif

@@ -19,24 +19,29 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr const char* kGivePath = "give the path of a TOML file with --config, or, in conf.d, take it away";
+
 ConfigText no_text(int code) {
   const std::error_code error{code, std::generic_category()};
-  return {{}, error.message() + remedy_of(error, "give the path of a TOML file with --config")};
+  const bool denied = error == std::errc::permission_denied;
+  return {
+      {},
+      error.message() + remedy_of(error, denied ? "give the user that runs tcphub the right to read it" : kGivePath)};
 }
 
 /// What stands there instead of a file, or "".
 std::string instead_of_file(const struct stat& info, bool pipes) {
-  constexpr const char* kRemedy = "; give the path of a TOML file with --config";
+  const std::string remedy = std::string{"; "} + kGivePath;
   if (S_ISREG(info.st_mode) || (pipes && S_ISFIFO(info.st_mode))) return {};
-  if (S_ISDIR(info.st_mode)) return std::string{"it is a folder"} + kRemedy;
-  if (S_ISSOCK(info.st_mode)) return std::string{"it is a socket"} + kRemedy;
+  if (S_ISDIR(info.st_mode)) return "it is a folder" + remedy;
+  if (S_ISSOCK(info.st_mode)) return "it is a socket" + remedy;
   if (S_ISFIFO(info.st_mode)) {
     return "it is a pipe, which only a hub that starts can read, as the file of --config; put a regular file in its "
            "place";
   }
   // The usual word for "no file".
   if (S_ISCHR(info.st_mode) && info.st_rdev == makedev(1, 3)) return {};
-  return std::string{"it is a device"} + kRemedy;
+  return "it is a device" + remedy;
 }
 
 /// Reads what is there, at most one byte more than a configuration may have. 0: the end, EAGAIN: the rest is not

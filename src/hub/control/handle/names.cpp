@@ -14,8 +14,10 @@ namespace ns = proto::ns;
 Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const ns::List& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
-    return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
-                                                   "' is no pattern: write a name in which a part may be * or **"};
+    return proto::Refusal{
+        Status::bad_request,
+        "'" + escaped(wanted.pattern, kQuotedMax) +
+            "' is no pattern: write a name of at most 16 parts and 255 bytes in which a part may be * or **"};
   }
   const Listed listed =
       list_nodes(context.membership, {pattern ? &*pattern : nullptr, index_of(wanted.after), wanted.connected_only,

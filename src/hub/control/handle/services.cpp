@@ -104,8 +104,10 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
 Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
-    return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
-                                                   "' is no pattern: write a full name in which a part may be * or **"};
+    return proto::Refusal{
+        Status::bad_request,
+        "'" + escaped(wanted.pattern, kQuotedMax) +
+            "' is no pattern: write a full name of at most 16 parts and 255 bytes in which a part may be * or **"};
   }
   const Listed listed =
       list_services(context.membership.services(), {pattern ? &*pattern : nullptr, index_of(wanted.after), false,

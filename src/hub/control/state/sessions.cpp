@@ -92,10 +92,10 @@ Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token, st
 std::optional<proto::Goodbye> Sessions::full_refusal(Places places, std::size_t ending) const {
   const std::uint64_t most = limits_.nodes + (places == Places::all ? limits_.administrators : 0);
   if (sessions_.size() - ending < most) return std::nullopt;
+  const std::string limit = places == Places::all ? "administrators" : "nodes";
   return proto::Goodbye{proto::GoodbyeCode::hub_full,
-                        "this hub takes " + std::to_string(limits_.nodes) +
-                            " nodes and has them; connect to another one, or start it with a "
-                            "larger --limit nodes"};
+                        "this hub has as many nodes as it takes (" + std::to_string(most) +
+                            "); connect to another one, or start it with a larger --limit " + limit};
 }
 
 Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,

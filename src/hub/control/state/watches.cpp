@@ -65,8 +65,10 @@ Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node, const
   watch.subjects = wanted.subjects;
   if (!wanted.pattern.empty()) watch.pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !watch.pattern) {
-    return proto::Refusal{Status::bad_request, "'" + escaped(wanted.pattern, kQuotedMax) +
-                                                   "' is no pattern: write a name in which a part may be * or **"};
+    return proto::Refusal{
+        Status::bad_request,
+        "'" + escaped(wanted.pattern, kQuotedMax) +
+            "' is no pattern: write a name of at most 16 parts and 255 bytes in which a part may be * or **"};
   }
   Watcher& watcher = watchers_[node];
   const auto old = std::ranges::find(watcher.watches, wanted.watch, &Watch::number);
@@ -75,10 +77,10 @@ Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node, const
     const bool own = watcher.watches.size() >= limits_.watches_per_node;
     if (watcher.watches.empty()) watchers_.erase(node);
     const std::string limit = own ? "watches_per_node" : "watches";
-    return proto::Refusal{Status::limit, (own ? "a node may have " + std::to_string(limits_.watches_per_node)
-                                              : "this hub takes " + std::to_string(limits_.watches)) +
-                                             " watches; end one first, or start the hub with a larger --limit " +
-                                             limit};
+    const std::string who = own ? "a node" : "this hub";
+    return proto::Refusal{Status::limit, who + " has as many watches as it may have (" +
+                                             std::to_string(own ? limits_.watches_per_node : limits_.watches) +
+                                             "); end one first, or start the hub with a larger --limit " + limit};
   }
   journal_.begin();
   const bool goes_on = wanted.epoch == journal_.epoch() && journal_.reaches(wanted.version);

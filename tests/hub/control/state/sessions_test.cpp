@@ -51,9 +51,21 @@ TEST_F(SessionsTest, TakesAsManyAsTheLimitAndNotOneMore) {
   const auto refused = sessions_.create(std::nullopt, 0ms);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, proto::GoodbyeCode::hub_full);
-  EXPECT_THAT(refused.error().sentence, HasSubstr("takes 3 nodes"));
+  EXPECT_EQ(
+      refused.error().sentence,
+      "this hub has as many nodes as it takes (3); connect to another one, or start it with a larger --limit nodes");
   sessions_.end(last, 0ms);
   EXPECT_TRUE(sessions_.create(std::nullopt, 0ms));
+}
+
+TEST_F(SessionsTest, AnAdministratorIsToldOfTheLimitThatIsHis) {
+  limits_.administrators = 1;
+  for (int i = 0; i < 3; ++i) create();
+  EXPECT_TRUE(sessions_.create(std::nullopt, 0ms, Places::all));
+  const auto refused = sessions_.create(std::nullopt, 0ms, Places::all);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().sentence,
+              HasSubstr("(4); connect to another one, or start it with a larger --limit admin"));
 }
 
 TEST_F(SessionsTest, ATokenClaimsItsOwnSessionOnly) {
