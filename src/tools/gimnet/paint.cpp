@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace gimnet::tool {
@@ -26,6 +27,22 @@ std::string_view escape_of(Tone tone) {
   return {};
 }
 
+/// Bytes of what stands first, if it is a control character: C0, DEL, and in UTF-8 C1, ends of lines and paragraphs,
+/// and what turns the direction of writing, so that another text is seen than there is. 0: it is none.
+std::size_t control_size(std::string_view text) {
+  const auto byte = [text](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const unsigned first = byte(0);
+  const unsigned second = byte(1);
+  const unsigned third = byte(2);
+  if (first < 0x20 || first == 0x7F) return 1;
+  if (first == 0xC2 && second >= 0x80 && second <= 0x9F) return 2;
+  if (first == 0xD8 && second == 0x9C) return 2;  // U+061C
+  if (first != 0xE2) return 0;
+  const bool marks = second == 0x80 && ((third >= 0x8E && third <= 0x8F) || (third >= 0xA8 && third <= 0xAE));
+  const bool isolates = second == 0x81 && third >= 0xA6 && third <= 0xA9;
+  return marks || isolates ? 3 : 0;
+}
+
 }  // namespace
 
 Paint Paint::of(Colour colour, int descriptor) {
@@ -41,9 +58,10 @@ std::string Paint::operator()(std::string_view text, Tone tone) const {
 
 std::string printable(std::string_view text) {
   std::string shown;
-  for (const char letter : text) {
-    const auto code = static_cast<unsigned char>(letter);
-    shown += code < 0x20 || code == 0x7F ? '.' : letter;
+  while (!text.empty()) {
+    const std::size_t control = control_size(text);
+    shown += control != 0 ? '.' : text.front();
+    text.remove_prefix(std::max<std::size_t>(control, 1));
   }
   return shown;
 }

@@ -25,7 +25,8 @@ class Paint {
   bool on_;
 };
 
-/// Text of others for people: control characters would let it write over the terminal.
+/// Text of others for people, a '.' for each control character: they would let it write over the terminal, or turn
+/// what is written.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace gimnet::tool

@@ -42,6 +42,14 @@ TEST(Printable, HidesControlCharacters) {
   EXPECT_EQ(printable("a\x1b[2J\n\x7f"
                       "b\xc3\xa9"),
             "a.[2J..b\xc3\xa9");
+  // C1, then what turns the direction, and ends of lines.
+  EXPECT_EQ(printable("\u009b2J"), ".2J");
+  EXPECT_EQ(printable("a\u202eb\u2066c\u2069\u200e\u200f\u061c\u2028"), "a.b.c.....");
+  // Their neighbours are letters and spaces, and what is cut off is left as it is.
+  for (const char* text :
+       {"\u00a0", "\u061b", "\u200d", "\u2010", "\u2027", "\u202f", "\u2065", "\u206a", "\xe2\x80", "\xc2"}) {
+    EXPECT_EQ(printable(text), text);
+  }
 }
 
 }  // namespace
