@@ -171,7 +171,12 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
     if (equals == std::string::npos) {
       return "--limit " + escaped(assignment, kQuotedMax) + " has no value: write NAME=VALUE, for example nodes=1000";
     }
-    sources.flags.push_back(flag("limits." + assignment.substr(0, equals), "--limit", assignment.substr(equals + 1)));
+    const std::string name = assignment.substr(0, equals);
+    const std::string key = "limits." + name;
+    if (std::ranges::find(sources.flags, key, &Given::key) != sources.flags.end()) {
+      return "--limit " + escaped(name, kQuotedMax) + " is given twice: give it once";
+    }
+    sources.flags.push_back(flag(key, "--limit", assignment.substr(equals + 1)));
   }
   if (app.count("--config") != 0 && raw.config.empty()) {
     return "--config is empty: give it the path of a TOML file, or leave it out";

@@ -101,6 +101,8 @@ TEST(Options, RangesAreKept) {
 TEST(Options, ErrorsSayWhatWasMeant) {
   EXPECT_THAT(error({"--lisen", "tcp://127.0.0.1:1"}), AllOf(HasSubstr("'--lisen'"), HasSubstr("--listen?")));
   EXPECT_THAT(error({"--limit", "nods=1"}), HasSubstr("did you mean nodes?"));
+  EXPECT_EQ(error({"--limit", "nodes=2", "--limit", "watches=2", "--limit", "nodes=2"}),
+            "tcphub: --limit nodes is given twice: give it once\n");
   EXPECT_THAT(error({"--placement", "hnt"}), HasSubstr("did you mean hint?"));
   EXPECT_THAT(error({"--log-level", "inof"}), HasSubstr("did you mean info?"));
   EXPECT_THAT(error({"robot"}), HasSubstr("'robot'"));
