@@ -121,11 +121,16 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
     return Error{"cannot lock " + name + ": " + system_text(errno) +
                  "; give tcphub a folder on a disk of this machine with --state-dir"};
   }
+  // A hub that kept nothing takes the file away: what was opened before then is no file of the folder any more.
+  struct stat info{};
+  if (::fstat(lock.get(), &info) == 0 && info.st_nlink == 0) return open(path);
   write_holder(lock.get());
   return std::unique_ptr<StateFolder>(new StateFolder(path, folder.release(), lock.release(), was_used));
 }
 
 StateFolder::~StateFolder() {
+  // No hub was here: the next one is not to believe that what a hub kept is lost.
+  if (!was_used_ && !kept_) static_cast<void>(::unlinkat(folder_, kLock, 0));
   ::close(lock_);
   ::close(folder_);
 }
@@ -162,6 +167,7 @@ std::string StateFolder::write(const HubState& state) {
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");
   if (::fsync(file.get()) != 0) return failed("fsync");
   if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");
+  kept_ = true;
   if (::fsync(folder_) != 0) return failed("fsync the folder");
   return {};
 }

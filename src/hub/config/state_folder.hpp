@@ -12,6 +12,7 @@ namespace gimnet::hub {
 
 /// The folder in which one hub keeps its state: a file `state`, and a file `lock` that keeps a second hub out while
 /// this one lives. What stands there is not trusted: it is read within bounds, links are not followed.
+/// A folder that was opened and into which nothing was kept is left as it was found, but for being there.
 /// Thread safety: none. Ownership: of two descriptors. Errors: sentences that name the file and say what to do.
 class StateFolder {
  public:
@@ -39,6 +40,7 @@ class StateFolder {
   const int folder_;
   const int lock_;
   const bool was_used_;
+  bool kept_ = false;  ///< something, since it was opened
 };
 
 }  // namespace gimnet::hub

@@ -66,6 +66,34 @@ TEST_F(StateFolderTest, KeepsStateInFilesOfOneUser) {
   EXPECT_EQ(**(*again)->read(), some_state(4));
 }
 
+TEST_F(StateFolderTest, AHubThatKeptNothingLeavesNoTrace) {
+  {
+    const auto folder = StateFolder::open(path());
+    ASSERT_TRUE(folder);
+    ASSERT_EQ(::mkdir(file("state.new").c_str(), 0700), 0);
+    EXPECT_NE((*folder)->write(some_state()), "");
+    ASSERT_EQ(::rmdir(file("state.new").c_str()), 0);
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(path()));
+  keep();
+  const auto again = StateFolder::open(path());
+  ASSERT_TRUE(again);
+  EXPECT_TRUE((*again)->was_used());
+  EXPECT_TRUE((*again)->read()->has_value());
+}
+
+TEST_F(StateFolderTest, WhereNothingWasKeptTheNextOneIsTheFirst) {
+  auto first = StateFolder::open(path());
+  ASSERT_TRUE(first);
+  *first = nullptr;
+  EXPECT_FALSE(std::filesystem::exists(file("lock")));
+  const auto second = StateFolder::open(path());
+  ASSERT_TRUE(second);
+  EXPECT_FALSE((*second)->was_used());
+  EXPECT_FALSE(StateFolder::open(path())) << "it is in use";
+  EXPECT_TRUE(std::filesystem::exists(file("lock"))) << "and stays so";
+}
+
 TEST_F(StateFolderTest, ASecondHubIsToldWhoHasIt) {
   const auto first = StateFolder::open(path());
   ASSERT_TRUE(first);
