@@ -87,6 +87,11 @@ std::string prepare_state_folder(const std::string& path) {
   if (!S_ISDIR(info.st_mode)) {
     return "cannot use " + path + " for state: it is not a folder; remove it, or " + kStateElsewhere;
   }
+  if (info.st_uid != ::geteuid() && info.st_uid != 0) {
+    return "cannot use the folder " + path +
+           " for state: it belongs to another user, who could put other files into it; run tcphub as that user, or " +
+           kStateElsewhere;
+  }
   if ((info.st_mode & 0022) != 0) {
     return "cannot use the folder " + path + " for state: other users may write to it; chmod go-w " + path;
   }

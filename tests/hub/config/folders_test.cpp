@@ -97,6 +97,14 @@ TEST(Folders, AStateFolderIsCreatedOrUsed) {
   EXPECT_THAT(prepare_state_folder(folder.path("file")), AllOf(HasSubstr("not a folder"), HasSubstr("--state-dir")));
 }
 
+TEST(Folders, AnotherUsersStateFolderIsRefused) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder away";
+  const TestFolder folder;
+  ASSERT_EQ(prepare_state_folder(folder.path("state")), "");
+  ASSERT_EQ(::chown(folder.path("state").c_str(), 12'345, 12'345), 0);
+  EXPECT_THAT(prepare_state_folder(folder.path("state")), AllOf(HasSubstr("another user"), HasSubstr("--state-dir")));
+}
+
 TEST(Folders, AStateFolderThatCannotBeMadeIsToldWithTheRemedy) {
   const TestFolder folder;
   std::ofstream(folder.path("file")) << "x";
