@@ -128,6 +128,10 @@ class Publisher {
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
   [[nodiscard]] std::string name() const;         ///< in full, as it is now: another one after Node::take_name()
   [[nodiscard]] std::uint64_t published() const;  ///< messages given to publish() that answered ok
+  /// Does the hub have the service, or will it be offered with the next connection? Errors: why it did not take it
+  /// again after a break or another name, with its words (limit and others; it is asked again after the next break);
+  /// closed.
+  [[nodiscard]] Outcome<void> standing() const;
 
  private:
   friend class Node;
@@ -153,6 +157,8 @@ class Subscription {
   [[nodiscard]] const std::string& name() const;  ///< in full
   /// Messages of the provider that did not come, by their sequence.
   [[nodiscard]] std::uint64_t missed() const;
+  /// As Publisher::standing(), of the subscription; with or without a provider.
+  [[nodiscard]] Outcome<void> standing() const;
 
  private:
   friend class Node;

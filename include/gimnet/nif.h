@@ -312,12 +312,13 @@ typedef enum nif_incoming_type {
   /** ... and left again [same]. */
   NIF_SUBSCRIBER_LEFT = 7,
   /** A service that this node subscribed appeared, came under another group id, or went [text: full name, former_group
-   * (0: none), group (0: withdrawn), message_type, instance, delivery, direction]. Comes before the first message of
-   * the new group, also after a break; messages of former groups may still come. */
+   * (0: none), group (0: withdrawn; with a reason, nif_status: the hub refused the subscription after a break, payload:
+   * its words), message_type, instance, delivery, direction]. Comes before the first message of the new group, also
+   * after a break; messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
-   *  it; reason: nif_status)]. Send to the new id from now on; what waited for the connection goes there, and what is
-   * still sent to the former id, unless another own service has that. */
+   *  it; reason: nif_status; payload: its words)]. Send to the new id from now on; what waited for the connection goes
+   * there, and what is still sent to the former id, unless another own service has that. */
   NIF_OWN_SERVICE_MOVED = 9,
   /** Something that a watch of this node is about [watched; text and reason: why the hub ended it, if
    * NIF_WATCH_ENDED]. */
@@ -356,7 +357,7 @@ typedef struct nif_incoming {
   int64_t arrival_ns; /**< When it was read from the socket, ns since 1970. */
   uint64_t count;     /**< Frames of a NIF_REPORT, messages or frames of a NIF_GAP, subscribers; NIF_COUNT_UNKNOWN. */
   /** nif_drop_reason of a NIF_REPORT and a NIF_GAP, the GOODBYE code (docs/protocol.md, section 3) of a
-   * NIF_DISCONNECTED, nif_status of a NIF_OWN_SERVICE_MOVED and a NIF_WATCHED; else 0. */
+   * NIF_DISCONNECTED, nif_status of a NIF_SERVICE_MOVED, a NIF_OWN_SERVICE_MOVED and a NIF_WATCHED; else 0. */
   uint32_t reason;
   uint32_t group;             /**< Group id; 0: none. */
   uint32_t former_group;      /**< Group id; 0: none. */

@@ -239,7 +239,8 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SERVICE_MOVED:
       return verdict_of(services_.on_service_moved(in));
     case NIF_OWN_SERVICE_MOVED:
-      return verdict_of(services_.on_own_service_moved(in.text, {in.former_group, in.group}));
+      return verdict_of(
+          services_.on_own_service_moved(in.text, {in.former_group, in.group, ServiceTable::refusal_of(in)}));
     case NIF_NAME_LOST:
       on_renamed();
       return NIF_DONE;

@@ -33,6 +33,7 @@ Outcome<void> Publisher::wait_for_subscribers(std::size_t count, Timeout timeout
 }
 std::string Publisher::name() const { return service_->full_name(); }
 std::uint64_t Publisher::published() const { return service_->published(); }
+Outcome<void> Publisher::standing() const { return service_->standing(); }
 
 Outcome<Message> Subscription::receive(Timeout timeout) const {
   gimi::MessageQueue& queue = service_->queue();
@@ -48,6 +49,7 @@ bool Subscription::accepts() const { return service_->accepts(); }
 Outcome<void> Subscription::wait_until_exists(Timeout timeout) const { return service_->wait_until_exists(timeout); }
 const std::string& Subscription::name() const { return service_->name(); }
 std::uint64_t Subscription::missed() const { return service_->missed(); }
+Outcome<void> Subscription::standing() const { return service_->standing(); }
 
 Outcome<WatchEvent> Watch::receive(Timeout timeout) const { return queue_->receive(timeout); }
 std::optional<WatchEvent> Watch::try_receive() const { return queue_->try_receive(); }

@@ -1,5 +1,7 @@
 #include "client/gimi/published_service.hpp"
 
+#include <utility>
+
 #include "client/gimi/deadline.hpp"
 
 namespace gimnet::gimi {
@@ -21,8 +23,7 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
     }
     if (end_) return end_.failure("publish " + full_name_);
     if (group_ == 0) {
-      return Failure{Status::refused, "cannot publish " + full_name_ +
-                                          ": the hub did not take the service again, after a break or another name"};
+      return Failure{Status::refused, refusal("publish").sentence};
     }
     sequence = ++sequence_;
     if (subscribers_ == 0 && subscribers_known_ && !options_.retain) {
@@ -72,6 +73,20 @@ std::uint64_t PublishedService::published() {
   return published_;
 }
 
+Outcome<void> PublishedService::standing() {
+  const MutexLock lock(mutex_);
+  if (end_) return end_.failure("provide " + full_name_);
+  if (group_ == 0) return refusal("provide");
+  return {};
+}
+
+Failure PublishedService::refusal(std::string_view doing) const {
+  std::string sentence = "cannot " + std::string(doing) + " " + full_name_ +
+                         ": the hub did not take the service again, after a break or another name";
+  if (!refusal_.sentence.empty()) sentence += ": " + refusal_.sentence;
+  return {refusal_.status, std::move(sentence)};
+}
+
 std::uint32_t PublishedService::group() {
   const MutexLock lock(mutex_);
   return group_;
@@ -80,6 +95,12 @@ std::uint32_t PublishedService::group() {
 void PublishedService::on_group(std::uint32_t group) {
   const MutexLock lock(mutex_);
   group_ = group;
+  refusal_ = {Status::refused, ""};
+}
+
+void PublishedService::on_refused(Failure refusal) {
+  const MutexLock lock(mutex_);
+  refusal_ = std::move(refusal);
 }
 
 void PublishedService::on_subscribers(std::size_t count) {

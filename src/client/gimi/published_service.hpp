@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
@@ -25,10 +26,13 @@ class PublishedService {
   [[nodiscard]] std::size_t subscribers() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
 
   /// 0: the hub refuses it at the moment.
   [[nodiscard]] std::uint32_t group() GIMNET_EXCLUDES(mutex_);
   void on_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
+  /// Why that is so: the hub's words.
+  void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
   void on_subscribers(std::size_t count) GIMNET_EXCLUDES(mutex_);
   /// The node has another name now.
   void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);
@@ -37,6 +41,9 @@ class PublishedService {
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
+  /// REQUIRES: the hub refuses it.
+  [[nodiscard]] Failure refusal(std::string_view doing) const GIMNET_REQUIRES(mutex_);
+
   Uplink& uplink_;
   const std::string name_;
   const PublishOptions options_;
@@ -45,6 +52,7 @@ class PublishedService {
   Condition changed_;
   std::string full_name_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t group_ GIMNET_GUARDED_BY(mutex_) = 0;
+  Failure refusal_ GIMNET_GUARDED_BY(mutex_){Status::refused, ""};  ///< while it has no group
   std::size_t subscribers_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool subscribers_known_ GIMNET_GUARDED_BY(mutex_) = true;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;

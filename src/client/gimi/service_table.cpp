@@ -273,6 +273,14 @@ ServiceTable::Place ServiceTable::on_subscribers(std::uint32_t group, std::size_
   return Place::found;
 }
 
+std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
+  if (moved.group != 0 || moved.reason == NIF_OK) return std::nullopt;
+  const auto status = static_cast<nif_status>(moved.reason);
+  std::string words(static_cast<const char*>(moved.payload), moved.size);
+  if (words.empty()) words = nif_status_text(status);
+  return Failure{status_of(status), std::move(words)};
+}
+
 ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
   const std::string full_name = moved.text;
   const ServicePlace place{moved.group, {moved.message_type, moved.instance}, moved.direction == NIF_ACCEPTS};
@@ -282,6 +290,7 @@ ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
     const auto known = subscribed_.find(full_name);
     if (known == subscribed_.end()) return Place::unknown;
     set_place(known->second, place);
+    if (const auto refusal = refusal_of(moved)) known->second->on_refused(*refusal);
   }
   on_moved_(full_name, place);
   return Place::found;
@@ -302,6 +311,7 @@ ServiceTable::Place ServiceTable::on_own_service_moved(const std::string& name, 
   std::erase_if(published_by_group_, [service](const auto& entry) { return entry.second == service; });
   if (move.group != 0) published_by_group_[move.group] = service;
   service->on_group(move.group);
+  if (move.refusal) service->on_refused(*move.refusal);
   return Place::found;
 }
 

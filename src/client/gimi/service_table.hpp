@@ -64,11 +64,14 @@ class ServiceTable {
   };
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
+  /// What a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED says of a refusal.
+  [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved);
   [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);
   /// `unknown`: nor is one of an earlier service of that name, which had `former`.
   struct OwnMove {
     std::uint32_t former = 0;
     std::uint32_t group = 0;
+    std::optional<Failure> refusal{};  ///< the hub did not take it again
   };
   [[nodiscard]] Place on_own_service_moved(const std::string& name, const OwnMove& move) GIMNET_EXCLUDES(mutex_);
   void on_reconnected() GIMNET_EXCLUDES(mutex_);

@@ -1,5 +1,7 @@
 #include "client/gimi/subscribed_service.hpp"
 
+#include <utility>
+
 #include "client/gimi/deadline.hpp"
 
 namespace gimnet::gimi {
@@ -33,6 +35,15 @@ std::uint64_t SubscribedService::missed() {
   return missed_;
 }
 
+Outcome<void> SubscribedService::standing() {
+  const MutexLock lock(mutex_);
+  if (end_) return end_.failure("subscribe " + *name_);
+  if (!refusal_) return {};
+  return Failure{refusal_->status,
+                 "cannot subscribe " + *name_ +
+                     ": the hub did not take the subscription again, after a break: " + refusal_->sentence};
+}
+
 bool SubscribedService::is_repeated(std::uint32_t from, std::uint32_t sequence) {
   const MutexLock lock(mutex_);
   return from == provider_ && sequence == sequence_ && sequence != 0;
@@ -51,7 +62,13 @@ void SubscribedService::on_place(const ServicePlace& now) {
   const MutexLock lock(mutex_);
   exists_ = now.group != 0 && !now.accepts;
   accepts_ = now.group != 0 && now.accepts;
+  refusal_.reset();
   changed_.notify_all();
+}
+
+void SubscribedService::on_refused(Failure refusal) {
+  const MutexLock lock(mutex_);
+  refusal_ = std::move(refusal);
 }
 
 void SubscribedService::end(const Ending& ending) {

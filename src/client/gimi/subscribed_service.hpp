@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,12 +36,15 @@ class SubscribedService {
   [[nodiscard]] bool accepts() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
 
   /// The message that came last from that provider comes once more.
   [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   /// One of its messages is in the queue.
   void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
+  /// The hub did not take the subscription again; until on_place().
+  void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
   /// Handles of the program that read it; guarded by the table's asking mutex.
@@ -62,6 +66,7 @@ class SubscribedService {
   Condition changed_;
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
+  std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t provider_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;

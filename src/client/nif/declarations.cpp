@@ -15,6 +15,13 @@ bool same_stream(proto::ns::Advertise former, const proto::ns::Advertise& now) {
   return former == now;
 }
 
+/// Why the hub did not take again what the record names.
+void add_refusal(Record& record, const proto::Refusal& refusal) {
+  record.incoming.reason = static_cast<std::uint32_t>(status_of(refusal.status));
+  // Without memory for the words the reason has to do.
+  if (record.payload.append(std::as_bytes(std::span(refusal.sentence)))) record.finish();
+}
+
 }  // namespace
 
 Declarations::~Declarations() {
@@ -188,8 +195,11 @@ bool Declarations::declare_service(const std::string& service) {
   Service& own = found->second;
   if (own.ended && !own.asked) return withdraw_service(service, own.group);
   proto::ns::Advertise request = own.request;
-  request.former_group = own.group;
-  request.former_proof = own.proof;
+  // Also where the hub refused it meanwhile: it gave the group to nobody who could not prove that it was theirs.
+  if (own.last_group != GroupId{}) {
+    request.former_group = own.last_group;
+    request.former_proof = own.proof;
+  }
   const auto handler = [this, service, round = round_](const proto::Payload& payload) {
     if (round == round_) on_advertised(service, payload);
   };
@@ -271,7 +281,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     if (found != services_.end()) {
       provides = found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
       former = std::exchange(found->second.group, group);
-      found->second.proof = answer ? answer->proof : std::vector<std::byte>{};
+      if (answer) found->second.proof = answer->proof;
       found->second.asked = false;
       changed = former != group && !found->second.ended;
       if (found->second.ended && group == GroupId{}) {
@@ -288,7 +298,7 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     Record* record = make_event(NIF_OWN_SERVICE_MOVED, service);
     record->incoming.former_group = former.value();
     record->incoming.group = group.value();
-    record->incoming.reason = static_cast<std::uint32_t>(answer ? NIF_OK : status_of(answer.error().status));
+    if (!answer) add_refusal(*record, answer.error());
     events_.push_back(item_of(record, service.size()));
   }
   // Who came or went while this node was away, nobody told it.
@@ -316,7 +326,8 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
     if (found != subscriptions_.end()) {
       former = std::exchange(found->second.group, group);
       const bool ended = found->second.ended;
-      changed = former != group && !ended;
+      const bool was_refused = std::exchange(found->second.refused, !answer);
+      changed = (former != group || (!answer && !was_refused)) && !ended;
       // What the program asked for in between may never have left.
       if (ended) subscriptions_due_.push_back(full_name);
       // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to another one.
@@ -332,6 +343,8 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
       record->incoming.instance = answer->instance;
       record->incoming.delivery = static_cast<std::uint32_t>(answer->delivery);
       record->incoming.direction = static_cast<std::uint32_t>(answer->direction);
+    } else {
+      add_refusal(*record, answer.error());
     }
     events_.push_back(item_of(record, full_name.size()));
   }

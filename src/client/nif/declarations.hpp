@@ -74,16 +74,17 @@ class Declarations {
   struct Service {
     proto::ns::Advertise request;
     GroupId group;
-    std::vector<std::byte> proof{};  ///< of that group
-    GroupId last_group;     ///< while the hub refuses it: the one that it had before, unless another one has that
-    bool last_due = false;  ///< retained, and the hub may not have the last message
-    bool asked = false;     ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
-    bool ended = false;     ///< for the program, and the hub may still have it
+    GroupId last_group;  ///< while the hub refuses it: the one that it had before, unless another one has that
+    std::vector<std::byte> proof{};  ///< of that
+    bool last_due = false;           ///< retained, and the hub may not have the last message
+    bool asked = false;              ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
+    bool ended = false;              ///< for the program, and the hub may still have it
   };
   struct Subscription {
     proto::ns::Subscribe request;
     GroupId group;
-    bool ended = false;  ///< for the program, and the hub may still have it
+    bool ended = false;    ///< for the program, and the hub may still have it
+    bool refused = false;  ///< by the hub, when it was declared last
   };
   void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
   void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);

@@ -21,6 +21,8 @@ constexpr Timeout kDrain{10'000};
 /// What a hub keeps of a retained service, unless its limit `retained_bytes` is another one, and its provider's
 /// library.
 constexpr std::size_t kRetainedMax = std::size_t{1} << 20;
+/// How long it may take the library to say why, at the longest.
+constexpr std::int64_t kWhyNs = 1'000'000'000;
 /// How often the connection is looked at.
 constexpr std::int64_t kLookNs = 200'000'000;
 
@@ -28,7 +30,8 @@ constexpr std::int64_t kLookNs = 200'000'000;
 /// publishing would wait without a word.
 class Standing {
  public:
-  explicit Standing(Session& session) : session_(session), watch_(session.node()) {}
+  Standing(Session& session, const Publisher& publisher)
+      : session_(session), publisher_(publisher), watch_(session.node()) {}
 
   /// False: none will come any more, or a signal came; outcome() says which.
   [[nodiscard]] bool stands() {
@@ -48,16 +51,20 @@ class Standing {
     }
     return false;
   }
-  /// The hub wants this node; looks at once.
-  [[nodiscard]] bool goes_on() { return watch_.goes_on(); }
+  /// The hub wants this node and has its service; looks at once.
+  [[nodiscard]] bool goes_on() { return watch_.goes_on() && publisher_.standing(); }
   /// Why it did not stand: a signal is no failure.
   [[nodiscard]] Outcome<void> outcome() const {
     if (session_.stopped()) return {};
+    if (!session_.node().state().ended) {
+      if (auto stands = publisher_.standing(); !stands) return stands;
+    }
     return Session::gone();
   }
 
  private:
   Session& session_;
+  const Publisher& publisher_;
   ConnectionWatch watch_;
   std::int64_t next_look_ns_ = 0;
 };
@@ -81,6 +88,16 @@ class Retaining {
   bool told_;
 };
 
+/// Whoever publishes may hear that the service was refused a moment before the library says why.
+Outcome<void> why_refused(Session& session, const Publisher& publisher, const Outcome<void>& sent) {
+  const std::int64_t end_ns = steady_now_ns() + kWhyNs;
+  while (!session.node().state().ended && steady_now_ns() < end_ns) {
+    if (auto stands = publisher.standing(); !stands) return stands;
+    if (!session.stop().wait_until(steady_now_ns() + kWhyNs / 100)) break;
+  }
+  return sent;
+}
+
 Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing, UnheardLines& unheard) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
@@ -100,14 +117,14 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
         unheard.before_line(publisher.subscribers());
         if (auto sent = publisher.publish(line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
             !sent) {
-          return sent;
+          return sent.is(Status::refused) ? why_refused(session, publisher, sent) : sent;
         }
         unheard.after_line(publisher.subscribers());
         break;
       case LineInput::State::failed:
         return Failure{Status::system, std::string("cannot read standard input: ") + std::strerror(input.error())};
       case LineInput::State::given_up:
-        return Session::gone();
+        return standing.outcome();
       case LineInput::State::stopped:
       case LineInput::State::end:
         return {};
@@ -160,7 +177,7 @@ ExitCode run_pub(Session& session) {
   service.key = options.key;
   const auto publisher = session.node().advertise(options.target.substr(middle + 1), service);
   if (!publisher) return session.fail(publisher.failure());
-  Standing standing(session);
+  Standing standing(session, *publisher);
   auto sent = wait_for_subscribers(session, *publisher, standing);
   UnheardLines unheard;
   if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing, unheard);

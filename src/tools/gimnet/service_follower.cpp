@@ -11,6 +11,8 @@ namespace {
 
 /// How long it waits before it asks again for what the hub has refused.
 constexpr std::int64_t kRetryNs = 1'000'000'000;
+/// How often it looks whether the hub has its subscriptions still.
+constexpr std::int64_t kLookNs = 500'000'000;
 
 }  // namespace
 
@@ -162,8 +164,34 @@ bool ServiceFollower::take_lateness(std::string_view name) {
 
 std::vector<std::string> ServiceFollower::news(std::int64_t now_ns) {
   const MutexLock lock(mutex_);
-  if (vanished_.empty()) return {};
-  return vanished_.news(now_ns);
+  std::vector<std::string> sentences;
+  if (!vanished_.empty()) sentences = vanished_.news(now_ns);
+  if (now_ns < look_ns_) return sentences;
+  look_ns_ = now_ns + kLookNs;
+  if (std::string words = refusal_news(); !words.empty()) sentences.push_back(std::move(words));
+  return sentences;
+}
+
+std::string ServiceFollower::refusal_news() {
+  if (node_.state().ended) return "";
+  std::set<std::string> refused;
+  std::string first;
+  std::size_t others = 0;
+  for (const auto& [name, subscription] : subscriptions_) {
+    const auto stands = subscription.standing();
+    if (stands || stands.is(Status::closed)) continue;
+    refused.insert(name);
+    if (refused_.contains(name)) continue;
+    if (first.empty()) {
+      first = stands.failure().sentence;
+    } else {
+      ++others;
+    }
+  }
+  refused_ = std::move(refused);
+  if (first.empty()) return "";
+  if (others > 0) first += "; nor those of " + std::to_string(others) + " others that match";
+  return first + "; going on without";
 }
 
 std::vector<std::string> ServiceFollower::rest() {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -44,7 +45,8 @@ class ServiceFollower {
   [[nodiscard]] std::map<std::string, std::uint64_t> missed() const GIMNET_EXCLUDES(mutex_);
   /// As MatchingServices::take_lateness().
   [[nodiscard]] bool take_lateness(std::string_view name) GIMNET_EXCLUDES(mutex_);
-  /// As VanishedServices::news() and rest().
+  /// As VanishedServices::news() and rest(); news() also of subscriptions that the hub did not take again after a
+  /// break.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::vector<std::string> rest() GIMNET_EXCLUDES(mutex_);
 
@@ -62,6 +64,8 @@ class ServiceFollower {
   [[nodiscard]] bool remembers_too_many() const GIMNET_EXCLUDES(mutex_);
   /// Ends the subscription of whom has been gone for longest. False: nobody is, or its messages are still to be taken.
   [[nodiscard]] bool let_one_go() GIMNET_EXCLUDES(mutex_);
+  /// About those that the hub did not take again and that were not told yet; "" if there are none.
+  [[nodiscard]] std::string refusal_news() GIMNET_REQUIRES(mutex_);
 
   Node& node_;
   const std::string pattern_;
@@ -75,6 +79,8 @@ class ServiceFollower {
   MatchingServices matching_ GIMNET_GUARDED_BY(mutex_);
   Subscriptions subscriptions_ GIMNET_GUARDED_BY(mutex_);
   VanishedServices vanished_ GIMNET_GUARDED_BY(mutex_);
+  std::set<std::string> refused_ GIMNET_GUARDED_BY(mutex_);  ///< told. Limit: subscriptions_
+  std::int64_t look_ns_ GIMNET_GUARDED_BY(mutex_) = 0;       ///< not earlier is looked for others
   std::optional<Failure> failure_ GIMNET_GUARDED_BY(mutex_);
   std::thread thread_;
 };

@@ -38,8 +38,9 @@ Outcome<Message> Subscriptions::receive(Timeout timeout) {
     const Timeout left{std::max<std::int64_t>((end_ns - now_ns) / 1'000'000, 0)};
     auto message = node_.receive(std::min(timeout, left));
     if (message && message->service().empty()) continue;  // sent to this node by somebody who guessed its id
-    if (!follower_ && !message && message.is(Status::timeout) && one_ && one_->accepts()) {
-      return Failure{Status::not_found, word_ + " takes data and gives none; send to it"};
+    if (!follower_ && !message && message.is(Status::timeout) && one_) {
+      if (one_->accepts()) return Failure{Status::not_found, word_ + " takes data and gives none; send to it"};
+      if (const auto stands = one_->standing(); !stands) return stands.failure();
     }
     if (!follower_) return message;
     for (const std::string& sentence : follower_->news(now_ns)) say(sentence);

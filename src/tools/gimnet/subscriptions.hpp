@@ -26,7 +26,8 @@ class Subscriptions {
   /// and Node::watch().
   [[nodiscard]] Outcome<void> open();
   /// The next message of any of them. Says on standard error, now and then, which services of a pattern came and went
-  /// without one. Errors: timeout, closed; not_found: the service came and accepts data; for a pattern also refused: it
+  /// without one. Errors: timeout, closed; not_found: the service came and accepts data; limit
+  /// and others: the hub did not take the subscription again after a break; for a pattern also refused: it
   /// takes in no more services.
   [[nodiscard]] Outcome<Message> receive(Timeout timeout);
   /// What receive() would still have said.

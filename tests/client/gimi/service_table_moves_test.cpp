@@ -154,6 +154,22 @@ TEST_P(MovedOwnServices, ArePublishedToTheirOwnSubscribers) {
   close_node();
 }
 
+TEST_P(MovedOwnServices, SayWhyTheyAreNotThereAnyMore) {
+  const Publisher odometry = advertise("odom", kFirst);
+  const Publisher map = advertise("map", kSecond);
+  EXPECT_TRUE(map.standing());
+  come_back<ns::Advertise>({{"odom", kFirst}, {"map", 0}});
+  EXPECT_TRUE(odometry.standing());
+  const auto stands = map.standing();
+  ASSERT_TRUE(stands.is(Status::limit));
+  EXPECT_NE(stands.failure().sentence.find("robot/map: the hub did not take the service again"), std::string::npos);
+  EXPECT_NE(stands.failure().sentence.find("no more"), std::string::npos);
+  EXPECT_TRUE(map.publish("x", kForever).is(Status::refused));
+  come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
+  EXPECT_TRUE(map.standing());
+  close_node();
+}
+
 TEST_P(MovedOwnServices, CountTheirOwnSubscribers) {
   const Publisher odometry = advertise("odom", kFirst);
   const Publisher map = advertise("map", kSecond);

@@ -99,5 +99,64 @@ TEST(MovedGroups, WhatIsSentToARefusedServiceIsRefused) {
   expect_published(connected.hub, kNewGroup, "back");
 }
 
+TEST(MovedGroups, ARefusedServiceAsksForItsFormerGroupAgain) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
+  advertise(connected, "odom", kGroup, false);
+  const std::vector<std::byte> proof{std::byte{1}, std::byte{2}};
+  come_back(hub, connected, false);
+  expect_claim(connected.hub, kGroup, {}, {GroupId{kGroup}, 0, proof});
+  come_back(hub, connected, false);
+  answer_advertise(connected.hub, "odom", 0);
+  nif_incoming in{};
+  while (nif_receive(connected.node.get(), &in, NIF_FOREVER) == NIF_OK && in.type != NIF_OWN_SERVICE_MOVED) {
+    nif_release(&in);
+  }
+  EXPECT_EQ(in.group, 0u);
+  EXPECT_EQ(in.reason, static_cast<std::uint32_t>(NIF_LIMIT));
+  EXPECT_EQ(std::string(static_cast<const char*>(in.payload), in.size), "no more");
+  nif_release(&in);
+  come_back(hub, connected, false);
+  expect_claim(connected.hub, kGroup, proof, {GroupId{kNewGroup}, 0, {}});
+  EXPECT_EQ(wait_for_move(connected.node.get()), kNewGroup);
+  come_back(hub, connected, false);
+  expect_claim(connected.hub, kNewGroup, {}, {GroupId{kNewGroup}, 0, {}});
+}
+
+TEST(MovedGroups, ARefusedSubscriptionIsToldOnceWithItsReason) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
+  std::thread asking(
+      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  answer_subscribe(connected.hub);
+  asking.join();
+  for (int i = 0; i < 2; ++i) {
+    come_back(hub, connected, false);
+    std::uint16_t number = 0;
+    ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
+    connected.hub.send_control(proto::Kind::ns, proto::encode_refusal({proto::ns::Subscribe::kOperation, number},
+                                                                      {proto::Status::limit, "no more"}));
+  }
+  come_back(hub, connected, false);
+  answer_subscribe(connected.hub);
+  advertise(connected, "odom", kGroup, false);
+  connected.hub.close();
+  int told = 0;
+  for (int breaks = 0; breaks < 4;) {
+    nif_incoming in{};
+    ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);
+    breaks += in.type == NIF_DISCONNECTED ? 1 : 0;
+    if (in.type == NIF_SERVICE_MOVED) {
+      ++told;
+      EXPECT_STREQ(in.text, "peer/scan");
+      EXPECT_EQ(in.group, 0u);
+      EXPECT_EQ(in.reason, static_cast<std::uint32_t>(NIF_LIMIT));
+      EXPECT_EQ(std::string(static_cast<const char*>(in.payload), in.size), "no more");
+    }
+    nif_release(&in);
+  }
+  EXPECT_EQ(told, 1);
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
