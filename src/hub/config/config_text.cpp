@@ -70,8 +70,9 @@ ConfigText read_pipe(int descriptor, milliseconds patience) {
     if (error == 0 && !file.text.empty()) return file;
     const std::int64_t left_ns = until - steady_now_ns();
     if (left_ns <= 0) {
-      const std::string within = " within " + std::to_string(patience.count()) + " ms";
-      return {{}, (error == 0 ? "nobody wrote into this pipe" : "this pipe did not end") + within + remedy};
+      std::string why = error == 0 ? "nobody wrote into this pipe" : "this pipe did not end";
+      why += " within " + std::to_string(patience.count()) + " ms";
+      return {{}, why + remedy};
     }
     pollfd wait{descriptor, POLLIN, 0};
     const int events = ::poll(&wait, 1, static_cast<int>(left_ns / 1'000'000 + 1));

@@ -203,6 +203,7 @@ constexpr std::array kSettings{
 const std::vector<std::string>& all_keys() {
   static const std::vector<std::string> all = [] {
     std::vector<std::string> keys;
+    keys.reserve(std::size(kSettings) + 1 + limit_table().size());
     for (const Setting& setting : kSettings) keys.emplace_back(setting.key);
     keys.emplace_back("limits");
     for (const LimitInfo& limit : limit_table()) keys.push_back(std::string{kLimits} + std::string{limit.name});

@@ -210,7 +210,7 @@ std::string wrong_word(std::span<const char* const> words, const std::vector<con
 
 /// What CLI11 says, in words that name the option, what was given and what it takes.
 std::string explained(const CLI::ParseError& error, const std::vector<const CLI::Option*>& options) {
-  const std::string said = error.what();
+  std::string said = error.what();
   const CLI::Option* concerned = nullptr;
   std::size_t longest = 0;
   for (const CLI::Option* option : options) {

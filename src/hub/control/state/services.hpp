@@ -93,22 +93,22 @@ class Services {
   [[nodiscard]] std::optional<proto::Refusal> withdraw(std::uint32_t provider, std::uint32_t group,
                                                        std::chrono::milliseconds now, Effects& effects);
   /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors: bad_request, limit.
-  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(std::uint32_t node, std::string_view full_name,
+  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(std::uint32_t node_index, std::string_view full_name,
                                                                const SubscriberTerms& terms, Effects& effects);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<proto::Refusal> unsubscribe(std::uint32_t node, std::string_view full_name,
+  [[nodiscard]] std::optional<proto::Refusal> unsubscribe(std::uint32_t node_index, std::string_view full_name,
                                                           Effects& effects);
 
   /// The node came back on a new connection: it will declare again what it still wants.
   void node_returned(std::uint32_t node);
   /// Forgets what the node has not declared since node_returned().
-  void drop_undeclared(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  void drop_undeclared(std::uint32_t node_index, std::chrono::milliseconds now, Effects& effects);
   /// Withdraws what the node provides: it has another name now.
-  void node_renamed(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  void node_renamed(std::uint32_t node_index, std::chrono::milliseconds now, Effects& effects);
   /// The node goes on under another index, with what it declared.
-  void node_renumbered(std::uint32_t node, std::uint32_t new_node, Effects& effects);
+  void node_renumbered(std::uint32_t node_index, std::uint32_t new_index, Effects& effects);
   /// The node's session is over.
-  void node_left(std::uint32_t node, std::chrono::milliseconds now, Effects& effects);
+  void node_left(std::uint32_t node_index, std::chrono::milliseconds now, Effects& effects);
 
   /// What the node is to be told, since it came back: each service whose moves it may not know of, once, and where it
   /// is now. To be told again at its next return unless moves_read() came.

@@ -16,8 +16,8 @@ class SlotPool {
 
   /// A slot on the least loaded shard; among equals they take turns.
   [[nodiscard]] Place take();
-  /// A slot on that shard. REQUIRES: shard < shards.
-  [[nodiscard]] Place take_on(ShardIndex shard);
+  /// A slot on that shard. REQUIRES: index < shards().
+  [[nodiscard]] Place take_on(ShardIndex index);
   /// REQUIRES: the place is held. Its slot may be handed out again at once, under another generation.
   void give_back(const Place& place);
 

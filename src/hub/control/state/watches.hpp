@@ -31,7 +31,7 @@ class Watches {
   [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(std::uint32_t node,
                                                                      const proto::ns::Watch& wanted);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<proto::Refusal> unwatch(std::uint32_t node, std::uint32_t watch);
+  [[nodiscard]] std::optional<proto::Refusal> unwatch(std::uint32_t node, std::uint32_t number);
   /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
   void taken(std::uint32_t node, const proto::ns::WatchTaken& taken);
   /// The node's connection ended, and its watches with it.
