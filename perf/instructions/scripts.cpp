@@ -217,6 +217,29 @@ Work hub_turn_fan_out(std::uint32_t services) {
           }};
 }
 
+/// A long run to members whose queues are full: for each of them as many messages go as come.
+Work hub_turn_full() {
+  Limits limits;
+  limits.lane1_bytes = 40'000;
+  auto rig = std::make_shared<testing::HubRig>(1, limits);
+  testing::FakeNode& provider = rig->join(0);
+  std::vector<testing::FakeNode*> members;
+  for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
+  rig->publish_group(1, provider.id, members);
+  rig->settle();
+  for (testing::FakeNode* member : members) member->pipe.set_room(0);
+  const auto frame =
+      testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload, {.kind = proto::Kind::group});
+  std::vector<std::byte> bytes;
+  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) bytes.insert(bytes.end(), frame.begin(), frame.end());
+  const auto turn = [rig, &provider, bytes] {
+    rig->write(provider, bytes);
+    rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
+  };
+  for (int i = 0; i < 8; ++i) turn();
+  return {kFramesPerTurn * kFanOut, turn};
+}
+
 /// The same to recipients by their ids: each frame brings its own.
 Work hub_turn_list() {
   auto rig = std::make_shared<testing::HubRig>();
@@ -258,6 +281,7 @@ constexpr Script kScripts[] = {
     {"hub_turn_in_turns", [] { return hub_turn(kDestinations); }},
     {"hub_turn_fan_out_100", [] { return hub_turn_fan_out(1); }},
     {"hub_turn_fan_out_100_in_turns", [] { return hub_turn_fan_out(kDestinations); }},
+    {"hub_turn_full_100", hub_turn_full},
     {"hub_turn_list_100", hub_turn_list},
     {"hub_turn_single", hub_turn_single},
 };

@@ -104,7 +104,7 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
         keep_rest(connection, {next, received.end});
         break;
       }
-      if (!handle_run(connection, found.run)) return false;
+      if (!handle_run(connection, found)) return false;
       next += found.run.size;
       continue;
     }
@@ -154,7 +154,8 @@ Connection* Reader::begun_before(const Connection& connection) const {
   return oldest;
 }
 
-bool Reader::handle_run(Connection& connection, proto::RunView& view) {
+bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
+  proto::RunView& view = found.run;
   auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
   const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
   if (admission == Admission::data) {
@@ -163,7 +164,7 @@ bool Reader::handle_run(Connection& connection, proto::RunView& view) {
       // it stays its sender's, like what is not read any more.
       state_.counters.untaken_frames.add(view.frames);
     } else {
-      route(connection, view);
+      route(connection, found);
     }
     return true;
   }
@@ -199,13 +200,14 @@ bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::Goo
   return false;
 }
 
-void Reader::route(Connection& connection, const proto::RunView& view) {
+void Reader::route(Connection& connection, const proto::NextRun& found) {
+  const proto::RunView& view = found.run;
   count(connection, view);
   if (state_.router.append(view.bytes, view.size, view.frames)) return;
   const proto::FrameHeader header = proto::load_header(view.bytes);
   if (header.has(proto::kFlagExt)) fill_trace(view);
   const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
-  state_.router.route(run, header);
+  state_.router.route(run, header, found.shortest_bytes);
 }
 
 void Reader::count(Connection& connection, const proto::RunView& view) {

@@ -46,9 +46,9 @@ class Reader {
   /// Who began its frame longest ago, and before this one; nullptr: nobody.
   [[nodiscard]] Connection* begun_before(const Connection& connection) const;
   /// May shorten `view` to the frames that it handled.
-  [[nodiscard]] bool handle_run(Connection& connection, proto::RunView& view);
+  [[nodiscard]] bool handle_run(Connection& connection, proto::NextRun& found);
   [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view, Admission admission);
-  void route(Connection& connection, const proto::RunView& view);
+  void route(Connection& connection, const proto::NextRun& found);
   [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_control(Connection& connection, const proto::RunView& view);

@@ -35,6 +35,7 @@ struct NextRun {
   Found found = Found::need_more;
   RunView run;
   std::uint32_t needed = 0;
+  std::uint32_t shortest_bytes = 0;  ///< of a run: of its frames, header included
 };
 
 /// Bytes of a read buffer that one call looks at.
@@ -58,13 +59,14 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   asm volatile("nop\n\tnop\n\tnop\n\tnop");
 #endif
   const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
-  if (available < kHeaderSize) return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize)};
+  if (available < kHeaderSize) return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize), 0};
   const FrameHeader header = load_header(begin);
-  if (header.length > max_length) return {Found::too_long, {}, 0};
+  if (header.length > max_length) return {Found::too_long, {}, 0, 0};
   if (header.frame_size() > available) {
-    return {Found::need_more, {}, static_cast<std::uint32_t>(header.frame_size())};
+    return {Found::need_more, {}, static_cast<std::uint32_t>(header.frame_size()), 0};
   }
   std::size_t size = header.frame_size();
+  auto shortest = static_cast<std::uint32_t>(size);
   std::uint32_t frames = 1;
   if (may_form_run(header)) {
     std::size_t frame_size = size;
@@ -91,10 +93,11 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
       const auto length = load_le<std::uint32_t>(next);
       if (length > max_length || kHeaderSize + length > available - size) break;
       frame_size = kHeaderSize + length;
+      shortest = std::min(shortest, static_cast<std::uint32_t>(kHeaderSize) + length);
       length_and_dst = load_le<std::uint64_t>(next);
     }
   }
-  return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0};
+  return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0, shortest};
 }
 
 /// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0 and without ids.

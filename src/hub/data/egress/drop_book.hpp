@@ -21,8 +21,9 @@ class DropBook {
       : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
   /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one header but for the
-  /// length.
-  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
+  /// length. None is shorter than `shortest_bytes`: with frames that are equally long it takes no longer than with one.
+  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason,
+            std::uint32_t shortest_bytes = proto::kHeaderSize);
 
   /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT shows need be there.
   void drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason);

@@ -82,6 +82,7 @@ void LaneQueue::push(Entry entry) {
         same_header(last.run.bytes, entry.run.bytes) && last.run.extend(entry.run)) {
       last.size += entry.size;
       last.frames += entry.frames;
+      last.shortest_bytes = std::min(last.shortest_bytes, entry.shortest_bytes);
       return;
     }
   }
@@ -151,24 +152,16 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   return true;
 }
 
-bool LaneQueue::drop_oldest(Entry& dropped) {
+bool LaneQueue::drop_oldest(std::uint64_t bytes, Entry& dropped) {
   oldest_hint_ = std::max(oldest_hint_, entries_.first_number());
   for (; oldest_hint_ != entries_.end_number(); ++oldest_hint_) {
     Entry& entry = entries_.at(oldest_hint_);
     if (entry.frames == 0 || entry.block || entry.touched) continue;
     discount(entry);
-    if (entry.fragmented || entry.frames == 1) {
-      dropped = std::exchange(entry, Entry{});
-      entry.frames = 0;
-    } else {
-      dropped = Entry{};
-      dropped.run = entry.run.take_frame();
-      dropped.size = dropped.run.size;
-      dropped.frames = 1;
-      entry.size -= dropped.size;
-      --entry.frames;
-      count(entry);
-    }
+    // Of a message in fragments all go.
+    const Leading whole{entry.frames, entry.size};
+    dropped = entry.take_front(entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes));
+    count(entry);
     skip_dead();
     return true;
   }

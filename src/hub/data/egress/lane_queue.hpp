@@ -65,8 +65,9 @@ class LaneQueue {
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Takes out the oldest entry (or first frame of a run) that may be dropped for room. Returns false if there is none.
-  [[nodiscard]] bool drop_oldest(Entry& dropped);
+  /// Takes out the oldest entry that may be dropped for room; of a run as many frames as come to `bytes`, if it has
+  /// those. Returns false if there is none. REQUIRES: bytes is not 0.
+  [[nodiscard]] bool drop_oldest(std::uint64_t bytes, Entry& dropped);
 
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
   [[nodiscard]] Entry& front();

@@ -41,6 +41,10 @@ bool Outbox::fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) c
   return lanes_->queues[lane].bytes() + bytes <= limits.lane_bytes(lane);
 }
 
+std::uint64_t Outbox::room(std::size_t lane, const Limits& limits) const {
+  return limits.lane_bytes(lane) - std::min(limits.lane_bytes(lane), lanes_->queues[lane].bytes());
+}
+
 Run Outbox::copy(const Run& run, EgressContext& context) {
   close_run();
   if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
@@ -70,6 +74,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   entry.block = proto::is_block(header);
   entry.latest = header.policy() == proto::Policy::latest;
   entry.shared = handover.fan_out;
+  entry.shortest_bytes = handover.shortest_bytes;
   if (header.has(proto::kFlagFragment)) {
     const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
     if (frame && frame->fragment) {
@@ -111,6 +116,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
 
 void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
   Entry& last = lane.entries().back();
+  last.shortest_bytes = proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
   const std::uint64_t lane_room = limits.lane_bytes(lane_index) - lane.bytes();
   const auto room = static_cast<std::uint32_t>(std::min<std::uint64_t>(chunk_->capacity - chunk_used_, lane_room));
   lanes_->open = {room,
@@ -267,6 +273,12 @@ void Outbox::tell_lost(const Entry& entry) const {
   const proto::FrameHeader header = entry.run.header();
   if (header.kind != proto::Kind::group) return;
   counted_->on_lost(GroupId{header.dst}, entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames);
+}
+
+void Outbox::tell_lost(const Run& run, const proto::FrameHeader& header) const {
+  if (counted_ == nullptr || header.kind != proto::Kind::group) return;
+  if (header.has(proto::kFlagFragment)) return tell_lost(run);
+  counted_->on_lost(GroupId{header.dst}, run.frames);
 }
 
 void Outbox::tell_lost(const Run& run) const {

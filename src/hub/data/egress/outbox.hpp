@@ -17,7 +17,8 @@ namespace gimnet::hub {
 
 /// How a run came to an outbox.
 struct Handover {
-  bool fan_out = false;  ///< the same bytes go to many: keep a reference instead of a copy
+  bool fan_out = false;                               ///< the same bytes go to many: keep a reference instead of a copy
+  std::uint32_t shortest_bytes = proto::kHeaderSize;  ///< no frame of the run is shorter, header included
 };
 
 /// What waits to be written to one connection: control frames, and four lanes of messages, with the policies of
@@ -65,8 +66,8 @@ class Outbox {
 
   /// Messages of that group of which the end still waits in a lane.
   [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
-  /// Frames that were for this connection did not get here.
-  void tell_lost(const Run& run) const;
+  /// Frames that were for this connection did not get here. REQUIRES: as push().
+  void tell_lost(const Run& run, const proto::FrameHeader& header) const;
 
   /// Frames of an earlier connection, to be written again before all lanes.
   [[nodiscard]] RingQueue<Run>& replay() { return lanes().replay; }
@@ -157,10 +158,12 @@ class Outbox {
                                  EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
+  /// Bytes that still fit.
+  [[nodiscard]] std::uint64_t room(std::size_t lane, const Limits& limits) const;
 
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
-  void admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
-  void admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void admit_first(Entry entry, std::size_t lane_index, EgressContext& context);
+  void admit_newest(Entry entry, std::size_t lane_index, EgressContext& context);
   /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns false if it came all
   /// the same, although it was held: the message is not to be taken.
   [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
@@ -173,6 +176,8 @@ class Outbox {
   void put_control(std::span<const std::byte> frame, EgressContext& context);
   [[nodiscard]] std::uint32_t first_control_bytes() const { return lanes_ ? lanes_->first_control_bytes : 0; }
   void tell_lost(const Entry& entry) const;
+  /// Frames of any headers.
+  void tell_lost(const Run& run) const;
   void replace_latest(EgressContext& context);
   /// Many small messages that cannot form runs take more memory for their entries than for their bytes.
   void charge_entries(EgressContext& context);

@@ -79,8 +79,10 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
     }
   } else if (entry.touched) {
     lane.push(std::move(entry));
+  } else if (header.policy() == proto::Policy::drop) {
+    admit_first(std::move(entry), header.lane & proto::kLaneMask, context);
   } else {
-    admit_full(std::move(entry), header, context);
+    admit_newest(std::move(entry), header.lane & proto::kLaneMask, context);
   }
 }
 
@@ -99,36 +101,38 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
   return !comes_though_held || bytes <= limit + reserves;
 }
 
-/// Policies count messages: the first ones of a run may still fit.
-void Outbox::admit_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
-  while (entry.run.frames > 1) {
-    Entry first;
-    first.run = entry.run.take_frame();
-    first.size = first.run.size;
-    first.frames = 1;
-    first.shared = entry.shared;
-    entry.size -= first.size;
-    --entry.frames;
-    admit_message(std::move(first), header, context);
+/// Policies count messages: of a run the first that fit are taken.
+void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  while (entry.frames != 0) {
+    Leading fitting = leading_within(entry.run, entry.shortest_bytes, room(lane_index, context.limits));
+    // Besides what is being written one message may wait, however large it is.
+    if (fitting.frames == 0 && !lane.holds_whole()) fitting = leading_from(entry.run, entry.shortest_bytes, 1);
+    if (fitting.frames != 0) lane.push(entry.take_front(fitting));
+    if (entry.frames == 0) return;
+    // Behind those that do not fit there may be shorter ones.
+    Entry lost = entry.take_front(leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, context.limits)));
+    lose(lost, proto::DropReason::queue_full, context);
   }
-  admit_message(std::move(entry), header, context);
 }
 
-void Outbox::admit_message(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
-  const std::size_t index = header.lane & proto::kLaneMask;
-  LaneQueue& lane = lanes_->queues[index];
-  if (header.policy() != proto::Policy::drop) {
-    Entry oldest;
-    while (!fits(index, entry.size, context.limits) && lane.drop_oldest(oldest)) {
-      lose(oldest, proto::DropReason::queue_full, context);
-    }
+/// As if each message came alone, and dropped as many older ones as it takes: what waits first, then the first of those
+/// that come.
+void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  const std::uint64_t limit = context.limits.lane_bytes(lane_index);
+  Entry older;
+  while (!fits(lane_index, entry.size, context.limits) && lane.drop_oldest(lane.bytes() + entry.size - limit, older)) {
+    lose(older, proto::DropReason::queue_full, context);
   }
-  // Besides what is being written the newest message may wait, however large it is.
-  if (fits(index, entry.size, context.limits) || !lane.holds_whole()) {
-    lane.push(std::move(entry));
-  } else {
-    lose(entry, proto::DropReason::queue_full, context);
+  if (const std::uint64_t left = room(lane_index, context.limits); entry.size > left) {
+    Leading lost = leading_from(entry.run, entry.shortest_bytes, entry.size - left);
+    // Besides what is being written the newest message may wait, however large it is.
+    if (lost.frames == entry.frames && !lane.holds_whole()) lost = all_but_last(entry.run, entry.shortest_bytes);
+    older = entry.take_front(lost);
+    lose(older, proto::DropReason::queue_full, context);
   }
+  if (entry.frames != 0) lane.push(std::move(entry));
 }
 
 void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
@@ -138,7 +142,8 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
   do {
-    if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason);
+    if (entry.run.frames == 0) continue;
+    context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason, entry.shortest_bytes);
   } while (entry.next_piece());
   entry.size = entry.frames = 0;
 }

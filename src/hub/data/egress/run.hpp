@@ -32,6 +32,14 @@ struct Run {
     frame.frames = 1;
     return frame;
   }
+  /// The first `first_frames` of it, which this run loses. REQUIRES: they have `first_size` bytes.
+  [[nodiscard]] Run take_front(std::uint32_t first_frames, std::uint32_t first_size) {
+    Run front{buffer.share(), bytes, first_size, first_frames};
+    bytes += first_size;
+    size -= first_size;
+    frames -= first_frames;
+    return front;
+  }
   /// Extends this run by `next` if that lies right behind it in the same buffer.
   bool extend(const Run& next) {
     if (buffer.get() != next.buffer.get() || bytes + size != next.bytes) return false;

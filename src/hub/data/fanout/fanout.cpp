@@ -22,9 +22,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
 #endif
   context_.owner.check_here();
   if (!recipient.connected && !recipient.waits_when_away) {
-    recipient.outbox.tell_lost(run);
-    recipient.outbox.count_dropped(run.frames);
-    context_.drops.drop(run.bytes, run.size, run.frames, proto::DropReason::away);
+    lose(recipient, run, header, handover, proto::DropReason::away);
     return;
   }
   // Only the first frame's length is in `header`; what is short altogether has no long frame in it.
@@ -32,17 +30,27 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
     push(recipient, run, header, handover);
     return;
   }
+  deliver_short_ones(recipient, run, header, handover);
+}
+
+void Fanout::deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+                                Handover handover) {
+  const std::uint64_t longest = recipient.frame_bytes + proto::kHeaderSize;
   Run rest = run.share();
   while (rest.frames != 0) {
-    const Run frame = rest.take_frame();
-    if (frame.size - proto::kHeaderSize <= recipient.frame_bytes) {
-      push(recipient, frame, frame.header(), handover);
-    } else {
-      recipient.outbox.tell_lost(frame);
-      recipient.outbox.count_dropped(1);
-      context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::too_large);
-    }
+    const Leading taken = leading_up_to(rest, handover.shortest_bytes, longest);
+    if (taken.frames != 0) push(recipient, rest.take_front(taken.frames, taken.size), header, handover);
+    if (rest.frames == 0) break;
+    const Leading too_large = leading_beyond(rest, handover.shortest_bytes, longest);
+    lose(recipient, rest.take_front(too_large.frames, too_large.size), header, handover, proto::DropReason::too_large);
   }
+}
+
+void Fanout::lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover,
+                  proto::DropReason reason) {
+  recipient.outbox.tell_lost(run, header);
+  recipient.outbox.count_dropped(run.frames);
+  context_.drops.drop(run.bytes, run.size, run.frames, reason, handover.shortest_bytes);
 }
 
 void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {

@@ -64,6 +64,10 @@ class Fanout {
     std::uint32_t deliveries = 0;
   };
 
+  /// Those that are not larger than it takes; the others are dropped.
+  void deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
+  void lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover,
+            proto::DropReason reason);
   void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
   [[nodiscard]] bool gather(Stretch& stretch, const Run& run);
   void make_room(Stretch& stretch, std::uint32_t bytes);

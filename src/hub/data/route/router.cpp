@@ -32,19 +32,19 @@ NodePlace Router::place_of(NodeId node) const {
   return hub_of(node) == hub_ ? nodes_.find(index_of(node)) : NodePlace{};
 }
 
-void Router::dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+void Router::dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   fanout_.context().owner.check_here();
   switch (header.kind) {
     case proto::Kind::group:
-      return to_group(run, header, handed_over);
+      return to_group(run, header, arrival);
     case proto::Kind::list:
-      return to_list(run, header, handed_over);
+      return to_list(run, header, arrival);
     case proto::Kind::broadcast:
-      return to_everybody(run, header, handed_over);
+      return to_everybody(run, header, arrival);
     case proto::Kind::service:
-      return to_provider(run, header, handed_over);
+      return to_provider(run, header, arrival);
     default:
-      return to_node(run, header, NodeId{header.dst}, handed_over);
+      return to_node(run, header, NodeId{header.dst}, arrival);
   }
 }
 
@@ -70,27 +70,27 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max, std::
     fanout_.context().tally.queued -= found.run.frames;
     if (append(found.run.bytes, found.run.size, found.run.frames)) continue;
     const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
-    dispatch(run, run.header(), true);
+    dispatch(run, run.header(), {true, found.shortest_bytes});
   }
 }
 
 inline void Router::to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
-                             bool handed_over) {
+                             Arrival arrival) {
   if (place.shard != fanout_.self()) {
     // A frame that was handed over here and would have to go on is for a node that left meanwhile.
-    if (handed_over) return drop(run, proto::DropReason::no_such_node);
+    if (arrival.handed_over) return drop(run, proto::DropReason::no_such_node);
     return fanout_.hand_over(place.shard, run);
   }
   Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
   if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
-  fanout_.deliver(*recipient, run, header, Handover{});
+  fanout_.deliver(*recipient, run, header, Handover{.shortest_bytes = arrival.shortest_bytes});
 }
 
-void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over) {
+void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival) {
   if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
   const NodePlace place = nodes_.find(index_of(node));
   if (!place.exists()) return drop(run, why_absent(node));
-  to_place(run, header, place, handed_over);
+  to_place(run, header, place, arrival);
 }
 
 proto::DropReason Router::why_absent(NodeId node) const {
@@ -119,15 +119,16 @@ bool Router::provider_goes_by(const GroupMembers& members, NodeId source) const 
   return recipient != nullptr && recipient->node == source;
 }
 
-void Router::to_group(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   // What was handed over was looked at by the shard that took it in; its provider may have been renumbered since.
-  if (!handed_over && members->provider != NodeId{header.src} && !provider_goes_by(*members, NodeId{header.src})) {
+  if (!arrival.handed_over && members->provider != NodeId{header.src} &&
+      !provider_goes_by(*members, NodeId{header.src})) {
     return drop(run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients, .shortest_bytes = arrival.shortest_bytes};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
   here.for_each([&](const GroupMember& member) {
@@ -137,9 +138,9 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, bool han
     ++outcomes;
   });
   if (!members->paced_by_shard.empty()) {
-    outcomes += to_paced(run, header, members->paced_by_shard[fanout_.self().value()]);
+    outcomes += to_paced(run, header, arrival, members->paced_by_shard[fanout_.self().value()]);
   }
-  if (!handed_over) {
+  if (!arrival.handed_over) {
     outcomes += to_members_elsewhere(run, *members);
     if (members->retain) retained_.keep(run, header);
   }
@@ -160,8 +161,9 @@ std::uint32_t Router::to_members_elsewhere(const Run& run, const GroupMembers& m
 }
 
 /// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one without the other.
-std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, const MemberList<PacedMember>& here) {
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
+std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, Arrival arrival,
+                               const MemberList<PacedMember>& here) {
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients, .shortest_bytes = arrival.shortest_bytes};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
   here.for_each([&](const PacedMember& member) {
@@ -188,12 +190,12 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
 
 /// By the provider's place: by its id a frame would be lost where this turn sees a group of before REASSIGN and the
 /// node table of after it, in whatever order the two are published.
-void Router::to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   if (members->ends()) return drop(run, proto::DropReason::no_such_group);
   if (!members->accepts) return drop(run, proto::DropReason::not_allowed);
-  to_place(run, header, members->provider_place, handed_over);
+  to_place(run, header, members->provider_place, arrival);
 }
 
 /// A LIST frame while it goes to its recipients on this shard.
@@ -209,8 +211,8 @@ struct Router::Listed {
   Run shared;                ///< header and payload without the ids, one for all, made when the first one needs it
 };
 
-void Router::to_list(const Run& run, const proto::FrameHeader& header, bool handed_over) {
-  if (handed_over) return to_listed_here(run, header);
+void Router::to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
+  if (arrival.handed_over) return to_listed_here(run, header);
   // Nobody else has the frame yet: it is told in it whose business each id is, for the other shards.
   std::byte* const frame = run.buffer->data + (run.bytes - run.buffer->data);
   std::byte* const ids = frame + proto::kHeaderSize;
@@ -274,20 +276,21 @@ void Router::drop_listed(const Listed& listed, std::uint32_t outcomes, proto::Dr
   fanout_.context().drops.drop_start(start.data(), outcomes, reason);
 }
 
-void Router::to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over) {
+void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const NodeId dst{header.dst};
   if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub) return drop(run, proto::DropReason::no_route);
   if (index_of(dst) != kEveryIndex) return drop(run, proto::DropReason::no_such_node);
   std::uint32_t outcomes = 0;
   const std::size_t slots = fanout_.recipients().by_slot().size();
   deliveries_ += slots;
+  const Handover handover{.fan_out = true, .shortest_bytes = arrival.shortest_bytes};
   for (Recipient* recipient : fanout_.recipients().by_slot()) {
     if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
-    fanout_.deliver(*recipient, run, header, Handover{.fan_out = true});
+    fanout_.deliver(*recipient, run, header, handover);
     ++outcomes;
   }
   // Nodes are spread over the shards: there are about as many on each other one.
-  if (!handed_over) to_other_shards(run, nodes_.shards(), slots, outcomes);
+  if (!arrival.handed_over) to_other_shards(run, nodes_.shards(), slots, outcomes);
   settle(run, outcomes);
 }
 

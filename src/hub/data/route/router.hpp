@@ -64,8 +64,10 @@ class Router {
   }
 
   /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for the length, alone if
-  /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate.
-  void route(const Run& run, const proto::FrameHeader& header) { dispatch(run, header, false); }
+  /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; none shorter than `shortest_bytes`.
+  void route(const Run& run, const proto::FrameHeader& header, std::uint32_t shortest_bytes = proto::kHeaderSize) {
+    dispatch(run, header, {false, shortest_bytes});
+  }
 
   /// Frames that another shard handed over, any mix: to their recipients on this shard, until deliveries() has come to
   /// `deliveries_end`. Returns those that are left.
@@ -79,20 +81,25 @@ class Router {
   [[nodiscard]] NodePlace place_of(NodeId node) const;
 
  private:
-  void dispatch(const Run& run, const proto::FrameHeader& header, bool handed_over);
-  void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, bool handed_over);
-  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place, bool handed_over);
+  /// How a run came here.
+  struct Arrival {
+    bool handed_over;  ///< by another shard
+    std::uint32_t shortest_bytes;
+  };
+  void dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival);
+  void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);
+  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place, Arrival arrival);
   [[nodiscard]] bool provider_goes_by(const GroupMembers& members, NodeId source) const;
-  void to_group(const Run& run, const proto::FrameHeader& header, bool handed_over);
-  [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
+  void to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival);
+  [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header, Arrival arrival,
                                        const MemberList<PacedMember>& here);
-  void to_provider(const Run& run, const proto::FrameHeader& header, bool handed_over);
-  void to_list(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival);
+  void to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_listed_here(const Run& run, const proto::FrameHeader& header);
   struct Listed;
   void to_listed(Listed& listed, NodeId node, const NodePlace& place);
   void drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason);
-  void to_everybody(const Run& run, const proto::FrameHeader& header, bool handed_over);
+  void to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   /// deliveries: at each of them.
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes);
   [[nodiscard]] std::uint32_t to_members_elsewhere(const Run& run, const GroupMembers& members);

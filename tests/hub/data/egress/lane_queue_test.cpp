@@ -51,13 +51,37 @@ TEST_F(LaneQueueTest, DropsTheOldestFrameOfARunFirst) {
   lane.push(entry("three"));
   Entry dropped;
   for (const std::uint32_t expected : {3u, 3u, 5u}) {
-    ASSERT_TRUE(lane.drop_oldest(dropped));
+    ASSERT_TRUE(lane.drop_oldest(1, dropped));
     EXPECT_EQ(dropped.size, proto::kHeaderSize + expected);
     EXPECT_EQ(dropped.frames, 1u);
   }
-  EXPECT_FALSE(lane.drop_oldest(dropped)) << "only BLOCK is left";
+  EXPECT_FALSE(lane.drop_oldest(1, dropped)) << "only BLOCK is left";
   EXPECT_EQ(lane.bytes(), proto::kHeaderSize + 5);
   EXPECT_EQ(lane.front().block, true);
+}
+
+TEST_F(LaneQueueTest, DropsAsManyFramesOfARunAsItTakes) {
+  // Together they are as large as if all were as long as the first ones.
+  const auto push = [this](const std::vector<std::string>& payloads, std::uint32_t shortest_bytes) {
+    Entry made;
+    made.run = rig.run(payloads);
+    made.size = made.run.size;
+    made.frames = made.run.frames;
+    made.shortest_bytes = shortest_bytes;
+    lane.push(std::move(made));
+  };
+  push({"four", "four"}, 20);
+  push({"", "12345678"}, 16);
+  ASSERT_EQ(lane.entries().size(), 1u);
+  Entry dropped;
+  ASSERT_TRUE(lane.drop_oldest(41, dropped));
+  EXPECT_EQ(dropped.frames, 3u);
+  EXPECT_EQ(dropped.size, 20u + 20u + 16u);
+  EXPECT_EQ(lane.bytes(), 24u);
+  ASSERT_TRUE(lane.drop_oldest(1'000, dropped));
+  EXPECT_EQ(dropped.frames, 1u);
+  EXPECT_FALSE(lane.drop_oldest(1, dropped));
+  EXPECT_TRUE(lane.empty());
 }
 
 TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
@@ -65,6 +89,7 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   part.fragmented = true;
   part.complete = false;
   part.message_number = 77;
+  part.shortest_bytes = part.size;
   lane.push(std::move(part));
   lane.push(entry("behind it"));
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 4}, 77), nullptr);
@@ -73,6 +98,7 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   ASSERT_NE(found, nullptr);
   lane.append_fragment(*found, rig.run({"the end"}, {.src = 3}), true, rig.pieces);
   EXPECT_EQ(found->frames, 2u);
+  EXPECT_EQ(found->shortest_bytes, proto::kHeaderSize) << "the end may be shorter";
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "complete";
   EXPECT_EQ(lane.bytes(), 4u + 9u + 7u + 3 * proto::kHeaderSize);
 }

@@ -12,6 +12,7 @@ namespace gimnet::hub {
 namespace {
 
 using proto::DropReason;
+using proto::Kind;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using testing::RouteRig;
@@ -152,6 +153,89 @@ TEST(Fanout, DropsSinglyWhatIsTooLarge) {
   EXPECT_EQ(rig.egress.dropped(DropReason::too_large), 1u);
   EXPECT_EQ(rig.egress.tally.queued, 2);
   EXPECT_TRUE(rig.ledger_exact());
+}
+
+// What fits between those that do not is one thing, and so is what does not fit.
+TEST(Fanout, KeepsTheOrderOfWhatIsNotTooLarge) {
+  RouteRig rig;
+  Recipient& a = rig.add_here(2);
+  a.frame_bytes = 2;
+  const hub::Run run = rig.egress.run({"lll", "a", "b", "lll", "lll", "cc", "lll"}, {.flags = kDrop});
+  rig.fanout.deliver(a, run, run.header(), {});
+  EXPECT_EQ(rig.egress.dropped(DropReason::too_large), 4u);
+  ASSERT_EQ(a.outbox.lane(1).front().frames, 3u);
+  EXPECT_EQ(std::memcmp(a.outbox.lane(1).front().run.bytes + 2 * 17 + proto::kHeaderSize, "cc", 2), 0);
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+/// A run of so many frames of 20 bytes. Only the first one can be read: the others say nonsense about their length.
+hub::Run unreadable_run(RouteRig& rig, std::uint32_t frames, std::uint32_t dst) {
+  hub::Run run =
+      rig.make_run(dst, std::vector<std::string>(frames, "four"), {.kind = Kind::group, .flags = proto::kFlagReport});
+  for (std::uint32_t frame = 1; frame < frames; ++frame) {
+    store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * 20, ~std::uint32_t{0});
+  }
+  return run;
+}
+
+struct CountedLosses final : CountedGroups {
+  [[nodiscard]] bool counts(GroupId) const override { return false; }
+  void on_lost(GroupId, std::uint32_t messages) override {
+    ++calls;
+    lost += messages;
+  }
+  std::uint64_t calls = 0;
+  std::uint64_t lost = 0;
+};
+
+// One publisher of small messages would hold up a shard for as long as it likes by subscribers that read nothing.
+TEST(Fanout, ARunToFullQueuesIsNotTakenApartFrameByFrame) {
+  constexpr std::uint32_t kMembers = 50;
+  constexpr std::uint32_t kFrames = 1'000;
+  constexpr std::uint32_t kRuns = 10;
+  Limits limits;
+  limits.lane1_bytes = 2'500 * 20 + 19;  // two runs and a half
+  RouteRig rig(limits);
+  CountedLosses losses;
+  std::vector<std::uint32_t> members;
+  for (std::uint32_t index = 2; index < 2 + kMembers; ++index) {
+    Recipient& member = rig.add_here(index);
+    member.outbox.set_counted_groups(&losses);
+    member.outbox.settle(rig.egress.context);  // as after a write that did not take all
+    members.push_back(index);
+  }
+  rig.publish_group(1, 1, members, {});
+  const std::uint32_t dst = make_id<GroupId>(HubId{7}, 1).value();
+  for (std::uint32_t i = 0; i < kRuns; ++i) {
+    const hub::Run run = unreadable_run(rig, kFrames, dst);
+    rig.router.route(run, run.header(), 20);
+    // A read buffer goes on behind the frames; here none joins its neighbour.
+    static_cast<void>(rig.egress.run({"between"}));
+    --rig.egress.accepted;
+  }
+  constexpr std::uint64_t kLost = std::uint64_t{kMembers} * (kRuns * kFrames - 2'500);
+  EXPECT_EQ(rig.egress.dropped(DropReason::queue_full), kLost);
+  EXPECT_EQ(losses.lost, kLost);
+  EXPECT_LE(losses.calls, std::uint64_t{kMembers} * kRuns * 2)
+      << "per run and queue: the rest of one, a part of another";
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(Fanout, ARunIsNotTooLargeFrameByFrame) {
+  for (const std::uint32_t frame_bytes : {3u, 4u}) {
+    RouteRig rig;
+    Recipient& a = rig.add_here(2);
+    CountedLosses losses;
+    a.outbox.set_counted_groups(&losses);
+    a.frame_bytes = frame_bytes;
+    const hub::Run run = unreadable_run(rig, 1'000, 1);
+    rig.fanout.deliver(a, run, run.header(), {.fan_out = true, .shortest_bytes = 20});
+    EXPECT_EQ(rig.egress.dropped(DropReason::too_large), frame_bytes == 3 ? 1'000u : 0u);
+    EXPECT_EQ(losses.calls, frame_bytes == 3 ? 1u : 0u);
+    EXPECT_EQ(losses.lost, frame_bytes == 3 ? 1'000u : 0u);
+    EXPECT_TRUE(rig.ledger_exact());
+    a.outbox.set_counted_groups(nullptr);
+  }
 }
 
 TEST(RecipientTable, FindsASessionByItsGenerationOnly) {

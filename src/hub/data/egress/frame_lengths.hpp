@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "hub/data/egress/run.hpp"
+
+// How many frames at the front of a run come to so many bytes: without looking at them where all are equally long, so
+// that a long run to many full queues costs each of them as much as a short one. No frame of the run is shorter than
+// `shortest_bytes`, header included; a header's size holds for all runs. Thread safety: pure functions.
+
+namespace gimnet::hub {
+
+/// The first frames of a run.
+struct Leading {
+  std::uint32_t frames = 0;
+  std::uint32_t size = 0;
+};
+
+[[nodiscard]] inline bool equally_long(std::uint32_t size, std::uint32_t frames, std::uint32_t shortest_bytes) {
+  return std::uint64_t{shortest_bytes} * frames == size;
+}
+
+/// The frames at the front of which takes(those before, bytes of the next one) is true, one after the other.
+template <class Takes>
+[[nodiscard]] Leading leading_frames(const Run& run, Takes&& takes) {
+  Leading leading;
+  while (leading.frames != run.frames) {
+    const auto next = static_cast<std::uint32_t>(proto::load_header(run.bytes + leading.size).frame_size());
+    if (!takes(leading, next)) break;
+    leading.size += next;
+    ++leading.frames;
+  }
+  return leading;
+}
+
+/// As few as come to `bytes` or more; all if they do not.
+[[nodiscard]] inline Leading leading_from(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+  if (run.size <= bytes) return {run.frames, run.size};
+  if (equally_long(run.size, run.frames, shortest_bytes)) {
+    const auto frames = static_cast<std::uint32_t>((bytes + shortest_bytes - 1) / shortest_bytes);
+    return {frames, frames * shortest_bytes};
+  }
+  return leading_frames(run, [&](const Leading& before, std::uint32_t) { return before.size < bytes; });
+}
+
+/// As many as come to `bytes` or less.
+[[nodiscard]] inline Leading leading_within(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+  if (run.size <= bytes) return {run.frames, run.size};
+  if (shortest_bytes > bytes) return {};
+  if (equally_long(run.size, run.frames, shortest_bytes)) {
+    const auto frames = static_cast<std::uint32_t>(bytes / shortest_bytes);
+    return {frames, frames * shortest_bytes};
+  }
+  return leading_frames(run, [&](const Leading& before, std::uint32_t next) { return before.size + next <= bytes; });
+}
+
+/// Those before the first that is longer than `bytes`.
+[[nodiscard]] inline Leading leading_up_to(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+  const std::uint64_t longest = run.size - std::uint64_t{shortest_bytes} * (run.frames - 1);
+  if (longest <= bytes) return {run.frames, run.size};
+  return leading_frames(run, [&](const Leading&, std::uint32_t next) { return next <= bytes; });
+}
+
+/// Those before the first that is not longer than `bytes`.
+[[nodiscard]] inline Leading leading_beyond(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+  if (shortest_bytes > bytes) return {run.frames, run.size};
+  return leading_frames(run, [&](const Leading&, std::uint32_t next) { return next > bytes; });
+}
+
+/// The last of so many frames, one behind the other. REQUIRES: there is one.
+[[nodiscard]] inline const std::byte* last_frame(const std::byte* first, std::uint32_t size, std::uint32_t frames,
+                                                 std::uint32_t shortest_bytes) {
+  const std::byte* const end = first + size;
+  if (equally_long(size, frames, shortest_bytes)) return end - shortest_bytes;
+  const std::byte* last = first;
+  for (const std::byte* next = first; next != end; next += proto::load_header(next).frame_size()) last = next;
+  return last;
+}
+
+/// All but the last one. REQUIRES: there is one.
+[[nodiscard]] inline Leading all_but_last(const Run& run, std::uint32_t shortest_bytes) {
+  const std::byte* const last = last_frame(run.bytes, run.size, run.frames, shortest_bytes);
+  return {run.frames - 1, static_cast<std::uint32_t>(last - run.bytes)};
+}
+
+}  // namespace gimnet::hub
