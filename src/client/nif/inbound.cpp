@@ -39,9 +39,8 @@ Inbound::Verdict Inbound::malformed(std::string why) {
 void Inbound::begin(const Session& session) {
   filled_ = parsed_ = 0;
   if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
-  if (!session.resumed) {
-    former_ids_.clear();
-  } else if (session.id != id_) {
+  // Also where the hub begins anew: what waited in its queues comes all the same.
+  if (session.id != id_ && id_ != 0) {
     if (former_ids_.size() == kFormerIdsMax) former_ids_.erase(former_ids_.begin());
     former_ids_.push_back(id_);
   }

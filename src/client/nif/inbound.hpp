@@ -100,7 +100,7 @@ class Inbound {
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
  private:
-  /// Frames for the one before these wait no more: the hub begins anew before it gives a node so many ids.
+  /// What waits through more REASSIGNs than that is for an id that this node has forgotten.
   static constexpr std::size_t kFormerIdsMax = 16;
 
   [[nodiscard]] Verdict malformed(std::string why);
@@ -135,7 +135,7 @@ class Inbound {
   std::size_t filled_ = 0;
   std::size_t parsed_ = 0;
   std::uint32_t id_ = 0;
-  /// Ids of this epoch before id_: frames which waited while the node was given another one are for them.
+  /// The last ids before id_: frames which waited while the node was given another one are for them.
   std::vector<std::uint32_t> former_ids_;
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;

@@ -132,7 +132,7 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command, 
   closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
   connection.resume.reset();
-  // Nothing of before comes again, under whatever id. Else no later REASSIGN would leave room for one more.
+  // The node sends nothing of before again, under whatever id. Else no later REASSIGN would leave room for one more.
   connection.ingress.former_nodes = {};
   connection.former_nodes.clear();
   count_anew(connection);

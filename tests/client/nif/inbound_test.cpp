@@ -334,7 +334,7 @@ TEST(Inbound, AResumedConnectionGoesOn) {
   EXPECT_EQ(receiving.host.texts(), (std::vector<std::string>{"abcdef"}));
 }
 
-TEST(Inbound, TakesWhatWaitedUnderEveryIdThatItHadInThisEpoch) {
+TEST(Inbound, TakesWhatWaitedUnderEachOfItsLastIds) {
   Receiving receiving;
   Session session = receiving.session();
   session.resume = session.resumed = true;
@@ -352,7 +352,14 @@ TEST(Inbound, TakesWhatWaitedUnderEveryIdThatItHadInThisEpoch) {
   session.resumed = false;
   receiving.inbound.begin(session);
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  EXPECT_EQ(receiving.inbound.counts().ignored, 4u) << "a new epoch is under one id";
+  EXPECT_EQ(receiving.inbound.counts().ignored, 2u)
+      << "what waited in the hub's queues comes also where it begins anew";
+  for (std::uint32_t i = 0; i < 16; ++i) {
+    session.id = kOwnId + 1'000 + i;
+    receiving.inbound.begin(session);
+  }
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.inbound.counts().ignored, 2u + 3u) << "16 are remembered: the last of these four, no other";
 }
 
 TEST(Inbound, ConfirmationIsDueAfterAQuarterOfTheHubsBuffer) {
