@@ -28,11 +28,11 @@ def defaults():
 
 
 def constant(name):
-    for header in sorted((ROOT / "src" / "proto").rglob("*.hpp")):
+    for header in (*sorted((ROOT / "src" / "proto").rglob("*.hpp")), ROOT / "src" / "hub" / "shard" / "connection.hpp"):
         found = re.search(rf"^inline constexpr [\w:]+ {name} = (.*);", header.read_text(encoding="utf-8"), re.M)
         if found:
             return number(found[1])
-    raise AssertionError(f"no {name} in src/proto")
+    raise AssertionError(f"no {name} in src/proto nor of a connection")
 
 
 def rows(heading):
@@ -84,7 +84,8 @@ class Tables(unittest.TestCase):
                             ("bytes of a sentence", "kSentenceBytesMax"),
                             ("bytes of KICK's reason, LOG_LEVEL's level and the words of other answers", "kRemarkBytesMax"),
                             ("bytes of a message in fragments", "kMessageBytesMax"),
-                            ("groups in between in a SERVICE_MOVED (key 12)", "kGroupsBetweenMax")):
+                            ("groups in between in a SERVICE_MOVED (key 12)", "kGroupsBetweenMax"),
+                            ("REASSIGNs of a node from one WELCOME without `resumed` to the next", "kFormerNodesMax")):
             self.assertEqual(said.pop(words), str(constant(name)), words)
         self.assertEqual(list(said), ["what"], "of which the source is not named here")
 
