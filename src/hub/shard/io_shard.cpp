@@ -223,6 +223,7 @@ void IoShard::read_waiting() {
 void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }
 
 void IoShard::finish_turn() {
+  state_.egress.starts.forget();
   state_.counters.turns.add(1);
   state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
   state_.counters.pinned_bytes.store(state_.pool.pinned_bytes());

@@ -5,15 +5,14 @@
 #include <cstring>
 #include <utility>
 
-#include "hub/data/egress/frame_lengths.hpp"
-
 namespace gimnet::hub {
 
-void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason,
-                    std::uint32_t shortest_bytes) {
+void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason) {
   tally_.drop(reason, frames);
   if (!wants_report(proto::load_header(first))) return;
-  remember(last_frame(first, size, frames, shortest_bytes), frames, reason);
+  const std::byte* last = first;
+  for (const std::byte* next = first; next < first + size; next += proto::load_header(next).frame_size()) last = next;
+  remember(last, frames, reason);
 }
 
 void DropBook::drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason) {

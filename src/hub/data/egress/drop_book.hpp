@@ -21,15 +21,19 @@ class DropBook {
       : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
   /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one header but for the
-  /// length. None is shorter than `shortest_bytes`: with frames that are equally long it takes no longer than with one.
-  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason,
-            std::uint32_t shortest_bytes = proto::kHeaderSize);
+  /// length. Where a REPORT is wanted all are looked at; who knows the last one calls drop_start() with that.
+  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
 
   /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT shows need be there.
   void drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
 
   /// The same for frames with any headers.
   void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);
+
+  /// Of a frame that is dropped its sender is told.
+  [[nodiscard]] static bool wants_report(const proto::FrameHeader& header) {
+    return header.has(proto::kFlagReport) && header.kind != proto::Kind::report;
+  }
 
   /// True while reports wait for their time, or senders are to be forgotten: flush() has something to do.
   [[nodiscard]] bool pending() const { return !notes_.empty(); }
@@ -70,9 +74,6 @@ class DropBook {
     std::byte following[proto::kReportFollowingMax];
   };
 
-  [[nodiscard]] static bool wants_report(const proto::FrameHeader& header) {
-    return header.has(proto::kFlagReport) && header.kind != proto::Kind::report;
-  }
   void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
   /// Found by a table, since who drops much has many notes.
   [[nodiscard]] Note* find(NodeId sender, proto::DropReason reason);

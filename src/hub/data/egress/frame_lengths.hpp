@@ -3,19 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "hub/data/egress/frame_starts.hpp"
 #include "hub/data/egress/run.hpp"
 
-// How many frames at the front of a run come to so many bytes: without looking at them where all are equally long, so
-// that a long run to many full queues costs each of them as much as a short one. No frame of the run is shorter than
-// `shortest_bytes`, header included; a header's size holds for all runs. Thread safety: pure functions.
+// How many frames at the front of a run come to so many bytes: without looking at them where all are equally long, and
+// else by `starts`, so that a long run to many full queues costs each of them about as much as a short one. No frame of
+// the run is shorter than `shortest_bytes`, header included; a header's size holds for all runs. Thread safety: one
+// shard.
 
 namespace gimnet::hub {
-
-/// The first frames of a run.
-struct Leading {
-  std::uint32_t frames = 0;
-  std::uint32_t size = 0;
-};
 
 [[nodiscard]] inline bool equally_long(std::uint32_t size, std::uint32_t frames, std::uint32_t shortest_bytes) {
   return std::uint64_t{shortest_bytes} * frames == size;
@@ -35,23 +31,28 @@ template <class Takes>
 }
 
 /// As few as come to `bytes` or more; all if they do not.
-[[nodiscard]] inline Leading leading_from(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+[[nodiscard]] inline Leading leading_from(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes,
+                                          FrameStarts& starts) {
   if (run.size <= bytes) return {run.frames, run.size};
   if (equally_long(run.size, run.frames, shortest_bytes)) {
     const auto frames = static_cast<std::uint32_t>((bytes + shortest_bytes - 1) / shortest_bytes);
     return {frames, frames * shortest_bytes};
   }
+  if (shortest_bytes >= bytes) return {1, static_cast<std::uint32_t>(run.header().frame_size())};
+  if (const auto* known = starts.find(run)) return known->leading_from(run, bytes);
   return leading_frames(run, [&](const Leading& before, std::uint32_t) { return before.size < bytes; });
 }
 
 /// As many as come to `bytes` or less.
-[[nodiscard]] inline Leading leading_within(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
+[[nodiscard]] inline Leading leading_within(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes,
+                                            FrameStarts& starts) {
   if (run.size <= bytes) return {run.frames, run.size};
   if (shortest_bytes > bytes) return {};
   if (equally_long(run.size, run.frames, shortest_bytes)) {
     const auto frames = static_cast<std::uint32_t>(bytes / shortest_bytes);
     return {frames, frames * shortest_bytes};
   }
+  if (const auto* known = starts.find(run)) return known->leading_within(run, bytes);
   return leading_frames(run, [&](const Leading& before, std::uint32_t next) { return before.size + next <= bytes; });
 }
 
@@ -68,19 +69,19 @@ template <class Takes>
   return leading_frames(run, [&](const Leading&, std::uint32_t next) { return next > bytes; });
 }
 
-/// The last of so many frames, one behind the other. REQUIRES: there is one.
-[[nodiscard]] inline const std::byte* last_frame(const std::byte* first, std::uint32_t size, std::uint32_t frames,
-                                                 std::uint32_t shortest_bytes) {
-  const std::byte* const end = first + size;
-  if (equally_long(size, frames, shortest_bytes)) return end - shortest_bytes;
-  const std::byte* last = first;
-  for (const std::byte* next = first; next != end; next += proto::load_header(next).frame_size()) last = next;
+/// The last frame. REQUIRES: there is one.
+[[nodiscard]] inline const std::byte* last_frame(const Run& run, std::uint32_t shortest_bytes, FrameStarts& starts) {
+  const std::byte* const end = run.bytes + run.size;
+  if (equally_long(run.size, run.frames, shortest_bytes)) return end - shortest_bytes;
+  if (const auto* known = starts.find(run)) return known->last(run);
+  const std::byte* last = run.bytes;
+  for (const std::byte* next = last; next != end; next += proto::load_header(next).frame_size()) last = next;
   return last;
 }
 
 /// All but the last one. REQUIRES: there is one.
-[[nodiscard]] inline Leading all_but_last(const Run& run, std::uint32_t shortest_bytes) {
-  const std::byte* const last = last_frame(run.bytes, run.size, run.frames, shortest_bytes);
+[[nodiscard]] inline Leading all_but_last(const Run& run, std::uint32_t shortest_bytes, FrameStarts& starts) {
+  const std::byte* const last = last_frame(run, shortest_bytes, starts);
   return {run.frames - 1, static_cast<std::uint32_t>(last - run.bytes)};
 }
 

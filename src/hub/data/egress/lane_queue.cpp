@@ -152,7 +152,7 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   return true;
 }
 
-bool LaneQueue::drop_oldest(std::uint64_t bytes, Entry& dropped) {
+bool LaneQueue::drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped) {
   oldest_hint_ = std::max(oldest_hint_, entries_.first_number());
   for (; oldest_hint_ != entries_.end_number(); ++oldest_hint_) {
     Entry& entry = entries_.at(oldest_hint_);
@@ -160,7 +160,7 @@ bool LaneQueue::drop_oldest(std::uint64_t bytes, Entry& dropped) {
     discount(entry);
     // Of a message in fragments all go.
     const Leading whole{entry.frames, entry.size};
-    dropped = entry.take_front(entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes));
+    dropped = entry.take_front(entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
     count(entry);
     skip_dead();
     return true;

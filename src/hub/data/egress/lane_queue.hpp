@@ -67,7 +67,7 @@ class LaneQueue {
 
   /// Takes out the oldest entry that may be dropped for room; of a run as many frames as come to `bytes`, if it has
   /// those. Returns false if there is none. REQUIRES: bytes is not 0.
-  [[nodiscard]] bool drop_oldest(std::uint64_t bytes, Entry& dropped);
+  [[nodiscard]] bool drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped);
 
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
   [[nodiscard]] Entry& front();

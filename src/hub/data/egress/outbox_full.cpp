@@ -105,9 +105,10 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
 void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
   while (entry.frames != 0) {
-    Leading fitting = leading_within(entry.run, entry.shortest_bytes, room(lane_index, context.limits));
+    Leading fitting = leading_within(entry.run, entry.shortest_bytes, room(lane_index, context.limits), context.starts);
     // Besides what is being written one message may wait, however large it is.
-    if (fitting.frames == 0 && !lane.holds_whole()) fitting = leading_from(entry.run, entry.shortest_bytes, 1);
+    if (fitting.frames == 0 && !lane.holds_whole())
+      fitting = leading_from(entry.run, entry.shortest_bytes, 1, context.starts);
     if (fitting.frames != 0) lane.push(entry.take_front(fitting));
     if (entry.frames == 0) return;
     // Behind those that do not fit there may be shorter ones.
@@ -122,13 +123,15 @@ void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& co
   LaneQueue& lane = lanes_->queues[lane_index];
   const std::uint64_t limit = context.limits.lane_bytes(lane_index);
   Entry older;
-  while (!fits(lane_index, entry.size, context.limits) && lane.drop_oldest(lane.bytes() + entry.size - limit, older)) {
+  while (!fits(lane_index, entry.size, context.limits) &&
+         lane.drop_oldest(lane.bytes() + entry.size - limit, context.starts, older)) {
     lose(older, proto::DropReason::queue_full, context);
   }
   if (const std::uint64_t left = room(lane_index, context.limits); entry.size > left) {
-    Leading lost = leading_from(entry.run, entry.shortest_bytes, entry.size - left);
+    Leading lost = leading_from(entry.run, entry.shortest_bytes, entry.size - left, context.starts);
     // Besides what is being written the newest message may wait, however large it is.
-    if (lost.frames == entry.frames && !lane.holds_whole()) lost = all_but_last(entry.run, entry.shortest_bytes);
+    if (lost.frames == entry.frames && !lane.holds_whole())
+      lost = all_but_last(entry.run, entry.shortest_bytes, context.starts);
     older = entry.take_front(lost);
     lose(older, proto::DropReason::queue_full, context);
   }
@@ -143,7 +146,7 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
   context.tally.queued -= entry.frames;
   do {
     if (entry.run.frames == 0) continue;
-    context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, reason, entry.shortest_bytes);
+    context.drop(entry.run, entry.shortest_bytes, reason);
   } while (entry.next_piece());
   entry.size = entry.frames = 0;
 }

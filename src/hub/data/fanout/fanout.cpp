@@ -50,7 +50,7 @@ void Fanout::lose(const Recipient& recipient, const Run& run, const proto::Frame
                   proto::DropReason reason) {
   recipient.outbox.tell_lost(run, header);
   recipient.outbox.count_dropped(run.frames);
-  context_.drops.drop(run.bytes, run.size, run.frames, reason, handover.shortest_bytes);
+  context_.drop(run, handover.shortest_bytes, reason);
 }
 
 void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {

@@ -22,6 +22,7 @@ class LaneQueueTest : public ::testing::Test {
     return made;
   }
   EgressRig rig;
+  FrameStarts starts;
   LaneQueue lane;
 };
 
@@ -51,11 +52,11 @@ TEST_F(LaneQueueTest, DropsTheOldestFrameOfARunFirst) {
   lane.push(entry("three"));
   Entry dropped;
   for (const std::uint32_t expected : {3u, 3u, 5u}) {
-    ASSERT_TRUE(lane.drop_oldest(1, dropped));
+    ASSERT_TRUE(lane.drop_oldest(1, starts, dropped));
     EXPECT_EQ(dropped.size, proto::kHeaderSize + expected);
     EXPECT_EQ(dropped.frames, 1u);
   }
-  EXPECT_FALSE(lane.drop_oldest(1, dropped)) << "only BLOCK is left";
+  EXPECT_FALSE(lane.drop_oldest(1, starts, dropped)) << "only BLOCK is left";
   EXPECT_EQ(lane.bytes(), proto::kHeaderSize + 5);
   EXPECT_EQ(lane.front().block, true);
 }
@@ -74,13 +75,13 @@ TEST_F(LaneQueueTest, DropsAsManyFramesOfARunAsItTakes) {
   push({"", "12345678"}, 16);
   ASSERT_EQ(lane.entries().size(), 1u);
   Entry dropped;
-  ASSERT_TRUE(lane.drop_oldest(41, dropped));
+  ASSERT_TRUE(lane.drop_oldest(41, starts, dropped));
   EXPECT_EQ(dropped.frames, 3u);
   EXPECT_EQ(dropped.size, 20u + 20u + 16u);
   EXPECT_EQ(lane.bytes(), 24u);
-  ASSERT_TRUE(lane.drop_oldest(1'000, dropped));
+  ASSERT_TRUE(lane.drop_oldest(1'000, starts, dropped));
   EXPECT_EQ(dropped.frames, 1u);
-  EXPECT_FALSE(lane.drop_oldest(1, dropped));
+  EXPECT_FALSE(lane.drop_oldest(1, starts, dropped));
   EXPECT_TRUE(lane.empty());
 }
 

@@ -55,7 +55,7 @@ TEST_F(OpenRunTest, AppendedFramesMayHaveAnyLength) {
   EXPECT_TRUE(offer({""}, to_group));
   EXPECT_TRUE(offer({"12345678"}, to_group));
   Entry dropped;
-  ASSERT_TRUE(connection.outbox.lane(1).drop_oldest(21, dropped));
+  ASSERT_TRUE(connection.outbox.lane(1).drop_oldest(21, rig.context.starts, dropped));
   EXPECT_EQ(dropped.size, 20u + 16u);
   connection.outbox.lose(dropped, proto::DropReason::queue_full, rig.context);
   EXPECT_THAT(flush_and_take(), ElementsAre("12345678"));
