@@ -327,7 +327,8 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
       former = std::exchange(found->second.group, group);
       const bool ended = found->second.ended;
       const bool was_refused = std::exchange(found->second.refused, !answer);
-      changed = (former != group || (!answer && !was_refused)) && !ended;
+      // Also that the hub takes it again while nobody provides it: a program that was told of the refusal has to know.
+      changed = (former != group || was_refused == answer.has_value()) && !ended;
       // What the program asked for in between may never have left.
       if (ended) subscriptions_due_.push_back(full_name);
       // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to another one.

@@ -29,6 +29,9 @@ namespace ns = proto::ns;
 constexpr std::uint32_t kFirst = (7u << 20) | 11;
 constexpr std::uint32_t kSecond = (7u << 20) | 12;
 
+/// In the place of a group: the hub does not take the subscription.
+constexpr std::uint32_t kRefused = ~std::uint32_t{0};
+
 using Groups = std::map<std::string, std::uint32_t>;
 
 /// The parameter: the service of which the hub tells first.
@@ -118,6 +121,9 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     return proto::encode_refusal({ns::Advertise::kOperation, number}, {proto::Status::limit, "no more"});
   }
   static proto::Payload answer_to(const ns::Subscribe& /*request*/, std::uint32_t group, std::uint16_t number) {
+    if (group == kRefused) {
+      return proto::encode_refusal({ns::Subscribe::kOperation, number}, {proto::Status::limit, "no more"});
+    }
     ns::SubscribeAnswer answer;
     answer.group = GroupId{group};
     return proto::encode_answer(answer, number);
@@ -266,6 +272,22 @@ TEST_P(MovedSubscriptions, GetTheirOwnMessages) {
     expect_received(odometry, kFirst);
     expect_received(map, kSecond);
   }
+  close_node();
+}
+
+TEST_P(MovedSubscriptions, StandAgainWhereTheHubTakesThemWithOrWithoutAProvider) {
+  const Subscription odometry = subscribe("robot/odom", kFirst);
+  const Subscription map = subscribe("robot/map", 0);
+  come_back<ns::Subscribe>({{"robot/odom", kRefused}, {"robot/map", kRefused}});
+  for (const Subscription& refused : {odometry, map}) {
+    const auto stands = refused.standing();
+    ASSERT_TRUE(stands.is(Status::limit));
+    EXPECT_NE(stands.failure().sentence.find("no more"), std::string::npos);
+  }
+  come_back<ns::Subscribe>({{"robot/odom", kSecond}, {"robot/map", 0}});
+  EXPECT_TRUE(odometry.standing());
+  EXPECT_TRUE(map.standing());
+  expect_received(odometry, kSecond);
   close_node();
 }
 
