@@ -280,7 +280,8 @@ class Node {
   /// Lists the service `own name/name`, to which others send, until the node is closed. Errors: as advertise().
   Outcome<Queue> accept(std::string_view name, const AcceptOptions& options = {},
                         Timeout timeout = Timeout{5000}) const;
-  /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name is the same one.
+  /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name is the same one;
+  /// where the hub did not take that again after a break, it is asked once more.
   /// Errors: bad_name, limit, denied, timeout, not_connected, not_found (it is there and accepts data: send to it).
   Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
                                   Timeout timeout = Timeout{5000}, const PaceOptions& pace = {}) const;

@@ -145,8 +145,14 @@ nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
   const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
   const nif_status status = nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
-  const MutexLock lock(mutex_);
-  set_place(service, {found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS});
+  const ServicePlace place{found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS};
+  const bool was_refused = service->is_refused();
+  {
+    const MutexLock lock(mutex_);
+    set_place(service, place);
+  }
+  // The hub tells of no move to who did not subscribe.
+  if (was_refused) on_moved_(service->name(), place);
   return NIF_OK;
 }
 
@@ -160,15 +166,20 @@ Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& ful
     service = entry(full_name, options);
     service->read = true;
   }
-  inbox_.set(service->queue(), options);
-  if (service->handles == 0) {
-    const nif_status status = ask(service, pace, nif_timeout(timeout));
+  const bool first = service->handles == 0;
+  if (first) {
+    service->pace = pace;
+    inbox_.set(service->queue(), options);
+  }
+  if (first || service->is_refused()) {
+    const nif_status status = ask(service, service->pace, nif_timeout(timeout));
     if (status != NIF_OK) {
       auto failure = failure_of(status, "subscribe " + full_name);
-      give_up(service);
+      if (first) give_up(service);
       return failure;
     }
   }
+  if (!first) inbox_.set(service->queue(), options);
   ++service->handles;
   // It may have been subscribed before, to know where it is or when it was another one.
   if (!service->accepts()) return service;
@@ -235,8 +246,9 @@ Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout 
     const MutexLock lock(mutex_);
     service = entry(full_name, {1, AtFullQueue::overwrite_oldest});
   }
-  if (service->handles == 0 && !service->followed) {
-    const nif_status status = ask(service, {}, nif_timeout(timeout));
+  const bool read = service->handles != 0;
+  if ((!read && !service->followed) || service->is_refused()) {
+    const nif_status status = ask(service, read ? service->pace : PaceOptions{}, nif_timeout(timeout));
     if (status != NIF_OK) {
       auto failure = failure_of(status, "send to " + full_name);
       forget_unused(service);

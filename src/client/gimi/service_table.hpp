@@ -24,7 +24,8 @@ namespace gimnet::gimi {
 /// once stays in the table until the node is closed; a subscription goes with its last handle.
 class ServiceTable {
  public:
-  /// `on_moved` is called without a lock, from the library's thread, for each service that is somewhere else now.
+  /// `on_moved` is called without a lock of this table but the asking one, for each service that is somewhere else now:
+  /// from the library's thread, or from a program's whose question the hub answered so.
   using OnMoved = std::function<void(const std::string& full_name, const ServicePlace& place)>;
   ServiceTable(Uplink& uplink, Inbox& inbox, OnMoved on_moved)
       : uplink_(uplink), inbox_(inbox), on_moved_(std::move(on_moved)) {}

@@ -44,6 +44,11 @@ Outcome<void> SubscribedService::standing() {
                      ": the hub did not take the subscription again, after a break: " + refusal_->sentence};
 }
 
+bool SubscribedService::is_refused() {
+  const MutexLock lock(mutex_);
+  return refusal_.has_value();
+}
+
 bool SubscribedService::is_repeated(std::uint32_t from, std::uint32_t sequence) {
   const MutexLock lock(mutex_);
   return from == provider_ && sequence == sequence_ && sequence != 0;

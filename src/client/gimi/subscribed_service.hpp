@@ -12,6 +12,7 @@
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "client/gimi/send_stream.hpp"
+#include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
 namespace gimnet::gimi {
@@ -37,6 +38,8 @@ class SubscribedService {
   [[nodiscard]] Outcome<void> wait_until_exists(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t missed() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
+  /// The hub did not take the subscription again, and was not asked since.
+  [[nodiscard]] bool is_refused() GIMNET_EXCLUDES(mutex_);
 
   /// The message that came last from that provider comes once more.
   [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
@@ -49,6 +52,8 @@ class SubscribedService {
 
   /// Handles of the program that read it; guarded by the table's asking mutex.
   std::size_t handles = 0;
+  /// What those asked the hub for; guarded by the table's asking mutex.
+  PaceOptions pace;
   /// A stream of this node leads there; guarded by the table's asking mutex.
   bool followed = false;
   /// What comes is for a queue of the program; guarded by the table's mutex.
