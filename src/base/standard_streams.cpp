@@ -1,12 +1,12 @@
 #include "base/standard_streams.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <string_view>
 
 namespace gimnet {
 
@@ -24,16 +24,24 @@ void have_failed_writes_told() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-std::string write_standard_output(const std::string& text) {
-  for (std::string_view rest = text; !rest.empty();) {
-    const ssize_t count = ::write(STDOUT_FILENO, rest.data(), rest.size());
+int write_all(int descriptor, std::string_view text, WhenFull when_full) {
+  while (!text.empty()) {
+    const ssize_t count = ::write(descriptor, text.data(), text.size());
     if (count >= 0) {
-      rest.remove_prefix(static_cast<std::size_t>(count));
+      text.remove_prefix(static_cast<std::size_t>(count));
+    } else if (errno == EAGAIN && when_full == WhenFull::wait) {
+      pollfd room{descriptor, POLLOUT, 0};
+      if (::poll(&room, 1, -1) < 0 && errno != EINTR) return errno;
     } else if (errno != EINTR) {
-      return errno == EPIPE ? "" : std::strerror(errno);
+      return errno;
     }
   }
-  return {};
+  return 0;
+}
+
+std::string write_standard_output(std::string_view text, WhenFull when_full) {
+  const int error = write_all(STDOUT_FILENO, text, when_full);
+  return error == 0 || error == EPIPE ? "" : std::strerror(error);
 }
 
 }  // namespace gimnet

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace gimnet {
 
@@ -14,8 +16,15 @@ void hold_standard_descriptors();
 /// nobody reads with EPIPE, instead of ending the process without a word. In main(), before threads.
 void have_failed_writes_told();
 
+/// What becomes of a text for which a non-blocking stream has no room now. Others always wait: who started the process
+/// says which it is, often without knowing, as a pipe or terminal that it shares with another process.
+enum class WhenFull : std::uint8_t { wait, fail };
+
+/// Writes all of `text`. 0: done; else the errno (EAGAIN: there was no room; a part may have been written).
+[[nodiscard]] int write_all(int descriptor, std::string_view text, WhenFull when_full = WhenFull::wait);
+
 /// Writes all of `text` to standard output at once. Empty: done, or the reader went away, which is no failure (EPIPE);
 /// else why it could not be written.
-[[nodiscard]] std::string write_standard_output(const std::string& text);
+[[nodiscard]] std::string write_standard_output(std::string_view text, WhenFull when_full = WhenFull::wait);
 
 }  // namespace gimnet

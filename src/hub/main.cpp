@@ -45,7 +45,9 @@ int run(const hub::CommandLine& line) {
     std::fprintf(stderr, "tcphub: %s\n", hub.error().sentence.c_str());
     return 1;
   }
-  if (const std::string why = write_standard_output("ready " + (*hub)->addresses() + "\n"); !why.empty()) {
+  // Nodes do not wait for somebody who reads this.
+  const std::string ready = "ready " + (*hub)->addresses() + "\n";
+  if (const std::string why = write_standard_output(ready, WhenFull::fail); !why.empty()) {
     log_warning("the ready line cannot be written to standard output: " + why);
   }
   (*hub)->run();

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 namespace gimnet {
 namespace {
@@ -59,6 +61,32 @@ int write_to_a_reader_that_left() {
   return write_standard_output("unread").empty() ? kGood : 2;
 }
 
+/// More than fits into the pipe, which is read only when it is full.
+int write_to_a_full_pipe_that_does_not_block(WhenFull when_full) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO) return 1;
+  if (::fcntl(STDOUT_FILENO, F_SETFL, O_NONBLOCK) != 0) return 2;
+  ::close(pipe[1]);
+  const int room = ::fcntl(pipe[0], F_SETPIPE_SZ, 4096);
+  const std::string text(1'000'000, 'x');
+  if (when_full == WhenFull::fail) {
+    return write_standard_output(text, when_full) == "Resource temporarily unavailable" ? kGood : 3;
+  }
+  std::size_t got = 0;
+  std::thread reader([&] {
+    for (int waiting = 0; waiting < room;) static_cast<void>(::ioctl(pipe[0], FIONREAD, &waiting));
+    std::array<char, 4096> bytes{};
+    for (ssize_t count = 0; (count = ::read(pipe[0], bytes.data(), bytes.size())) > 0;) {
+      got += static_cast<std::size_t>(count);
+    }
+  });
+  const std::string why = write_standard_output(text, when_full);
+  ::close(STDOUT_FILENO);
+  reader.join();
+  if (!why.empty()) return 4;
+  return got == text.size() ? kGood : 5;
+}
+
 TEST(StandardStreams, MissingOnesAreHeldAndRefuseUse) {
   EXPECT_EXIT(::_exit(hold_those_that_are_missing()), testing::ExitedWithCode(kGood), "");
 }
@@ -75,6 +103,14 @@ TEST(StandardStreams, AWriteBeyondTheLimitOfFilesIsToldInsteadOfEndingTheProcess
 
 TEST(StandardStreams, AReaderThatLeftIsNoFailure) {
   EXPECT_EXIT(::_exit(write_to_a_reader_that_left()), testing::ExitedWithCode(kGood), "");
+}
+
+TEST(StandardStreams, OneThatDoesNotBlockIsWaitedFor) {
+  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::wait)), testing::ExitedWithCode(kGood), "");
+}
+
+TEST(StandardStreams, OneThatDoesNotBlockIsNotWaitedForWhereNobodyWants) {
+  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::fail)), testing::ExitedWithCode(kGood), "");
 }
 
 TEST(StandardStreams, AFullDiskIsTold) {

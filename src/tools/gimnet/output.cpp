@@ -1,10 +1,10 @@
 #include "tools/gimnet/output.hpp"
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+
+#include "base/standard_streams.hpp"
 
 namespace gimnet::tool {
 namespace {
@@ -35,14 +35,7 @@ bool Output::finish() {
 }
 
 void Output::write_all(std::string_view text) {
-  while (!text.empty() && ok()) {
-    const ssize_t count = ::write(descriptor_, text.data(), text.size());
-    if (count >= 0) {
-      text.remove_prefix(static_cast<std::size_t>(count));
-    } else if (errno != EINTR) {
-      error_ = errno;
-    }
-  }
+  if (ok()) error_ = gimnet::write_all(descriptor_, text);
 }
 
 }  // namespace gimnet::tool

@@ -1,6 +1,8 @@
 #include "tools/gimnet/output.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <array>
@@ -46,6 +48,30 @@ TEST(Output, KeepsTheOrderOfSmallAndLarge) {
   reader.join();
   ::close(ends[0]);
   EXPECT_EQ(got, "begin" + large + "end");
+}
+
+TEST(Output, WaitsForAPipeThatIsFullAndDoesNotBlock) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe2(ends.data(), O_NONBLOCK), 0);
+  const int room = ::fcntl(ends[1], F_SETPIPE_SZ, 4096);
+  const std::string large(1'000'000, 'x');
+  std::size_t got = 0;
+  std::thread reader([&] {
+    for (int waiting = 0; waiting < room;) static_cast<void>(::ioctl(ends[0], FIONREAD, &waiting));
+    std::array<char, 4096> bytes{};
+    for (ssize_t count = -1; count != 0;) {
+      count = ::read(ends[0], bytes.data(), bytes.size());
+      if (count > 0) got += static_cast<std::size_t>(count);
+    }
+  });
+  Output output(ends[1]);
+  output.write(large);
+  output.flush();
+  EXPECT_TRUE(output.ok());
+  ::close(ends[1]);
+  reader.join();
+  ::close(ends[0]);
+  EXPECT_EQ(got, large.size());
 }
 
 TEST(Output, SaysThatNobodyReads) {
