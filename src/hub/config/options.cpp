@@ -133,6 +133,17 @@ std::string wrong_word(const CLI::App& app, std::span<const char* const> words) 
   });
 }
 
+/// Why a word that CLI11 left over cannot be, or "". It leaves over the end of the options, too.
+std::string leftover_fault(std::vector<std::string> words) {
+  const auto end = std::ranges::find(words, "--");
+  const bool behind_end = end == words.begin();
+  if (end != words.end()) words.erase(end);
+  if (words.empty()) return {};
+  const std::string word = behind_end ? words.front() : words.front().substr(0, words.front().find('='));
+  return "there is no argument '" + escaped(word, kQuotedMax) + "'" +
+         (behind_end ? " behind --" : did_you_mean(word, kOptionNames)) + " (tcphub --help shows all)";
+}
+
 Given flag(const std::string& key, const std::string& label, std::string text) {
   Given given;
   given.key = key;
@@ -227,11 +238,7 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
     return wrong(syntax_error(app, error));
   }
   if (raw.help) return CommandLineEnding{0, app.help()};
-  if (const std::vector<std::string> extras = app.remaining(); !extras.empty()) {
-    const std::string word = extras.front().substr(0, extras.front().find('='));
-    return wrong("there is no argument '" + escaped(word, kQuotedMax) + "'" + did_you_mean(word, kOptionNames) +
-                 " (tcphub --help shows all)");
-  }
+  if (const std::string fault = leftover_fault(app.remaining()); !fault.empty()) return wrong(fault);
   if (raw.version) return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};
   if (raw.help_limits) return CommandLineEnding{0, help_limits()};
   CommandLine line;

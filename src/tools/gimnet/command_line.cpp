@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,9 @@
 
 namespace gimnet::tool {
 namespace {
+
+/// What follows is no option, whatever it begins with: the names of nodes may begin so.
+constexpr std::string_view kEndOfOptions = "--";
 
 /// What the words call: a command and, of `ctl`, an action. "" where it is missing.
 struct Called {
@@ -88,7 +92,7 @@ std::string_view stranger_before(std::string_view command, std::span<const char*
   for (const char* const argument : arguments) {
     if (argument == command.data()) break;
     const std::string_view word = argument;
-    if (!word.starts_with('-')) continue;
+    if (!word.starts_with('-') || word == kEndOfOptions) continue;
     if (app.get_option_no_throw(std::string(word.substr(0, word.find('=')))) == nullptr) return word;
   }
   return {};
@@ -179,9 +183,26 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, const Called& ca
   return all;
 }
 
+/// The first word that CLI11 left over, and whether it stands behind the end of options, which it leaves over, too.
+struct LeftOver {
+  std::string word;
+  bool behind_end = false;
+};
+std::optional<LeftOver> left_over(std::vector<std::string> extras, std::span<const char* const> arguments) {
+  const auto end = std::ranges::find(arguments, kEndOfOptions, [](const char* word) { return std::string_view(word); });
+  if (end != arguments.end()) {
+    const auto mark = std::ranges::find(extras, kEndOfOptions);
+    if (mark != extras.end()) extras.erase(mark);
+  }
+  if (extras.empty()) return std::nullopt;
+  const bool before = std::find(arguments.begin(), end, extras.front()) != end;
+  return LeftOver{extras.front(), !before};
+}
+
 /// A word that nothing takes.
-std::string unexpected(const std::string& word, const std::vector<const CLI::Option*>& options, const Called& called) {
-  if (!word.starts_with('-')) {
+std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option*>& options, const Called& called) {
+  const std::string& word = left.word;
+  if (left.behind_end || !word.starts_with('-')) {
     const bool reads_lines = called.command == "send" || called.command == "pub";
     const std::string advice = called.command == "recv" ? "; did you mean --name " + word + "?"
                                : reads_lines            ? ": messages are lines of its standard input"
@@ -242,7 +263,7 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   if (!called.command.empty() && known == kCommands.end()) {
     const std::string_view stranger = stranger_before(called.command, arguments, app);
     if (stranger.empty()) return unknown_command(called.command);
-    return wrong(unexpected(std::string(stranger), options_of(app, {}), {}), {});
+    return wrong(unexpected({std::string(stranger)}, options_of(app, {}), {}), {});
   }
   const bool acts = std::ranges::find(kCtlActions, called.action) != kCtlActions.end();
   if (!called.action.empty() && !acts) return unknown_action(called.action);
@@ -257,8 +278,8 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   } catch (const CLI::ParseError& error) {
     sentence = explained(error, options_of(app, called));
   }
-  if (const auto extras = app.remaining(true); !extras.empty()) {
-    return wrong(unexpected(extras.front(), options_of(app, called), called), called);
+  if (const auto left = left_over(app.remaining(true), arguments)) {
+    return wrong(unexpected(*left, options_of(app, called), called), called);
   }
   if (called.command == "ctl" && !acts) return missing_action();
   if (!sentence.empty()) return wrong(sentence, called);

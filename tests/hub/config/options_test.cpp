@@ -110,6 +110,13 @@ TEST(Options, ErrorsSayWhatWasMeant) {
   EXPECT_THAT(error({"--listen", "tcp://127.0.0.1:1", "--listen", "tcp://127.0.0.1:1"}), HasSubstr("twice"));
 }
 
+TEST(Options, WhatFollowsTwoDashesIsNoOption) {
+  EXPECT_TRUE(options({"--spin", "--"}).spin);
+  EXPECT_EQ(error({"--", "--spin"}), "tcphub: there is no argument '--spin' behind -- (tcphub --help shows all)\n");
+  EXPECT_EQ(error({"--", "--"}), "tcphub: there is no argument '--' behind -- (tcphub --help shows all)\n");
+  EXPECT_THAT(error({"spni", "--"}), HasSubstr("there is no argument 'spni'"));
+}
+
 TEST(Options, SaysWhatAnOptionTakes) {
   EXPECT_EQ(error({"--shards"}),
             "tcphub: --shards needs a value: threads that carry data, 1 to 16; tcphub --help shows what there is\n");

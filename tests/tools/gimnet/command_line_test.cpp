@@ -144,6 +144,27 @@ TEST(CommandLine, NodesMayBeCalledAsCommandsAre) {
   EXPECT_EQ(options({"ctl", "kick", "drain"}).ctl.action, CtlAction::kick);
 }
 
+TEST(CommandLine, WhatFollowsTwoDashesIsNoOption) {
+  EXPECT_EQ(options({"ping", "-c2", "--", "-robot"}).target, "-robot");
+  EXPECT_EQ(options({"ping", "-c2", "--", "-robot"}).pings, 2u);
+  EXPECT_EQ(options({"--json", "send", "--lane", "bulk", "--", "--odd"}).target, "--odd");
+  EXPECT_EQ(options({"nodes", "--", "--all"}).target, "--all");
+  EXPECT_FALSE(options({"nodes", "--", "--all"}).all);
+  EXPECT_EQ(options({"pub", "--", "-robot/odom"}).target, "-robot/odom");
+  EXPECT_EQ(options({"echo", "--", "--/odom"}).target, "--/odom");
+  EXPECT_EQ(options({"ping", "--", "--"}).target, "--");
+  EXPECT_EQ(options({"ctl", "kick", "--", "-robot"}).ctl.node, "-robot");
+  EXPECT_EQ(options({"--", "ping", "B"}).target, "B");
+  EXPECT_EQ(options({"ping", "B", "--"}).target, "B");
+  EXPECT_EQ(options({"recv", "--name", "B", "--"}).name, "B");
+  EXPECT_NE(refusal({"ping", "--"}).find("node is missing"), std::string::npos);
+  EXPECT_NE(refusal({"ping", "--", "-robot", "-c2"}).find("'-c2' is one word too many for gimnet ping"),
+            std::string::npos);
+  EXPECT_NE(refusal({"ping", "-robot", "--", "B"}).find("there is no option -robot for gimnet ping"),
+            std::string::npos);
+  EXPECT_NE(refusal({"--", "statsu"}).find("there is no command 'statsu'; did you mean status?"), std::string::npos);
+}
+
 TEST(CommandLine, ASecondCommandIsOneWordTooMany) {
   EXPECT_NE(refusal({"ping", "B", "status", "-c", "1"}).find("'status' is one word too many for gimnet ping"),
             std::string::npos);
