@@ -30,10 +30,13 @@ std::string wrong_option_word(std::span<const char* const> words, const std::fun
     const Takes what = takes(word.substr(0, equals));
     if (equals == std::string_view::npos) {
       if (what != Takes::value) continue;
-      if (++i == words.size() || !looks_like_option(words[i], takes)) continue;
+      ++i;  // over its value
+      if (i == words.size() || !looks_like_option(words[i], takes)) continue;
       const std::string value = escaped(words[i], kQuotedMax);
-      return std::string(word) + " needs a value, and '" + value + "' looks like an option; if it is meant, write " +
-             std::string(word) + (word.starts_with("--") ? "=" : "") + value;
+      std::string sentence(word);
+      sentence += " needs a value, and '" + value + "' looks like an option; if it is meant, write ";
+      sentence.append(word).append(word.starts_with("--") ? "=" : "");
+      return sentence + value;
     }
     std::string fault = fault_of(std::string(word.substr(0, equals)), word.substr(equals + 1), what);
     if (!fault.empty()) return fault;
