@@ -110,7 +110,6 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
   if (!folder.is_open())
     return Error{"cannot use the folder " + path + " for state: " + open_fault(errno, kOtherFolder)};
   const std::string name = path + "/" + kLock;
-  const bool was_used = ::faccessat(folder.get(), kLock, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   Descriptor lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!lock.is_open()) return Error{"cannot use " + name + ": " + open_fault(errno, kOtherFolder)};
   if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
@@ -124,6 +123,9 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
   // A hub that kept nothing takes the file away: what was opened before then is no file of the folder any more.
   struct stat info{};
   if (::fstat(lock.get(), &info) == 0 && info.st_nlink == 0) return open(path);
+  // Not before it is locked: the file may be of a hub that just takes it away, or that could not lock it. Who had it
+  // wrote its number.
+  const bool was_used = info.st_size > 0 || ::faccessat(folder.get(), kState, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   write_holder(lock.get());
   return std::unique_ptr<StateFolder>(new StateFolder(path, folder.release(), lock.release(), was_used));
 }
@@ -156,7 +158,12 @@ Result<std::optional<HubState>> StateFolder::read() const {
 }
 
 std::string StateFolder::write(const HubState& state) {
-  const auto failed = [this](const char* what) { return write_fault(path_, what, errno); };
+  bool created = false;
+  const auto failed = [&](const char* what) {
+    const int error = errno;
+    if (created) static_cast<void>(::unlinkat(folder_, kFresh, 0));  // nobody needs the part of it
+    return write_fault(path_, what, error);
+  };
   // A file left over by a crash, or a link that somebody put there: never written through.
   if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) {
     const std::string why = errno == EISDIR ? "it is a folder; remove it" : system_text(errno) + kMakeWritable;
@@ -164,9 +171,11 @@ std::string StateFolder::write(const HubState& state) {
   }
   const Descriptor file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!file.is_open()) return failed("create");
+  created = true;
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");
   if (::fsync(file.get()) != 0) return failed("fsync");
   if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");
+  created = false;
   kept_ = true;
   if (::fsync(folder_) != 0) return failed("fsync the folder");
   return {};

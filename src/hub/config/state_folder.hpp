@@ -12,7 +12,8 @@ namespace gimnet::hub {
 
 /// The folder in which one hub keeps its state: a file `state`, and a file `lock` that keeps a second hub out while
 /// this one lives. What stands there is not trusted: it is read within bounds, links are not followed.
-/// A folder that was opened and into which nothing was kept is left as it was found, but for being there.
+/// A folder that no hub used before, that was opened and into which nothing was kept is left empty. Where the lock
+/// cannot be had its file stays: to remove it without holding it could take it from another hub.
 /// Thread safety: none. Ownership: of two descriptors. Errors: sentences that name the file and say what to do.
 class StateFolder {
  public:

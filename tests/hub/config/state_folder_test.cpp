@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -82,6 +84,23 @@ TEST_F(StateFolderTest, AHubThatKeptNothingLeavesNoTrace) {
   EXPECT_TRUE((*again)->read()->has_value());
 }
 
+/// In a process of its own: the limit is for all of it.
+int leave_no_trace_where_no_file_may_grow(const std::string& path) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{.rlim_cur = 0, .rlim_max = 0};
+  if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 1;
+  {
+    const auto folder = StateFolder::open(path);
+    if (!folder) return 2;
+    if ((*folder)->write(some_state()).find("(write): File too large") == std::string::npos) return 3;
+  }
+  return std::filesystem::is_empty(path) ? 0 : 4;
+}
+
+TEST_F(StateFolderTest, APartOfAStateIsNotLeftBehind) {
+  EXPECT_EXIT(::_exit(leave_no_trace_where_no_file_may_grow(path())), testing::ExitedWithCode(0), "");
+}
+
 TEST_F(StateFolderTest, WhereNothingWasKeptTheNextOneIsTheFirst) {
   auto first = StateFolder::open(path());
   ASSERT_TRUE(first);
@@ -92,6 +111,26 @@ TEST_F(StateFolderTest, WhereNothingWasKeptTheNextOneIsTheFirst) {
   EXPECT_FALSE((*second)->was_used());
   EXPECT_FALSE(StateFolder::open(path())) << "it is in use";
   EXPECT_TRUE(std::filesystem::exists(file("lock"))) << "and stays so";
+}
+
+/// It was left by a hub that could not lock it, or is of one that ended between another one's looking and locking.
+TEST_F(StateFolderTest, ALockThatNobodyHadIsNoSignOfAHub) {
+  ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
+  std::ofstream(file("lock")).close();
+  ASSERT_EQ(::chmod(file("lock").c_str(), 0600), 0);
+  const auto folder = StateFolder::open(path());
+  ASSERT_TRUE(folder) << folder.error().sentence;
+  EXPECT_FALSE((*folder)->was_used());
+}
+
+TEST_F(StateFolderTest, ALockOrAStateIsTheSignOfAHub) {
+  for (const char* name : {"lock", "state"}) {
+    keep();
+    ASSERT_EQ(::unlink(file(name).c_str()), 0);
+    const auto folder = StateFolder::open(path());
+    ASSERT_TRUE(folder) << folder.error().sentence;
+    EXPECT_TRUE((*folder)->was_used()) << "without " << name;
+  }
 }
 
 TEST_F(StateFolderTest, ASecondHubIsToldWhoHasIt) {
