@@ -92,16 +92,23 @@ sockaddr_un unix_address(const std::string& path) {
   return address;
 }
 
-/// Who answers on the socket file: a process, "" for nobody.
-std::string unix_owner(const sockaddr_un& address) {
+/// Why the socket file has to stay: somebody answers on it, or may; "" for nobody.
+std::string unix_obstacle(const sockaddr_un& address) {
   const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int failed = ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
-  if (failed != 0 && errno == EACCES) return "a process of another user";
+  // Also of a file that a killed process left behind, and nothing else tells it from that of a live one: /proc/net/unix
+  // lacks those of other network namespaces (containers) and has others under the path that was theirs.
+  if (failed != 0 && errno == EACCES) {
+    return "there is a socket to which this user may not connect, as that of another user; end the process that "
+           "listens "
+           "on it, remove it if none does, or choose another path";
+  }
   if (failed != 0 && errno != EAGAIN) return {};  // EAGAIN: it listens, and its queue is full
   ucred peer{};
   socklen_t size = sizeof peer;
-  if (failed != 0 || ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return "another process";
-  return process_text(peer.pid);
+  const bool known = failed == 0 && ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return "the socket is in use by " + (known ? process_text(peer.pid) : "another process") +
+         "; end that, or choose another path";
 }
 
 /// "" when nothing stands at the path any more, or why it has to stay.
@@ -109,8 +116,7 @@ std::string clear_path(const std::string& path, const sockaddr_un& address) {
   struct stat info{};
   if (::lstat(path.c_str(), &info) != 0) return {};
   if (!S_ISSOCK(info.st_mode)) return "there is a file of that name that is no socket; choose another path";
-  const std::string owner = unix_owner(address);
-  if (!owner.empty()) return "the socket is in use by " + owner + "; end that, or choose another path";
+  if (std::string obstacle = unix_obstacle(address); !obstacle.empty()) return obstacle;
   if (::unlink(path.c_str()) != 0) {
     return "a socket is left over there and cannot be removed: " + system_text(errno) +
            "; remove it as the user whose it is, or choose another path";
@@ -191,8 +197,8 @@ bool Listener::overlaps(const ListenUrl& url) const {
 Listener::~Listener() {
   ::close(descriptor_);
   struct stat info{};
-  const bool still_ours =
-      url_.scheme == ListenUrl::Scheme::unix_socket && ::lstat(url_.path.c_str(), &info) == 0 && info.st_ino == file_;
+  const bool still_ours = url_.scheme == ListenUrl::Scheme::unix_socket && ::lstat(url_.path.c_str(), &info) == 0 &&
+                          info.st_dev == device_ && info.st_ino == file_;
   if (still_ours) ::unlink(url_.path.c_str());
 }
 

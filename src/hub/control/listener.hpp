@@ -16,8 +16,9 @@ namespace gimnet::hub {
 class Listener {
  public:
   /// Binds and listens. A port that a killed process left behind is taken over at once; so is a Unix socket's file that
-  /// nobody answers on. Errors: a sentence that names the address, what stands in the way (where it can be found out,
-  /// the process, or which of this hub's `others`), and what to do.
+  /// nobody answers on, if this user may connect to it: else there may be somebody. Errors: a sentence that names the
+  /// address, what stands in the way (where it can be found out, the process, or which of this hub's `others`), and
+  /// what to do.
   [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const ListenUrl& url,
                                                               std::span<const std::unique_ptr<Listener>> others = {});
 

@@ -112,7 +112,7 @@ TEST(Listener, APlaceThatThisUserMayNotWriteToIsToldWithTheRemedy) {
                                        ": Permission denied; run tcphub as a user that may write to " +
                                        fs::path(folder.path("s")).parent_path().string() + ", or choose another path");
   ASSERT_FALSE(taken);
-  EXPECT_THAT(taken.error().sentence, HasSubstr("in use by a process of another user"));
+  EXPECT_THAT(taken.error().sentence, HasSubstr("end the process that listens on it, remove it if none does"));
 }
 
 TEST(Listener, APortWithALingeringConnectionCanBeBoundAgain) {
@@ -170,6 +170,37 @@ TEST(Listener, ReplacesASocketFileThatNobodyAnswersOn) {
   ::close(dead);  // as after kill -9: the file stays
   ASSERT_TRUE(fs::is_socket(folder.path("s")));
   EXPECT_TRUE(Listener::open(url("unix:" + folder.path("s"))));
+}
+
+/// The file of another user: whether somebody listens on it is not to be found out.
+TEST(Listener, LeavesASocketFileToWhichThisUserMayNotConnect) {
+  const TestFolder folder;
+  const bool root = ::geteuid() == 0;
+  auto live = Listener::open(url("unix:" + folder.path("live")));
+  ASSERT_TRUE(live);
+  auto dead = Listener::open(url("unix:" + folder.path("dead-too")));
+  ASSERT_TRUE(dead);
+  fs::rename(folder.path("dead-too"), folder.path("dead"));  // a listener that ends leaves it alone there
+  *dead = nullptr;
+  for (const char* name : {"live", "dead"}) {
+    ASSERT_EQ(::chmod(folder.path(name).c_str(), root ? 0700 : 0), 0);
+  }
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0777), 0);
+  for (const char* name : {"live", "dead"}) {
+    if (root) {  // who may connect everywhere: it acts for another user
+      ASSERT_EQ(::seteuid(12'345), 0);
+    }
+    const auto taken = Listener::open(url("unix:" + folder.path(name)));
+    if (root) {
+      ASSERT_EQ(::seteuid(0), 0);
+    }
+    ASSERT_FALSE(taken) << name;
+    EXPECT_EQ(taken.error().sentence,
+              "cannot listen on unix:" + folder.path(name) +
+                  ": there is a socket to which this user may not connect, as that of another user; end the process "
+                  "that listens on it, remove it if none does, or choose another path");
+    EXPECT_TRUE(fs::is_socket(folder.path(name)));
+  }
 }
 
 TEST(Listener, DoesNotTakeASocketFileFromALiveHub) {
