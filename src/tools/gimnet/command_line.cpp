@@ -240,8 +240,15 @@ std::string explained(const CLI::ParseError& error, const std::vector<const CLI:
     concerned = option;
     longest = name.size();
   }
+  // One that the help does not show has no name for CLI11, which then begins with what would be behind it.
+  const bool hidden = concerned == nullptr && said.starts_with(':');
+  if (hidden) {
+    const auto found =
+        std::ranges::find_if(options, [](const CLI::Option* option) { return option->get_group().empty(); });
+    if (found != options.end()) concerned = *found;
+  }
   if (concerned == nullptr) return said;
-  const std::string name = concerned->get_name(false, true);
+  const std::string name = hidden ? "--" + concerned->get_lnames().front() : concerned->get_name(false, true);
   const std::string& takes = concerned->get_description();
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return name + " is missing: " + takes;
   const auto given = concerned->results();

@@ -215,6 +215,16 @@ TEST(CommandLine, SaysWhatAnOptionTakes) {
   EXPECT_NE(refusal({"echo", "a/b", "-n", "0"}).find("'0' is no value for -n,--count"), std::string::npos);
 }
 
+TEST(CommandLine, SaysWhatAHiddenOptionTakes) {
+  EXPECT_EQ(options({"--shard", "255", "nodes"}).shard, 255u);
+  EXPECT_NE(refusal({"--shard", "256", "nodes"})
+                .find("gimnet: '256' is no value for --shard: the hub's shard on which to live, 0 to 255\n"),
+            std::string::npos);
+  EXPECT_NE(refusal({"nodes", "--shard", "1", "--shard", "2"}).find("gimnet: --shard is given 2 times: give it once"),
+            std::string::npos);
+  EXPECT_NE(refusal({"nodes", "--shard"}).find("gimnet: --shard needs a value: the hub's shard"), std::string::npos);
+}
+
 TEST(CommandLine, ReadsTheBoundsOfWhatGoesOn) {
   for (const char* command : {"echo", "hz", "bw", "watch"}) {
     const Options read = options({command, "robot/*", "-n", "5", "--seconds", "2.5"});
