@@ -288,8 +288,8 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
 
 bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
-  if (connection.draining)
-    return true;  // what stands before it may not have been taken, nor may it be confirmed with it
+  // What stands before it may not have been taken, nor may it be confirmed with it.
+  if (connection.draining) return true;
   std::uint64_t& taken = connection.resume->taken;
   if (skip.count > UINT64_MAX - 1 - std::min(taken, UINT64_MAX - 1)) {
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
