@@ -1,15 +1,16 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 #include "hub/data/egress/frame_starts.hpp"
 #include "hub/data/egress/run.hpp"
 
-// How many frames at the front of a run come to so many bytes: without looking at them where all are equally long, and
-// else by `starts`, so that a long run to many full queues costs each of them about as much as a short one. No frame of
-// the run is shorter than `shortest_bytes`, header included; a header's size holds for all runs. Thread safety: one
-// shard.
+// How many frames at the front of a run come to so many bytes, and the other way round: without looking at them where
+// all are equally long, and else by `starts`, so that a long run to many full queues costs each of them about as much
+// as a short one. No frame of the run is shorter than `shortest_bytes`, header included; a header's size holds for all
+// runs. Thread safety: one shard.
 
 namespace gimnet::hub {
 
@@ -28,6 +29,16 @@ template <class Takes>
     ++leading.frames;
   }
   return leading;
+}
+
+/// So many; all if there are not more.
+[[nodiscard]] inline Leading leading_frames_of(const Run& run, std::uint32_t shortest_bytes, std::uint64_t frames,
+                                               FrameStarts& starts) {
+  if (run.frames <= frames) return {run.frames, run.size};
+  const auto most = static_cast<std::uint32_t>(frames);
+  if (equally_long(run.size, run.frames, shortest_bytes)) return {most, most * shortest_bytes};
+  if (const auto* known = starts.find(run)) return known->leading_frames(run, most);
+  return leading_frames(run, [&](const Leading& before, std::uint32_t) { return before.frames < most; });
 }
 
 /// As few as come to `bytes` or more; all if they do not.
@@ -67,6 +78,16 @@ template <class Takes>
 [[nodiscard]] inline Leading leading_beyond(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
   if (shortest_bytes > bytes) return {run.frames, run.size};
   return leading_frames(run, [&](const Leading&, std::uint32_t next) { return next > bytes; });
+}
+
+/// The bytes of the shortest frame. All are looked at. REQUIRES: there is one.
+[[nodiscard]] inline std::uint32_t shortest_frame(const Run& run) {
+  std::uint32_t shortest = run.size;
+  static_cast<void>(leading_frames(run, [&](const Leading&, std::uint32_t next) {
+    shortest = std::min(shortest, next);
+    return true;
+  }));
+  return shortest;
 }
 
 /// The last frame. REQUIRES: there is one.

@@ -9,6 +9,11 @@ std::size_t FrameStarts::Stretch::index_of(const Run& run) const {
   return static_cast<std::size_t>(std::lower_bound(starts_.begin(), starts_.end(), offset) - starts_.begin());
 }
 
+Leading FrameStarts::Stretch::leading_frames(const Run& run, std::uint32_t frames) const {
+  const std::size_t first = index_of(run);
+  return {frames, starts_[first + frames] - starts_[first]};
+}
+
 Leading FrameStarts::Stretch::leading_from(const Run& run, std::uint64_t bytes) const {
   const auto first = starts_.begin() + static_cast<std::ptrdiff_t>(index_of(run));
   // The start of the frame behind those that are looked for; behind the run's last one there may be none.

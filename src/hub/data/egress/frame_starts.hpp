@@ -24,6 +24,8 @@ class FrameStarts {
   /// The starts of one run and of whatever is left of it.
   class Stretch {
    public:
+    /// So many. REQUIRES: the run was asked for, and has more.
+    [[nodiscard]] Leading leading_frames(const Run& run, std::uint32_t frames) const;
     /// As few as come to `bytes` or more. REQUIRES: the run was asked for, and is longer than that.
     [[nodiscard]] Leading leading_from(const Run& run, std::uint64_t bytes) const;
     /// As many as come to `bytes` or less. REQUIRES: as leading_from().

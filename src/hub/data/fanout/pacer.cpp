@@ -53,7 +53,7 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
   if (subscription.awaits_start) return false;
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
-    drop(subscription, run, DropReason::away);
+    drop(subscription, run, DropReason::away, handover.shortest_bytes);
   } else if (header.has(proto::kFlagFragment)) {
     give_up_stalled(subscription);
     offer_fragment(subscription, run, header, handover);
@@ -85,23 +85,66 @@ void Pacer::give_up_stalled(PacedSubscription& subscription) {
 
 void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                         Handover handover) {
-  Run rest = run.share();
-  if (subscription.held() == 0 && subscription.terms().interval_us == 0 && subscription.space() >= run.frames) {
-    return pass(subscription, rest, run.frames, header, handover);
+  const bool any_time = subscription.terms().interval_us == 0;
+  if (subscription.held() == 0 && any_time && subscription.space() >= run.frames) {
+    return pass(subscription, run, run.frames, header, handover);
   }
+  Run rest = run.share();
+  // What is lost at once of those that went makes room for more.
+  while (rest.frames != 0 && subscription.held() == 0 && subscription.may_begin(now_us())) {
+    const std::uint64_t most = any_time ? subscription.space() : 1;
+    const Leading begun = leading_frames_of(rest, handover.shortest_bytes, most, context_.starts);
+    subscription.on_begun(now_us());
+    const Run front = rest.take_front(begun.frames, begun.size);
+    const std::uint64_t space = subscription.space();
+    pass(subscription, front, begun.frames, header, handover);
+    // Where not one of them had room, none does that is as long, and they are lost as one.
+    if (!any_time || header.policy() != proto::Policy::drop || subscription.space() != space) continue;
+    const Leading too_long = leading_beyond(rest, handover.shortest_bytes, shortest_frame(front) - 1);
+    if (too_long.frames == 0) continue;
+    pass(subscription, rest.take_front(too_long.frames, too_long.size), too_long.frames, header, handover);
+  }
+  if (rest.frames != 0) hold_newest(subscription, std::move(rest), header.lane & proto::kLaneMask, handover);
+  release(subscription);
+}
+
+/// As if each had come alone and replaced an older one; what would have been held for a moment is never kept.
+void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover) {
+  if (context_.budget.exhausted()) return drop(subscription, rest, DropReason::over_budget, handover.shortest_bytes);
   while (rest.frames != 0) {
+    const Leading passed_over = replaced_at_once(subscription, rest, lane, handover);
+    if (passed_over.frames != 0) {
+      // In the order in which they came: a REPORT shows the last one.
+      while (subscription.held() != 0) drop_oldest(subscription, DropReason::replaced);
+      drop(subscription, rest.take_front(passed_over.frames, passed_over.size), DropReason::replaced,
+           handover.shortest_bytes);
+      continue;
+    }
     const Run frame = rest.take_frame();
-    if (subscription.held() == 0 && subscription.may_begin(now_us())) {
-      subscription.on_begun(now_us());
-      pass(subscription, frame, 1, header, handover);
-    } else if (context_.budget.exhausted()) {
+    if (context_.budget.exhausted()) {
       drop(subscription, frame, DropReason::over_budget);
     } else {
       keep(scratch_, frame, handover);
-      hold(subscription, scratch_, header.lane & proto::kLaneMask);
+      hold(subscription, scratch_, lane);
     }
   }
-  release(subscription);
+}
+
+/// Those at the front that others of the run replace, and with them all that is held; none if it has to be looked at
+/// one by one, since their bytes may be too many first.
+Leading Pacer::replaced_at_once(const PacedSubscription& subscription, const Run& run, std::size_t lane,
+                                Handover handover) {
+  const std::uint32_t depth = subscription.terms().depth;
+  if (run.frames <= depth) return {};
+  Leading fitting{run.frames, run.size};
+  // One is held however large it is.
+  if (depth != 1) {
+    const std::uint64_t limit = context_.limits.lane_bytes(lane);
+    const std::uint64_t room = limit - std::min(limit, subscription.held_bytes());
+    fitting = leading_within(run, handover.shortest_bytes, room, context_.starts);
+  }
+  if (fitting.frames <= depth) return {};
+  return leading_frames_of(run, handover.shortest_bytes, fitting.frames - depth, context_.starts);
 }
 
 void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
@@ -198,12 +241,16 @@ void Pacer::drop_held(PacedSubscription& subscription, DropReason reason) {
 
 void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, DropReason reason) {
   context_.tally.queued -= message.frames();
-  message.for_each([&](const Run& run) { drop(subscription, run, reason); });
+  message.for_each([&](const Run& run) {
+    subscription.recipient().outbox.count_dropped(run.frames);
+    // Nobody else drops of the same run: it is not worth a place among the starts of those that come.
+    context_.drops.drop(run.bytes, run.size, run.frames, reason);
+  });
 }
 
-void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason) {
+void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason, std::uint32_t shortest_bytes) {
   subscription.recipient().outbox.count_dropped(run.frames);
-  context_.drops.drop(run.bytes, run.size, run.frames, reason);
+  context_.drop(run, shortest_bytes, reason);
 }
 
 bool Pacer::on_credit(const Recipient& recipient, GroupId group, std::uint64_t total) {

@@ -53,6 +53,10 @@ class Pacer {
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
   void offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                    Handover handover);
+  /// Frames that may not begin. REQUIRES: there are some.
+  void hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover);
+  [[nodiscard]] Leading replaced_at_once(const PacedSubscription& subscription, const Run& run, std::size_t lane,
+                                         Handover handover);
   void offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                       Handover handover);
   void begin_plain(PacedSubscription& subscription) const;
@@ -68,7 +72,8 @@ class Pacer {
   void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
   void drop_held(PacedSubscription& subscription, proto::DropReason reason);
   void drop(PacedSubscription& subscription, const KeptMessage& message, proto::DropReason reason);
-  void drop(PacedSubscription& subscription, const Run& run, proto::DropReason reason);
+  void drop(PacedSubscription& subscription, const Run& run, proto::DropReason reason,
+            std::uint32_t shortest_bytes = proto::kHeaderSize);
   void release(PacedSubscription& subscription);
   void release_oldest(PacedSubscription& subscription);
   [[nodiscard]] bool release_open(PacedSubscription& subscription);

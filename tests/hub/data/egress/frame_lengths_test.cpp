@@ -38,6 +38,10 @@ TEST(FrameLengths, CountsFramesThatAreEquallyLongWithoutLooking) {
   EgressRig rig;
   FrameStarts starts;
   const hub::Run run = unreadable_run(rig, 1'000, 20);
+  EXPECT_EQ(told(leading_frames_of(run, 20, 0, starts)), "0 of 0");
+  EXPECT_EQ(told(leading_frames_of(run, 20, 999, starts)), "999 of 19980");
+  EXPECT_EQ(told(leading_frames_of(run, 20, 1'000, starts)), "1000 of 20000");
+  EXPECT_EQ(told(leading_frames_of(run, 20, UINT64_MAX, starts)), "1000 of 20000");
   EXPECT_EQ(told(leading_from(run, 20, 1, starts)), "1 of 20");
   EXPECT_EQ(told(leading_from(run, 20, 20, starts)), "1 of 20");
   EXPECT_EQ(told(leading_from(run, 20, 21, starts)), "2 of 40");
@@ -60,6 +64,7 @@ TEST(FrameLengths, LooksAtFramesOfAnyLengthOneByOne) {
   EgressRig rig;
   FrameStarts starts;
   const hub::Run run = run_of(rig, {30, 20, 40, 16, 50});
+  EXPECT_EQ(told(leading_frames_of(run, 16, 3, starts)), "3 of 90");
   EXPECT_EQ(told(leading_from(run, 16, 30, starts)), "1 of 30");
   EXPECT_EQ(told(leading_from(run, 16, 31, starts)), "2 of 50");
   EXPECT_EQ(told(leading_from(run, 16, 107, starts)), "5 of 156");
@@ -70,6 +75,7 @@ TEST(FrameLengths, LooksAtFramesOfAnyLengthOneByOne) {
   EXPECT_EQ(told(leading_beyond(run, 16, 16)), "3 of 90");
   EXPECT_EQ(told(leading_beyond(run, 16, 30)), "0 of 0");
   EXPECT_EQ(told(all_but_last(run, 16, starts)), "4 of 106");
+  EXPECT_EQ(shortest_frame(run), 16u);
 }
 
 TEST(FrameLengths, WhatIsTooShortForTheShortestIsNotLookedFor) {
@@ -98,6 +104,8 @@ TEST(FrameLengths, KnowingMoreChangesNothing) {
       const std::uint32_t known = found.shortest_bytes;
       EXPECT_EQ(told(leading_from(run, known, bytes, starts)), told(leading_from(run, kHeader, bytes, starts)));
       EXPECT_EQ(told(leading_within(run, known, bytes, starts)), told(leading_within(run, kHeader, bytes, starts)));
+      EXPECT_EQ(told(leading_frames_of(run, known, bytes, starts)),
+                told(leading_frames_of(run, kHeader, bytes, starts)));
       EXPECT_EQ(told(leading_up_to(run, known, bytes)), told(leading_up_to(run, kHeader, bytes)));
       EXPECT_EQ(told(leading_beyond(run, known, bytes)), told(leading_beyond(run, kHeader, bytes)));
       EXPECT_EQ(told(all_but_last(run, known, starts)), told(all_but_last(run, kHeader, starts)));

@@ -43,6 +43,9 @@ TEST_F(FrameStartsTest, LooksAtARunOnce) {
   for (int queue = 0; queue < 3; ++queue) {
     const auto* known = starts.find(run);
     ASSERT_NE(known, nullptr);
+    EXPECT_EQ(known->leading_frames(run, 0).size, 0u);
+    EXPECT_EQ(known->leading_frames(run, 2).size, 33u);
+    EXPECT_EQ(known->leading_frames(run, kFrames - 1).size, run.size - 16);
     EXPECT_EQ(known->leading_from(run, 1).size, 16u);
     EXPECT_EQ(known->leading_from(run, 16).frames, 1u);
     EXPECT_EQ(known->leading_from(run, 17).frames, 2u);
@@ -64,6 +67,7 @@ TEST_F(FrameStartsTest, KnowsWhatIsLeftOfARun) {
   hub::Run middle = run.take_front(60, 60 * 17);
   const auto* known = starts.find(middle);
   ASSERT_NE(known, nullptr);
+  EXPECT_EQ(known->leading_frames(middle, 3).size, 17u + 18u + 16u);
   EXPECT_EQ(known->leading_from(middle, 18).size, 17u + 18u);
   EXPECT_EQ(known->leading_from(middle, middle.size - 1).size, middle.size) << "the next frame is not one of it";
   EXPECT_EQ(known->leading_within(middle, middle.size - 1).frames, 59u);

@@ -305,6 +305,33 @@ TEST_F(PacerTest, HoldsWithinTheLaneAndTheBudget) {
   rig.egress.lease.give_back(rig.egress.limits.budget_bytes);
 }
 
+// Only the first frame of what is dropped is looked at, and what is held: the others say nonsense about
+// their length.
+TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {
+  constexpr std::uint32_t kFrames = 1'000;
+  for (const PaceTerms& terms : {PaceTerms{.window = 1, .depth = 2}, PaceTerms{.depth = 2, .interval_us = 1'000'000}}) {
+    PacedSubscription& one = subscribe(terms);
+    offer(one, {"open"});
+    EXPECT_THAT(sent(), ElementsAre("open"));
+    std::vector<std::string> texts(kFrames, "same");
+    texts[kFrames - 2] = "last";
+    texts[kFrames - 1] = "new!";
+    const hub::Run run = rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group});
+    const std::uint32_t size = run.size / kFrames;
+    for (std::uint32_t frame = 1; frame + 2 < kFrames; ++frame) {
+      store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * size, ~std::uint32_t{0});
+    }
+    const std::uint64_t copied = rig.egress.tally.copied_bytes;
+    EXPECT_TRUE(rig.pacer.offer(one, run, run.header(), {.shortest_bytes = size}));
+    EXPECT_EQ(rig.egress.tally.copied_bytes - copied, 2 * size);
+    EXPECT_EQ(one.held(), 2u);
+    subscribe({.window = 3, .depth = 2});
+    EXPECT_THAT(sent(), ElementsAre("last", "new!"));
+    rig.pacer.unsubscribe(recipient, kGroup, true);
+  }
+  EXPECT_EQ(dropped(DropReason::replaced), 2 * (kFrames - 2));
+}
+
 TEST_F(PacerTest, ForASubscriberThatIsAway) {
   PacedSubscription& one = subscribe({.window = 1});
   offer(one, {"1", "2"});

@@ -1,0 +1,300 @@
+// Random messages to a paced subscription, from a seed, with everything else that happens to one between them: what a
+// run does to it at once is what its frames do one by one. One side gets each burst as the run that it is, the other
+// one each of its frames alone.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "hub/observe/session_gauges.hpp"
+#include "proto/frame/frame_parser.hpp"
+#include "tests/hub/data/support/route_rig.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using proto::Kind;
+using testing::RouteRig;
+using testing::TestFrame;
+
+constexpr std::uint32_t kSeeds = 400;
+constexpr int kOperations = 120;
+constexpr GroupId kGroup{7u << 20 | 5};
+constexpr std::uint32_t kLaneBytes = 1'000;
+constexpr std::uint8_t kDrop = 2;
+constexpr std::uint64_t kMuch = std::uint64_t{1} << 40;
+
+Limits limits() {
+  Limits small;
+  small.lane0_bytes = small.lane1_bytes = small.lane2_bytes = small.lane3_bytes = kLaneBytes;
+  small.block_ms = std::uint64_t{1} << 40;
+  return small;
+}
+
+/// Frames with one header; every payload is another one, as far as its length allows.
+struct Burst {
+  TestFrame frame;
+  std::vector<std::string> payloads;
+  [[nodiscard]] std::size_t bytes() const {
+    std::size_t sum = 0;
+    for (const std::string& payload : payloads) sum += proto::kHeaderSize + payload.size();
+    return sum;
+  }
+};
+
+/// A shard with one subscriber, and all that can be seen of it.
+struct Side {
+  Side() : rig(limits()) { recipient.outbox.set_counters(counters); }
+
+  void subscribe(const PaceTerms& terms) { one = &rig.pacer.subscribe(recipient, kGroup, terms); }
+  void offer(const hub::Run& run, Handover handover) {
+    EXPECT_TRUE(rig.pacer.offer(*one, run, run.header(), handover));
+  }
+  /// shortest: is it known how long the shortest frame is?
+  void offer_whole(const Burst& burst, bool fan_out, bool shortest) {
+    const hub::Run run = rig.make_run(kGroup.value(), burst.payloads, burst.frame);
+    const auto found = proto::next_run(run.bytes, run.bytes + run.size, proto::kFrameLengthDefault);
+    offer(run, {fan_out, shortest ? found.shortest_bytes : std::uint32_t{proto::kHeaderSize}});
+  }
+  void offer_singly(const Burst& burst, bool fan_out) {
+    hub::Run rest = rig.make_run(kGroup.value(), burst.payloads, burst.frame);
+    while (rest.frames != 0) {
+      const hub::Run frame = rest.take_frame();
+      offer(frame, {fan_out, frame.size});
+    }
+  }
+  void end_turn(std::uint64_t ms) {
+    rig.pacer.release_due();
+    rig.egress.context.starts.forget();
+    rig.egress.context.now_ms += ms;
+    rig.pacer.release_due();
+  }
+  /// The subscriber takes all that waits for it.
+  void drain() {
+    for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
+      LaneQueue& queue = recipient.outbox.lane(lane);
+      for (; !queue.empty(); queue.pop_front()) {
+        Entry& entry = queue.front();
+        do {
+          received.emplace_back(reinterpret_cast<const char*>(entry.run.bytes), entry.run.size);
+          for (hub::Run rest = entry.run.share(); rest.frames != 0; rest.skip_frame()) {
+            const auto frame = proto::parse_frame({rest.bytes, rest.size}, proto::Origin::hub);
+            if (frame && frame->ends_message()) ++taken;
+          }
+        } while (entry.next_piece());
+        rig.egress.tally.queued -= entry.frames;
+        rig.egress.tally.delivered += entry.frames;
+        queue.on_left(entry, entry.size);
+      }
+    }
+  }
+  std::string seen() {
+    std::string all = "queued " + std::to_string(rig.egress.tally.queued) + " held " + std::to_string(one->held()) +
+                      " of " + std::to_string(one->held_bytes()) + " uncredited " + std::to_string(one->uncredited()) +
+                      " space " + std::to_string(one->space()) + " due " + std::to_string(one->due_us()) + " next " +
+                      std::to_string(rig.pacer.next_due_ms()) + " dropped " + std::to_string(counters.dropped.value()) +
+                      " taken " + std::to_string(taken);
+    for (const std::uint64_t dropped : rig.egress.tally.dropped) all += " " + std::to_string(dropped);
+    return all;
+  }
+  /// What was received, however it was cut into runs.
+  std::string bytes() const {
+    std::string all;
+    for (const std::string& each : received) all += each;
+    return all;
+  }
+  std::string reports() {
+    std::string all;
+    rig.egress.drops.flush(reported_ms += 10'000, [&](NodeId sender, std::span<const std::byte> report) {
+      all += std::to_string(sender.value()) + ":" +
+             std::string(reinterpret_cast<const char*>(report.data()), report.size()) + "\n";
+    });
+    return all;
+  }
+
+  SessionCounters counters;
+  RouteRig rig;
+  Recipient& recipient = rig.add_here(2);
+  PacedSubscription* one = nullptr;
+  std::vector<std::string> received;
+  std::uint64_t taken = 0;
+  std::uint64_t reported_ms = 0;
+};
+
+class Pair {
+ public:
+  explicit Pair(std::uint32_t seed) : random_(seed) {
+    new_terms();
+    if (below(4) == 0) both([](Side& side) { side.recipient.frame_bytes = 40; });
+  }
+
+  void step() {
+    switch (below(16)) {
+      case 0:
+        return new_terms();
+      case 1:
+      case 2:
+        return both([](Side& side) { side.drain(); });
+      case 3:
+      case 4:
+      case 5:
+        return credit();
+      case 6:
+        return fragment();
+      case 7:
+        return toggle_budget();
+      case 8:
+        return lose_all();
+      case 9:
+        return pass_time();
+      default:
+        return burst();
+    }
+  }
+  void check(const std::string& where) {
+    ASSERT_EQ(whole_.seen(), singly_.seen()) << where;
+    if (below(8) != 0) return;
+    ASSERT_EQ(whole_.reports(), singly_.reports()) << where;
+  }
+  void end() {
+    if (used_up_) both([](Side& side) { side.rig.egress.lease.give_back(kMuch); });
+    // Another window lets all that is held go.
+    both([](Side& side) {
+      side.drain();
+      side.subscribe({});
+      side.drain();
+    });
+    check("at the end");
+    EXPECT_TRUE(whole_.bytes() == singly_.bytes());
+    EXPECT_TRUE(whole_.rig.ledger_exact());
+    EXPECT_TRUE(singly_.rig.ledger_exact());
+    EXPECT_LE(whole_.rig.egress.tally.copied_bytes, singly_.rig.egress.tally.copied_bytes);
+  }
+
+ private:
+  template <class Do>
+  void both(Do&& what) {
+    what(whole_);
+    what(singly_);
+  }
+  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(random_() % n); }
+
+  void new_terms() {
+    PaceTerms terms;
+    if (below(3) != 0) terms.window = 1 + below(below(2) == 0 ? 3 : 40);
+    if (below(2) == 0) terms.interval_us = 1 + below(below(2) == 0 ? 3'000 : 20'000);
+    terms.depth = below(2) == 0 ? 1 : 1 + below(below(2) == 0 ? 4 : 80);
+    both([&](Side& side) { side.subscribe(terms); });
+  }
+  std::string payload(std::size_t size) {
+    std::string text = std::to_string(++made_);
+    text.resize(size, '.');
+    return text;
+  }
+  void burst() {
+    Burst burst{{.kind = Kind::group, .flags = below(3) == 0 ? kDrop : std::uint8_t{0}}, {}};
+    // Not that of the fragments: one that is given up makes room for what is held, once all of the run is.
+    burst.frame.lane = below(8) == 0 ? 3 : 1;
+    burst.frame.src = 1 + below(2);
+    if (below(2) == 0) burst.frame.flags |= proto::kFlagReport;
+    const std::uint32_t base = below(8) == 0 ? below(1'500) : below(30);
+    const std::uint32_t spread = below(2) == 0 ? 1 : 1 + below(below(4) == 0 ? 1'200 : 30);
+    const std::uint32_t frames = 1 + below(base > 100 ? 4 : 120);
+    for (std::uint32_t i = 0; i < frames; ++i) burst.payloads.push_back(payload(base + below(spread)));
+    if (used_up_) {
+      // Where nothing waits, a run that does not fit is refused as one thing.
+      both([](Side& side) { side.drain(); });
+      if (burst.bytes() > kLaneBytes) return;
+    }
+    const bool fan_out = below(2) == 0;
+    whole_.offer_whole(burst, fan_out, below(4) != 0);
+    singly_.offer_singly(burst, fan_out);
+    if (below(2) == 0) both([](Side& side) { side.end_turn(0); });
+  }
+  /// Messages in three parts, of which now and then a part is missing.
+  void fragment() {
+    if (below(12) == 0) ++message_;
+    const std::uint32_t part = part_++ % 3;
+    std::string bytes(proto::kFragmentHeaderSize, '\0');
+    proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()), {message_, 100 * part, 300});
+    bytes += std::string(100, static_cast<char>('a' + part));
+    const Burst burst{{.kind = Kind::group, .flags = proto::kFlagFragment, .lane = 2}, {bytes}};
+    both([&](Side& side) { side.offer_singly(burst, false); });
+    if (part == 2) ++message_;
+  }
+  /// So many as it took, or some of them.
+  void credit() {
+    const std::uint64_t total = whole_.taken - below(2) * std::min<std::uint64_t>(whole_.taken, below(3));
+    both([&](Side& side) { std::ignore = side.rig.pacer.on_credit(side.recipient, kGroup, total); });
+  }
+  void pass_time() {
+    const std::uint64_t ms = below(4) == 0 ? 1'000 : below(12);
+    both([&](Side& side) { side.end_turn(ms); });
+  }
+  void lose_all() {
+    if (below(3) != 0) return;
+    both([](Side& side) {
+      side.recipient.outbox.drop_all(DropReason::link_lost, side.rig.egress.context);
+      side.rig.pacer.release_due();
+    });
+  }
+  void toggle_budget() {
+    if (used_up_) {
+      both([](Side& side) { side.rig.egress.lease.give_back(kMuch); });
+      used_up_ = false;
+    } else if (below(3) == 0) {
+      both([](Side& side) {
+        side.drain();
+        side.rig.egress.lease.take(kMuch);
+      });
+      used_up_ = true;
+    }
+  }
+
+  std::mt19937 random_;
+  Side whole_;
+  Side singly_;
+  std::uint32_t made_ = 0;
+  std::uint32_t message_ = 1;
+  std::uint32_t part_ = 0;
+  bool used_up_ = false;
+};
+
+TEST(PacerProperty, ARunIsTakenAsItsFramesAre) {
+  for (std::uint32_t seed = 1; seed <= kSeeds && !::testing::Test::HasFailure(); ++seed) {
+    Pair pair(seed);
+    for (int i = 0; i < kOperations && !::testing::Test::HasFailure(); ++i) {
+      pair.step();
+      pair.check("seed " + std::to_string(seed) + ", operation " + std::to_string(i));
+    }
+    pair.end();
+  }
+}
+
+// Of messages that are to be dropped where there is no room, those that are as long as one that had none go with it.
+TEST(PacerProperty, AShorterOneStillGoesBehindThoseThatHaveNoRoom) {
+  std::vector<std::string> payloads(50, "12345");
+  payloads.insert(payloads.end(), {"1234", "12345"});
+  const Burst burst{{.kind = Kind::group, .flags = kDrop}, payloads};
+  Side whole;
+  Side singly;
+  for (Side* side : {&whole, &singly}) {
+    side->subscribe({});
+    // All but the 20 bytes of the short one.
+    side->offer_singly({{.kind = Kind::group}, {std::string(kLaneBytes - 20 - proto::kHeaderSize, 'x')}}, false);
+    side->subscribe({.window = 2});
+  }
+  whole.offer_whole(burst, false, true);
+  singly.offer_singly(burst, false);
+  EXPECT_EQ(whole.seen(), singly.seen());
+  EXPECT_EQ(whole.one->held(), 1u);
+  EXPECT_EQ(whole.rig.egress.dropped(DropReason::queue_full), 50u);
+  whole.drain();
+  EXPECT_EQ(whole.taken, 2u);
+  EXPECT_EQ(whole.received.back().substr(proto::kHeaderSize), "1234");
+}
+
+}  // namespace
+}  // namespace gimnet::hub
