@@ -55,7 +55,7 @@ Outcome<void> FileContent::fill(int file, const std::string& path, std::size_t b
 bool FileContent::grow(std::size_t capacity) {
   auto* const larger = static_cast<std::byte*>(std::realloc(memory_.get(), capacity));
   if (larger == nullptr) return false;
-  static_cast<void>(memory_.release());
+  [[maybe_unused]] const std::byte* const former = memory_.release();  // realloc() has taken it
   memory_.reset(larger);
   capacity_ = capacity;
   return true;

@@ -47,6 +47,7 @@ class Meters {
     look();
     const std::int64_t now_ns = wall_now_ns();
     std::vector<ServiceReading> readings;
+    readings.reserve(counted_.size());
     for (auto& [name, counted] : counted_) {
       readings.push_back(
           {name, span == Span::whole ? counted.meter.whole(now_ns) : counted.meter.recent(now_ns), counted.missed});
