@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "tests/hub/shard/support/hub_rig.hpp"
 
 namespace gimnet::hub {
@@ -9,6 +11,8 @@ namespace {
 
 using testing::FakeNode;
 using testing::HubRig;
+
+constexpr auto kDrop = static_cast<std::uint8_t>(proto::Policy::drop);
 
 // What waits between shards when the hub ends is let go on both sides.
 TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
@@ -34,6 +38,31 @@ TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
     rig.state(shard).pool.take_back_lent();
     EXPECT_EQ(rig.state(shard).pool.lent_buffers(), 0u);
   }
+}
+
+// What a turn knows of a run keeps that run's buffer, here another shard's, only until the turn is over.
+TEST(IoShard, KeepsNoBufferForTheNextTurnThatNobodyWaitsFor) {
+  Limits limits;
+  limits.lane1_bytes = 4'000;
+  HubRig rig(2, limits);
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(1);
+  b.pipe.set_room(0);
+  std::vector<std::byte> burst;
+  for (int i = 0; i < 1'000; ++i) {
+    const auto frame = HubRig::frame(a, b.id.value(), i % 2 == 0 ? "" : "x", {.flags = kDrop});
+    burst.insert(burst.end(), frame.begin(), frame.end());
+  }
+  for (int i = 0; i < 3; ++i) {
+    rig.write(a, burst);
+    rig.turn();
+  }
+  ASSERT_GT(rig.dropped(proto::DropReason::queue_full), 1'000u);
+  rig.release(b);
+  rig.settle();
+  rig.state(0).pool.take_back_lent();
+  EXPECT_EQ(rig.state(0).pool.lent_buffers(), 0u);
+  EXPECT_EQ(rig.state(1).pool.pinned_bytes(), 0u);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -31,13 +30,17 @@ template <class Takes>
   return leading;
 }
 
+/// Fewer frames than this are looked at one by one: quicker than to look for the starts of all.
+inline constexpr std::uint32_t kFewFrames = FrameStarts::kFramesMin;
+
 /// So many; all if there are not more.
 [[nodiscard]] inline Leading leading_frames_of(const Run& run, std::uint32_t shortest_bytes, std::uint64_t frames,
                                                FrameStarts& starts) {
   if (run.frames <= frames) return {run.frames, run.size};
   const auto most = static_cast<std::uint32_t>(frames);
   if (equally_long(run.size, run.frames, shortest_bytes)) return {most, most * shortest_bytes};
-  if (const auto* known = starts.find(run)) return known->leading_frames(run, most);
+  const auto* known = most < kFewFrames ? nullptr : starts.find(run);
+  if (known != nullptr) return known->leading_frames(run, most);
   return leading_frames(run, [&](const Leading& before, std::uint32_t) { return before.frames < most; });
 }
 
@@ -49,8 +52,8 @@ template <class Takes>
     const auto frames = static_cast<std::uint32_t>((bytes + shortest_bytes - 1) / shortest_bytes);
     return {frames, frames * shortest_bytes};
   }
-  if (shortest_bytes >= bytes) return {1, static_cast<std::uint32_t>(run.header().frame_size())};
-  if (const auto* known = starts.find(run)) return known->leading_from(run, bytes);
+  const auto* known = bytes < std::uint64_t{kFewFrames} * shortest_bytes ? nullptr : starts.find(run);
+  if (known != nullptr) return known->leading_from(run, bytes);
   return leading_frames(run, [&](const Leading& before, std::uint32_t) { return before.size < bytes; });
 }
 
@@ -63,7 +66,8 @@ template <class Takes>
     const auto frames = static_cast<std::uint32_t>(bytes / shortest_bytes);
     return {frames, frames * shortest_bytes};
   }
-  if (const auto* known = starts.find(run)) return known->leading_within(run, bytes);
+  const auto* known = bytes < std::uint64_t{kFewFrames} * shortest_bytes ? nullptr : starts.find(run);
+  if (known != nullptr) return known->leading_within(run, bytes);
   return leading_frames(run, [&](const Leading& before, std::uint32_t next) { return before.size + next <= bytes; });
 }
 
@@ -78,16 +82,6 @@ template <class Takes>
 [[nodiscard]] inline Leading leading_beyond(const Run& run, std::uint32_t shortest_bytes, std::uint64_t bytes) {
   if (shortest_bytes > bytes) return {run.frames, run.size};
   return leading_frames(run, [&](const Leading&, std::uint32_t next) { return next > bytes; });
-}
-
-/// The bytes of the shortest frame. All are looked at. REQUIRES: there is one.
-[[nodiscard]] inline std::uint32_t shortest_frame(const Run& run) {
-  std::uint32_t shortest = run.size;
-  static_cast<void>(leading_frames(run, [&](const Leading&, std::uint32_t next) {
-    shortest = std::min(shortest, next);
-    return true;
-  }));
-  return shortest;
 }
 
 /// The last frame. REQUIRES: there is one.

@@ -95,17 +95,30 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const p
     const std::uint64_t most = any_time ? subscription.space() : 1;
     const Leading begun = leading_frames_of(rest, handover.shortest_bytes, most, context_.starts);
     subscription.on_begun(now_us());
-    const Run front = rest.take_front(begun.frames, begun.size);
     const std::uint64_t space = subscription.space();
-    pass(subscription, front, begun.frames, header, handover);
-    // Where not one of them had room, none does that is as long, and they are lost as one.
-    if (!any_time || header.policy() != proto::Policy::drop || subscription.space() != space) continue;
-    const Leading too_long = leading_beyond(rest, handover.shortest_bytes, shortest_frame(front) - 1);
-    if (too_long.frames == 0) continue;
-    pass(subscription, rest.take_front(too_long.frames, too_long.size), too_long.frames, header, handover);
+    pass(subscription, rest.take_front(begun.frames, begun.size), begun.frames, header, handover);
+    if (any_time && header.policy() == proto::Policy::drop && subscription.space() == space) {
+      drop_what_has_no_room(subscription, rest, header.lane & proto::kLaneMask, handover);
+    }
   }
   if (rest.frames != 0) hold_newest(subscription, std::move(rest), header.lane & proto::kLaneMask, handover);
   release(subscription);
+}
+
+/// The frames at the front that a full outbox would refuse one by one, each of which would leave the window open.
+void Pacer::drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane, Handover handover) {
+  Recipient& recipient = subscription.recipient();
+  const LaneQueue& queue = recipient.outbox.lane(lane);
+  if (rest.frames == 0 || !queue.holds_whole()) return;
+  const std::uint64_t limit = context_.limits.lane_bytes(lane);
+  const std::uint64_t room = limit - std::min(limit, queue.bytes());
+  // What is too large for the recipient is dropped for that reason.
+  const Leading legal = leading_up_to(rest, handover.shortest_bytes, recipient.frame_bytes + proto::kHeaderSize);
+  Leading refused = leading_beyond(rest, handover.shortest_bytes, room);
+  if (legal.frames < refused.frames) refused = legal;
+  if (refused.frames == 0) return;
+  const DropReason reason = context_.budget.exhausted() ? DropReason::over_budget : DropReason::queue_full;
+  drop(subscription, rest.take_front(refused.frames, refused.size), reason, handover.shortest_bytes);
 }
 
 /// As if each had come alone and replaced an older one; what would have been held for a moment is never kept.

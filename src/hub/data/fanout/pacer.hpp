@@ -53,6 +53,7 @@ class Pacer {
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
   void offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
                    Handover handover);
+  void drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane, Handover handover);
   /// Frames that may not begin. REQUIRES: there are some.
   void hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover);
   [[nodiscard]] Leading replaced_at_once(const PacedSubscription& subscription, const Run& run, std::size_t lane,

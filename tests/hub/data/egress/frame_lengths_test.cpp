@@ -75,7 +75,23 @@ TEST(FrameLengths, LooksAtFramesOfAnyLengthOneByOne) {
   EXPECT_EQ(told(leading_beyond(run, 16, 16)), "3 of 90");
   EXPECT_EQ(told(leading_beyond(run, 16, 30)), "0 of 0");
   EXPECT_EQ(told(all_but_last(run, 16, starts)), "4 of 106");
-  EXPECT_EQ(shortest_frame(run), 16u);
+}
+
+// What a queue needs for a small frame does not depend on how many wait.
+TEST(FrameLengths, FewFramesAreFoundWithoutLookingAtTheRest) {
+  EgressRig rig;
+  FrameStarts starts;
+  std::vector<std::uint32_t> sizes;
+  for (std::uint32_t i = 0; i < 1'000; ++i) sizes.push_back(16 + i % 2);
+  hub::Run run = run_of(rig, sizes);
+  for (std::uint32_t offset = 66; offset != run.size;) {
+    auto* const frame = const_cast<std::byte*>(run.bytes + offset);
+    offset += static_cast<std::uint32_t>(proto::load_header(frame).frame_size());
+    store_le(frame, ~std::uint32_t{0});
+  }
+  EXPECT_EQ(told(leading_from(run, 16, 40, starts)), "3 of 49");
+  EXPECT_EQ(told(leading_within(run, 16, 40, starts)), "2 of 33");
+  EXPECT_EQ(told(leading_frames_of(run, 16, 4, starts)), "4 of 66");
 }
 
 TEST(FrameLengths, WhatIsTooShortForTheShortestIsNotLookedFor) {
