@@ -312,9 +312,9 @@ typedef enum nif_incoming_type {
   /** ... and left again [same]. */
   NIF_SUBSCRIBER_LEFT = 7,
   /** A service that this node subscribed appeared, came under another group id, or went [text: full name, former_group
-   * (0: none), group (0: withdrawn, or after a refusal taken again, there being none; with a reason, nif_status: the hub
-   * refused the subscription after a break, payload: its words), message_type, instance, delivery, direction]. Comes before the first message of the new group, also
-   * after a break; messages of former groups may still come. */
+   * (0: none), group (0: withdrawn, or after a refusal taken again, there being none; with a reason, nif_status: the
+   * hub refused the subscription after a break, payload: its words), message_type, instance, delivery, direction].
+   * Comes before the first message of the new group, also after a break; messages of former groups may still come. */
   NIF_SERVICE_MOVED = 8,
   /** An own service got another group id after a reconnect [text: service name, former_group, group (0: the hub refused
    *  it; reason: nif_status; payload: its words)]. Send to the new id from now on; what waited for the connection goes

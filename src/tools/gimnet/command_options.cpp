@@ -187,7 +187,9 @@ void add_commands(CLI::App& app, Options& options) {
   app.add_flag("--json", options.json, "print JSON: one document, or an object a line where there is no end");
   app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
       ->transform(CLI::CheckedTransformer(kColours).description(""));
-  app.add_option("--shard", options.shard, "the hub's shard on which to live, 0 to 255")->group("")->transform(within(0U, 255U));
+  app.add_option("--shard", options.shard, "the hub's shard on which to live, 0 to 255")
+      ->group("")
+      ->transform(within(0U, 255U));
   app.set_version_flag("--version", "gimnet " GIMNET_VERSION);
   add_send(app, options);
   add_recv(app, options);
