@@ -195,7 +195,7 @@ TEST(Fanout, ARunToFullQueuesIsNotTakenApartFrameByFrame) {
   constexpr std::uint32_t kRuns = 10;
   Limits limits;
   limits.lane1_bytes = 2'500 * 20 + 19;  // two runs and a half
-  CountedLosses losses;  // told until the rig ends
+  CountedLosses losses;                  // told until the rig ends
   RouteRig rig(limits);
   std::vector<std::uint32_t> members;
   for (std::uint32_t index = 2; index < 2 + kMembers; ++index) {
