@@ -61,36 +61,35 @@ void IoShard::send(ShardCommand command) {
 }
 
 void IoShard::run() {
-  Waker& waker = *state_.shared.wakers[state_.self.value()];
   meter_ = AllocationMeter();
   while (!stopped_) {
-    int timeout_ms = options_.spin ? 0 : sleep_ms();
-    if (timeout_ms != 0) {
-      state_.shared.quiescence.leave(state_.self.value());
-      waker.prepare_to_sleep();
-      if (has_work()) timeout_ms = 0;
-    }
-    const std::span<const Ready> ready = state_.poller.wait(timeout_ms);
-    waker.awake();
+    const std::span<const Ready> ready = wait();
     turn(ready, static_cast<std::uint64_t>(steady_now_ns() / kNsPerMs));
   }
   state_.shared.quiescence.leave(state_.self.value());
   state_.egress.owner.let_go();  // who joins this thread clears up
 }
 
-int IoShard::sleep_ms() {
-  if (flush_again_ || !state_.recipients.dirty().empty() || has_rest()) return 0;
-  int timeout_ms = keeper_.next_tick_ms();
-  if (const std::uint64_t due_ms = state_.pacer.next_due_ms(); due_ms != Pacer::kNever) {
-    constexpr std::uint64_t kLongestMs = 60'000;
-    const auto pace_ms = due_ms > state_.now_ms ? static_cast<int>(std::min(due_ms - state_.now_ms, kLongestMs)) : 0;
-    timeout_ms = timeout_ms < 0 ? pace_ms : std::min(timeout_ms, pace_ms);
+std::span<const Ready> IoShard::wait() {
+  Waker& waker = *state_.shared.wakers[state_.self.value()];
+  std::uint64_t until_ms = options_.spin ? Poller::kNow : wake_at_ms();
+  if (until_ms != Poller::kNow) {
+    state_.shared.quiescence.leave(state_.self.value());
+    waker.prepare_to_sleep();
+    if (has_work()) until_ms = Poller::kNow;
   }
+  const std::span<const Ready> ready = state_.poller.wait_until(until_ms);
+  waker.awake();
+  return ready;
+}
+
+std::uint64_t IoShard::wake_at_ms() {
+  if (flush_again_ || !state_.recipients.dirty().empty() || has_rest()) return Poller::kNow;
+  std::uint64_t at_ms = std::min(keeper_.next_tick_at_ms(), state_.pacer.next_due_ms());
   if (state_.drops.pending()) {
-    const auto report_ms = static_cast<int>(std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
-    timeout_ms = timeout_ms < 0 ? report_ms : std::min(timeout_ms, report_ms);
+    at_ms = std::min(at_ms, state_.now_ms + std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
   }
-  return timeout_ms;
+  return at_ms > state_.now_ms ? at_ms : Poller::kNow;
 }
 
 bool IoShard::has_rest() const {

@@ -51,7 +51,9 @@ class IoShard {
   static constexpr std::uint64_t kReadBytesPerFlush = 256 * 1024;
 
   void run();
-  [[nodiscard]] int sleep_ms();
+  [[nodiscard]] std::span<const Ready> wait();
+  /// When there is something to do again whatever comes: Poller::kNow, Poller::kNever, or a monotonic time.
+  [[nodiscard]] std::uint64_t wake_at_ms();
   /// After prepare_to_sleep(): is there something that nobody will wake this thread for any more?
   [[nodiscard]] bool has_work();
   [[nodiscard]] bool room_came();
@@ -77,7 +79,7 @@ class IoShard {
   bool stopped_ = false;
   bool flush_again_ = false;
   bool room_came_ = false;  ///< in a mailbox, since connections that wait for room were last looked at
-  AllocationMeter meter_;   ///< of the thread that takes the turns
+  AllocationMeter meter_;  ///< of the thread that takes the turns
   std::thread thread_;
 };
 

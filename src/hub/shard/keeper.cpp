@@ -39,9 +39,9 @@ bool Keeper::is_silent(Connection& connection) {
   return connection.connected && !connection.waits_for_room && over();
 }
 
-int Keeper::next_tick_ms() const {
-  if (state_.counters.connections.value() == 0 && (!draining_ || drained_told_)) return -1;
-  return next_tick_at_ms_ > state_.now_ms ? static_cast<int>(next_tick_at_ms_ - state_.now_ms) : 0;
+std::uint64_t Keeper::next_tick_at_ms() const {
+  if (state_.counters.connections.value() == 0 && (!draining_ || drained_told_)) return Poller::kNever;
+  return next_tick_at_ms_;
 }
 
 void Keeper::look_at(Connection& connection) {

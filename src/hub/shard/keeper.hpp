@@ -20,8 +20,8 @@ class Keeper {
 
   /// Looks at all connections, if a tick has passed.
   void tick();
-  /// ms until the next tick, or -1 if there is nobody to look at.
-  [[nodiscard]] int next_tick_ms() const;
+  /// When the next tick is, or Poller::kNever if there is nobody to look at.
+  [[nodiscard]] std::uint64_t next_tick_at_ms() const;
 
   /// Nothing is read any more. Every connection ends once all shards drain and what waits for it was written, or at the
   /// deadline.

@@ -4,6 +4,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/clock.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -70,6 +72,55 @@ TEST_F(PollerTest, TellsAnEndOnceToWhoWaitsForNothing) {
   poller.change(ends[0], 1, {});
   EXPECT_LE(poller.wait(0).size(), 1u);
   EXPECT_TRUE(poller.wait(0).empty());
+}
+
+std::uint64_t now_ms() { return static_cast<std::uint64_t>(steady_now_ns() / 1'000'000); }
+
+TEST_F(PollerTest, WaitsUntilATimeAndNoLonger) {
+  for (int round = 0; round < 3; ++round) {
+    const std::uint64_t at = now_ms() + 5;
+    EXPECT_TRUE(poller.wait_until(at).empty());
+    EXPECT_GE(now_ms(), at);
+  }
+  EXPECT_TRUE(poller.wait_until(now_ms() - 1'000).empty()) << "a time that has passed";
+  EXPECT_TRUE(poller.wait_until(Poller::kNow).empty());
+}
+
+TEST_F(PollerTest, WhatIsReadyEndsAWaitUntilLater) {
+  ASSERT_TRUE(poller.add(ends[0], 42, {.read = true}));
+  write_one();
+  for (const std::uint64_t at : {now_ms() + 600'000, std::uint64_t{Poller::kNever}}) {
+    const auto ready = poller.wait_until(at);
+    ASSERT_EQ(ready.size(), 1u);
+    EXPECT_EQ(ready[0].token, 42u);
+  }
+}
+
+TEST_F(PollerTest, AnEarlierTimeEndsAWaitUntilALaterOneOnceOnly) {
+  ASSERT_TRUE(poller.add(ends[0], 42, {.read = true}));
+  write_one();
+  const std::uint64_t early = now_ms() + 20;
+  EXPECT_EQ(poller.wait_until(early).size(), 1u) << "so that its timer stays set";
+  poller.change(ends[0], 42, {});
+  const std::uint64_t late = early + 20;
+  EXPECT_TRUE(poller.wait_until(late).empty());
+  EXPECT_GE(now_ms(), early);
+  EXPECT_TRUE(poller.wait_until(late).empty());
+  EXPECT_GE(now_ms(), late);
+}
+
+TEST_F(PollerTest, ATimerThatWentOffUnheardDoesNotHoldUpTheNext) {
+  ASSERT_TRUE(poller.add(ends[0], 42, {.read = true}));
+  write_one();
+  const std::uint64_t first = now_ms() + 2;
+  EXPECT_EQ(poller.wait_until(first).size(), 1u);
+  while (now_ms() < first + 2) {
+  }
+  // Both are ready now, the timer and the descriptor.
+  EXPECT_EQ(poller.wait_until(now_ms() + 600'000).size(), 1u) << "the timer is nobody's";
+  poller.change(ends[0], 42, {});
+  const std::uint64_t second = now_ms() + 5;
+  while (now_ms() < second) EXPECT_TRUE(poller.wait_until(second).empty());
 }
 
 TEST_F(PollerTest, RefusesWhatTheKernelRefuses) {
