@@ -34,6 +34,7 @@ void Attacher::attach(AttachCommand command) {
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};
+  connection.read_again = Backoff{};
   connection.ingress.node = connection.node;
   connection.ingress.former_nodes = connection.former_nodes;
   connection.posted_shards = kAllShards;

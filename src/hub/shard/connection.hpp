@@ -10,6 +10,7 @@
 #include "hub/data/fanout/recipient.hpp"
 #include "hub/data/ingress/ingress_gate.hpp"
 #include "hub/data/ingress/receive_buffer.hpp"
+#include "hub/shard/backoff.hpp"
 #include "hub/shard/commands.hpp"
 #include "hub/shard/poller.hpp"
 #include "hub/transport/transport.hpp"
@@ -61,6 +62,7 @@ struct Connection : Recipient {
   bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
   bool draining = false;        ///< closes once everything is written
   bool tell_heard = false;      ///< the conductor waits for the first that is heard of it
+  Backoff read_again;           ///< of reading it twice in a turn
   std::uint32_t attachment = 0;
   std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;  ///< that are unanswered

@@ -6,6 +6,7 @@
 
 #include "base/clock.hpp"
 #include "hub/shard/flow_words.hpp"
+#include "hub/shard/repeated_receive.hpp"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_parser.hpp"
 
@@ -53,8 +54,7 @@ void Reader::read(Connection& connection) {
   }
   const std::span<std::byte> room = state_.receive_buffer.prepare(connection.tail);
   const std::span<std::byte> share = room.first(std::min<std::size_t>(room.size(), most));
-  const IoResult result = connection.transport->receive(share);
-  ++state_.tally.receive_calls;
+  const IoResult result = receive_repeatedly(connection, share, state_.tally);
   if (result.status == IoStatus::would_block) return;
   if (result.status != IoStatus::ok) return closer_.on_end(connection);
   state_.tally.received_bytes += result.bytes;

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "hub/data/tally.hpp"
+#include "hub/shard/connection.hpp"
+
+namespace gimnet::hub {
+
+/// From this size on a read is worth its system call.
+inline constexpr std::size_t kSmallReadBytes = 16 * 1024;
+/// So often more is read behind a small read.
+inline constexpr int kReadsMore = 4;
+
+/// What follows in the same room. An end or an error shows again at the next read.
+[[nodiscard]] std::size_t receive_more(Connection& connection, std::span<std::byte> room, Tally& tally);
+
+/// What is there, and behind a small read what came meanwhile, where that is often the case: who writes message by
+/// message has written the next one while the first was read, and both then leave in one write, which is what a message
+/// costs (docs/performance.md, "Findings"). REQUIRES: `room` is not empty. Thread safety: one shard.
+[[nodiscard]] inline IoResult receive_repeatedly(Connection& connection, std::span<std::byte> room, Tally& tally) {
+  IoResult result = connection.transport->receive(room);
+  ++tally.receive_calls;
+  if (result.status == IoStatus::ok && result.bytes < std::min(kSmallReadBytes, room.size()) &&
+      connection.read_again.is_due()) {
+    result.bytes += receive_more(connection, room.subspan(result.bytes), tally);
+  }
+  return result;
+}
+
+}  // namespace gimnet::hub
