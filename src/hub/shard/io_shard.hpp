@@ -9,6 +9,7 @@
 #include "hub/shard/flusher.hpp"
 #include "hub/shard/keeper.hpp"
 #include "hub/shard/reader.hpp"
+#include "hub/shard/ready_guess.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -79,6 +80,7 @@ class IoShard {
   bool stopped_ = false;
   bool flush_again_ = false;
   bool room_came_ = false;  ///< in a mailbox, since connections that wait for room were last looked at
+  ReadyGuess guess_;
   AllocationMeter meter_;  ///< of the thread that takes the turns
   std::thread thread_;
 };
