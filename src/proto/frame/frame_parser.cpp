@@ -1,9 +1,19 @@
 #include "proto/frame/frame_parser.hpp"
 
+#include <cstring>
+
 #include "proto/frame/extensions.hpp"
 
 namespace gimnet::proto {
 namespace {
+
+using HeaderWords [[gnu::vector_size(kHeaderSize)]] = std::uint64_t;
+
+HeaderWords load_words(const std::byte* header) {
+  HeaderWords words;
+  std::memcpy(&words, header, sizeof words);
+  return words;
+}
 
 /// What of the frame has not been taken apart yet.
 class Rest {
@@ -89,6 +99,20 @@ FrameError take_apart(Rest& rest, FrameView& view) {
 }
 
 }  // namespace
+
+/// Four at a time without a branch between: half the instructions of a frame.
+std::uint32_t count_equal_fours(const std::byte* next, std::size_t available, std::size_t frame_size,
+                                const std::byte* like) {
+  const HeaderWords wanted = load_words(like);
+  std::uint32_t count = 0;
+  for (const std::size_t fours = 4 * frame_size; available >= fours; available -= fours, next += fours, count += 4) {
+    const HeaderWords differ = (load_words(next) ^ wanted) | (load_words(next + frame_size) ^ wanted) |
+                               (load_words(next + 2 * frame_size) ^ wanted) |
+                               (load_words(next + 3 * frame_size) ^ wanted);
+    if ((differ[0] | differ[1]) != 0) break;
+  }
+  return count;
+}
 
 Result<FrameView, FrameError> parse_frame(std::span<const std::byte> frame, Origin origin) {
   if (frame.size() < kHeaderSize) return FrameError::incomplete;

@@ -99,6 +99,42 @@ TEST(NextRun, EndsWhereAnyOtherByteOfTheHeaderDiffers) {
   }
 }
 
+TEST(NextRun, EndsAtTheFirstDifferentHeaderHoweverManyAreEqual) {
+  constexpr std::size_t kFrames = 14;
+  for (const std::size_t payload : {0u, 1u, 16u}) {
+    const std::size_t frame_size = kHeaderSize + payload;
+    Bytes equal;
+    for (std::size_t i = 0; i < kFrames; ++i) append_frame(equal, header_to(1), payload);
+    EXPECT_EQ(run_of(equal).run.frames, kFrames);
+    for (std::size_t other = 1; other < kFrames; ++other) {
+      for (std::size_t byte = 4; byte < kHeaderSize; ++byte) {
+        Bytes bytes = equal;
+        bytes[other * frame_size + byte] ^= std::byte{0x40};
+        const auto next = run_of(bytes);
+        ASSERT_EQ(next.run.frames, other) << "payload " << payload << ", byte " << byte;
+        ASSERT_EQ(next.run.size, other * frame_size);
+      }
+    }
+    for (std::size_t whole = 1; whole < kFrames; ++whole) {
+      const auto next = next_run(equal.data(), equal.data() + (whole + 1) * frame_size - 1, kMax);
+      ASSERT_EQ(next.run.frames, whole) << "the last byte of the next one is missing";
+    }
+  }
+}
+
+TEST(NextRun, GoesOnBehindEqualFramesWithOneOfAnotherLength) {
+  for (std::size_t equal = 1; equal < 14; ++equal) {
+    Bytes bytes;
+    for (std::size_t i = 0; i < equal; ++i) append_frame(bytes, header_to(1), 16);
+    append_frame(bytes, header_to(1), 3);
+    for (std::size_t i = 0; i < equal; ++i) append_frame(bytes, header_to(1), 40);
+    const auto next = run_of(bytes);
+    EXPECT_EQ(next.run.frames, 2 * equal + 1);
+    EXPECT_EQ(next.run.size, bytes.size());
+    EXPECT_EQ(next.shortest_bytes, kHeaderSize + 3);
+  }
+}
+
 TEST(NextRun, GivesSomeFramesSingly) {
   const std::vector<FrameHeader> single = {header_to(2, Kind::list),          header_to(0, Kind::flow),
                                            header_to(0, Kind::link),          header_to(0, Kind::ns),
