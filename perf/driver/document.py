@@ -4,9 +4,9 @@ import pathlib
 
 from driver import control, yardstick
 from driver.figures import shown, shown_with_spread
-from driver.floor import floor_text
 from driver.markdown import table
 from driver.repetition import APART_MAX
+from driver.single_writes import single_writes_text
 from driver.suite import SCENARIOS
 from driver.summary import DOCUMENT_COLUMNS, absence_lines, document_cells
 from driver.verdicts import EXPLANATION, goal_table
@@ -119,7 +119,7 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         "## Bounds and goals", "",
         EXPLANATION, "",
         goal_table(rows), "",
-        *floor_text(rows),
+        *single_writes_text(rows),
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         FINDINGS.read_text(),
         *control.section_lines(),

@@ -68,3 +68,15 @@ def shown_spread(row: dict, name: str) -> str:
 def shown_with_spread(row: dict, name: str) -> str:
     spread = shown_spread(row, name)
     return shown(row.get(name)) + (f" ({spread})" if spread else "")
+
+
+def ratios(row: dict, other: dict, name: str) -> list[float]:
+    """`other` in terms of `row`, for each round that both have."""
+    theirs = {found["round"]: found for found in other["rounds"]}
+    return [theirs[found["round"]][name] / found[name] for found in row["rounds"] if found["round"] in theirs and found[name]]
+
+
+def times(values: list[float]) -> str:
+    """'1.2 times (1.1 to 1.3)'"""
+    spread = f" ({shown(min(values))} to {shown(max(values))})" if len(values) > 1 else ""
+    return f"{shown(statistics.median(values))} times{spread}"

@@ -7,7 +7,6 @@ from support import outcome, result_of
 from driver import measure, suite
 from driver.document import make_document
 from driver.figures import decisive, shown, shown_with_spread, summarise
-from driver.floor import floor_text
 from driver.goals import GOALS, Goal
 from driver.measure import Outcome, Settings, run_group
 from driver.repetition import find_undecided, to_repeat
@@ -170,39 +169,6 @@ class Yardstick(unittest.TestCase):
 
     def test_without_a_null_relay_there_is_no_table(self):
         self.assertEqual(yardstick_table(make_rows([outcome("tcphub", ONE_TO_ONE, [99])])), "")
-
-
-class Floor(unittest.TestCase):
-    UNBATCHED = suite.Case("one_to_one_unbatched", 16, "tcp")
-
-    def rows(self, *subjects_and_costs):
-        return make_rows([outcome(subject, self.UNBATCHED, costs) for subject, costs in subjects_and_costs])
-
-    def test_says_who_is_cheaper_who_dearer_and_of_whom_the_runs_cannot_tell(self):
-        text = " ".join(floor_text(self.rows(("null", [4000, 4000]), ("tcphub", [4000, 4400]), ("nats", [3600, 3300]),
-                                             ("redis", [6000, 6600]), ("zeromq", [3800, 4800]))))
-        self.assertIn("the null relay takes 4,000 (4,000 to 4,000) ns a message", text)
-        self.assertIn("tcphub takes 1.05 times (1 to 1.1) the null relay", text)
-        self.assertIn("The dearest, redis, takes 1.57 times (1.5 to 1.65) the null relay.", text)
-        self.assertIn("cheaper: nats 0.825 times (0.75 to 0.9); dearer: redis 1.5 times (1.5 to 1.5); "
-                      "not told from it by these runs: zeromq 1.02 times (0.95 to 1.09).", text)
-
-    def test_says_that_nobody_is_cheaper(self):
-        text = " ".join(floor_text(self.rows(("null", [4000]), ("tcphub", [4000]), ("redis", [6000]))))
-        self.assertIn("In tcphub's cost, cheaper: none; dearer: redis 1.5 times.", text)
-
-    def test_compares_round_trips_by_library(self):
-        case = suite.Case("library_round_trip", 16, "tcp")
-        rows = make_rows([Outcome(subject, case, [{"p50_us": 1, "messages_per_second": rate, "cpu_ns_per_message": 100,
-                                                   "system_ns_per_message": system}])
-                          for subject, rate, system in (("tcphub", 1000, 80), ("nats", 500, 160), ("mosquitto", 1100, 40))])
-        text = " ".join(floor_text(rows))
-        self.assertIn("1,000 messages/s by NIF and tcphub, and 80% of all their processor time is the kernel's. In that rate, "
-                      "slower: nats 0.5 times; faster: mosquitto 1.1 times; in system time a message, "
-                      "cheaper: mosquitto 0.5 times; dearer: nats 2 times.", text)
-
-    def test_without_such_rows_there_is_no_such_text(self):
-        self.assertEqual(floor_text(make_rows([outcome("tcphub", ONE_TO_ONE, [99])])), [])
 
 
 class Repetition(unittest.TestCase):

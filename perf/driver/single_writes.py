@@ -1,8 +1,6 @@
 """What is left of the differences where each message is a write of its own: sentences made from the rows of a result."""
 
-import statistics
-
-from driver.figures import decisive, shown, shown_with_spread, values_of
+from driver.figures import decisive, ratios, shown, shown_with_spread, times, values_of
 
 UNBATCHED = ("one_to_one_unbatched", 16)
 BURSTS = ("one_to_one", 16)
@@ -15,18 +13,6 @@ def rows_of(rows: list[dict], scenario: str, size: int, transport: str) -> dict[
     """By subject."""
     wanted = (scenario, size, transport)
     return {row["subject"]: row for row in rows if (row["scenario"], row["size"], row["transport"]) == wanted}
-
-
-def ratios(row: dict, other: dict, name: str) -> list[float]:
-    """`other` in terms of `row`, for each round that both have."""
-    theirs = {found["round"]: found for found in other["rounds"]}
-    return [theirs[found["round"]][name] / found[name] for found in row["rounds"] if found["round"] in theirs and found[name]]
-
-
-def times(values: list[float]) -> str:
-    """'1.2 times (1.1 to 1.3)'"""
-    spread = f" ({shown(min(values))} to {shown(max(values))})" if len(values) > 1 else ""
-    return f"{shown(statistics.median(values))} times{spread}"
 
 
 def in_order(ours: dict, others: dict[str, dict], name: str, less: str, more: str, better: str) -> str:
@@ -46,21 +32,34 @@ def peers(rows: dict[str, dict]) -> dict[str, dict]:
     return {name: row for name, row in rows.items() if name != "null" and not name.startswith("tcphub")}
 
 
+def null_text(null: dict, ours: dict, others: dict[str, dict]) -> str:
+    return (f"With a write for each message ({UNBATCHED[0]}, {UNBATCHED[1]} bytes, TCP, at most 64 under way) the null relay takes "
+            f"{shown_with_spread(null, 'cpu_ns_per_message')} ns a message. It reads once, and writes what that read found with one write. Nearly all of "
+            "its cost is the kernel's path of a read, a write and a wake-up, so that a hub that merges more messages into one write is below it: it reads "
+            "again before it writes, or it is so slow that messages gather meanwhile. In the null relay's cost, "
+            f"{in_order(null, {'tcphub': ours} | others, 'cpu_ns_per_message', 'cheaper', 'dearer', 'cheaper')}.")
+
+
+def dearest_text(rows: list[dict], others: dict[str, dict]) -> str:
+    """How little apart hubs are here, if that is so: beside bursts."""
+    dearest = max(others, key=lambda name: others[name]["ratio_to_null"])
+    here = values_of(others[dearest], "ratio_to_null")
+    burst = rows_of(rows, *BURSTS, "tcp").get(dearest, {"rounds": []})
+    in_bursts = values_of(burst, "ratio_to_null")
+    if not in_bursts:
+        return f"The dearest other hub, {dearest}, takes {times(here)} the null relay."
+    small = "Differences are small here beside those in bursts: the" if decisive(in_bursts)[0] > decisive(here)[1] else "The"
+    return f"{small} dearest other hub, {dearest}, takes {times(here)} the null relay, and {times(in_bursts)} in bursts ({BURSTS[0]})."
+
+
 def unbatched_text(rows: list[dict]) -> list[str]:
     found = rows_of(rows, *UNBATCHED, "tcp")
     if "null" not in found or "tcphub" not in found:
         return []
-    null, ours, others = found["null"], found["tcphub"], peers(found)
-    text = [f"With a write for each message ({UNBATCHED[0]}, {UNBATCHED[1]} bytes, TCP, at most 64 under way) the null relay takes "
-            f"{shown_with_spread(null, 'cpu_ns_per_message')} ns a message, for the kernel's TCP path and nothing else. That is the floor, and no "
-            f"hub is far from it: tcphub takes {times(values_of(ours, 'ratio_to_null'))} the null relay."]
+    ours, others = found["tcphub"], peers(found)
+    text = [null_text(found["null"], ours, others)]
     if others:
-        dearest = max(others, key=lambda name: others[name]["ratio_to_null"])
-        burst = rows_of(rows, *BURSTS, "tcp").get(dearest)
-        in_bursts = f"; in bursts it takes {shown(burst['ratio_to_null'])} times" if burst is not None else ""
-        text.append(f"The dearest, {dearest}, takes {times(values_of(others[dearest], 'ratio_to_null'))} the null relay{in_bursts}. So here no hub can "
-                    "be many times cheaper than another: only a client that gathers its messages, or a Unix socket, changes that. In tcphub's cost, "
-                    f"{in_order(ours, others, 'cpu_ns_per_message', 'cheaper', 'dearer', 'cheaper')}.")
+        text += [f"In tcphub's cost, {in_order(ours, others, 'cpu_ns_per_message', 'cheaper', 'dearer', 'cheaper')}.", dearest_text(rows, others)]
     unix = rows_of(rows, *UNBATCHED, "unix").get("tcphub")
     if unix is not None and "ratio_to_null_tcp" in unix:
         text.append(f"On a Unix socket tcphub takes {times(values_of(unix, 'ratio_to_null_tcp'))} the null relay on TCP.")
@@ -84,7 +83,7 @@ def round_trip_text(rows: list[dict]) -> list[str]:
     return text
 
 
-def floor_text(rows: list[dict]) -> list[str]:
+def single_writes_text(rows: list[dict]) -> list[str]:
     """Lines of Markdown; none where nothing of it was measured."""
     paragraphs = [" ".join(unbatched_text(rows)), *round_trip_text(rows)]
     lines = [line for paragraph in paragraphs if paragraph for line in (paragraph, "")]
