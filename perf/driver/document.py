@@ -3,6 +3,7 @@
 import pathlib
 
 from driver import control, yardstick
+from driver.ahead import ahead_lines
 from driver.figures import shown, shown_with_spread
 from driver.markdown import table
 from driver.repetition import APART_MAX
@@ -119,6 +120,7 @@ def make_document(result: dict, pictures: list[str] | None = None) -> str:
         "## Bounds and goals", "",
         EXPLANATION, "",
         goal_table(rows), "",
+        *ahead_lines(rows),
         *single_writes_text(rows),
         *(["## Pictures", "", *(line for link in pictures for line in (link, ""))] if pictures else []),
         FINDINGS.read_text(),

@@ -4,11 +4,69 @@
 import unittest
 
 from support import outcome, result_of
-from driver import suite
+from driver import ahead, suite
 from driver.document import make_document
 from driver.measure import Outcome
 from driver.single_writes import HEADING, single_writes_text
 from driver.summary import make_rows
+
+
+class Ahead(unittest.TestCase):
+    PING = suite.Case("ping_paced", 16, "tcp")
+
+    def listed(self, *outcomes):
+        """Figure, other hub and ratio of each line."""
+        section = "\n".join(ahead.ahead_lines(make_rows(list(outcomes))))
+        return [tuple(line.strip("| ").split(" | ")[each] for each in (3, 4, 7)) for line in section.splitlines() if line.startswith("| ")][2:]
+
+    def test_lists_who_is_better_in_every_round_with_both_values_and_their_ratio(self):
+        case = suite.Case("fan_out_10", 1024, "tcp")
+        lines = ahead.ahead_lines(make_rows([outcome("null", case, [1, 1]), outcome("tcphub", case, [20, 40]), outcome("redis", case, [10, 30]),
+                                             outcome("nats", case, [19, 41]), outcome("tcphub_2_shards", case, [1, 1])]))
+        self.assertEqual(lines[-2].splitlines()[2:],
+                         ["| fan_out_10 | 1024 | tcp | CPU ns a message | redis | 20 (10 to 30) | 30 (20 to 40) | 0.625 |"])
+        self.assertIn(ahead.HEADING, make_document(result_of(make_rows([outcome("tcphub", case, [2]), outcome("nats", case, [1])]))).splitlines())
+
+    def test_rounds_decide_and_not_medians(self):
+        ours = outcome("tcphub", self.PING, [100, 200], p99_us=5)
+        self.assertEqual(self.listed(ours, outcome("nats", self.PING, [101, 90], p99_us=5)), [])
+        self.assertEqual(self.listed(ours, outcome("nats", self.PING, [99, 190], p99_us=5)),
+                         [("round trip, us, median", "nats", "0.97")])
+
+    def test_the_best_and_the_worst_of_nine_rounds_do_not_count(self):
+        case = suite.Case("in_turns", 16, "tcp")
+        ours = outcome("tcphub", case, [10] * 9)
+        self.assertEqual(self.listed(ours, outcome("zeromq", case, [5] * 8 + [20])), [("CPU ns a message", "zeromq", "0.5")])
+        self.assertEqual(self.listed(ours, outcome("zeromq", case, [5] * 7 + [20, 20])), [])
+
+    def test_round_trips_are_listed_by_both_percentiles_and_libraries_also_by_their_rate(self):
+        self.assertEqual(self.listed(outcome("tcphub", self.PING, [100], p99_us=200), outcome("redis", self.PING, [50], p99_us=150)),
+                         [("round trip, us, median", "redis", "0.5"), ("round trip, us, 99th percentile", "redis", "0.75")])
+        library = suite.Case("library_burst", 16, "tcp")
+        more = {"system_ns_per_message": 1}
+        self.assertEqual(self.listed(outcome("tcphub", library, [100], messages_per_second=10, **more),
+                                     outcome("nats", library, [200], messages_per_second=15, **more),
+                                     outcome("mosquitto", library, [200], messages_per_second=5, **more)), [("messages/s", "nats", "1.5")])
+
+    def test_other_transports_are_other_cases(self):
+        unix = suite.Case("ping_paced", 16, "unix")
+        self.assertEqual(self.listed(outcome("tcphub", self.PING, [100]), outcome("tcphub", unix, [100]), outcome("redis", unix, [200])), [])
+        self.assertEqual(len(self.listed(outcome("tcphub", self.PING, [100]), outcome("tcphub", unix, [100]), outcome("redis", unix, [90]))), 1)
+
+    def test_nobody_is_ahead_of_nothing(self):
+        case = suite.Case("idle_alone", 16, "tcp")
+        self.assertEqual(self.listed(outcome("tcphub", case, [0, 5]), outcome("nats", case, [0, 2])), [])
+        self.assertEqual(self.listed(outcome("tcphub", case, [4, 5]), outcome("nats", case, [0, 2])), [("context switches/s", "nats", "0.2")])
+
+    def test_says_that_there_is_none_and_nothing_where_no_other_hub_was_measured(self):
+        ours = outcome("tcphub", self.PING, [100])
+        self.assertIn("There is none.", ahead.ahead_lines(make_rows([ours, outcome("redis", self.PING, [200])])))
+        self.assertEqual(ahead.ahead_lines(make_rows([outcome("null", self.PING, [1]), ours])), [])
+
+    def test_every_figure_that_decides_has_a_title(self):
+        for scenario in suite.SCENARIOS:
+            for name in ahead.figures_of(scenario):
+                self.assertIn(name, ahead.TITLES)
 
 
 class SingleWrites(unittest.TestCase):
