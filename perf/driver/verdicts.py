@@ -4,9 +4,15 @@ from driver.figures import decisive, shown, shown_spread, values_of
 from driver.goals import FIELD_TITLES, GOALS, Goal
 from driver.markdown import table
 
-EXPLANATION = """A bound must hold; a goal is where the hub is to get. `measured` is the median of the runs; of a figure that compares two subjects, the median
-of what the rounds gave in which both were measured. `undecided`: some runs meet the limit and others do not; where there are nine or more, the smallest and the
-largest do not count for that."""
+EXPLANATION = """A bound must hold; a goal is where the hub is to get, and never weaker than the bound. `measured` is the median of the runs; of a figure that compares two
+subjects, the median of what the rounds gave in which both were measured. The verdict is of all runs, not of the median; where there are nine or more, the smallest
+and the largest do not count for it. A limit is met where all runs hold it, missed where none does, and undecided where some do and others do not.
+
+- `goal met`: all runs hold the goal, and with it the bound if there is one.
+- `goal missed`: no run holds it; `goal undecided`: some do.
+- `bound met, goal missed` and `bound met, goal undecided`: the same, where there is a bound, which all runs hold.
+- `bound missed`: no run holds the bound, and so none the goal; `bound undecided`: some hold the bound, and not all the goal.
+- `not measured`: this result has no such row."""
 
 
 def standing(goal: Goal, values: list[float], limit: float) -> bool | None:
@@ -19,9 +25,9 @@ def verdict(goal: Goal, values: list[float]) -> str:
     reached = standing(goal, values, goal.goal)
     if reached:
         return "goal met"
-    of_goal = "goal undecided" if reached is None else "goal open"
+    of_goal = "goal undecided" if reached is None else "goal missed"
     if goal.bound is None:
-        return "undecided" if reached is None else of_goal
+        return of_goal
     kept = standing(goal, values, goal.bound)
     return f"bound met, {of_goal}" if kept else "**bound undecided**" if kept is None else "**bound missed**"
 

@@ -11,7 +11,7 @@ from driver.goals import GOALS, Goal
 from driver.measure import Outcome, Settings, run_group
 from driver.repetition import find_undecided, to_repeat
 from driver.summary import make_rows, text_table
-from driver.verdicts import goal_table, verdict
+from driver.verdicts import EXPLANATION, goal_table, verdict
 from driver.yardstick import ELSEWHERE, yardstick_table
 
 ONE_TO_ONE = suite.Case("one_to_one", 16, "tcp")
@@ -116,27 +116,39 @@ class Verdicts(unittest.TestCase):
         self.assertFalse(self.GOAL.holds(1.26, self.GOAL.goal))
 
     def test_runs_that_agree_decide(self):
-        for values, expected in (([1.1, 1.2, 1.25], "goal met"), ([1.3, 1.9, 1.6], "bound met, goal open"),
+        for values, expected in (([1.1, 1.2, 1.25], "goal met"), ([1.3, 1.9, 1.6], "bound met, goal missed"),
                                  ([2.1, 2.2, 2.3], "**bound missed**")):
             self.assertEqual(verdict(self.GOAL, values), expected)
         self.assertEqual(verdict(self.ONLY_GOAL, [15, 16, 17]), "goal met")
-        self.assertEqual(verdict(self.ONLY_GOAL, [11, 12, 14]), "goal open")
+        self.assertEqual(verdict(self.ONLY_GOAL, [11, 12, 14]), "goal missed")
 
     def test_runs_on_both_sides_of_a_limit_decide_nothing(self):
         self.assertEqual(verdict(self.GOAL, [1.1, 1.2, 1.3]), "bound met, goal undecided")
         self.assertEqual(verdict(self.GOAL, [1.9, 1.9, 2.1]), "**bound undecided**")
-        self.assertEqual(verdict(self.ONLY_GOAL, [14, 16, 16]), "undecided")
+        self.assertEqual(verdict(self.ONLY_GOAL, [14, 16, 16]), "goal undecided")
+
+    def test_every_verdict_is_explained(self):
+        found = {verdict(goal, values).strip("*") for goal in (self.GOAL, self.ONLY_GOAL) for values in
+                 ([1, 1], [1, 1.5], [1.5, 1.5], [1.5, 2.5], [2.5, 2.5], [14, 16], [16, 16])}
+        self.assertEqual(len(found), 7)
+        for words in (*found, "not measured"):
+            self.assertIn(f"`{words}`", EXPLANATION)
+
+    def test_no_goal_is_weaker_than_its_bound(self):
+        for goal in GOALS:
+            if goal.bound is not None:
+                self.assertTrue(goal.holds(goal.goal, goal.bound), goal)
 
     def test_a_stalled_subscriber_is_judged_by_rate_memory_and_the_publisher(self):
         case = suite.Case("stalled_subscriber", 1024, "tcp")
         hub = Outcome("tcphub", case, [{"cpu_ns_per_message": 1, "rate_kept": kept, "rss_growth_bytes": 3 << 20, "publisher_pause_ms": 700}
                                        for kept in (0.94, 0.97)])
         lines = [line for line in goal_table(make_rows([hub])).splitlines() if "stalled" in line]
-        self.assertEqual([line.split(" | ")[-1] for line in lines], ["undecided |", "goal met |", "goal open |"])
+        self.assertEqual([line.split(" | ")[-1] for line in lines], ["goal undecided |", "goal met |", "goal missed |"])
 
     def test_an_idle_hub_is_to_do_nothing_at_all(self):
         case = suite.Case("idle_alone", 16, "tcp")
-        for switches, expected in ((0, "goal met |"), (2, "goal open |")):
+        for switches, expected in ((0, "goal met |"), (2, "goal missed |")):
             hub = Outcome("tcphub", case, [{"context_switches_per_second": switches, "cpu_share": 0}] * 3)
             lines = [line for line in goal_table(make_rows([hub])).splitlines() if "idle_alone" in line]
             self.assertEqual([line.split(" | ")[-1] for line in lines], ["goal met |", expected])
@@ -149,7 +161,7 @@ class Verdicts(unittest.TestCase):
         rows = make_rows([outcome("null", ONE_TO_ONE, [10, 10, 10]), outcome("tcphub", ONE_TO_ONE, [15, 14, 16])])
         document = make_document(result_of(rows))
         self.assertIn("| tcphub | one_to_one | 16 | tcp | times the null relay | <= 2 | <= 1.25 | 1.5 | 1.4 to 1.6 | 3 | "
-                      "bound met, goal open |", document)
+                      "bound met, goal missed |", document)
         self.assertIn("3 runs, up to 9 where they lie more than 1.5 times apart or do not agree on a goal, of 1 s each (ping_paced 4, stalled_subscriber 6, ", document)
         self.assertIn("15 (14 to 16)", document)
         self.assertIn("not measured", document)
