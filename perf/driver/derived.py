@@ -1,7 +1,7 @@
 """Figures that need two rows of one result, made for each round in which both were measured."""
 
 from driver.figures import pair
-from driver.goals import NULL, NULL_TCP, RIVAL_FIELDS
+from driver.goals import NULL, NULL_TCP, RIVAL_FIELDS, UNIX
 from driver.suite import SCENARIOS, Case
 
 Index = dict[tuple[str, str, int, str], dict]
@@ -63,16 +63,22 @@ def add_rivals(row: dict, index: Index) -> None:
 
 
 def add_libraries(row: dict, rows: list[dict]) -> None:
-    """How a library with its hub does beside the best of the others over TCP: rates, and time of all processes."""
+    """How a library with its hub does beside the best of the others: over TCP, and over a Unix socket also over Unix sockets."""
     if row["subject"] != "tcphub" or SCENARIOS[row["scenario"]].roles is None:
         return
-    rivals = [other for other in rows if other["scenario"] == row["scenario"] and other["size"] == row["size"]
-              and other["transport"] == "tcp" and other["subject"] != "tcphub"]
+    for transport, suffix in (("tcp", ""), ("unix", UNIX)):
+        if not suffix or row["transport"] == transport:
+            add_best(row, [other for other in rows if other["scenario"] == row["scenario"] and other["size"] == row["size"]
+                           and other["transport"] == transport and other["subject"] != "tcphub"], suffix)
+
+
+def add_best(row: dict, rivals: list[dict], suffix: str) -> None:
+    """In terms of the best of each round: rates, and time of all processes."""
     for found in row["rounds"]:
         theirs = [each for rival in rivals for each in rival["rounds"] if each["round"] == found["round"]]
         if not theirs:
             continue
-        found["rate_over_best"] = found["messages_per_second"] / max(each["messages_per_second"] for each in theirs)
+        found[f"rate_over_best{suffix}"] = found["messages_per_second"] / max(each["messages_per_second"] for each in theirs)
         for part in ("cpu", "system"):
             if least := min(each[f"{part}_ns_per_message"] for each in theirs):
-                found[f"{part}_over_best"] = found[f"{part}_ns_per_message"] / least
+                found[f"{part}_over_best{suffix}"] = found[f"{part}_ns_per_message"] / least

@@ -22,6 +22,8 @@ class Goal:
 
 NULL = "ratio_to_null"
 NULL_TCP = "ratio_to_null_tcp"
+# Ends the name of a figure that compares with others over Unix sockets instead of TCP.
+UNIX = "_unix"
 # Another hub's cost in that of the row.
 RIVAL_FIELDS = {"nats": "times_nats", "mosquitto": "times_mosquitto", "redis": "times_redis", "zeromq": "times_zeromq"}
 
@@ -62,14 +64,19 @@ GOALS = (
     Goal("idle_alone", 16, "tcp", "cpu_share", None, 0),
     Goal("idle_alone", 16, "tcp", "context_switches_per_second", None, 0),
     Goal("connect_10000", 16, "tcp", "seconds_over_null", None, 0.5),
+    # Over a Unix socket a goal can be read either way: beside the others as they are mostly used, or as they are there.
     Goal("library_burst", 16, "tcp", "rate_over_best", None, 2, at_least=True),
     Goal("library_burst", 16, "unix", "rate_over_best", None, 2, at_least=True),
+    Goal("library_burst", 16, "unix", "rate_over_best" + UNIX, None, 2, at_least=True),
     Goal("library_burst", 16, "tcp", "system_over_best", None, 0.5),
     Goal("library_burst", 16, "unix", "system_over_best", None, 0.5),
+    Goal("library_burst", 16, "unix", "system_over_best" + UNIX, None, 0.5),
     Goal("library_round_trip", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
     Goal("library_round_trip", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
+    Goal("library_round_trip", 16, "unix", "rate_over_best" + UNIX, None, 1.8, at_least=True),
     Goal("library_round_trip_one_cpu", 16, "tcp", "rate_over_best", None, 1.1, at_least=True),
     Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best", None, 1.8, at_least=True),
+    Goal("library_round_trip_one_cpu", 16, "unix", "rate_over_best" + UNIX, None, 1.8, at_least=True),
 )
 
 
@@ -95,4 +102,6 @@ FIELD_TITLES = {
     "seconds_over_null": "seconds longer than the null relay",
     "rate_over_best": "messages/s, times the best other library on TCP",
     "system_over_best": "system CPU a message, times the best other library on TCP",
+    "rate_over_best" + UNIX: "messages/s, times the best other library on a Unix socket",
+    "system_over_best" + UNIX: "system CPU a message, times the best other library on a Unix socket",
 }

@@ -86,8 +86,12 @@ class Derived(unittest.TestCase):
                            [{"messages_per_second": rate, "cpu_ns_per_message": 2e8 / rate, "system_ns_per_message": 1e8 / rate}
                             for rate in rates])
         rows = make_rows([runs("tcphub", "unix", [6e6, 8e6]), runs("nats", "tcp", [2e6, 1e6]), runs("mosquitto", "tcp", [1e6, 2e6]),
-                          runs("mosquitto", "unix", [9e6, 9e6])])
+                          runs("mosquitto", "unix", [4e6, 2e6]), runs("tcphub", "tcp", [3e6, 3e6])])
         self.assertEqual(rows[0]["spread"]["rate_over_best"], [3, 4])
+        self.assertEqual(rows[0]["spread"]["rate_over_best_unix"], [1.5, 4])
+        self.assertAlmostEqual(rows[0]["spread"]["system_over_best_unix"][1], 1 / 1.5)
+        self.assertEqual(rows[4]["spread"]["rate_over_best"], [1.5, 1.5])
+        self.assertNotIn("rate_over_best_unix", rows[4])
         self.assertEqual(rows[0]["rate_over_best"], 3.5)
         self.assertAlmostEqual(rows[0]["spread"]["system_over_best"][0], 1 / 4)
         self.assertNotIn("rate_over_best", rows[1])
@@ -138,6 +142,16 @@ class Verdicts(unittest.TestCase):
         for goal in GOALS:
             if goal.bound is not None:
                 self.assertTrue(goal.holds(goal.goal, goal.bound), goal)
+
+    def test_a_library_on_a_unix_socket_is_judged_beside_others_on_either_transport(self):
+        def runs(subject, transport, rate):
+            return Outcome(subject, suite.Case("library_burst", 16, transport),
+                           [{"messages_per_second": rate, "cpu_ns_per_message": 1, "system_ns_per_message": 1}])
+        rows = make_rows([runs("tcphub", "unix", 5e6), runs("mosquitto", "tcp", 2e6), runs("mosquitto", "unix", 4e6)])
+        lines = [line.split(" | ") for line in goal_table(rows).splitlines() if "library_burst | 16 | unix | messages/s" in line]
+        self.assertEqual([(line[4], line[7], line[-1]) for line in lines],
+                         [("messages/s, times the best other library on TCP", "2.5", "goal met |"),
+                          ("messages/s, times the best other library on a Unix socket", "1.25", "goal missed |")])
 
     def test_a_stalled_subscriber_is_judged_by_rate_memory_and_the_publisher(self):
         case = suite.Case("stalled_subscriber", 1024, "tcp")
