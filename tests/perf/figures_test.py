@@ -167,6 +167,14 @@ class Verdicts(unittest.TestCase):
             lines = [line for line in goal_table(make_rows([hub])).splitlines() if "idle_alone" in line]
             self.assertEqual([line.split(" | ")[-1] for line in lines], ["goal met |", expected])
 
+    def test_keep_alives_are_judged_to_the_letter_and_by_what_each_costs(self):
+        case = suite.Case("idle_10000", 16, "tcp")
+        hub = Outcome("tcphub", case, [{"rss_bytes_per_connection": 2000, "cpu_share_beyond_keep_alives": 0.001, "keep_alive_over_busy": 1.2}] * 3)
+        lines = [line.split(" | ") for line in goal_table(make_rows([hub])).splitlines() if "idle_10000" in line]
+        self.assertEqual([(line[4], line[6], line[-1]) for line in lines[1:]],
+                         [("of a processor used beyond keep-alives", "<= 0", "goal missed |"),
+                          ("CPU of a keep-alive, times that of one among many at once", "<= 1.25", "goal met |")])
+
     def test_one_wild_run_of_nine_does_not_count(self):
         self.assertEqual(verdict(self.GOAL, [1.1] * 8 + [5]), "goal met")
         self.assertEqual(verdict(self.GOAL, [1.1] * 7 + [1.3, 5]), "bound met, goal undecided")
