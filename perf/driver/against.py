@@ -95,17 +95,22 @@ def measure_pairs(case: Case, other: pathlib.Path, count: int, settings: Setting
 
 def describe(case: Case, comparison: Comparison) -> str:
     change, low, high = ((each - 1) * 100 for each in (comparison.ratio, comparison.low, comparison.high))
+    confidence = f", confidence {comparison.confidence * 100:.1f} %" if comparison.is_shown else ""
     return (f"{str(case):32} {case.spec.metric:20} {change:+6.1f} %  (between {low:+.1f} and {high:+.1f} %)  "
-            f"{comparison.verdict}, confidence {comparison.confidence:.1%}, {comparison.pairs} pairs")
+            f"{comparison.verdict}{confidence}, {comparison.pairs} pairs")
 
 
-def explain(cases: int) -> str:
-    """What the confidence is of."""
-    of_all = f"that of all {cases} cases together (Holm's method)" if cases > 1 else "that of Wilcoxon's signed-rank test"
-    called = "one of them" if cases > 1 else "it"
-    return (f"The confidence is {of_all}: if the versions were equally fast, {called} would be called faster or slower in fewer than "
-            f"{(1 - CONFIDENCE) * 100:.0f} of 100 such comparisons.\n'No difference' says that there is none that so many pairs show; the "
-            "brackets say how large it could be.")
+def explain(comparisons: list[Comparison]) -> str:
+    """What the brackets, the verdicts and the confidence say."""
+    count = len(comparisons)
+    changes, any_case = (f"the true changes of all {count} cases lie", f" in any of the {count} cases") if count > 1 else ("the true change lies", "")
+    text = (f"In at least {CONFIDENCE * 100:.0f} of 100 such comparisons {changes} between what the brackets say (Wilcoxon's signed-rank test). 'Faster' "
+            "and 'slower': the brackets leave 0 out.\n'No difference shown': they do not; there may be one, no larger than they say.")
+    shown = [each.p_of_all for each in comparisons if each.is_shown]
+    if shown:
+        text += (f"\nConfidence {(1 - max(shown)) * 100:.1f} %: were the versions equally fast, chance would show a difference this clear{any_case} in at most "
+                 f"{max(shown) * 100:.1f} of 100 such comparisons.")
+    return text
 
 
 def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count: int | None, settings: Settings) -> dict:
@@ -127,7 +132,7 @@ def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count
     cases = [each.case for each in measured if not each.failed]
     comparisons = compare_all([each.pairs for each in measured if not each.failed])
     if cases:
-        say("\n".join([f"this version against {revision} ({commit[:12]}):", *map(describe, cases, comparisons), explain(len(cases))]))
+        say("\n".join([f"this version against {revision} ({commit[:12]}):", *map(describe, cases, comparisons), explain(comparisons)]))
     return {"against": revision, "commit": commit, "confidence_of_all": CONFIDENCE, "faults": [str(each) for each in faults],
             "is_good": not any(fault.is_error for fault in faults) and all(each.verdict != "slower" for each in comparisons),
             "comparisons": [

@@ -1,13 +1,16 @@
-"""Is one of two versions faster? From pairs of measurements that were made one right after the other."""
+"""Is one of two versions faster? From pairs of measurements that were made one right after the other.
 
+Everything is of Wilcoxon's signed-rank test, by way of the means of each two differences (Walsh averages): the sum of ranks
+on one side is how many of these lie there. So the interval, the verdict and the confidence always say the same."""
+
+import functools
+import itertools
 import math
-import random
 import statistics
 from dataclasses import dataclass
 
 # Of all cases of one comparison together: were there no difference anywhere, in so many of them none would be called one.
 CONFIDENCE = 0.95
-RESAMPLES = 10_000
 # No ratio says how much more than nothing something is: this one stands for it, above every other.
 RATIO_MAX = 1e6
 
@@ -25,10 +28,10 @@ class Comparison:
     """`ratio` is new to old, of a figure of which less is better."""
 
     ratio: float
-    low: float  # between low and high lie the medians of resampled pairs, with CONFIDENCE for all cases together
+    low: float  # between low and high it lies, with CONFIDENCE for all cases together
     high: float
-    p: float  # of Wilcoxon's signed-rank test, for this case alone
-    p_of_all: float  # the same among all cases, by Holm
+    p: float  # of the test, for this case alone
+    p_of_all: float  # the same among all cases, by Bonferroni
     pairs: int
 
     @property
@@ -37,39 +40,45 @@ class Comparison:
         return 1 - self.p_of_all
 
     @property
+    def is_shown(self) -> bool:
+        return not self.low <= 1 <= self.high
+
+    @property
     def verdict(self) -> str:
-        if self.p_of_all > 1 - CONFIDENCE or self.low <= 1 <= self.high:
-            return "no difference"
-        return "faster" if self.ratio < 1 else "slower"
+        if not self.is_shown:
+            return "no difference shown"
+        return "faster" if self.high < 1 else "slower"
+
+
+def walsh_averages(differences: list[float]) -> list[float]:
+    """In order. Their median is the estimate of the difference that belongs to the test (Hodges and Lehmann)."""
+    return sorted((one + other) / 2 for one, other in itertools.combinations_with_replacement(differences, 2))
+
+
+@functools.cache
+def tails(count: int) -> list[float]:
+    """By sum of ranks: how probable that sum or less is on one side, of `count` differences of which each is on either by chance."""
+    total = count * (count + 1) // 2
+    ways = [1] + [0] * total  # by sum: how many choices of signs give it
+    for rank in range(1, count + 1):
+        for sum_so_far in range(total, rank - 1, -1):
+            ways[sum_so_far] += ways[sum_so_far - rank]
+    return [each / 2**count for each in itertools.accumulate(ways)]
 
 
 def signed_rank_p(differences: list[float]) -> float:
-    """Two-sided p of Wilcoxon's signed-rank test, exact: equal sizes share their ranks, zeros are left out."""
-    differences = [each for each in differences if each != 0]
-    if not differences:
-        return 1.0
-    sizes = sorted(abs(each) for each in differences)
-    # Twice the mean rank, so that shared ranks are whole numbers.
-    rank = {size: 2 * sizes.index(size) + sizes.count(size) + 1 for size in sizes}
-    ranks = [rank[abs(each)] for each in differences]
-    total = sum(ranks)
-    ways = [1] + [0] * total  # by sum: how many choices of signs give it
-    for each in ranks:
-        for sum_so_far in range(total, each - 1, -1):
-            ways[sum_so_far] += ways[sum_so_far - each]
-    positive = sum(each for each, difference in zip(ranks, differences) if difference > 0)
-    tail = sum(ways[: min(positive, total - positive) + 1])
-    return min(1.0, 2 * tail / 2 ** len(ranks))
+    """Two-sided p, exact where no two differences are equal in size; what is 0 or equal speaks against a difference."""
+    averages = walsh_averages(differences)
+    fewest = min(sum(each <= 0 for each in averages), sum(each >= 0 for each in averages))
+    return min(1.0, 2 * tails(len(differences))[fewest])
 
 
-def holm(ps: list[float]) -> list[float]:
-    """What each p is worth where so many were looked at: Holm's method, so that looking often finds nothing by itself."""
-    adjusted = [0.0] * len(ps)
-    least = 0.0
-    for rank, index in enumerate(sorted(range(len(ps)), key=ps.__getitem__)):
-        least = max(least, min(1.0, (len(ps) - rank) * ps[index]))
-        adjusted[index] = least
-    return adjusted
+def interval(differences: list[float], cases: int) -> tuple[float, float]:
+    """All that the test does not rule out, at the confidence that each of so many cases needs (Bonferroni). Without an end where there
+    are fewer pairs than pairs_min()."""
+    averages = walsh_averages(differences)
+    ruled_out = sum(2 * tail <= (1 - CONFIDENCE) / cases for tail in tails(len(differences)))
+    return (averages[ruled_out - 1], averages[-ruled_out]) if ruled_out else (-math.inf, math.inf)
 
 
 def logarithms_of(pairs: list[tuple[float, float]]) -> list[float]:
@@ -83,17 +92,12 @@ def logarithm_of(old: float, new: float) -> float:
     return math.log(min(max(ratio, 1 / RATIO_MAX), RATIO_MAX))
 
 
-def interval(logarithms: list[float], cases: int) -> tuple[float, float]:
-    """Of the median, from resampled pairs, widened for the number of cases by Bonferroni's method."""
-    chance = random.Random(len(logarithms))  # the same pairs give the same answer
-    medians = sorted(statistics.median(chance.choices(logarithms, k=len(logarithms))) for _ in range(RESAMPLES))
-    outside = int(RESAMPLES * (1 - CONFIDENCE) / cases / 2)
-    return math.exp(medians[outside]), math.exp(medians[-1 - outside])
-
-
 def compare_all(cases: list[list[tuple[float, float]]]) -> list[Comparison]:
     """REQUIRES: of each case pairs of old and new, none below 0."""
-    found = [logarithms_of(pairs) for pairs in cases]
-    ps = [signed_rank_p(logarithms) for logarithms in found]
-    return [Comparison(math.exp(statistics.median(logarithms)), *interval(logarithms, len(cases)), p, p_of_all, len(logarithms))
-            for logarithms, p, p_of_all in zip(found, ps, holm(ps), strict=True)]
+    return [compare(logarithms_of(pairs), len(cases)) for pairs in cases]
+
+
+def compare(logarithms: list[float], cases: int) -> Comparison:
+    p = signed_rank_p(logarithms)
+    ratio, low, high = map(math.exp, (statistics.median(walsh_averages(logarithms)), *interval(logarithms, cases)))
+    return Comparison(ratio, low, high, p, min(1.0, cases * p), len(logarithms))
