@@ -57,19 +57,38 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
-    parser.add_argument("--size", nargs="+", action="extend", type=usage.positive_whole, default=[], metavar="BYTES")
+    parser.add_argument("--size", nargs="+", action="extend", type=usage.payload_bytes, default=[], metavar="BYTES",
+                        help="16 to 1,048,576; others than those of the whole run, too")
     parser.add_argument("--transport", nargs="+", action="extend", choices=("tcp", "unix"), default=[])
-    parser.add_argument("--seconds", type=usage.positive_seconds, help="length of each measurement")
+    parser.add_argument("--seconds", type=usage.seconds, help="length of each measurement, 0.01 to 600; some scenarios take several times that")
     parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3, and more where they decide nothing)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
                         help="more for the hub's command line; repeatable, write --hub-argument=--shards")
     arguments = parser.parse_args(given)
-    if (wrong := usage.find_wrong(arguments, parser.get_default)) is not None:
+    if (wrong := usage.find_wrong(arguments, parser.get_default) or find_impossible(arguments)) is not None:
         parser.error(wrong)
-    if usage.mode_of(arguments) in ("--against", None) and not any(choose_plan(arguments).values()):
-        parser.error("there is nothing to measure: none of these subjects has these scenarios over that transport")
     return arguments
+
+
+def find_impossible(arguments: argparse.Namespace) -> str | None:
+    """Why what is asked for cannot be had, as far as that is known before anything is installed or built."""
+    mode = usage.mode_of(arguments)
+    try:
+        if mode == "--instructions" and arguments.instructions:
+            instructions.require_script(arguments.instructions, instructions.known_scripts())
+        if mode in ("--instructions", "--control"):
+            return None
+        plan = choose_plan(arguments)
+        if not any(plan.values()):
+            return "there is nothing to measure: none of these subjects has these scenarios over that transport"
+        if mode == "--against":
+            cases = cases_against(arguments)
+            against.require_comparable(ROOT, arguments.against, cases, arguments.runs)
+            return usage.find_too_long(cases, arguments.seconds)
+        return usage.find_too_long(plan, arguments.seconds)
+    except (instructions.CountingError, against.BuildError) as error:
+        return str(error)
 
 
 def choose_plan(arguments: argparse.Namespace) -> suite.Plan:
@@ -232,15 +251,18 @@ def measure_control(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def cases_against(arguments: argparse.Namespace) -> list[suite.Case]:
+    if arguments.scenario or arguments.size or arguments.transport:
+        return list(suite.chosen_plan(arguments.scenario, arguments.size, arguments.transport, ()))
+    return list(against.CASES)
+
+
 def compare_versions(arguments: argparse.Namespace) -> int:
     """The exit status: 1 where this version is slower, or something of it failed."""
     settings = make_settings(arguments)
     settings.seconds = arguments.seconds or against.PAIR_SECONDS
-    cases = list(against.CASES)
-    if arguments.scenario or arguments.size or arguments.transport:
-        cases = list(suite.chosen_plan(arguments.scenario, arguments.size, arguments.transport, ()))
     try:
-        document = against.compare_versions(ROOT, arguments.against, cases, arguments.runs, settings)
+        document = against.compare_versions(ROOT, arguments.against, cases_against(arguments), arguments.runs, settings)
     except against.BuildError as error:
         say(f"error: {error}")
         return 1

@@ -113,14 +113,21 @@ def explain(comparisons: list[Comparison]) -> str:
     return text
 
 
-def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count: int | None, settings: Settings) -> dict:
-    """The JSON document; `count` pairs of each case, None: as many as usual. Raises BuildError."""
+def require_comparable(root: pathlib.Path, revision: str, cases: list[Case], count: int | None) -> None:
+    """What can be known before anything is built. Raises BuildError."""
     if not cases:
         raise BuildError("none of the scenarios asked for exists in that size and on that transport")
     least = pairs_min(len(cases))
-    count = count or max(PAIRS, least)
-    if count < least:
-        raise BuildError(f"{count} pairs cannot show a difference in one of {len(cases)} cases: at least {least} (--runs)")
+    if count is not None and count < least:
+        among = f"one of {len(cases)} cases" if len(cases) > 1 else "a case"
+        raise BuildError(f"--runs {count}: so few pairs cannot show a difference in {among}; give at least {least}")
+    commit_of(root, revision)
+
+
+def compare_versions(root: pathlib.Path, revision: str, cases: list[Case], count: int | None, settings: Settings) -> dict:
+    """The JSON document; `count` pairs of each case, None: as many as usual. Raises BuildError."""
+    require_comparable(root, revision, cases, count)
+    count = count or max(PAIRS, pairs_min(len(cases)))
     commit, other = build_version(root, revision)
     measured = []
     for case in cases:

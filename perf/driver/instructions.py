@@ -7,11 +7,13 @@ import collections
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
 from dataclasses import dataclass
 
+SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "scripts.cpp"
 BUDGET = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "budget.json"
 TOLERANCE = 0.02
 SECONDS_MAX = 250  # of one program: what takes longer hangs, however loaded the machine is
@@ -151,9 +153,14 @@ def require_comparable(made_by: dict, budget: dict) -> None:
         raise NotCountable(f"the budget is for {' '.join(budget['made_by'].values()) or 'nothing yet'}; this is {' '.join(made_by.values())}")
 
 
+def known_scripts() -> list[str]:
+    """Those of the source, so that a wrong name is told before anything is built."""
+    return re.findall(r'^    \{"(\w+)", ', SCRIPTS.read_text(), re.MULTILINE)
+
+
 def require_script(script: str, scripts: list[str]) -> None:
     if script not in scripts:
-        raise CountingError(f"there is no script '{script}'; there are {', '.join(scripts)}")
+        raise CountingError(f"there is no script '{script}'; give one of {', '.join(scripts)}")
 
 
 def measure(program: pathlib.Path, scripts: list[str], budget: dict) -> list[Verdict]:

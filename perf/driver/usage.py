@@ -2,7 +2,9 @@
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+
+from driver.suite import Case
 
 # What each way to run takes; without one of these names the suite is measured, which takes all but --update.
 ALWAYS = ("packages", "build_dir")
@@ -11,6 +13,10 @@ TAKEN_BY = {
     "--control": ("control", "report", *ALWAYS),
     "--against": ("against", "json", "scenario", "size", "transport", "seconds", "runs", "hub_argument", *ALWAYS),
 }
+# What the generator takes (perf/generator/pattern.hpp, perf/load_generator.cpp).
+SIZE_MIN, SIZE_MAX = 16, 1_048_576
+GENERATOR_SECONDS_MAX = 3600
+SECONDS_MIN, SECONDS_MAX = 0.01, 600
 
 
 def positive_whole(text: str) -> int:
@@ -20,14 +26,22 @@ def positive_whole(text: str) -> int:
     return int(text)
 
 
-def positive_seconds(text: str) -> float:
+def payload_bytes(text: str) -> int:
+    """For argparse."""
+    value = positive_whole(text)
+    if not SIZE_MIN <= value <= SIZE_MAX:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size that can be measured: give {SIZE_MIN} to {SIZE_MAX:,} bytes")
+    return value
+
+
+def seconds(text: str) -> float:
     """For argparse."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or value <= 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds above 0")
+    if not SECONDS_MIN <= value <= SECONDS_MAX:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a length that can be measured: give {SECONDS_MIN} to {SECONDS_MAX} seconds")
     return value
 
 
@@ -53,6 +67,16 @@ def find_wrong(arguments: argparse.Namespace, default_of: Callable[[str], object
         return "--quick and --smoke are two different runs"
     if arguments.smoke and arguments.report:
         return "--smoke measures nothing that --report could write"
+    return None
+
+
+def find_too_long(cases: Iterable[Case], given_seconds: float | None) -> str | None:
+    """Some scenarios take several times --seconds, and the generator refuses to measure for ever."""
+    for case in cases:
+        factor = case.spec.seconds_factor
+        if given_seconds is not None and given_seconds * factor > GENERATOR_SECONDS_MAX:
+            return (f"--seconds {given_seconds:g} is too long for {case.scenario}, which takes {factor:g} times that: give at most "
+                    f"{GENERATOR_SECONDS_MAX / factor:g}, or other scenarios")
     return None
 
 

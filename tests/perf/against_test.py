@@ -115,7 +115,7 @@ class ManyCases(unittest.TestCase):
     def test_more_cases_need_more_pairs(self):
         self.assertEqual([pairs_min(cases) for cases in (1, 2, 7)], [6, 7, 9])
         self.assertLessEqual(pairs_min(len(against.CASES)), against.PAIRS)
-        with self.assertRaisesRegex(against.BuildError, "8 pairs .* one of 7 cases: at least 9"):
+        with self.assertRaisesRegex(against.BuildError, "--runs 8: .* one of 7 cases; give at least 9"):
             against.compare_versions(ROOT, "HEAD", list(against.CASES), 8, None)
 
     def test_nothing_to_compare_is_said(self):
@@ -131,7 +131,7 @@ class Report(unittest.TestCase):
     """compare_versions() with figures that are given instead of measured."""
 
     def setUp(self):
-        for name in ("build_version", "measure_once", "say"):
+        for name in ("build_version", "commit_of", "measure_once", "say"):
             self.addCleanup(setattr, against, name, getattr(against, name))
         self.said = []
         self.order = []
@@ -139,6 +139,7 @@ class Report(unittest.TestCase):
         self.factor = 1.1
         self.failing = None
         against.build_version = lambda root, revision: ("c0ffee", pathlib.Path("old"))
+        against.commit_of = lambda root, revision: "c0ffee"
         against.measure_once = self.measure_once
         against.say = self.said.append
 

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """perf/run.py without the programs that it runs: what is compared with what, and how rows and the document are made."""
 
-import contextlib
-import io
 import math
 import os
 import pathlib
@@ -186,51 +184,6 @@ class Subjects(unittest.TestCase):
         self.assertEqual(run.needed_packages(arguments), ["nats-server"])
         self.assertEqual(run.needed_packages(run.parse_arguments(["--only", "nats"])), ["nats-server", "libnats-dev"])
         self.assertEqual(run.needed_packages(run.parse_arguments(["--subjects", "tcphub"])), [])
-
-
-class Arguments(unittest.TestCase):
-    def assert_refused(self, words: str, sentence: str):
-        said = io.StringIO()
-        with contextlib.redirect_stderr(said), self.assertRaises(SystemExit) as caught:
-            run.parse_arguments(words.split())
-        self.assertEqual(caught.exception.code, 2, words)
-        self.assertIn(sentence, said.getvalue())
-
-    def test_numbers_are_above_zero(self):
-        for number in ("0", "-1", "1.5", "many", "\u0661"):
-            self.assert_refused(f"--runs={number}", "is not a whole number above 0")
-            self.assert_refused(f"--size={number}", "is not a whole number above 0")
-        for number in ("0", "-1", "nan", "inf", "long"):
-            self.assert_refused(f"--seconds={number}", "is not a number of seconds above 0")
-        arguments = run.parse_arguments(["--runs", "1", "--seconds", "0.1", "--size", "1"])
-        self.assertEqual((arguments.runs, arguments.seconds, arguments.size), (1, 0.1, [1]))
-
-    def test_what_would_be_ignored_is_refused(self):
-        for words, sentence in (("--update", "--update goes with --instructions"),
-                                ("--instructions parser_run --update", "of all scripts"),
-                                ("--instructions --runs 3", "--runs means nothing with --instructions"),
-                                ("--control --quick", "--quick means nothing with --control"),
-                                ("--against HEAD --only nats", "--subjects means nothing with --against"),
-                                ("--against HEAD --report", "--report means nothing with --against"),
-                                ("--against HEAD --quick", "--quick means nothing with --against"),
-                                ("--against HEAD --instructions", "--against means nothing with --instructions"),
-                                ("--quick --smoke", "two different runs"), ("--smoke --report", "nothing that --report")):
-            self.assert_refused(words, sentence)
-
-    def test_nothing_to_measure_is_refused(self):
-        for words in ("--scenario idle_10000 --transport unix", "--only null --scenario library_burst",
-                      "--against HEAD --scenario idle_10000 --transport unix"):
-            self.assert_refused(words, "nothing to measure")
-
-    def test_an_unknown_argument_is_named(self):
-        self.assert_refused("--scenaro ping_paced", "--scenaro")
-        self.assert_refused("--scenario pingpong", "pingpong")
-
-    def test_what_goes_together_is_taken(self):
-        for words in ("--instructions --update", "--instructions parser_run", "--control --report --packages", "--quick --json --report",
-                      "--against HEAD --runs 9 --json --scenario one_to_one --hub-argument=--spin", "--smoke --only nats",
-                      "--build-dir build/release --instructions"):
-            run.parse_arguments(words.split())
 
 
 class Folders(unittest.TestCase):

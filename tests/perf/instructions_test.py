@@ -149,7 +149,7 @@ class FailsClosed(unittest.TestCase):
         growing = list(growth_test.SCRIPTS)
         self.made_by = made_by
         for name, replacement in (("describe", lambda program: (self.made_by, growing if program.name == "growth_scripts" else ["parser"])),
-                                  ("count", self.count), ("load_budget", lambda: budget)):
+                                  ("count", self.count), ("load_budget", lambda: budget), ("known_scripts", lambda: ["parser", "newer"])):
             patch = mock.patch.object(instructions, name, replacement)
             patch.start()
             self.addCleanup(patch.stop)
@@ -176,8 +176,8 @@ class FailsClosed(unittest.TestCase):
         self.assertEqual(self.gate("parser"), 1)
         self.assertEqual(list(self.ends_of_others()), [self.error, self.error])
 
-    def test_an_unknown_script_fails(self):
-        self.assertEqual(self.gate("nonsense"), 1)
+    def test_a_script_that_the_program_does_not_have_fails(self):
+        self.assertEqual(self.gate("newer"), 1)
 
     def test_a_program_that_hangs_fails(self):
         with mock.patch.object(instructions, "SECONDS_MAX", 0.01), self.assertRaises(CountingError) as caught:
