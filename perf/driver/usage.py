@@ -13,6 +13,8 @@ TAKEN_BY = {
     "--control": ("control", "report", *ALWAYS),
     "--against": ("against", "json", "scenario", "size", "transport", "seconds", "runs", "hub_argument", *ALWAYS),
 }
+# What makes a run a part of the suite.
+PARTS = ("quick", "scenario", "size", "transport", "subjects")
 # What the generator takes (perf/generator/pattern.hpp, perf/load_generator.cpp).
 SIZE_MIN, SIZE_MAX = 16, 1_048_576
 GENERATOR_SECONDS_MAX = 3600
@@ -67,7 +69,16 @@ def find_wrong(arguments: argparse.Namespace, default_of: Callable[[str], object
         return "--quick and --smoke are two different runs"
     if arguments.smoke and arguments.report:
         return "--smoke measures nothing that --report could write"
-    return None
+    return find_partial(given) if arguments.report else None
+
+
+def find_partial(given: list[str]) -> str | None:
+    """Why this run is not what docs/performance.md is of."""
+    parts = [flag(name) for name in given if name in PARTS]
+    if not parts:
+        return None
+    return (f"--report replaces all of docs/performance.md, and {' and '.join(parts)} would leave most of it out: keep the result with --json >RESULT.json, "
+            "and make a page of its own with perf/report.py RESULT.json OTHER.md")
 
 
 def find_too_long(cases: Iterable[Case], given_seconds: float | None) -> str | None:

@@ -79,6 +79,12 @@ class Arguments(unittest.TestCase):
                                 ("--quick --smoke", "two different runs"), ("--smoke --report", "nothing that --report")):
             self.assert_refused(words, sentence)
 
+    def test_a_part_of_the_suite_does_not_replace_the_whole_page(self):
+        for words in ("--quick", "--scenario one_to_one", "--size 16", "--transport unix", "--only nats"):
+            self.assert_refused(f"{words} --report", "--report replaces all of docs/performance.md, and --")
+        self.assert_refused("--scenario in_turns --size 16 --report",
+                            "keep the result with --json >RESULT.json, and make a page of its own with perf/report.py RESULT.json OTHER.md")
+
     def test_nothing_to_measure_is_refused(self):
         for words in ("--scenario idle_10000 --transport unix", "--only null --scenario library_burst",
                       "--against HEAD --scenario idle_10000 --transport unix"):
@@ -89,7 +95,7 @@ class Arguments(unittest.TestCase):
         self.assert_refused("--scenario pingpong", "pingpong")
 
     def test_what_goes_together_is_taken(self):
-        for words in ("--instructions --update", "--instructions parser_run", "--control --report --packages", "--quick --json --report",
+        for words in ("--instructions --update", "--instructions parser_run", "--control --report --packages", "--quick --json", "--json --report --runs 5",
                       "--against HEAD --runs 9 --json --scenario one_to_one --hub-argument=--spin", "--smoke --only nats",
                       "--build-dir build/release --instructions"):
             run.parse_arguments(words.split())
