@@ -80,8 +80,9 @@ def find_impossible(arguments: argparse.Namespace) -> str | None:
         if mode in ("--instructions", "--control"):
             return None
         plan = choose_plan(arguments)
-        if not any(plan.values()):
-            return "there is nothing to measure: none of these subjects has these scenarios over that transport"
+        # The null relay is always there, but is only something to measure where it was asked for.
+        if (why := catalogue.why_nothing(plan, arguments.subjects or list(catalogue.SUBJECTS))) is not None:
+            return f"there is nothing to measure: {why}"
         if mode == "--against":
             cases = cases_against(arguments)
             against.require_comparable(ROOT, arguments.against, cases, arguments.runs)

@@ -7,7 +7,7 @@ import subprocess
 from driver.library import CLIENTS
 from driver.rivals import RIVALS, Rival, find_program
 from driver.subjects import NullRelay, Subject, TcpHub, allowed_cpus
-from driver.suite import Case
+from driver.suite import WITH_LIBRARY, Case, Plan
 
 HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": ["--spin"]}
 RIVAL_CLASSES = {rival.name: rival for rival in RIVALS}
@@ -18,17 +18,38 @@ NOT_OF_TOPICS = {"list_100": "it has no lists of recipients",
                  "broadcast_100": "it has no broadcast; a topic to which all subscribe is fan_out_100"}
 
 
-def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
-    """Why there will be no row of this subject for this case; None: there will be one."""
+def why_never(name: str, case: Case) -> str | None:
+    """Why there can be no row of this subject for this case, whatever is built or installed."""
     if name == "null" and case.baseline is None:
         return "a relay without queues says nothing here"
     if name not in RIVAL_CLASSES:
         return None
     if case.transport not in RIVAL_CLASSES[name].transports:
         return "it has no Unix socket"
+    return NOT_OF_TOPICS.get(case.scenario)
+
+
+def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
+    """Why there will be no row of this subject for this case; None: there will be one."""
+    if (never := why_never(name, case)) is not None or name not in RIVAL_CLASSES:
+        return never
     if case.spec.roles is not None and not (build / "bin" / CLIENTS[name]).exists():
         return f"{CLIENTS[name]} was not built: no library (package {LIBRARY_PACKAGES[name]})"
-    return NOT_OF_TOPICS.get(case.scenario) or RIVAL_CLASSES[name].why_absent(build)
+    return RIVAL_CLASSES[name].why_absent(build)
+
+
+def why_nothing(plan: Plan, wanted: list[str]) -> str | None:
+    """Why none of the wanted subjects has a row, whatever is built or installed; None: one has."""
+    if not plan:
+        return "these scenarios are not measured over that transport"
+    reasons = {}
+    for name in wanted:
+        cases = [case for case, subjects in plan.items() if name in subjects]
+        found = {why_never(name, case) for case in cases} or {f"libraries are measured with {', '.join(WITH_LIBRARY)} only"}
+        if None in found:
+            return None
+        reasons[name] = " and ".join(sorted(found))
+    return "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
 
 
 def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list[str]) -> Subject:

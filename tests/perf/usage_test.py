@@ -85,10 +85,21 @@ class Arguments(unittest.TestCase):
         self.assert_refused("--scenario in_turns --size 16 --report",
                             "keep the result with --json >RESULT.json, and make a page of its own with perf/report.py RESULT.json OTHER.md")
 
-    def test_nothing_to_measure_is_refused(self):
-        for words in ("--scenario idle_10000 --transport unix", "--only null --scenario library_burst",
-                      "--against HEAD --scenario idle_10000 --transport unix"):
-            self.assert_refused(words, "nothing to measure")
+    def test_nothing_to_measure_is_refused_with_the_reason(self):
+        for words, reason in (("--scenario idle_10000 --transport unix", "these scenarios are not measured over that transport"),
+                              ("--against HEAD --scenario idle_10000 --transport unix", "these scenarios are not measured over that transport"),
+                              ("--only nats --transport unix --scenario one_to_one", "nats: it has no Unix socket"),
+                              ("--only null --scenario idle_alone", "null: a relay without queues says nothing here"),
+                              ("--only null --scenario library_burst", "null: libraries are measured with tcphub, nats, mosquitto only"),
+                              ("--only redis nats --scenario list_100 --transport unix",
+                               "redis: it has no lists of recipients; nats: it has no Unix socket"),
+                              ("--only nats --scenario list_100", "nats: it has no Unix socket and it has no lists of recipients")):
+            self.assert_refused(words, f"there is nothing to measure: {reason}\n")
+
+    def test_what_has_a_row_is_measured_though_others_have_none(self):
+        for words in ("--only nats redis --transport unix --scenario one_to_one", "--only nats --scenario one_to_one list_100",
+                      "--only null --scenario one_to_one idle_alone", "--scenario idle_alone", "--only tcphub_spinning --quick"):
+            run.parse_arguments(words.split())
 
     def test_an_unknown_argument_is_named(self):
         self.assert_refused("--scenaro ping_paced", "--scenaro")
