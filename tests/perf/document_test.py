@@ -1,9 +1,17 @@
 #!/usr/bin/env python3
 """The parts of docs/performance.md that perf/driver writes from the rows of a result."""
 
+import contextlib
+import io
+import json
+import pathlib
+import sys
+import tempfile
 import unittest
+from unittest import mock
 
 from support import outcome, result_of
+import report
 from driver import ahead, suite
 from driver.document import make_document
 from driver.measure import Outcome
@@ -122,6 +130,43 @@ class SingleWrites(unittest.TestCase):
 
     def test_is_a_section_of_the_document(self):
         self.assertIn(HEADING, make_document(result_of(self.rows(("null", [4000]), ("tcphub", [3000])))).splitlines())
+
+
+class Report(unittest.TestCase):
+    """perf/report.py as it is called."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def report(self, text: str | bytes | None):
+        """The exit status and what was said, of a file with this in it."""
+        path = self.folder / "result.json"
+        if text is not None:
+            path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said), mock.patch.object(sys, "argv", ["report.py", str(path), str(self.folder / "page.md")]), \
+                mock.patch.object(report, "write_report", lambda result, target: target.write_text(make_document(result))):
+            return report.main(), said.getvalue().replace(str(self.folder), "")
+
+    def test_what_is_no_result_is_named_in_one_sentence(self):
+        good = result_of([])
+        for text, sentence in ((None, "/result.json cannot be read: No such file or directory"), ("{", "/result.json is not JSON ("),
+                               (b"\xff\xfe", "/result.json is not JSON ("), ("", "/result.json is not JSON ("),
+                               ("[]", "/result.json is not a result of ./dev perf --json: it has no results, machine,"),
+                               ('{"rejoin": []}', "it has no results, machine,"),
+                               (json.dumps({name: value for name, value in good.items() if name != "date"}), "it has no date"),
+                               (json.dumps(good | {"results": [{"subject": "null"}]}), "/result.json does not hold the runs of each row"),
+                               (json.dumps(good | {"results": [1]}), "does not hold the runs"), (json.dumps(good | {"results": 1}), "does not hold")):
+            status, said = self.report(text)
+            self.assertEqual((status, said.count("\n")), (1, 1), said)
+            self.assertIn(sentence, said)
+            self.assertFalse((self.folder / "page.md").exists())
+
+    def test_a_result_becomes_the_page_that_is_named(self):
+        self.assertEqual(self.report(json.dumps(result_of([]))), (0, ""))
+        self.assertTrue((self.folder / "page.md").read_text().startswith("# Performance"))
 
 
 if __name__ == "__main__":
