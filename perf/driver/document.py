@@ -95,11 +95,21 @@ def library_figures(rows: list[dict]) -> str:
 def runs_of(result: dict) -> str:
     """How many runs, and how long."""
     wild = f", up to {result['runs_max']} where they lie more than {APART_MAX} times apart or do not agree on a goal" if result["runs_max"] > result["runs"] else ""
-    longer = [f"{name} {shown(result['seconds'] * spec.seconds_factor)}" for name, spec in SCENARIOS.items() if spec.seconds_factor != 1]
-    longer += [f"{scenario} {size} B {transport} of {', '.join(subjects)} {shown(seconds)}"
-               for scenario, size, transport, seconds, subjects in result.get("longer", [])]
+    lengths = ", ".join(longer_runs(result))
     runs = "one run" if result["runs"] == 1 else f"{result['runs']} runs"
-    return f"{runs}{wild}, of {result['seconds']} s each ({', '.join(longer)} s)"
+    return f"{runs}{wild}, of {result['seconds']} s each" + (f" ({lengths} s)" if lengths else "")
+
+
+def longer_runs(result: dict) -> list[str]:
+    """What was measured longer, of what was measured."""
+    measured = {(row["scenario"], row["size"], row["transport"], row["subject"]) for row in result["results"]}
+    scenarios = {scenario for scenario, *_ in measured}
+    longer = [f"{name} {shown(result['seconds'] * spec.seconds_factor)}" for name, spec in SCENARIOS.items()
+              if spec.seconds_factor != 1 and name in scenarios]
+    for scenario, size, transport, seconds, subjects in result.get("longer", []):
+        if there := [name for name in subjects if (scenario, size, transport, name) in measured]:
+            longer.append(f"{scenario} {size} B {transport} of {', '.join(there)} {shown(seconds)}")
+    return longer
 
 
 def make_document(result: dict, pictures: list[str] | None = None) -> str:

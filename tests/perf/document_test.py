@@ -132,6 +132,15 @@ class SingleWrites(unittest.TestCase):
         self.assertIn(HEADING, make_document(result_of(self.rows(("null", [4000]), ("tcphub", [3000])))).splitlines())
 
 
+class Lengths(unittest.TestCase):
+    def test_what_was_measured_longer_is_said_and_what_was_not_measured_is_not(self):
+        paced = suite.Case("ping_paced", 16, "tcp")
+        rows = make_rows([outcome("null", paced, [1]), outcome("tcphub", paced, [1]), outcome("nats", suite.Case("one_to_one", 16, "tcp"), [1])])
+        longer = {"longer": [["ping_paced", 16, "tcp", 20, ["null", "tcphub", "tcphub_spinning"]], ["library_burst", 16, "tcp", 5, ["tcphub", "nats"]]]}
+        self.assertIn(" of 1 s each (ping_paced 4, ping_paced 16 B tcp of null, tcphub 20 s);", make_document(result_of(rows) | longer))
+        self.assertIn(" of 1 s each;", make_document(result_of(rows[2:]) | longer))
+
+
 class Report(unittest.TestCase):
     """perf/report.py as it is called."""
 

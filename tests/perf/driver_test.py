@@ -111,10 +111,6 @@ class Suite(unittest.TestCase):
         longer = sum((seconds - 0.5 * case.spec.seconds_factor) * len(names) for case, (seconds, names) in suite.WHOLE_SECONDS.items())
         self.assertLess(3 * longer, 300, "a whole run shall stay one of less than an hour")
 
-    def test_what_was_measured_longer_is_said(self):
-        text = make_document(result_of([]) | {"longer": [["ping_paced", 16, "tcp", 20, ["null", "tcphub"]]]})
-        self.assertIn("ping_paced 16 B tcp of null, tcphub 20", text)
-
     def test_some_scenarios_are_measured_longer(self):
         settings = run.make_settings(run.parse_arguments(["--seconds", "2"]))
         self.assertEqual([settings.length_of("tcphub", suite.Case(name, 16, "tcp")) for name in ("one_to_one", "ping_paced")], [2, 8])
