@@ -43,11 +43,11 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     # ./dev looks for whole words in the same arguments.
     parser = argparse.ArgumentParser(prog="./dev perf", description=__doc__, allow_abbrev=False)
     parser.add_argument("--quick", action="store_true", help="the scenarios that decide, in a few minutes")
-    parser.add_argument("--smoke", action="store_true", help="every scenario for a second, with 200 clients for 10,000: nothing lost? not timed")
+    parser.add_argument("--smoke", action="store_true", help="every scenario for a second, with 200 clients for 10,000: is anything lost? times mean nothing")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
-    parser.add_argument("--report", action="store_true", help="write docs/performance.md and its pictures")
+    parser.add_argument("--report", action="store_true", help="write docs/performance.md and its pictures, of the whole suite")
     parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
-                        metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; all")
+                        metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; default: all; the null relay is always among them")
     parser.add_argument("--against", metavar="REV", help="build that version too, and say which is faster; --runs are pairs")
     parser.add_argument("--instructions", nargs="?", const="", metavar="SCRIPT",
                         help="instructions per frame against the budget; of one script: where they go")
@@ -64,7 +64,8 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--runs", type=usage.positive_whole, help="measurements of which the median is taken (3, and more where they decide nothing)")
     parser.add_argument("--build-dir", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--hub-argument", action="append", default=[], metavar="ARGUMENT",
-                        help="more for the hub's command line; repeatable, write --hub-argument=--shards")
+                        help="one more word for the hub's command line, and another for the value of an option: "
+                             "--hub-argument=--shards --hub-argument=2")
     arguments = parser.parse_args(given)
     if (wrong := usage.find_wrong(arguments, parser.get_default) or find_impossible(arguments)) is not None:
         parser.error(wrong)

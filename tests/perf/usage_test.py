@@ -3,12 +3,13 @@
 
 import contextlib
 import io
+import os
 import unittest
 from unittest import mock
 
 import support  # noqa: F401
 import run
-from driver import against, instructions, usage
+from driver import against, catalogue, instructions, usage
 
 
 class Arguments(unittest.TestCase):
@@ -104,6 +105,20 @@ class Arguments(unittest.TestCase):
     def test_an_unknown_argument_is_named(self):
         self.assert_refused("--scenaro ping_paced", "--scenaro")
         self.assert_refused("--scenario pingpong", "pingpong")
+
+    def test_the_help_s_example_gives_the_hub_an_option_with_its_value(self):
+        said = io.StringIO()
+        # Wide enough that no word is parted at its hyphen.
+        with mock.patch.dict(os.environ, COLUMNS="400"), contextlib.redirect_stdout(said), self.assertRaises(SystemExit):
+            run.parse_arguments(["--help"])
+        example = "--hub-argument=--shards --hub-argument=2"
+        self.assertIn(example, " ".join(said.getvalue().split()))
+        settings = run.make_settings(run.parse_arguments(example.split()))
+        self.assertEqual(settings.hub_arguments, ["--shards", "2"])
+
+    def test_the_null_relay_is_always_among_the_subjects_as_the_help_says(self):
+        self.assertEqual(run.chosen_subjects(run.parse_arguments(["--only", "redis"])), ("null", "redis"))
+        self.assertEqual(run.chosen_subjects(run.parse_arguments([])), catalogue.SUBJECTS)
 
     def test_what_goes_together_is_taken(self):
         for words in ("--instructions --update", "--instructions parser_run", "--control --report --packages", "--quick --json", "--json --report --runs 5",
