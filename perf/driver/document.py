@@ -33,6 +33,11 @@ machine to machine; the ratios of one run are what counts.
 At most 2 MiB are under way (128 KiB a recipient in fan-outs to more than 16), so that nobody is measured while it drops. Messages over 4 KiB travel in
 fragments of 32 KiB. A publisher writes 64 KiB with one system call, in whole messages, unless the name says `unbatched`.
 
+To stay within an hour, a whole run leaves out one_to_one_unbatched at 64 KiB and 1 MiB, where one_to_one writes each message by itself, too; fan_out_1000,
+list_100 and broadcast_100 but for 16 and 1,024 bytes, since fan_out_10 and fan_out_100 show what size does; two shards over Unix sockets; spinning but at 16
+bytes, where a wake-up weighs most; and of other hubs over Unix sockets all but what goes between two. `--scenario NAME --size BYTES` measures other sizes, of
+all subjects.
+
 **Other hubs** (`perf/driver/rivals.py`): Debian's packages as their documentation would have them for messages that need not be kept, and in their favour:
 nothing on disk, no passwords, TCP_NODELAY; nats-server; mosquitto at QoS 0; redis-server with RESP 3 and without replies to PUBLISH; ZeroMQ's XPUB/XSUB
 proxy that drops nothing. One raw generator speaks each one's protocol, so that every subject sees the same client. `tcphub_2_shards` has
@@ -52,7 +57,7 @@ thread, so that no publish wakes another one. Cost is that of all three processe
 | list_100, broadcast_100 | the same by recipient list, and by broadcast to all nodes of the hub; compared with the null fan_out_100 |
 | ping_one_cpu | round trips of 16 B, generator and hub on one processor: the software's path without idle wake-ups |
 | ping_two_cpus, ping_paced | round trips between two processors, without a pause, and at 1 kHz |
-| ping_under_bulk, ping_under_300MBps | round trips in lane 0 while another pair moves 64 KiB messages in lane 2, at full speed and at 300 MB/s |
+| ping_under_bulk, ping_under_300MBps | round trips in lane 0 while another pair moves 64 KiB messages in lane 2, at full speed and at 300 MB/s; lanes are tcphub's alone: other hubs have none, and ping and bulk share what they have |
 | stalled_subscriber | a service at line rate: one subscriber, and the same with another one that does not read, in turns |
 | idle_10000 | 10,000 nodes that say nothing but keep-alives, each 0.9 s; and then five rounds of keep-alives without a pause, to know what one costs |
 | idle_alone | nobody is connected |

@@ -12,8 +12,9 @@ from unittest import mock
 
 from support import outcome, result_of
 import report
-from driver import ahead, suite
-from driver.document import make_document
+import run
+from driver import ahead, catalogue, suite
+from driver.document import INTRODUCTION, make_document
 from driver.measure import Outcome
 from driver.single_writes import HEADING, single_writes_text
 from driver.summary import make_rows
@@ -139,6 +140,43 @@ class Lengths(unittest.TestCase):
         longer = {"longer": [["ping_paced", 16, "tcp", 20, ["null", "tcphub", "tcphub_spinning"]], ["library_burst", 16, "tcp", 5, ["tcphub", "nats"]]]}
         self.assertIn(" of 1 s each (ping_paced 4, ping_paced 16 B tcp of null, tcphub 20 s);", make_document(result_of(rows) | longer))
         self.assertIn(" of 1 s each;", make_document(result_of(rows[2:]) | longer))
+
+
+class WhatIsLeftOut(unittest.TestCase):
+    """What the introduction says of the whole run is so."""
+
+    PLAN = suite.whole_plan(catalogue.SUBJECTS)
+
+    def sizes(self, scenario):
+        return {case.size for case in self.PLAN if case.scenario == scenario}
+
+    def test_sizes(self):
+        self.assertIn("leaves out one_to_one_unbatched at 64 KiB and 1 MiB", INTRODUCTION)
+        self.assertEqual(set(suite.SIZES) - self.sizes("one_to_one_unbatched"), {65536, 1048576})
+        self.assertIn("fan_out_1000,\nlist_100 and broadcast_100 but for 16 and 1,024 bytes", INTRODUCTION)
+        for scenario in ("fan_out_1000", "list_100", "broadcast_100"):
+            self.assertEqual(self.sizes(scenario), {16, 1024})
+        self.assertGreaterEqual(self.sizes("fan_out_10") & self.sizes("fan_out_100"), {16, 256, 1024, 4096, 65536})
+
+    def test_subjects(self):
+        def cases(*names):
+            return {case for case, subjects in self.PLAN.items() if set(names) & set(subjects)}
+
+        self.assertIn("two shards over Unix sockets; spinning but at 16\nbytes", INTRODUCTION)
+        self.assertEqual({case.transport for case in cases("tcphub_2_shards")}, {"tcp"})
+        self.assertEqual({case.size for case in cases("tcphub_spinning")}, {16})
+        self.assertIn("of other hubs over Unix sockets all but what goes between two", INTRODUCTION)
+        over_unix = {case.scenario for case in cases("mosquitto", "redis", "zeromq") if case.transport == "unix"}
+        self.assertEqual(over_unix, suite.OF_TWO | {name for name, spec in suite.SCENARIOS.items() if spec.roles is not None})
+
+    def test_other_sizes_are_measured_of_all_subjects(self):
+        self.assertIn("`--scenario NAME --size BYTES` measures other sizes, of\nall subjects", INTRODUCTION)
+        plan = run.choose_plan(run.parse_arguments("--scenario one_to_one_unbatched --size 65536".split()))
+        self.assertEqual(plan[suite.Case("one_to_one_unbatched", 65536, "tcp")], catalogue.SUBJECTS)
+
+    def test_only_our_hub_has_lanes(self):
+        line = next(line for line in INTRODUCTION.splitlines() if line.startswith("| ping_under_bulk"))
+        self.assertIn("lanes are tcphub's alone: other hubs have none, and ping and bulk share what they have", line)
 
 
 class Report(unittest.TestCase):
