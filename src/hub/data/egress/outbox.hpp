@@ -40,8 +40,9 @@ class Outbox {
     chunk_used_ += size;
     return true;
   }
-  /// Runs below this are cheaper to copy than to reference (bench/hub/data/egress/outbox_bench.cpp).
-  static constexpr std::uint32_t kAppendBytesMax = 1024;
+  /// Runs below this are cheaper to copy than to reference: up to a fifth of in_turns at 1 to 2 KiB, and the same from
+  /// there to 4 KiB (docs/performance.md, "Findings"; bench/hub/data/egress/outbox_bench.cpp).
+  static constexpr std::uint32_t kAppendBytesMax = 4096;
   /// Data frames for this connection. Every frame ends in a lane or in the drop book.
   /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if FRAGMENT, EXT or LATEST.
   void push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context);

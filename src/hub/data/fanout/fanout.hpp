@@ -54,7 +54,7 @@ class Fanout {
   static constexpr std::uint32_t kListChunkBytes = kSharedChunkBytes;
   static constexpr std::uint32_t kGatherChunkBytes = kSharedChunkBytes;
   /// Frames below this are cheaper to copy than to give an entry of their own.
-  static constexpr std::uint32_t kGatherBytesMax = 1024;
+  static constexpr std::uint32_t kGatherBytesMax = 4096;
 
   /// What goes to one other shard in this burst and may still grow.
   struct Stretch {

@@ -100,8 +100,9 @@ TEST(FullOutbox, GroupDropsTheOldestForTheNewest) {
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "as many of the oldest as it takes";
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
-  const auto texts = connection.take();
-  ASSERT_THAT(texts, SizeIs(16));
+  auto texts = connection.take();
+  std::erase(texts, "first");  // of another lane
+  ASSERT_THAT(texts, SizeIs(15));
   EXPECT_EQ(texts[0][0], 'c');
   EXPECT_EQ(texts[14][0], 'z');
   EXPECT_TRUE(rig.ledger_exact());

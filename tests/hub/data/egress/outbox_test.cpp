@@ -303,11 +303,11 @@ TEST(Outbox, SmallWaitingFramesLeaveTheirSlab) {
   EgressRig rig;
   TestConnection connection(rig);
   block(connection);
-  rig.push(connection.outbox, sized(2 * kKiB));
+  rig.push(connection.outbox, sized(6 * kKiB));
   EXPECT_EQ(connection.outbox.lane(1).front().run.buffer->kind, BufferKind::slab);
-  rig.push(connection.outbox, sized(2 * kKiB), {.lane = 0});  // so that the first is not the last entry
+  rig.push(connection.outbox, sized(6 * kKiB), {.lane = 0});  // so that the first is not the last entry
   connection.flush();
-  rig.push(connection.outbox, sized(2 * kKiB), {.src = 2});
+  rig.push(connection.outbox, sized(6 * kKiB), {.src = 2});
   connection.flush();
   EXPECT_EQ(connection.outbox.lane(1).front().run.buffer->kind, BufferKind::chunk);
 }

@@ -67,8 +67,8 @@ TEST(Fanout, SmallFramesThatLieApartBecomeOneEntryInTheirOrder) {
 
 TEST(Fanout, LargeFramesThatLieApartStayWhereTheyAre) {
   RouteRig rig;
-  const std::string large(1'024 - proto::kHeaderSize, 'l');
-  const std::string small(1'023 - proto::kHeaderSize, 's');
+  const std::string large(4'096 - proto::kHeaderSize, 'l');
+  const std::string small(4'095 - proto::kHeaderSize, 's');
   const auto apart = [&](const std::string& payload) {
     rig.fanout.hand_over(kThere, rig.egress.run({payload}));
     static_cast<void>(rig.egress.run({"for somebody else"}));
@@ -83,7 +83,7 @@ TEST(Fanout, LargeFramesThatLieApartStayWhereTheyAre) {
   apart(small);
   apart(small);
   rig.fanout.post_all();
-  EXPECT_EQ(rig.egress.tally.copied_bytes, copied + 2 * 1'023u);
+  EXPECT_EQ(rig.egress.tally.copied_bytes, copied + 2 * 4'095u);
   EXPECT_EQ(entries_of(rig), (Entries{{small, small}}));
 }
 
