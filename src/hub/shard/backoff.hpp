@@ -11,7 +11,7 @@ class Backoff {
  public:
   static constexpr std::uint8_t kPauseMax = 63;
 
-  /// Asked once each time that the call could be made; if true, one of succeeded() and failed() follows.
+  /// Asked once each time that the call could be made; if it then is, one of succeeded() and failed() follows.
   [[nodiscard]] bool is_due() {
     if (left_ == 0) return true;
     --left_;

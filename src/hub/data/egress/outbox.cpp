@@ -63,11 +63,13 @@ Run Outbox::copy(const Run& run, EgressContext& context) {
   return Run{chunk_.share(), place, run.size, run.frames};
 }
 
-Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context) {
+Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover, bool has_room,
+                         EgressContext& context) {
   Entry entry;
   entry.extended = header.has(proto::kFlagExt);
-  // An extension may be a TRACE, which each recipient gets filled in on its own.
-  const bool by_copy = (run.size < kAppendBytesMax && !handover.fan_out) || entry.extended;
+  // What is likely to be refused is not copied: it would fill a chunk that others keep. What stays of it is, at the
+  // turn's end. An extension may be a TRACE, which each recipient gets filled in on its own.
+  const bool by_copy = (run.size < kAppendBytesMax && !handover.fan_out && has_room) || entry.extended;
   entry.run = by_copy ? copy(run, context) : run.share();
   entry.size = run.size;
   entry.frames = run.frames;
@@ -100,12 +102,13 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   }
   Lanes& lanes = this->lanes();
   lanes.open.close();
-  Entry entry = make_entry(run, header, handover, context);
+  const bool has_room = fits(lane, run.size, context.limits);
+  Entry entry = make_entry(run, header, handover, has_room, context);
   if (entry.fragmented) {
     if (!follow_message(entry, header, context)) return;
     if (entry.touched && join_message(entry, header, context)) return;
   }
-  if (!backlog_ && fits(lane, run.size, context.limits)) {
+  if (!backlog_ && has_room) {
     const bool may_grow = proto::may_form_run(header) && entry.run.buffer.get() == chunk_.get();
     lanes.queues[lane].push(std::move(entry));
     if (may_grow) open_run(lanes.queues[lane], context.limits, lane);

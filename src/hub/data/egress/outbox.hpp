@@ -155,7 +155,7 @@ class Outbox {
   }
   /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in the chunk.
   void open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index);
-  [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
+  [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover, bool has_room,
                                  EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;

@@ -71,9 +71,9 @@ TEST(GatherWriter, AWaitingLaneGetsASixteenthOfTheBytes) {
   EgressRig rig;
   TestConnection connection(rig);
   connection.peer.set_room(0);
-  for (int i = 0; i < 400; ++i) {
-    rig.push(connection.outbox, std::string(1'008, '0'), {.lane = 0, .src = static_cast<std::uint32_t>(i % 2)});
-    rig.push(connection.outbox, std::string(1'008, '3'), {.lane = 3, .src = static_cast<std::uint32_t>(i % 2)});
+  for (int i = 0; i < 100; ++i) {
+    rig.push(connection.outbox, std::string(4'080, '0'), {.lane = 0, .src = static_cast<std::uint32_t>(i % 2)});
+    rig.push(connection.outbox, std::string(4'080, '3'), {.lane = 3, .src = static_cast<std::uint32_t>(i % 2)});
   }
   connection.flush();
   connection.peer.set_room(200 * 1'024);

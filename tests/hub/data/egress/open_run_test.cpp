@@ -96,7 +96,7 @@ TEST_F(OpenRunTest, BlockIsCountedAsWhatItIs) {
 TEST_F(OpenRunTest, LargeRunsAreReferredTo) {
   const std::string largest_copied(4'095 - proto::kHeaderSize, 'x');
   const std::string smallest_referred(4'096 - proto::kHeaderSize, 'x');
-  offer({std::string(3'000, 'f')});  // makes a large chunk the next one
+  offer({std::string(3'000, 'f')});  // fills a chunk, so that the next one is large
   offer({largest_copied});
   offer({largest_copied});
   while (!offer({"small"})) {

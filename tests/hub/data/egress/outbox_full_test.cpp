@@ -53,6 +53,25 @@ TEST(FullOutbox, DropRefusesTheNewMessageOneByteBeyondTheLimit) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
+// A chunk filled with what was refused would stay for the sake of one message that was not.
+TEST(FullOutbox, WhatIsRefusedTakesNoMemory) {
+  for (const std::uint32_t size : {100u, 900u, 3'000u}) {
+    EgressRig rig(small_limits());
+    TestConnection connection(rig);
+    block(connection);
+    while (rig.dropped(DropReason::queue_full) == 0) rig.push(connection.outbox, sized(size), {.flags = kDrop});
+    connection.outbox.settle(rig.context);
+    const std::uint64_t copied = rig.tally.copied_bytes;
+    const std::uint64_t pinned = rig.pool.pinned_bytes();
+    for (int i = 0; i < 1'000; ++i) rig.push(connection.outbox, sized(size), {.flags = kDrop});
+    connection.outbox.settle(rig.context);
+    EXPECT_EQ(rig.tally.copied_bytes, copied) << size;
+    EXPECT_EQ(rig.pool.pinned_bytes(), pinned) << size;
+    EXPECT_EQ(rig.dropped(DropReason::queue_full), 1'001u);
+    EXPECT_TRUE(rig.ledger_exact());
+  }
+}
+
 // What arrives in one read is as many messages as it is.
 TEST(FullOutbox, DropTakesTheMessagesOfABurstThatFit) {
   EgressRig rig(small_limits());
