@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Writes docs/performance.md and its pictures from a JSON document of `./dev perf --json`: perf/report.py RESULT.json [DOCUMENT.md]"""
+"""Writes a page such as docs/performance.md, and its pictures, from a JSON document of `./dev perf --json`:
+
+    perf/report.py RESULT.json DOCUMENT.md
+"""
 
 import json
 import pathlib
@@ -9,7 +12,6 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 from driver.report import write_report  # noqa: E402
 
-DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "performance.md"
 # Without these there is no page; what else there may be, it can do without.
 NEEDED = ("results", "machine", "date", "seconds", "runs", "runs_max", "hub_arguments")
 
@@ -36,16 +38,20 @@ def read_result(path: str) -> dict:
 
 
 def main() -> int:
-    if not 2 <= len(sys.argv) <= 3:
-        print(__doc__, file=sys.stderr)
+    if "--help" in sys.argv or "-h" in sys.argv:
+        print(__doc__.strip())
+        return 0
+    if len(sys.argv) != 3:
+        print(__doc__.strip(), file=sys.stderr)
         return 2
     try:
-        result = read_result(sys.argv[1])
+        write_report(read_result(sys.argv[1]), pathlib.Path(sys.argv[2]))
     except ResultError as error:
         print(error, file=sys.stderr)
         return 1
-    target = pathlib.Path(sys.argv[2]) if len(sys.argv) == 3 else DOCUMENT
-    write_report(result, target)
+    except (KeyError, TypeError, AttributeError) as error:
+        print(f"{sys.argv[1]} is not a whole result of ./dev perf --json: {type(error).__name__} {error}", file=sys.stderr)
+        return 1
     return 0
 
 

@@ -67,6 +67,10 @@ def find_wrong(arguments: argparse.Namespace, default_of: Callable[[str], object
         return "--update goes with --instructions, of all scripts"
     if arguments.quick and arguments.smoke:
         return "--quick and --smoke are two different runs"
+    chosen = [name for name in given if name in ("scenario", "size", "transport")]
+    if chosen and (arguments.quick or arguments.smoke):
+        which = flag("quick" if arguments.quick else "smoke")
+        return f"{which} is a choice of scenarios of its own: leave out {which}, or {', '.join(map(flag, chosen))}"
     if arguments.smoke and arguments.report:
         return "--smoke measures nothing that --report could write"
     return find_partial(given) if arguments.report else None

@@ -205,6 +205,7 @@ class Report(unittest.TestCase):
                                ('{"rejoin": []}', "it has no results, machine,"),
                                (json.dumps({name: value for name, value in good.items() if name != "date"}), "it has no date"),
                                (json.dumps(good | {"results": [{"subject": "null"}]}), "/result.json does not hold the runs of each row"),
+                               (json.dumps(good | {"machine": {}}), "/result.json is not a whole result of ./dev perf --json: KeyError"),
                                (json.dumps(good | {"results": [1]}), "does not hold the runs"), (json.dumps(good | {"results": 1}), "does not hold")):
             status, said = self.report(text)
             self.assertEqual((status, said.count("\n")), (1, 1), said)

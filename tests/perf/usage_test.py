@@ -77,7 +77,8 @@ class Arguments(unittest.TestCase):
                                 ("--against HEAD --report", "--report means nothing with --against"),
                                 ("--against HEAD --quick", "--quick means nothing with --against"),
                                 ("--against HEAD --instructions", "--against means nothing with --instructions"),
-                                ("--quick --smoke", "two different runs"), ("--smoke --report", "nothing that --report")):
+                                ("--quick --smoke", "two different runs"), ("--quick --scenario one_to_one --size 16", "leave out --quick, or --scenario, --size"),
+                                ("--smoke --transport tcp", "leave out --smoke, or --transport"), ("--smoke --report", "nothing that --report")):
             self.assert_refused(words, sentence)
 
     def test_a_part_of_the_suite_does_not_replace_the_whole_page(self):
