@@ -6,7 +6,8 @@
 
 #include "gimnet/gimi.hpp"
 
-// What a message is, in numbers of the application's own. Each has a queue of its own at its receiver.
+// What a message is, in numbers of the application's own. Each has a queue of its own at its
+// receiver.
 constexpr gimnet::MessageKey kQuestion{.type = 1, .instance = 0};
 constexpr gimnet::MessageKey kAnswer{.type = 2, .instance = 0};
 
@@ -18,7 +19,8 @@ int main() try {
     double sum = 0.0;
     for (double number = 0.0; numbers >> number;) sum += number;
     const auto sent = node.send(question.from(), std::to_string(sum), {.key = kAnswer});
-    if (!sent) std::cerr << "adder: " << sent.failure().sentence << '\n';  // who asked may be gone: go on
+    if (!sent)
+      std::cerr << "adder: " << sent.failure().sentence << '\n';  // who asked may be gone: go on
   }
 } catch (const gimnet::GimnetError& error) {
   std::cerr << "adder: " << error.what() << '\n';

@@ -16,7 +16,8 @@ static int talk(nif_node* node, const char* word) {
   uint32_t mirror = 0;
   nif_incoming in;
   nif_status status;
-  if (nif_resolve(node, "mirror", &mirror, PATIENCE_MS) != NIF_OK) return failed("find the node mirror");
+  if (nif_resolve(node, "mirror", &mirror, PATIENCE_MS) != NIF_OK)
+    return failed("find the node mirror");
   if (nif_send_to(node, mirror, word, strlen(word)) != NIF_OK) return failed("send");
   while ((status = nif_receive(node, &in, PATIENCE_MS)) == NIF_OK) {
     const int is_answer = in.type == NIF_MESSAGE && in.from == mirror;

@@ -10,7 +10,8 @@ static int failed(const char* what) {
 }
 
 int main(void) {
-  const nif_options options = {.struct_size = sizeof options, .name = "mirror"}; /* the rest: defaults */
+  const nif_options options = {.struct_size = sizeof options,
+                               .name = "mirror"}; /* the rest: defaults */
   nif_node* node = NULL;
   nif_incoming in;
   if (nif_connect(&options, &node) != NIF_OK) return failed("connect");

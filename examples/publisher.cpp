@@ -8,7 +8,7 @@
 #include "gimnet/gimi.hpp"
 
 int main() try {
-  const gimnet::Node robot("robot");                         // joins by the hub of this machine, or of GIMNET_HUB
+  const gimnet::Node robot("robot");  // joins by the hub of this machine, or of GIMNET_HUB
   const auto odometry = robot.advertise("odom").or_throw();  // its full name is robot/odom
   for (int step = 0;; ++step) {
     const auto sent = odometry.publish("x " + std::to_string(0.1 * step) + " y 0");

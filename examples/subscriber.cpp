@@ -1,4 +1,5 @@
-// Prints what publisher.cpp says. It may be started first, and goes on when the publisher or the hub was away.
+// Prints what publisher.cpp says. It may be started first, and goes on when the publisher or the
+// hub was away.
 
 #include <iostream>
 
@@ -9,7 +10,8 @@ int main() try {
   const auto odometry = viewer.subscribe("robot/odom").or_throw();
   for (;;) {
     const auto message = odometry.receive().or_throw();
-    std::cout << message.from().text() << " #" << message.sequence() << ": " << message.text() << std::endl;
+    std::cout << message.from().text() << " #" << message.sequence() << ": " << message.text()
+              << std::endl;
   }
 } catch (const gimnet::GimnetError& error) {
   std::cerr << "subscriber: " << error.what() << '\n';

@@ -1,8 +1,9 @@
-// A whole io shard with two admitted nodes, on the in-memory transport: whatever they send, however it is split and
-// whenever they read, the ledger is exact, and what comes out is legal frames that one of the two wrote. Of a paced
-// group (sync(n), a rate, retain) the one gets from the other no more than its window, in order, and in the end no
-// window has leaked. Input: steps of {u8 choice, ...}: which node, and bytes that it writes, how its connection
-// behaves, or time; from 16 on, what becomes of the paced group.
+// A whole io shard with two admitted nodes, on the in-memory transport: whatever they send, however
+// it is split and whenever they read, the ledger is exact, and what comes out is legal frames that
+// one of the two wrote. Of a paced group (sync(n), a rate, retain) the one gets from the other no
+// more than its window, in order, and in the end no window has leaked. Input: steps of {u8 choice,
+// ...}: which node, and bytes that it writes, how its connection behaves, or time; from 16 on, what
+// becomes of the paced group.
 
 #include <algorithm>
 #include <cstddef>
@@ -49,7 +50,9 @@ class PacedWorld final : public fuzzing::ShardWorld {
 
   // ---- the paced group: the conductor's part
 
-  [[nodiscard]] GroupId paced_group() const { return make_id<GroupId>(fuzzing::kHub, paced_index_); }
+  [[nodiscard]] GroupId paced_group() const {
+    return make_id<GroupId>(fuzzing::kHub, paced_index_);
+  }
 
   void pace_step(std::uint8_t choice, fuzz::Choices& input) {
     if (paced_index_ == 0 || choice % 16 == 0) begin_group(input.byte());
@@ -140,7 +143,8 @@ class PacedWorld final : public fuzzing::ShardWorld {
     const fuzz::PacedCounts::Message message{.sequence = ++sequence_};
     const auto bytes = std::as_bytes(std::span{&message, 1});
     if (content.size() > kPieceBytes) {
-      std::copy(bytes.begin(), bytes.end(), content.end() - static_cast<std::ptrdiff_t>(bytes.size()));
+      std::copy(bytes.begin(), bytes.end(),
+                content.end() - static_cast<std::ptrdiff_t>(bytes.size()));
     }
     std::copy(bytes.begin(), bytes.end(), content.begin());
     proto::FrameParts parts;
@@ -150,10 +154,11 @@ class PacedWorld final : public fuzzing::ShardWorld {
     parts.header.lane = 1;
     const auto total = static_cast<std::uint32_t>(content.size());
     for (std::uint32_t offset = 0; offset < total; offset += kPieceBytes) {
-      const std::span<const std::byte> piece =
-          std::span{content}.subspan(offset).first(std::min<std::size_t>(kPieceBytes, total - offset));
+      const std::span<const std::byte> piece = std::span{content}.subspan(offset).first(
+          std::min<std::size_t>(kPieceBytes, total - offset));
       if (total > kPieceBytes) {
-        parts.fragment = proto::FragmentHeader{static_cast<std::uint32_t>(sequence_), offset, total};
+        parts.fragment =
+            proto::FragmentHeader{static_cast<std::uint32_t>(sequence_), offset, total};
       }
       std::vector<std::byte> frame(proto::kPrefixSizeMax + piece.size());
       frame.resize(proto::write_frame(parts, piece, frame));
@@ -193,7 +198,8 @@ class PacedWorld final : public fuzzing::ShardWorld {
     for (Node& node : node_) read(node);
   }
 
-  /// On new connections the window is whole, the rate is kept, and who comes late gets the last message.
+  /// On new connections the window is whole, the rate is kept, and who comes late gets the last
+  /// message.
   void check_pace() {
     for (Node& node : node_) attach(node, false);
     pieces_.clear();
@@ -227,8 +233,9 @@ class PacedWorld final : public fuzzing::ShardWorld {
     begin_pace();
     for (int i = 0; i < 3; ++i) publish(0);
     settle(true);
-    // The first may count as one that was due before, up to one interval: then the next follows at once. Or the last
-    // one of an earlier rate was less than an interval ago: then the newest comes when that is over.
+    // The first may count as one that was due before, up to one interval: then the next follows at
+    // once. Or the last one of an earlier rate was less than an interval ago: then the newest comes
+    // when that is over.
     FUZZ_MUST(counts_.ended() - before <= 2);
     for (int i = 0; i < 9 && counts_.last() != sequence_; ++i) settle(true);
     FUZZ_MUST(counts_.last() == sequence_);

@@ -1,6 +1,7 @@
-// The receiving side of NIF against a hub that sends anything: the same bytes give the same messages however they are
-// split, nothing that is another node's or larger than allowed comes out, and nothing breaks. Input: a byte that
-// chooses handshake or connection and the size of the pieces, then the hub's bytes.
+// The receiving side of NIF against a hub that sends anything: the same bytes give the same
+// messages however they are split, nothing that is another node's or larger than allowed comes out,
+// and nothing breaks. Input: a byte that chooses handshake or connection and the size of the
+// pieces, then the hub's bytes.
 
 #include <algorithm>
 #include <cstddef>
@@ -22,9 +23,11 @@ using namespace gimnet;
 using namespace gimnet::nif;
 
 constexpr std::uint32_t kOwnId = (7u << 20) | 17;
-constexpr proto::ReassemblyLimits kLimits{.message_bytes_max = 4096, .waiting_bytes_max = 8192, .streams_max = 4};
+constexpr proto::ReassemblyLimits kLimits{
+    .message_bytes_max = 4096, .waiting_bytes_max = 8192, .streams_max = 4};
 
-/// Everything that the receiving half asks for, written down; what a node would do with it is done, too.
+/// Everything that the receiving half asks for, written down; what a node would do with it is done,
+/// too.
 class Witness final : public InboundHost {
  public:
   Witness() : outbound_({}, wake_), requests_(outbound_) {}
@@ -35,8 +38,10 @@ class Witness final : public InboundHost {
       const auto ping = clock_.ping(1, 2);
       clock_.on_pong({ping.sequence, pong->sent_ns, pong->now_ns}, 3);
     }
-    if (const auto* pause = std::get_if<proto::flow::Pause>(&message)) outbound_.on_pause(pause->target);
-    if (const auto* resume = std::get_if<proto::flow::Resume>(&message)) outbound_.on_resume(resume->target);
+    if (const auto* pause = std::get_if<proto::flow::Pause>(&message))
+      outbound_.on_pause(pause->target);
+    if (const auto* resume = std::get_if<proto::flow::Resume>(&message))
+      outbound_.on_resume(resume->target);
     const auto* confirm = std::get_if<proto::flow::Confirm>(&message);
     return confirm == nullptr || outbound_.on_confirm(confirm->count);
   }
@@ -53,18 +58,21 @@ class Witness final : public InboundHost {
     note("watched " + std::to_string(events.watch));
     return true;
   }
-  void on_name_decided(const std::string& name, bool lost) override { note((lost ? "lost " : "kept ") + name); }
+  void on_name_decided(const std::string& name, bool lost) override {
+    note((lost ? "lost " : "kept ") + name);
+  }
   void on_taken(std::uint32_t from, const proto::Taken& taken) override {
     note("taken " + std::to_string(taken.message));
     outbound_.on_taken(from, taken);
   }
   bool on_report(const proto::Report& report) override { return outbound_.on_report(report); }
-  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) override {
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(
+      const proto::Report& report) override {
     return outbound_.message_of(report);
   }
   void send_taken(std::uint32_t to, const proto::Taken& taken) override {
-    note("tell " + std::to_string(to) + " " + std::to_string(taken.message) + " " + std::to_string(taken.taken) + " " +
-         std::to_string(taken.allowed));
+    note("tell " + std::to_string(to) + " " + std::to_string(taken.message) + " " +
+         std::to_string(taken.taken) + " " + std::to_string(taken.allowed));
   }
   [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group & 1; }
   void on_message_lost(std::uint32_t) override {}
@@ -86,11 +94,14 @@ class Witness final : public InboundHost {
     FUZZ_MUST(in.text != nullptr && in.storage != nullptr);
     FUZZ_MUST(in.type != NIF_MESSAGE || in.kind != NIF_UNICAST || in.to == kOwnId);
     FUZZ_MUST(in.type != NIF_MESSAGE || in.size <= proto::kFrameLengthDefault);
-    std::string written = std::to_string(in.type) + "/" + std::to_string(in.from) + "/" + std::to_string(in.to) + "/" +
-                          std::to_string(in.kind) + "/" + std::to_string(in.flags) + "/" + std::to_string(in.key) +
-                          "/" + std::to_string(in.count) + "/" + std::to_string(in.reason) + "/" + in.text + "/";
+    std::string written = std::to_string(in.type) + "/" + std::to_string(in.from) + "/" +
+                          std::to_string(in.to) + "/" + std::to_string(in.kind) + "/" +
+                          std::to_string(in.flags) + "/" + std::to_string(in.key) + "/" +
+                          std::to_string(in.count) + "/" + std::to_string(in.reason) + "/" +
+                          in.text + "/";
     if (in.size > 0) written.append(static_cast<const char*>(in.payload), in.size);
-    if (in.extensions_size > 0) written.append(static_cast<const char*>(in.extensions), in.extensions_size);
+    if (in.extensions_size > 0)
+      written.append(static_cast<const char*>(in.extensions), in.extensions_size);
     delivered_.push_back(std::move(written));
   }
 

@@ -1,7 +1,9 @@
-// Runs one scenario against one subject and prints what it found as one JSON object. perf/run.py starts it, beside the
-// subject and on the right processor; docs/performance.md says what the scenarios are.
+// Runs one scenario against one subject and prints what it found as one JSON object. perf/run.py
+// starts it, beside the subject and on the right processor; docs/performance.md says what the
+// scenarios are.
 //
-//     load_generator --wire gimnet --connect tcp://127.0.0.1:7450 --process PID --scenario one_to_one --size 16
+//     load_generator --wire gimnet --connect tcp://127.0.0.1:7450 --process PID --scenario
+//     one_to_one --size 16
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -24,9 +26,11 @@ int main(int argc, char** argv) {
   double seconds = 1;
   double patience = 2;
   RunOptions options;
-  app.add_option("--wire", wire_name, "how the subject is spoken to: gimnet, null, nats, mqtt, resp or zmtp");
+  app.add_option("--wire", wire_name,
+                 "how the subject is spoken to: gimnet, null, nats, mqtt, resp or zmtp");
   app.add_option("--connect", url, "tcp://HOST:PORT or unix:PATH")->required();
-  app.add_option("--publish-to", publish_url, "where the subject takes messages, if at another address");
+  app.add_option("--publish-to", publish_url,
+                 "where the subject takes messages, if at another address");
   app.add_option("--process", options.process, "process id of the subject")->required();
   app.add_option("--scenario", scenario_name)->required()->check(CLI::IsMember(scenario_names()));
   app.add_option("--size", options.payload_bytes, "payload in bytes")

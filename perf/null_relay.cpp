@@ -1,10 +1,11 @@
-// The yardstick: the cheapest relay in user space. One thread, epoll, recv into one buffer of 256 KiB, send of the
-// same bytes, no parsing. What a hub costs beyond this is the hub's own doing.
+// The yardstick: the cheapest relay in user space. One thread, epoll, recv into one buffer of 256
+// KiB, send of the same bytes, no parsing. What a hub costs beyond this is the hub's own doing.
 //
-//     null_relay --mode pair|fan_out --listen tcp://127.0.0.1:0 --listen unix:/path [--send-buffer BYTES]
+//     null_relay --mode pair|fan_out --listen tcp://127.0.0.1:0 --listen unix:/path [--send-buffer
+//     BYTES]
 //
-// Connections are numbered as they are accepted. Pair mode: 2k to 2k+1 and back. Fan-out mode: 0 to all others; what
-// the others send is read and thrown away. Prints `ready URL ...` when it listens.
+// Connections are numbered as they are accepted. Pair mode: 2k to 2k+1 and back. Fan-out mode: 0 to
+// all others; what the others send is read and thrown away. Prints `ready URL ...` when it listens.
 
 #include <sys/epoll.h>
 #include <sys/socket.h>
@@ -32,9 +33,10 @@ enum class Mode { pair, fan_out };
 
 struct Connection {
   int socket = -1;
-  std::vector<std::byte> unsent;      ///< what the kernel did not take yet
-  std::size_t unsent_begin = 0;       ///< bytes of it sent since
-  std::size_t waiting_for_count = 0;  ///< connections that still hold unsent bytes of this one: it is not read
+  std::vector<std::byte> unsent;  ///< what the kernel did not take yet
+  std::size_t unsent_begin = 0;   ///< bytes of it sent since
+  std::size_t waiting_for_count =
+      0;  ///< connections that still hold unsent bytes of this one: it is not read
 };
 
 class Relay {
@@ -55,9 +57,11 @@ class Relay {
       const int count = ::epoll_wait(epoll_, events.data(), kEventsMax, -1);
       if (count < 0 && errno != EINTR) fail("epoll_wait", errno);
       const std::span ready(events.data(), static_cast<std::size_t>(count > 0 ? count : 0));
-      // Listeners first, so that what connection 0 sends reaches everybody who connected before it was sent.
+      // Listeners first, so that what connection 0 sends reaches everybody who connected before it
+      // was sent.
       for (const auto& event : ready) {
-        if ((event.data.u64 & kListenerFlag) != 0) accept_all(listeners_[event.data.u64 & ~kListenerFlag]);
+        if ((event.data.u64 & kListenerFlag) != 0)
+          accept_all(listeners_[event.data.u64 & ~kListenerFlag]);
       }
       for (const auto& event : ready) {
         if ((event.data.u64 & kListenerFlag) == 0) handle(event.data.u64, event.events);
@@ -80,7 +84,8 @@ class Relay {
 
   void accept_all(const Listener& listener) {
     for (;;) {
-      const int accepted = ::accept4(listener.socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+      const int accepted =
+          ::accept4(listener.socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
       if (accepted < 0) {
         if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
         fail("accept", errno);
@@ -129,7 +134,8 @@ class Relay {
   void send_rest(std::size_t index) {
     Connection& receiver = connections_[index];
     const std::size_t left = receiver.unsent.size() - receiver.unsent_begin;
-    const ssize_t sent = ::send(receiver.socket, receiver.unsent.data() + receiver.unsent_begin, left, MSG_NOSIGNAL);
+    const ssize_t sent =
+        ::send(receiver.socket, receiver.unsent.data() + receiver.unsent_begin, left, MSG_NOSIGNAL);
     if (sent < 0) {
       if (errno != EAGAIN) close(index);
       return;
@@ -145,7 +151,8 @@ class Relay {
     receiver.unsent.clear();
     if (receiver.socket >= 0) update_interest(index);
     const std::size_t sender = mode_ == Mode::pair ? index ^ 1 : 0;
-    if (--connections_[sender].waiting_for_count == 0 && connections_[sender].socket >= 0) update_interest(sender);
+    if (--connections_[sender].waiting_for_count == 0 && connections_[sender].socket >= 0)
+      update_interest(sender);
   }
 
   void update_interest(std::size_t index) const {
@@ -183,7 +190,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
 
   gimnet::perf::raise_descriptor_limit();
-  gimnet::perf::Relay relay(mode == "pair" ? gimnet::perf::Mode::pair : gimnet::perf::Mode::fan_out, send_buffer_bytes);
+  gimnet::perf::Relay relay(mode == "pair" ? gimnet::perf::Mode::pair : gimnet::perf::Mode::fan_out,
+                            send_buffer_bytes);
   std::string ready = "ready";
   for (const auto& url : urls) ready += " " + relay.listen(url);
   std::puts(ready.c_str());

@@ -1,10 +1,11 @@
-// A ZeroMQ hub to measure against: the XPUB/XSUB proxy of the ZeroMQ guide ("The Dynamic Discovery Problem").
+// A ZeroMQ hub to measure against: the XPUB/XSUB proxy of the ZeroMQ guide ("The Dynamic Discovery
+// Problem").
 //
-//     zeromq_proxy --subscribe tcp://127.0.0.1:0 --subscribe ipc:///path --publish tcp://127.0.0.1:0 --publish
-//     ipc:///path
+//     zeromq_proxy --subscribe tcp://127.0.0.1:0 --subscribe ipc:///path --publish
+//     tcp://127.0.0.1:0 --publish ipc:///path
 //
-// Prints `ready SUBSCRIBE_URL... PUBLISH_URL...` when it listens. Nothing is dropped: a full queue holds the publisher
-// up.
+// Prints `ready SUBSCRIBE_URL... PUBLISH_URL...` when it listens. Nothing is dropped: a full queue
+// holds the publisher up.
 
 #include <sys/resource.h>
 #include <zmq.h>
@@ -47,7 +48,8 @@ int main(int argc, char** argv) {
   CLI::App app{"zeromq_proxy: XPUB and XSUB with a proxy between"};
   std::vector<std::string> subscribe_urls;
   std::vector<std::string> publish_urls;
-  app.add_option("--subscribe", subscribe_urls, "where subscribers connect, repeatable")->required();
+  app.add_option("--subscribe", subscribe_urls, "where subscribers connect, repeatable")
+      ->required();
   app.add_option("--publish", publish_urls, "where publishers connect, repeatable")->required();
   CLI11_PARSE(app, argc, argv);
 

@@ -11,8 +11,8 @@
 
 namespace gimnet::fuzz {
 
-/// What a subscriber of a paced group counts, as its library would. Ends in an abort where it gets more than its
-/// window, or a message out of order or twice.
+/// What a subscriber of a paced group counts, as its library would. Ends in an abort where it gets
+/// more than its window, or a message out of order or twice.
 class PacedCounts {
  public:
   /// Stands before the sequence number in the messages of which the order is known.
@@ -23,7 +23,9 @@ class PacedCounts {
   };
 
   /// A subscription began or has another window; 0: none.
-  void set_window(std::uint64_t window) { window_most_ = window == 0 ? kNoWindow : std::max(window_most_, window); }
+  void set_window(std::uint64_t window) {
+    window_most_ = window == 0 ? kNoWindow : std::max(window_most_, window);
+  }
   /// The last message may come again, as far as up to this one.
   void allow_repeats(std::uint64_t up_to) { repeats_up_to_ = up_to; }
   /// The group is another one.
@@ -52,7 +54,8 @@ class PacedCounts {
     Message message;
     if (payload.size() < sizeof message) return;
     // The last fragment of a message says its number where a whole one has it at its beginning.
-    std::memcpy(&message, payload.data() + (whole ? 0 : payload.size() - sizeof message), sizeof message);
+    std::memcpy(&message, payload.data() + (whole ? 0 : payload.size() - sizeof message),
+                sizeof message);
     if (message.mark != kMark) return;
     FUZZ_MUST(message.sequence > last_ || (message.sequence == last_ && last_ <= repeats_up_to_));
     last_ = message.sequence;

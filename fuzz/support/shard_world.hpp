@@ -43,8 +43,9 @@ struct Node {
   std::uint64_t hub_epoch = 0;
 };
 
-/// A whole io shard with two admitted nodes, on the in-memory transport. Ends in an abort where the ledger is not
-/// exact, or something comes out that is no legal frame, or that neither of the two wrote.
+/// A whole io shard with two admitted nodes, on the in-memory transport. Ends in an abort where the
+/// ledger is not exact, or something comes out that is no legal frame, or that neither of the two
+/// wrote.
 class ShardWorld {
  public:
   ShardWorld()
@@ -107,8 +108,10 @@ class ShardWorld {
     turn();
     FUZZ_MUST(counters_.queued.value() == 0);
     FUZZ_MUST(counters_.gap_frames.value() <= kGapFramesMost);
-    // The slab that is read into may have been kept by a frame that is gone; the next read finds out.
-    FUZZ_MUST(shard_->state().pool.pinned_bytes() <= kBufferRoom + kSlabReadBytes + 16 + limits_.frame_bytes);
+    // The slab that is read into may have been kept by a frame that is gone; the next read finds
+    // out.
+    FUZZ_MUST(shard_->state().pool.pinned_bytes() <=
+              kBufferRoom + kSlabReadBytes + 16 + limits_.frame_bytes);
   }
 
  protected:
@@ -147,7 +150,8 @@ class ShardWorld {
     for (const Node& node : node_) {
       const Connection* connection = shard_->state().find(node.session);
       if (connection == nullptr || !connection->connected) continue;
-      ready.push_back({connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
+      ready.push_back(
+          {connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
     }
     shard_->turn(ready, now_ms_);
     inbox_.drain(1'000, [](ShardEvent&&) {});
@@ -173,7 +177,8 @@ class ShardWorld {
       check(node, *frame);
       begin += frame->header.frame_size();
     }
-    node.stream.erase(node.stream.begin(), node.stream.begin() + static_cast<std::ptrdiff_t>(begin));
+    node.stream.erase(node.stream.begin(),
+                      node.stream.begin() + static_cast<std::ptrdiff_t>(begin));
   }
 
   void check(Node& node, const proto::FrameView& frame) {

@@ -1,10 +1,11 @@
 #pragma once
 
-/* Bitestream: a FIFO of labelled values, written and read in order. The bytes are described in docs/bitestream.md.
+/* Bitestream: a FIFO of labelled values, written and read in order. The bytes are described in
+ * docs/bitestream.md.
  *
- * C11 and C++; needs nothing but the C library. Nothing here keeps global state: different writers and readers can be
- * used by different threads, one of them by one thread at a time. Nothing is ever read or written beyond the sizes
- * given.
+ * C11 and C++; needs nothing but the C library. Nothing here keeps global state: different writers
+ * and readers can be used by different threads, one of them by one thread at a time. Nothing is
+ * ever read or written beyond the sizes given.
  *
  *     unsigned char memory[64];
  *     bitestream_writer writer = bitestream_writer_over(memory, sizeof memory);
@@ -54,11 +55,13 @@ typedef enum bitestream_type {
 
 typedef enum bitestream_status {
   BITESTREAM_OK = 0,
-  BITESTREAM_END = 1,         /* reader: no more values */
-  BITESTREAM_MALFORMED = 2,   /* reader: the bytes are not a Bitestream from here on */
-  BITESTREAM_NO_ROOM = 3,     /* writer: the caller's memory is full, or the system has none */
-  BITESTREAM_BAD_KEY = 4,     /* writer: a number over 24 bits, or a text that is empty, over 255 bytes or not UTF-8 */
-  BITESTREAM_BAD_VALUE = 5,   /* writer: over 2^30 bytes, a text that is not UTF-8, a size that is not the type's */
+  BITESTREAM_END = 1,       /* reader: no more values */
+  BITESTREAM_MALFORMED = 2, /* reader: the bytes are not a Bitestream from here on */
+  BITESTREAM_NO_ROOM = 3,   /* writer: the caller's memory is full, or the system has none */
+  BITESTREAM_BAD_KEY =
+      4, /* writer: a number over 24 bits, or a text that is empty, over 255 bytes or not UTF-8 */
+  BITESTREAM_BAD_VALUE =
+      5, /* writer: over 2^30 bytes, a text that is not UTF-8, a size that is not the type's */
   BITESTREAM_TOO_DEEP = 6,    /* writer: more than 16 nested streams */
   BITESTREAM_NOT_BALANCED = 7 /* writer: nested streams ended more or less often than begun */
 } bitestream_status;
@@ -68,7 +71,8 @@ typedef enum bitestream_status {
 #define BITESTREAM_VALUE_BYTES_MAX (1u << 30)
 #define BITESTREAM_DEPTH_MAX 16u
 
-/* A label: a number of 24 bits where text is NULL, else 1..255 bytes of UTF-8 (not ended by a zero). */
+/* A label: a number of 24 bits where text is NULL, else 1..255 bytes of UTF-8 (not ended by a
+ * zero). */
 typedef struct bitestream_key {
   const char* text;
   uint32_t number; /* 0 where text is given */
@@ -81,14 +85,17 @@ static inline bitestream_key bitestream_number_key(uint32_t number) {
 }
 /* The text is not copied. Sizes over 255 bytes are refused when the key is used. */
 static inline bitestream_key bitestream_text_key(const char* text, size_t size) {
-  bitestream_key key = {text, 0, size <= BITESTREAM_KEY_TEXT_MAX ? (uint32_t)size : BITESTREAM_KEY_TEXT_MAX + 1};
+  bitestream_key key = {
+      text, 0, size <= BITESTREAM_KEY_TEXT_MAX ? (uint32_t)size : BITESTREAM_KEY_TEXT_MAX + 1};
   return key;
 }
 bool bitestream_keys_equal(bitestream_key a, bitestream_key b);
 
-/* Writing ----------------------------------------------------------------------------------------------------------
- * The first error stays in `status` and turns every later call into nothing, so that one check at the end, by
- * bitestream_finish(), is enough. A value of no bytes (empty text, array, opaque or nested stream) is left out. */
+/* Writing
+ * -------------------------------------------------------------------------------------------------
+ * The first error stays in `status` and turns every later call into nothing, so that one check at
+ * the end, by bitestream_finish(), is enough. A value of no bytes (empty text, array, opaque or
+ * nested stream) is left out. */
 typedef struct bitestream_writer {
   unsigned char* bytes;
   size_t size; /* written so far */
@@ -107,7 +114,8 @@ void bitestream_writer_free(bitestream_writer* writer);
 /* BITESTREAM_OK: bytes[0..size) is a whole stream. */
 bitestream_status bitestream_finish(const bitestream_writer* writer);
 
-void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key, const void* bytes, size_t size);
+void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key, const void* bytes,
+                           size_t size);
 void bitestream_put_bool(bitestream_writer* writer, bitestream_key key, bool value);
 void bitestream_put_u8(bitestream_writer* writer, bitestream_key key, uint8_t value);
 void bitestream_put_u16(bitestream_writer* writer, bitestream_key key, uint16_t value);
@@ -120,23 +128,26 @@ void bitestream_put_i64(bitestream_writer* writer, bitestream_key key, int64_t v
 void bitestream_put_f32(bitestream_writer* writer, bitestream_key key, float value);
 void bitestream_put_f64(bitestream_writer* writer, bitestream_key key, double value);
 /* UTF-8, `size` bytes without a closing zero. */
-void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text, size_t size);
+void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text,
+                         size_t size);
 /* Nanoseconds since 1970. */
 void bitestream_put_time(bitestream_writer* writer, bitestream_key key, int64_t ns);
 /* `count` elements in memory order, for an array type; a bool is a byte of 0 or 1. */
-void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type, const void* elements,
-                          size_t count);
-/* Everything put between the two calls belongs to the nested stream. One that is left out in the end needs room for its
- * key until then. */
+void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type,
+                          const void* elements, size_t count);
+/* Everything put between the two calls belongs to the nested stream. One that is left out in the
+ * end needs room for its key until then. */
 void bitestream_begin_nested(bitestream_writer* writer, bitestream_key key);
 void bitestream_end_nested(bitestream_writer* writer);
-/* A value as it stands on the wire, of any type but a nested one; its size is checked against the type. */
-void bitestream_put_value(bitestream_writer* writer, bitestream_key key, bitestream_type type, const void* bytes,
-                          size_t size);
+/* A value as it stands on the wire, of any type but a nested one; its size is checked against the
+ * type. */
+void bitestream_put_value(bitestream_writer* writer, bitestream_key key, bitestream_type type,
+                          const void* bytes, size_t size);
 
-/* Reading ----------------------------------------------------------------------------------------------------------
- * In place: values point into the bytes that are read, which must outlive them. Each step costs the same, however
- * large the value. Hostile bytes end the reading with BITESTREAM_MALFORMED. */
+/* Reading
+ * -------------------------------------------------------------------------------------------------
+ * In place: values point into the bytes that are read, which must outlive them. Each step costs the
+ * same, however large the value. Hostile bytes end the reading with BITESTREAM_MALFORMED. */
 typedef struct bitestream_reader {
   const unsigned char* bytes;
   size_t size;
@@ -153,14 +164,19 @@ typedef struct bitestream_value {
 } bitestream_value;
 
 bitestream_reader bitestream_reader_over(const void* bytes, size_t size);
-/* BITESTREAM_OK: `value` is the next one. BITESTREAM_END, BITESTREAM_MALFORMED: as every further call. */
+/* BITESTREAM_OK: `value` is the next one. BITESTREAM_END, BITESTREAM_MALFORMED: as every further
+ * call. */
 bitestream_status bitestream_next(bitestream_reader* reader, bitestream_value* value);
-/* The first value with that key, wherever the reader stands; does not move it. BITESTREAM_END: there is none. */
-bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key, bitestream_value* value);
-/* Checks everything, nested streams, texts and bools included, before any of it is used. Costs one pass. */
+/* The first value with that key, wherever the reader stands; does not move it. BITESTREAM_END:
+ * there is none. */
+bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key,
+                                  bitestream_value* value);
+/* Checks everything, nested streams, texts and bools included, before any of it is used. Costs one
+ * pass. */
 bitestream_status bitestream_check(const void* bytes, size_t size);
 
-/* Numbers of any type are given where no value is lost. False: not a number, or it does not fit; `out` is unchanged. */
+/* Numbers of any type are given where no value is lost. False: not a number, or it does not fit;
+ * `out` is unchanged. */
 bool bitestream_get_u8(const bitestream_value* value, uint8_t* out);
 bool bitestream_get_u16(const bitestream_value* value, uint16_t* out);
 bool bitestream_get_u32(const bitestream_value* value, uint32_t* out);

@@ -33,14 +33,16 @@ typedef struct nif_counters {
   uint64_t receive_queue_bytes; /**< Waiting for the program now. */
   uint64_t send_queue_bytes;    /**< Waiting to be written now. */
   uint64_t retained_bytes;      /**< Waiting to be confirmed now. */
-  uint64_t read_stops;          /**< How often the library stopped reading because the receive queue was full. */
-  /** Messages of own services with `retain` that the library did not keep for a hub that loses them: over
-   * nif_options.last_message_bytes or, with those of the other services, over 64 MiB; or no memory. */
+  uint64_t
+      read_stops; /**< How often the library stopped reading because the receive queue was full. */
+  /** Messages of own services with `retain` that the library did not keep for a hub that loses
+   * them: over nif_options.last_message_bytes or, with those of the other services, over 64 MiB; or
+   * no memory. */
   uint64_t last_messages_not_kept;
 } nif_counters;
 
-/** Fills *counters, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or struct_size is not
- * set. */
+/** Fills *counters, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or
+ * struct_size is not set. */
 nif_status nif_get_counters(nif_node* node, nif_counters* counters);
 
 #ifdef __cplusplus

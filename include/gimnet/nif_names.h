@@ -3,11 +3,12 @@
 
 /* Names, services and other questions to the hub. Included by gimnet/nif.h.
  *
- * All of these ask the hub and wait for its answer, for at most timeout_ms, over a break too: beside what is named
- * below they answer NIF_TIMEOUT, NIF_NOT_CONNECTED (broken, and the time is up), NIF_REFUSED or NIF_REPLACED (it will
- * not come back), NIF_PROTOCOL (the hub's answer cannot be), NIF_BAD_ARGUMENT (NULL), NIF_IN_CALLBACK, NIF_NO_MEMORY,
- * and what nif.h says of handles. Names are at most NIF_NAME_BYTES_MAX bytes: up to 16 parts of A-Z a-z 0-9 . _ -,
- * separated by `/` (docs/protocol.md, section 8). */
+ * All of these ask the hub and wait for its answer, for at most timeout_ms, over a break too:
+ * beside what is named below they answer NIF_TIMEOUT, NIF_NOT_CONNECTED (broken, and the time is
+ * up), NIF_REFUSED or NIF_REPLACED (it will not come back), NIF_PROTOCOL (the hub's answer cannot
+ * be), NIF_BAD_ARGUMENT (NULL), NIF_IN_CALLBACK, NIF_NO_MEMORY, and what nif.h says of handles.
+ * Names are at most NIF_NAME_BYTES_MAX bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`
+ * (docs/protocol.md, section 8). */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -21,12 +22,13 @@ extern "C" {
 /** One connection to a hub, one node. Opaque; not a pointer to anything. */
 typedef struct nif_node nif_node;
 
-/** Finds a node by its name. An answer is remembered for a second, and forgotten earlier where a REPORT says
- * no_such_node or renumbered, and at every break. NIF_NOT_FOUND, NIF_BAD_NAME, NIF_TIMEOUT, NIF_NOT_CONNECTED. */
+/** Finds a node by its name. An answer is remembered for a second, and forgotten earlier where a
+ * REPORT says no_such_node or renumbered, and at every break. NIF_NOT_FOUND, NIF_BAD_NAME,
+ * NIF_TIMEOUT, NIF_NOT_CONNECTED. */
 nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t timeout_ms);
 
-/** Finds the name of a node, "" for one without a name; remembered as those of nif_resolve(). `name` must have room for
- * NIF_NAME_BYTES_MAX + 1 bytes. NIF_NOT_FOUND. */
+/** Finds the name of a node, "" for one without a name; remembered as those of nif_resolve().
+ * `name` must have room for NIF_NAME_BYTES_MAX + 1 bytes. NIF_NOT_FOUND. */
 nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_ms);
 
 /** One node of a list. Text: NUL-terminated, never NULL. */
@@ -47,16 +49,21 @@ typedef struct nif_node_list {
   const nif_node_record* records; /**< Ascending node ids. */
 } nif_node_list;
 
-/** Lists the nodes whose name matches the pattern (`*` one part, `**` any number; NULL: all nodes, also those without a
- *  name) into *list, which nif_free_nodes() frees. It is asked for in pages: nodes that come or go meanwhile may be in
- *  it or not. NIF_BAD_NAME: no pattern. */
-nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list, int32_t timeout_ms);
+/** Lists the nodes whose name matches the pattern (`*` one part, `**` any number; NULL: all nodes,
+ * also those without a name) into *list, which nif_free_nodes() frees. It is asked for in pages:
+ * nodes that come or go meanwhile may be in it or not. NIF_BAD_NAME: no pattern. */
+nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list,
+                          int32_t timeout_ms);
 void nif_free_nodes(nif_node_list* list);
 
 typedef enum nif_direction { NIF_PROVIDES = 0, NIF_ACCEPTS = 1 } nif_direction;
-/** What a subscriber gets: every message; only the newest of those that wait; or, of sync(n), at most n that it has not
- *  taken, its hub holding the newest for it. */
-typedef enum nif_delivery { NIF_STREAM_DELIVERY = 0, NIF_LATEST_DELIVERY = 1, NIF_SYNC_DELIVERY = 2 } nif_delivery;
+/** What a subscriber gets: every message; only the newest of those that wait; or, of sync(n), at
+ * most n that it has not taken, its hub holding the newest for it. */
+typedef enum nif_delivery {
+  NIF_STREAM_DELIVERY = 0,
+  NIF_LATEST_DELIVERY = 1,
+  NIF_SYNC_DELIVERY = 2
+} nif_delivery;
 
 /** A service to advertise. Its full name is `node name/name`. */
 typedef struct nif_service {
@@ -67,25 +74,30 @@ typedef struct nif_service {
   uint8_t direction;    /**< nif_direction. */
   uint8_t delivery;     /**< nif_delivery. */
   const char* metadata; /**< For people and tools, at most 4,096 bytes of UTF-8; may be NULL. */
-  uint32_t window;      /**< n of NIF_SYNC_DELIVERY, 0: 1. At most the hub's limit, 1,024 unless it was set. */
-  uint8_t retain;       /**< Not 0: the hub keeps the last message (1 MiB) and gives it to each new subscriber first.
-                             The library keeps a copy (nif_options.last_message_bytes) and gives it to a hub that may have
-                             lost its own, before newer messages of its lane: after a break without resume, under
-                             another group, or after a NIF_GAP of the own id. Subscribers may get it twice then. */
+  uint32_t window; /**< n of NIF_SYNC_DELIVERY, 0: 1. At most the hub's limit, 1,024 unless it was
+                      set. */
+  /** Not 0: the hub keeps the last message (1 MiB) and gives it to each new subscriber first. The
+   * library keeps a copy (nif_options.last_message_bytes) and gives it to a hub that may have lost
+   * its own, before newer messages of its lane: after a break without resume, under another group,
+   * or after a NIF_GAP of the own id. Subscribers may get it twice then. */
+  uint8_t retain;
 } nif_service;
 
-/** Declares a service; stores its group id in *group and, if subscribers is not NULL, how many subscribers wait for it
- *  already. The library declares it again after every reconnect, under the former group id where the hub can.
- *  NIF_BAD_NAME, NIF_TAKEN (this node has such a service), NIF_LIMIT, NIF_DENIED (a node without a name). */
-nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
-                         int32_t timeout_ms);
+/** Declares a service; stores its group id in *group and, if subscribers is not NULL, how many
+ * subscribers wait for it already. The library declares it again after every reconnect, under the
+ * former group id where the hub can. NIF_BAD_NAME, NIF_TAKEN (this node has such a service),
+ * NIF_LIMIT, NIF_DENIED (a node without a name). */
+nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group,
+                         uint32_t* subscribers, int32_t timeout_ms);
 
-/** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's; NIF_BAD_ARGUMENT: group is 0. */
+/** Ends an own service. NIF_NOT_FOUND; NIF_DENIED: it is another node's; NIF_BAD_ARGUMENT: group is
+ * 0. */
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms);
 
-/** The same by its name, whatever group it has by now: also of a service that the hub moved or refuses at the moment.
- *  The library declares it no more, whatever this answers; where the hub could not be told within the time given, it is
- *  as soon as there is a connection. NIF_NOT_FOUND: this node has no such service. NIF_BAD_NAME. */
+/** The same by its name, whatever group it has by now: also of a service that the hub moved or
+ * refuses at the moment. The library declares it no more, whatever this answers; where the hub
+ * could not be told within the time given, it is as soon as there is a connection. NIF_NOT_FOUND:
+ * this node has no such service. NIF_BAD_NAME. */
 nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeout_ms);
 
 /** One service of a list. Text: NUL-terminated, never NULL. */
@@ -110,7 +122,8 @@ typedef struct nif_service_list {
 } nif_service_list;
 
 /** Lists services by a pattern of full names, as nif_list_nodes(). */
-nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list, int32_t timeout_ms);
+nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list,
+                             int32_t timeout_ms);
 void nif_free_services(nif_service_list* list);
 
 /** What a subscription stands for at the moment. */
@@ -121,8 +134,8 @@ typedef struct nif_subscription {
   uint32_t delivery; /**< nif_delivery. */
   uint32_t window;   /**< In force: messages that may be untaken; 0: any number. */
   uint32_t retain;   /**< 1: the last message comes first. */
-  /** nif_direction. NIF_ACCEPTS: nothing will come, since the service takes data; this tells where it is, for who sends
-   * to it (NIF_SERVICE). */
+  /** nif_direction. NIF_ACCEPTS: nothing will come, since the service takes data; this tells where
+   * it is, for who sends to it (NIF_SERVICE). */
   uint32_t direction;
 } nif_subscription;
 
@@ -130,30 +143,33 @@ typedef struct nif_subscription {
 typedef struct nif_pace {
   size_t struct_size; /**< sizeof(nif_pace). */
   uint32_t window;    /**< Of sync(n): fewer than n untaken messages. */
-  uint32_t depth;     /**< Newest messages that the hub holds meanwhile; 0: 1, always the latest. At most 64. */
+  uint32_t depth;     /**< Newest messages that the hub holds meanwhile; 0: 1, always the latest. At
+                         most 64. */
   double rate_hz;     /**< Messages a second at most, the newest at each due time: 0.001..1,000. */
 } nif_pace;
 
-/** Subscribes to a service by its full name; it need not exist yet. The library subscribes again after every reconnect.
- *  subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
-nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms);
+/** Subscribes to a service by its full name; it need not exist yet. The library subscribes again
+ * after every reconnect. subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
+nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription,
+                         int32_t timeout_ms);
 
-/** The same with a pace; NULL: none. Of a service that is subscribed already this changes it; where the hub could not
- * be told within the time given, it is with the next connection. Also NIF_BAD_REQUEST: a number beyond the hub's limit.
+/** The same with a pace; NULL: none. Of a service that is subscribed already this changes it; where
+ * the hub could not be told within the time given, it is with the next connection. Also
+ * NIF_BAD_REQUEST: a number beyond the hub's limit.
  */
 nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_pace* pace,
                                nif_subscription* subscription, int32_t timeout_ms);
 
-/** With nif_options.credit_by_program: the program took so many messages of the group that came with this
- *  nif_incoming.epoch. The hub is told at once, or, with `more`, when half of the window was taken: more is waiting to
- *  be taken anyway. An epoch of 0, an earlier one, and groups without a window are ignored. Does not wait; may be
- * called in the callback. No errors beside those of handles: while the connection is broken it is told after it is
- * back. */
+/** With nif_options.credit_by_program: the program took so many messages of the group that came
+ * with this nif_incoming.epoch. The hub is told at once, or, with `more`, when half of the window
+ * was taken: more is waiting to be taken anyway. An epoch of 0, an earlier one, and groups without
+ * a window are ignored. Does not wait; may be called in the callback. No errors beside those of
+ * handles: while the connection is broken it is told after it is back. */
 nif_status nif_credit(nif_node* node, uint32_t group, uint32_t epoch, uint32_t messages, int more);
 
-/** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. The library subscribes to
- *  it no more, whatever this answers; where the hub could not be told within the time given, it is as soon as there is
- * a connection. */
+/** Ends a subscription. NIF_NOT_FOUND. Messages that are on their way already may still come. The
+ * library subscribes to it no more, whatever this answers; where the hub could not be told within
+ * the time given, it is as soon as there is a connection. */
 nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms);
 
 /* ---------------------------------------------------------------- asking the hub */
@@ -183,16 +199,17 @@ typedef struct nif_reply {
   const char* sentence; /**< Of the hub, if status is not 0; never NULL. */
 } nif_reply;
 
-/** Sends a request (kind NIF_NS or NIF_CTRL, an operation below 0x8000, and its Bitestream) to the own hub and waits
- * for the answer. NIF_OK: *reply holds it, whatever its status. NIF_BAD_ARGUMENT also: another kind or operation, or
- * more than NIF_REQUEST_BYTES_MAX bytes of content. */
-nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content, size_t size,
-                       nif_reply** reply, int32_t timeout_ms);
+/** Sends a request (kind NIF_NS or NIF_CTRL, an operation below 0x8000, and its Bitestream) to the
+ * own hub and waits for the answer. NIF_OK: *reply holds it, whatever its status. NIF_BAD_ARGUMENT
+ * also: another kind or operation, or more than NIF_REQUEST_BYTES_MAX bytes of content. */
+nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content,
+                       size_t size, nif_reply** reply, int32_t timeout_ms);
 void nif_free_reply(nif_reply* reply);
 
-/** Measures the way to the hub with one FLOW PING: round trip and hub's clock minus this one, in ns; either may be
- *  NULL. The clock offset is good to half of the round trip. */
-nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns, int32_t timeout_ms);
+/** Measures the way to the hub with one FLOW PING: round trip and hub's clock minus this one, in
+ * ns; either may be NULL. The clock offset is good to half of the round trip. */
+nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns,
+                        int32_t timeout_ms);
 
 #ifdef __cplusplus
 }

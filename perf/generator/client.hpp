@@ -10,8 +10,9 @@
 
 namespace gimnet::perf {
 
-/// One connection of the generator to the subject that is measured. What is written is either a piece of a block of
-/// messages (referenced, valid until it is sent) or control bytes (copied), never one inside the other.
+/// One connection of the generator to the subject that is measured. What is written is either a
+/// piece of a block of messages (referenced, valid until it is sent) or control bytes (copied),
+/// never one inside the other.
 class Client {
  public:
   Client(std::size_t index, int socket) : index_(index), socket_(socket) {}
@@ -21,9 +22,11 @@ class Client {
 
   [[nodiscard]] std::size_t index() const { return index_; }
   [[nodiscard]] int socket() const { return socket_; }
-  /// Where its messages are written: the client itself, or its second connection to a subject that takes messages at
-  /// another address than it gives them out.
-  [[nodiscard]] Client& publishing_side() { return publishing_side_ != nullptr ? *publishing_side_ : *this; }
+  /// Where its messages are written: the client itself, or its second connection to a subject that
+  /// takes messages at another address than it gives them out.
+  [[nodiscard]] Client& publishing_side() {
+    return publishing_side_ != nullptr ? *publishing_side_ : *this;
+  }
   /// REQUIRES: `side` lives as long as this client.
   void set_publishing_side(Client& side) { publishing_side_ = &side; }
   /// The bytes after the last message end; the next recv continues them.
@@ -33,7 +36,8 @@ class Client {
   void close();
   /// Sends what was begun. False: the kernel takes no more now, or the connection is broken.
   bool flush();
-  /// Begins to write `bytes` with one system call. REQUIRES: flush() was true. Valid until: flush() is true.
+  /// Begins to write `bytes` with one system call. REQUIRES: flush() was true. Valid until: flush()
+  /// is true.
   bool write(std::span<const std::byte> bytes);
   /// Sends a copy of `bytes` after what was begun.
   void write_control(std::span<const std::byte> bytes);
@@ -44,7 +48,8 @@ class Client {
   bool is_side = false;      ///< another client's publishing side
   bool is_reading = true;    ///< a stalled client is not read
   bool is_closed = false;    ///< by the subject, or by close()
-  /// PAUSEs that were not lifted yet (one RESUME lifts any number for its target): nothing is published meanwhile.
+  /// PAUSEs that were not lifted yet (one RESUME lifts any number for its target): nothing is
+  /// published meanwhile.
   std::vector<proto::flow::Target> paused;
 
  private:

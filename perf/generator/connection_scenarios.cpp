@@ -13,7 +13,8 @@ constexpr std::size_t kClients = 10'000;
 constexpr std::size_t kClientsUnderLoad = 1'000;
 /// Long enough for every client's first keep-alive.
 constexpr std::chrono::seconds kSettling{2};
-/// Of all clients, one after the other, to learn what a keep-alive costs a subject that is busy with them.
+/// Of all clients, one after the other, to learn what a keep-alive costs a subject that is busy
+/// with them.
 constexpr int kBusyRounds = 5;
 /// A subject that has just started still does what belongs to that.
 constexpr std::chrono::milliseconds kStarting{500};
@@ -22,18 +23,22 @@ std::size_t count_of(const RunOptions& options, std::size_t usual = kClients) {
   return options.client_count == 0 ? usual : options.client_count;
 }
 
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 bool never() { return false; }
 
 /// Of a subject that answers none, or needs none, there is nothing to wait for.
 void await_answers(Engine& engine) {
   const KeepAlives& words = engine.wire().keep_alives();
-  const bool answered = engine.poll_until([&words] { return words.answered == words.said; }, engine.answer_limit());
+  const bool answered =
+      engine.poll_until([&words] { return words.answered == words.said; }, engine.answer_limit());
   if (!answered) fail("the subject did not answer all keep-alives in time");
 }
 
-/// What the subject used meanwhile, from rest to rest, and for how many keep-alives: word and answer are one.
+/// What the subject used meanwhile, from rest to rest, and for how many keep-alives: word and
+/// answer are one.
 struct KeepAlivesUsed {
   double cpu_ns = 0;
   double seconds = 0;
@@ -57,13 +62,14 @@ KeepAlivesUsed use_of(Engine& engine, const RunOptions& options, const Meanwhile
 
 }  // namespace
 
-/// Resident bytes and processor time of connections that say nothing but keep-alives, and what one of these costs there
-/// and among as many that follow each other at once.
+/// Resident bytes and processor time of connections that say nothing but keep-alives, and what one
+/// of these costs there and among as many that follow each other at once.
 Findings idle(Engine& engine, const RunOptions& options) {
   const auto count = static_cast<double>(count_of(options));
   const auto resident_before = resident_bytes(options.process);
   engine.connect(count_of(options));
-  std::ignore = engine.poll_until(never, std::min<std::chrono::nanoseconds>(2 * options.duration, kSettling));
+  std::ignore =
+      engine.poll_until(never, std::min<std::chrono::nanoseconds>(2 * options.duration, kSettling));
   const KeepAlivesUsed idle =
       use_of(engine, options, [&] { std::ignore = engine.poll_until(never, options.duration); });
   const auto resident = static_cast<double>(resident_bytes(options.process) - resident_before);
@@ -84,7 +90,8 @@ Findings idle(Engine& engine, const RunOptions& options) {
   findings.add("keep_alive_ns", idle.cpu_ns / idle.keep_alives);
   findings.add("keep_alive_ns_busy", busy_ns);
   findings.add("keep_alive_over_busy", idle.cpu_ns / idle.keep_alives / busy_ns);
-  findings.add("cpu_share_beyond_keep_alives", (idle.cpu_ns - idle.keep_alives * busy_ns) / 1e9 / idle.seconds);
+  findings.add("cpu_share_beyond_keep_alives",
+               (idle.cpu_ns - idle.keep_alives * busy_ns) / 1e9 / idle.seconds);
   return findings;
 }
 
@@ -106,7 +113,8 @@ Findings idle_alone(Engine& engine, const RunOptions& options) {
   return findings;
 }
 
-/// Connects and joins many, until a message goes from the last but one to the last: so the subject has accepted all.
+/// Connects and joins many, until a message goes from the last but one to the last: so the subject
+/// has accepted all.
 Findings connect_many(Engine& engine, const RunOptions& options) {
   const std::size_t count = count_of(options);
   const auto cpu_begin_ns = cpu_time_ns(options.process);
@@ -118,7 +126,8 @@ Findings connect_many(Engine& engine, const RunOptions& options) {
   Publisher publisher(engine.wire(), engine.client(count - 2), {Target{.recipients = {&last}}},
                       MessageShape{.payload_bytes = options.payload_bytes}, Writing::unbatched);
   publisher.publish(1);
-  const bool arrived = engine.poll_until([&last] { return last.inbox.settled() > 0; }, engine.answer_limit());
+  const bool arrived =
+      engine.poll_until([&last] { return last.inbox.settled() > 0; }, engine.answer_limit());
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   const auto cpu_ns = static_cast<double>(cpu_time_ns(options.process) - cpu_begin_ns);
 
@@ -139,7 +148,8 @@ Findings join_under_load(Engine& engine, const RunOptions& options) {
   const Inbox& inbox = engine.client(1).inbox;
   engine.client(1).inbox.expect(0, options.payload_bytes);
   std::vector<Publisher> publishers;
-  publishers.emplace_back(engine.wire(), engine.client(0), std::vector{Target{.recipients = {&engine.client(1)}}},
+  publishers.emplace_back(engine.wire(), engine.client(0),
+                          std::vector{Target{.recipients = {&engine.client(1)}}},
                           MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);
   Flood flood(engine, std::move(publishers), 1);
   flood.run_for(options.duration / 2);
@@ -153,7 +163,8 @@ Findings join_under_load(Engine& engine, const RunOptions& options) {
   while (engine.wire().joined_count() < count) {
     if (Clock::now() - begin > 3 * engine.answer_limit())
       fail("the subject did not admit all clients under load in time");
-    if (engine.client_count() < count && engine.client_count() - engine.wire().joined_count() < Engine::kJoiningMax) {
+    if (engine.client_count() < count &&
+        engine.client_count() - engine.wire().joined_count() < Engine::kJoiningMax) {
       engine.begin_connect();
     }
     flood.turn(std::chrono::nanoseconds(0));

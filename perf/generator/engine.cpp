@@ -37,11 +37,12 @@ Engine::~Engine() {
 void Engine::connect(std::size_t count) {
   for (std::size_t begun = 0; begun < count; ++begun) {
     begin_connect();
-    const bool room =
-        poll_until([this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, answer_limit());
+    const bool room = poll_until(
+        [this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, answer_limit());
     if (!room) fail("the subject admits nobody any more");
   }
-  const bool all = poll_until([this] { return wire_.joined_count() == clients_.size(); }, answer_limit());
+  const bool all =
+      poll_until([this] { return wire_.joined_count() == clients_.size(); }, answer_limit());
   if (!all) fail("the subject did not admit all clients in time");
 }
 
@@ -62,7 +63,8 @@ void Engine::open_publisher(Client& client) {
   client.set_publishing_side(side);
   watch(side);
   wire_.open_side(side);
-  if (!poll_until([&side] { return side.is_joined; }, answer_limit())) fail("no answer to a publisher in time");
+  if (!poll_until([&side] { return side.is_joined; }, answer_limit()))
+    fail("no answer to a publisher in time");
 }
 
 void Engine::watch(Client& client) const {
@@ -76,14 +78,16 @@ void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
   Client& provider = client(0);
   if (!provider.is_in_group) {
     wire_.provide(provider);
-    if (!poll_until([&provider] { return provider.is_in_group; }, answer_limit())) fail("no answer to ADVERTISE");
+    if (!poll_until([&provider] { return provider.is_in_group; }, answer_limit()))
+      fail("no answer to ADVERTISE");
   }
   for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
     Client& subscriber = client(index);
     wire_.subscribe(subscriber);
     // Not a round trip each: every so many the last one's answer is waited for.
     if (index % kJoiningMax != 0) continue;
-    if (!poll_until([&subscriber] { return subscriber.is_in_group; }, answer_limit())) fail("no answer to SUBSCRIBE");
+    if (!poll_until([&subscriber] { return subscriber.is_in_group; }, answer_limit()))
+      fail("no answer to SUBSCRIBE");
   }
   const auto all_in_group = [this, first_subscriber, count] {
     for (std::size_t index = first_subscriber; index < first_subscriber + count; ++index) {
@@ -91,13 +95,15 @@ void Engine::join_group(std::size_t first_subscriber, std::size_t count) {
     }
     return true;
   };
-  if (!poll_until(all_in_group, answer_limit())) fail("the subject did not answer every SUBSCRIBE in time");
+  if (!poll_until(all_in_group, answer_limit()))
+    fail("the subject did not answer every SUBSCRIBE in time");
 }
 
 std::uint64_t Engine::poll(std::chrono::nanoseconds timeout) {
   if (Clock::now() >= next_keep_alive_) keep_alive();
   std::array<epoll_event, kEventsMax> events;
-  const timespec wait{.tv_sec = timeout.count() / 1'000'000'000, .tv_nsec = timeout.count() % 1'000'000'000};
+  const timespec wait{.tv_sec = timeout.count() / 1'000'000'000,
+                      .tv_nsec = timeout.count() % 1'000'000'000};
   const int count = ::epoll_pwait2(epoll_, events.data(), kEventsMax, &wait, nullptr);
   if (count < 0 && errno != EINTR) fail("epoll_pwait2", errno);
   std::uint64_t settled = 0;
@@ -139,13 +145,15 @@ void Engine::read(Client& client) {
   const ssize_t size = ::recv(client.socket(), buffer_.get() + carry.size(), kReadBytes, 0);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
   if (size <= 0) return on_closed(client);
-  const std::span<const std::byte> bytes(buffer_.get(), carry.size() + static_cast<std::size_t>(size));
+  const std::span<const std::byte> bytes(buffer_.get(),
+                                         carry.size() + static_cast<std::size_t>(size));
   const auto rest = bytes.subspan(wire_.take(client, bytes));
   carry.assign(rest.begin(), rest.end());
 }
 
 void Engine::on_closed(Client& client) {
-  if (!is_closing_tolerated_) fail("the subject closed the connection of client " + std::to_string(client.index()));
+  if (!is_closing_tolerated_)
+    fail("the subject closed the connection of client " + std::to_string(client.index()));
   client.is_closed = true;
   ++closed_count_;
   if (::epoll_ctl(epoll_, EPOLL_CTL_DEL, client.socket(), nullptr) != 0) fail("epoll_ctl", errno);

@@ -21,7 +21,8 @@ using Clock = std::chrono::steady_clock;
 /// A subject that refuses, closes or does not answer ends the program with a sentence.
 class Engine {
  public:
-  /// `publish_endpoint`: where the subject takes messages, if it does so at another address than `endpoint`.
+  /// `publish_endpoint`: where the subject takes messages, if it does so at another address than
+  /// `endpoint`.
   Engine(Wire& wire, Endpoint endpoint, std::optional<Endpoint> publish_endpoint = {});
   ~Engine();
   Engine(const Engine&) = delete;
@@ -33,13 +34,14 @@ class Engine {
   void begin_connect();
   /// How many may wait for their admission at a time.
   static constexpr std::size_t kJoiningMax = 64;
-  /// Makes `client` ready to publish: opens its publishing side where it needs one. Before its Publisher is made.
+  /// Makes `client` ready to publish: opens its publishing side where it needs one. Before its
+  /// Publisher is made.
   void open_publisher(Client& client);
   /// Client 0 provides the group, clients 1..count subscribe to it.
   void join_group(std::size_t first_subscriber, std::size_t count);
 
-  /// Waits at most `timeout` for something to read, then reads every ready client once. Returns the messages that
-  /// were settled (delivered or known as lost) by that.
+  /// Waits at most `timeout` for something to read, then reads every ready client once. Returns the
+  /// messages that were settled (delivered or known as lost) by that.
   std::uint64_t poll(std::chrono::nanoseconds timeout);
   /// Lets every client say that it is there, as poll() does when it is time to.
   void keep_alive();
@@ -51,7 +53,8 @@ class Engine {
   void stop_reading(Client& client);
   /// Closes its connection, whatever is unread. REQUIRES: nothing is published by it any more.
   void close(Client& client);
-  /// What stays away for longer is lost; 2 s unless set. More where nothing is timed, and a busy machine no fault.
+  /// What stays away for longer is lost; 2 s unless set. More where nothing is timed, and a busy
+  /// machine no fault.
   void set_patience(std::chrono::nanoseconds patience) { patience_ = patience; }
   [[nodiscard]] std::chrono::nanoseconds patience() const { return patience_; }
   /// A subject that answers a request later than this is given up.

@@ -11,7 +11,8 @@ constexpr std::size_t kWindowBytesARecipient = 128 * 1024;
 constexpr std::size_t kUnbatchedMessages = 64;
 constexpr std::uint64_t kFirstMessages = 16;
 constexpr std::uint64_t kGrowth = 4;
-/// A subject that takes longer for a round gets no larger ones, or it would be at them long after the run's end.
+/// A subject that takes longer for a round gets no larger ones, or it would be at them long after
+/// the run's end.
 constexpr std::chrono::milliseconds kSlowRound{400};
 /// Writes of a publisher in one turn where each is a single message.
 constexpr std::size_t kUnbatchedWrites = 8;
@@ -19,7 +20,8 @@ constexpr std::chrono::milliseconds kPatience{1};
 
 }  // namespace
 
-Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message, double bytes_a_second)
+Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message,
+             double bytes_a_second)
     : engine_(engine),
       publishers_(std::move(publishers)),
       recipients_a_message_(recipients_a_message),
@@ -31,14 +33,17 @@ Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t reci
 
 std::uint64_t Flood::window() const {
   std::uint64_t deliveries = window_bytes_ / message_bytes_;
-  if (is_unbatched_) deliveries = std::min<std::uint64_t>(deliveries, kUnbatchedMessages * recipients_a_message_);
+  if (is_unbatched_)
+    deliveries = std::min<std::uint64_t>(deliveries, kUnbatchedMessages * recipients_a_message_);
   return std::max<std::uint64_t>(1, deliveries / recipients_a_message_);
 }
 
 std::uint64_t Flood::messages_allowed() const {
   const std::uint64_t most = std::min(window(), messages_max_);
-  const std::uint64_t under_way = (expected_ - settled_ - missing_ + recipients_a_message_ - 1) / recipients_a_message_;
-  if (under_way == 0) return UINT64_MAX;  // a write larger than the window could not start otherwise
+  const std::uint64_t under_way =
+      (expected_ - settled_ - missing_ + recipients_a_message_ - 1) / recipients_a_message_;
+  if (under_way == 0)
+    return UINT64_MAX;  // a write larger than the window could not start otherwise
   return under_way >= most ? 0 : most - under_way;
 }
 
@@ -78,7 +83,8 @@ bool Flood::publish() {
 /// What comes after it was given up was late, not lost.
 void Flood::settle(std::uint64_t count) {
   settled_ += count;
-  if (settled_ + missing_ > expected_) missing_ -= std::min(missing_, settled_ + missing_ - expected_);
+  if (settled_ + missing_ > expected_)
+    missing_ -= std::min(missing_, settled_ + missing_ - expected_);
 }
 
 std::uint64_t Flood::turn(std::chrono::nanoseconds patience) {

@@ -11,26 +11,31 @@
 
 namespace gimnet::perf {
 
-/// Publishes in a window, so that nobody is measured while it drops: at most 2 MiB are under way, or 128 KiB a
-/// recipient where that is more; less where warm_up() found the subject too slow for it. Of unbatched messages at most
-/// 64 a recipient are: where a subject that was not scheduled for a moment finds many of them at once, its cost says
-/// nothing about one. Counts what was sent to how many, and what became of it.
+/// Publishes in a window, so that nobody is measured while it drops: at most 2 MiB are under way,
+/// or 128 KiB a recipient where that is more; less where warm_up() found the subject too slow for
+/// it. Of unbatched messages at most 64 a recipient are: where a subject that was not scheduled for
+/// a moment finds many of them at once, its cost says nothing about one. Counts what was sent to
+/// how many, and what became of it.
 class Flood {
  public:
-  /// `recipients_a_message`: copies that the subject makes of each message. `bytes_a_second` 0: no pace.
-  Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message, double bytes_a_second = 0);
+  /// `recipients_a_message`: copies that the subject makes of each message. `bytes_a_second` 0: no
+  /// pace.
+  Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message,
+        double bytes_a_second = 0);
 
-  /// One turn: each publisher writes once if the window lets it, then every ready client is read once.
-  /// Waits at most `patience` where nothing could be written. Returns messages settled.
+  /// One turn: each publisher writes once if the window lets it, then every ready client is read
+  /// once. Waits at most `patience` where nothing could be written. Returns messages settled.
   std::uint64_t turn(std::chrono::nanoseconds patience);
-  /// Rounds that grow as long as the subject is quick to deliver them, then turns for `duration`; reads the rest.
+  /// Rounds that grow as long as the subject is quick to deliver them, then turns for `duration`;
+  /// reads the rest.
   void warm_up(std::chrono::nanoseconds duration);
   /// Turns until `duration` is over.
   void run_for(std::chrono::nanoseconds duration);
   /// Reads until all is settled. What does not come in the engine's patience counts as lost.
   void drain();
 
-  /// Deliveries that were asked for and are settled. Those of other messages that turn() settled are taken out.
+  /// Deliveries that were asked for and are settled. Those of other messages that turn() settled
+  /// are taken out.
   void forget_settled(std::uint64_t foreign) { settled_ -= foreign; }
   [[nodiscard]] std::uint64_t expected() const { return expected_; }
   [[nodiscard]] std::uint64_t missing() const { return missing_; }

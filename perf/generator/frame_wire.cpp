@@ -38,7 +38,8 @@ void FrameWire::append_frame(const proto::FrameHeader& header, std::span<const s
   append_bytes(body, to);
 }
 
-proto::FrameHeader FrameWire::make_header(const Client& from, const Target& target, std::uint8_t lane) const {
+proto::FrameHeader FrameWire::make_header(const Client& from, const Target& target,
+                                          std::uint8_t lane) const {
   proto::FrameHeader header;
   header.src = node_id(from);
   header.lane = lane;
@@ -77,7 +78,8 @@ void FrameWire::append_message(const Client& from, const Target& target, std::ui
   auto& bytes = block.bytes;
   for (std::size_t offset = 0; offset < payload.size(); offset += piece_bytes) {
     const auto piece = payload.subspan(offset, std::min(piece_bytes, payload.size() - offset));
-    header.length = static_cast<std::uint32_t>(ids.size() * 4 + (is_whole ? 0 : kFragmentHeaderBytes) + piece.size());
+    header.length = static_cast<std::uint32_t>(
+        ids.size() * 4 + (is_whole ? 0 : kFragmentHeaderBytes) + piece.size());
     bytes.resize(bytes.size() + proto::kHeaderSize);
     proto::store_header(bytes.data() + bytes.size() - proto::kHeaderSize, header);
     for (const std::uint32_t id : ids) append_u32(id, bytes);
@@ -111,10 +113,13 @@ std::size_t FrameWire::take(Client& client, std::span<const std::byte> bytes) {
   return at;
 }
 
-void FrameWire::take_data(Client& client, const proto::FrameHeader& header, std::span<const std::byte> body) {
-  if (header.kind == proto::Kind::unicast && header.dst != node_id(client)) return client.inbox.on_wrong();
+void FrameWire::take_data(Client& client, const proto::FrameHeader& header,
+                          std::span<const std::byte> body) {
+  if (header.kind == proto::Kind::unicast && header.dst != node_id(client))
+    return client.inbox.on_wrong();
   if (header.flags == 0) return client.inbox.on_message(body);
-  if (header.flags != proto::kFlagFragment || body.size() <= kFragmentHeaderBytes) return client.inbox.on_wrong();
+  if (header.flags != proto::kFlagFragment || body.size() <= kFragmentHeaderBytes)
+    return client.inbox.on_wrong();
   client.inbox.on_piece(load_u32(body.data()), load_u32(body.data() + 4), load_u32(body.data() + 8),
                         body.subspan(kFragmentHeaderBytes));
 }

@@ -21,7 +21,8 @@ constexpr const char* kServiceName = "data";
 constexpr std::uint16_t kRequestNumber = 1;
 
 std::int64_t wall_clock_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
       .count();
 }
 
@@ -84,7 +85,8 @@ std::size_t GimnetWire::take(Client& client, std::span<const std::byte> bytes) {
   return proto::kOpeningSize + FrameWire::take(client, bytes.subspan(proto::kOpeningSize));
 }
 
-void GimnetWire::take_other(Client& client, const proto::FrameHeader& header, std::span<const std::byte> body) {
+void GimnetWire::take_other(Client& client, const proto::FrameHeader& header,
+                            std::span<const std::byte> body) {
   switch (header.kind) {
     case proto::Kind::link:
       return take_link(client, body);
@@ -105,8 +107,8 @@ void GimnetWire::take_link(Client& client, std::span<const std::byte> body) {
   const auto view = proto::split_control(body);
   if (view && view->header.operation == proto::Goodbye::kOperation) {
     const auto goodbye = decoded<proto::Goodbye>(body);
-    fail("the hub said goodbye to client " + std::to_string(client.index()) + ", " + proto::goodbye_name(goodbye.code) +
-         ": " + goodbye.sentence);
+    fail("the hub said goodbye to client " + std::to_string(client.index()) + ", " +
+         proto::goodbye_name(goodbye.code) + ": " + goodbye.sentence);
   }
   if (client.is_joined) return client.inbox.on_wrong();
   sessions_[client.index()].node_id = decoded<proto::Welcome>(body).node.value();
@@ -122,7 +124,8 @@ void GimnetWire::take_answer(Client& client, std::span<const std::byte> body) {
       client.is_in_group = true;
       return;
     case proto::ns::SubscribeAnswer::kOperation:
-      if (granted<proto::ns::SubscribeAnswer>(body).group.value() != group_id_) fail("a subscriber got another group");
+      if (granted<proto::ns::SubscribeAnswer>(body).group.value() != group_id_)
+        fail("a subscriber got another group");
       client.is_in_group = true;
       return;
     default:
@@ -156,14 +159,16 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
   if (!message) return client.inbox.on_wrong();
   if (const auto* const ping = std::get_if<proto::flow::Ping>(&*message)) {
     std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
-    const proto::flow::Pong pong{.sequence = ping->sequence, .sent_ns = ping->sent_ns, .now_ns = wall_clock_ns()};
+    const proto::flow::Pong pong{
+        .sequence = ping->sequence, .sent_ns = ping->sent_ns, .now_ns = wall_clock_ns()};
     const std::size_t size = proto::flow::encode_frame(pong, NodeId{node_id(client)}, frame);
     client.write_control(std::span<const std::byte>(frame).first(size));
     ++keep_alives_.asked;
   } else if (std::holds_alternative<proto::flow::Pong>(*message)) {
     ++keep_alives_.answered;
   } else if (const auto* const pause = std::get_if<proto::flow::Pause>(&*message)) {
-    if (std::ranges::find(client.paused, pause->target) == client.paused.end()) client.paused.push_back(pause->target);
+    if (std::ranges::find(client.paused, pause->target) == client.paused.end())
+      client.paused.push_back(pause->target);
   } else if (const auto* const resume = std::get_if<proto::flow::Resume>(&*message)) {
     std::erase(client.paused, resume->target);
   }
@@ -172,7 +177,8 @@ void GimnetWire::take_flow(Client& client, std::span<const std::byte> body) {
 void GimnetWire::keep_alive(Client& client) {
   std::array<std::byte, proto::flow::kFrameSizeMax> frame{};
   ++keep_alives_.said;
-  const proto::flow::Ping ping{.sequence = ++sessions_[client.index()].pings, .sent_ns = wall_clock_ns()};
+  const proto::flow::Ping ping{.sequence = ++sessions_[client.index()].pings,
+                               .sent_ns = wall_clock_ns()};
   const std::size_t size = proto::flow::encode_frame(ping, NodeId{node_id(client)}, frame);
   client.write_control(std::span<const std::byte>(frame).first(size));
 }

@@ -8,8 +8,9 @@
 
 namespace gimnet::perf {
 
-/// A raw node of docs/protocol.md: opening, HELLO and WELCOME, frames, one service as the group, keep-alive, and PAUSE
-/// and RESUME honoured. It asks for no resume. What the hub refuses ends the program with the hub's own sentence.
+/// A raw node of docs/protocol.md: opening, HELLO and WELCOME, frames, one service as the group,
+/// keep-alive, and PAUSE and RESUME honoured. It asks for no resume. What the hub refuses ends the
+/// program with the hub's own sentence.
 class GimnetWire final : public FrameWire {
  public:
   void open(Client& client) override;
@@ -20,9 +21,12 @@ class GimnetWire final : public FrameWire {
   bool ask_for_ledger(Client& client) override;
 
  protected:
-  [[nodiscard]] std::uint32_t node_id(const Client& client) const override { return sessions_[client.index()].node_id; }
+  [[nodiscard]] std::uint32_t node_id(const Client& client) const override {
+    return sessions_[client.index()].node_id;
+  }
   [[nodiscard]] std::uint32_t group_id() const override { return group_id_; }
-  void take_other(Client& client, const proto::FrameHeader& header, std::span<const std::byte> body) override;
+  void take_other(Client& client, const proto::FrameHeader& header,
+                  std::span<const std::byte> body) override;
 
  private:
   struct Session {

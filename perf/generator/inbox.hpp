@@ -9,11 +9,12 @@
 
 namespace gimnet::perf {
 
-/// What one client receives: every message is compared byte for byte with what was sent, in its order.
-/// A gap in the sequence counts as lost; anything else that differs counts as wrong.
+/// What one client receives: every message is compared byte for byte with what was sent, in its
+/// order. A gap in the sequence counts as lost; anything else that differs counts as wrong.
 class Inbox {
  public:
-  /// From now on messages of `stream` with payloads of `size` bytes are expected, beginning with `first_sequence`.
+  /// From now on messages of `stream` with payloads of `size` bytes are expected, beginning with
+  /// `first_sequence`.
   void expect(StreamId stream, std::size_t size, std::uint64_t first_sequence = 0) {
     payload_ = pattern_payload(size);
     stream_ = stream;
@@ -23,7 +24,8 @@ class Inbox {
 
   /// A whole message.
   void on_message(std::span<const std::byte> payload) {
-    if (payload.size() != payload_.size() || load_u64(payload.data() + 8) != load_u64(payload_.data() + 8) ||
+    if (payload.size() != payload_.size() ||
+        load_u64(payload.data() + 8) != load_u64(payload_.data() + 8) ||
         (payload.size() > 16 && !same(payload, 16))) {
       ++wrong_;
       return;
@@ -31,16 +33,18 @@ class Inbox {
     if (take_stamp(load_u64(payload.data()))) ++delivered_;
   }
 
-  /// A part of a message that travels in pieces; `number` tells those of one message from those of others, which are
-  /// the same but for their stamps, and `total` is the size of the whole message.
-  void on_piece(std::uint32_t number, std::size_t offset, std::size_t total, std::span<const std::byte> piece) {
+  /// A part of a message that travels in pieces; `number` tells those of one message from those of
+  /// others, which are the same but for their stamps, and `total` is the size of the whole message.
+  void on_piece(std::uint32_t number, std::size_t offset, std::size_t total,
+                std::span<const std::byte> piece) {
     const std::size_t skipped = offset == 0 ? kStampBytes : 0;
     if (offset == 0) {
       piece_end_ = 0;
       piece_number_ = number;
     }
-    if (number != piece_number_ || offset != piece_end_ || total != payload_.size() || piece.size() < skipped + 1 ||
-        offset + piece.size() > total || !same(piece, skipped, offset)) {
+    if (number != piece_number_ || offset != piece_end_ || total != payload_.size() ||
+        piece.size() < skipped + 1 || offset + piece.size() > total ||
+        !same(piece, skipped, offset)) {
       ++wrong_;
       piece_end_ = 0;
       return;
@@ -59,8 +63,10 @@ class Inbox {
   [[nodiscard]] std::uint64_t settled() const { return delivered_ + lost_; }
 
  private:
-  [[nodiscard]] bool same(std::span<const std::byte> bytes, std::size_t from, std::size_t offset = 0) const {
-    return std::memcmp(bytes.data() + from, payload_.data() + offset + from, bytes.size() - from) == 0;
+  [[nodiscard]] bool same(std::span<const std::byte> bytes, std::size_t from,
+                          std::size_t offset = 0) const {
+    return std::memcmp(bytes.data() + from, payload_.data() + offset + from, bytes.size() - from) ==
+           0;
   }
 
   bool take_stamp(std::uint64_t stamp) {

@@ -9,13 +9,14 @@
 
 namespace gimnet::perf {
 
-/// Encoded messages, built once and sent again and again: before each round only the stamps, and the message numbers
-/// of fragmented messages, are renewed.
+/// Encoded messages, built once and sent again and again: before each round only the stamps, and
+/// the message numbers of fragmented messages, are renewed.
 class MessageBlock {
  public:
   std::vector<std::byte> bytes;
 
-  /// The payload of a message of `stream` begins here: its stamp is renewed. A stream's first message is number 0.
+  /// The payload of a message of `stream` begins here: its stamp is renewed. A stream's first
+  /// message is number 0.
   void mark_stamp(std::size_t position, StreamId stream) {
     if (stream >= next_sequences_.size()) next_sequences_.resize(stream + 1u);
     stamps_.push_back({static_cast<std::uint32_t>(position), stream});
@@ -23,7 +24,8 @@ class MessageBlock {
   }
   /// A message number (u32) of the message that was marked last is here.
   void mark_number(std::size_t position) {
-    numbers_.push_back({static_cast<std::uint32_t>(position), static_cast<std::uint32_t>(stamps_.size() - 1)});
+    numbers_.push_back(
+        {static_cast<std::uint32_t>(position), static_cast<std::uint32_t>(stamps_.size() - 1)});
   }
   /// The message that was marked last ends here.
   void mark_end() { ends_.back() = bytes.size(); }
@@ -36,9 +38,11 @@ class MessageBlock {
   /// Gives every message its next sequence. REQUIRES: nothing of the block is still being sent.
   void renew() {
     for (const auto& stamp : stamps_) {
-      store_u64(bytes.data() + stamp.position, make_stamp(stamp.stream, next_sequences_[stamp.stream]++));
+      store_u64(bytes.data() + stamp.position,
+                make_stamp(stamp.stream, next_sequences_[stamp.stream]++));
     }
-    for (const auto& number : numbers_) store_u32(bytes.data() + number.position, next_number_ + number.message);
+    for (const auto& number : numbers_)
+      store_u32(bytes.data() + number.position, next_number_ + number.message);
     next_number_ += static_cast<std::uint32_t>(stamps_.size());
   }
 

@@ -21,7 +21,9 @@ constexpr std::uint16_t kOwnPacketId = 1;
 constexpr std::uint16_t kGroupPacketId = 2;
 constexpr std::size_t kLengthBytesMax = 4;
 
-std::string u16(std::size_t value) { return {static_cast<char>(value >> 8), static_cast<char>(value & 0xFF)}; }
+std::string u16(std::size_t value) {
+  return {static_cast<char>(value >> 8), static_cast<char>(value & 0xFF)};
+}
 
 std::string text_field(std::string_view text) { return u16(text.size()) + std::string{text}; }
 
@@ -36,7 +38,9 @@ std::string packet_head(std::uint8_t head, std::size_t length) {
   return bytes;
 }
 
-std::string packet(std::uint8_t head, const std::string& body) { return packet_head(head, body.size()) + body; }
+std::string packet(std::uint8_t head, const std::string& body) {
+  return packet_head(head, body.size()) + body;
+}
 
 std::string subscribe_packet(std::uint16_t id, std::string_view topic) {
   return packet(kSubscribe, u16(id) + text_field(topic) + std::string(1, '\0'));
@@ -68,19 +72,22 @@ std::optional<Frame> find_packet(std::span<const std::byte> bytes) {
 }  // namespace
 
 void MqttWire::open(Client& client) {
-  const std::string body = text_field("MQTT") + std::string{'\x04', static_cast<char>(kCleanSession)} +
-                           u16(kKeepAliveSeconds) + text_field("c" + std::to_string(client.index()));
-  client.write_control(as_bytes(packet(kConnect, body) + subscribe_packet(kOwnPacketId, topic_of(client))));
+  const std::string body =
+      text_field("MQTT") + std::string{'\x04', static_cast<char>(kCleanSession)} +
+      u16(kKeepAliveSeconds) + text_field("c" + std::to_string(client.index()));
+  client.write_control(
+      as_bytes(packet(kConnect, body) + subscribe_packet(kOwnPacketId, topic_of(client))));
 }
 
 void MqttWire::subscribe(Client& client) {
   client.write_control(as_bytes(subscribe_packet(kGroupPacketId, kGroupTopic)));
 }
 
-void MqttWire::append_message(const Client&, const Target& target, std::uint8_t, std::span<const std::byte> payload,
-                              MessageBlock& block) {
+void MqttWire::append_message(const Client&, const Target& target, std::uint8_t,
+                              std::span<const std::byte> payload, MessageBlock& block) {
   const std::string topic = text_field(topic_of(target));
-  append_around(packet_head(kPublish, topic.size() + payload.size()) + topic, payload, {}, target.stream, block);
+  append_around(packet_head(kPublish, topic.size() + payload.size()) + topic, payload, {},
+                target.stream, block);
 }
 
 std::size_t MqttWire::take(Client& client, std::span<const std::byte> bytes) {
@@ -98,7 +105,8 @@ void MqttWire::take_packet(Client& client, std::uint8_t head, std::span<const st
     if (body.size() < 2 + topic_bytes) return client.inbox.on_wrong();
     client.inbox.on_message(body.subspan(2 + topic_bytes));
   } else if (head == kConnack && body.size() == 2) {
-    if (byte_at(body, 1) != 0) fail("the MQTT hub refused with code " + std::to_string(byte_at(body, 1)));
+    if (byte_at(body, 1) != 0)
+      fail("the MQTT hub refused with code " + std::to_string(byte_at(body, 1)));
   } else if (head == kSuback && body.size() == 3) {
     if (byte_at(body, 2) != 0) fail("the MQTT hub refused a subscription");
     byte_at(body, 1) == kOwnPacketId ? admit(client) : static_cast<void>(client.is_in_group = true);

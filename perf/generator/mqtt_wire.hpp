@@ -14,8 +14,8 @@ class MqttWire final : public Wire {
   void open(Client& client) override;
   void provide(Client& client) override { client.is_in_group = true; }
   void subscribe(Client& client) override;
-  void append_message(const Client& from, const Target& target, std::uint8_t lane, std::span<const std::byte> payload,
-                      MessageBlock& block) override;
+  void append_message(const Client& from, const Target& target, std::uint8_t lane,
+                      std::span<const std::byte> payload, MessageBlock& block) override;
   [[nodiscard]] std::size_t take(Client& client, std::span<const std::byte> bytes) override;
   void keep_alive(Client&) override {}
 

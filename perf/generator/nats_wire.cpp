@@ -11,31 +11,34 @@ namespace {
 
 constexpr std::string_view kLineEnd = "\r\n";
 constexpr std::string_view kConnect =
-    "CONNECT {\"verbose\":false,\"pedantic\":false,\"tls_required\":false,\"name\":\"\",\"lang\":\"raw\","
+    "CONNECT "
+    "{\"verbose\":false,\"pedantic\":false,\"tls_required\":false,\"name\":\"\",\"lang\":\"raw\","
     "\"version\":\"1\",\"protocol\":1}\r\n";
 
 /// The last word of `MSG subject sid [reply-to] bytes`.
 std::size_t payload_size(std::string_view line) {
   const std::string_view word = line.substr(line.rfind(' ') + 1);
   std::size_t size = 0;
-  if (std::from_chars(word.data(), word.data() + word.size(), size).ec != std::errc{}) fail("a MSG without a size");
+  if (std::from_chars(word.data(), word.data() + word.size(), size).ec != std::errc{})
+    fail("a MSG without a size");
   return size;
 }
 
 }  // namespace
 
 void NatsWire::open(Client& client) {
-  client.write_control(as_bytes(std::string{kConnect} + "SUB " + topic_of(client) + " 1\r\nPING\r\n"));
+  client.write_control(
+      as_bytes(std::string{kConnect} + "SUB " + topic_of(client) + " 1\r\nPING\r\n"));
 }
 
 void NatsWire::subscribe(Client& client) {
   client.write_control(as_bytes("SUB " + std::string{kGroupTopic} + " 2\r\nPING\r\n"));
 }
 
-void NatsWire::append_message(const Client&, const Target& target, std::uint8_t, std::span<const std::byte> payload,
-                              MessageBlock& block) {
-  append_around("PUB " + topic_of(target) + " " + std::to_string(payload.size()) + "\r\n", payload, kLineEnd,
-                target.stream, block);
+void NatsWire::append_message(const Client&, const Target& target, std::uint8_t,
+                              std::span<const std::byte> payload, MessageBlock& block) {
+  append_around("PUB " + topic_of(target) + " " + std::to_string(payload.size()) + "\r\n", payload,
+                kLineEnd, target.stream, block);
 }
 
 std::size_t NatsWire::take(Client& client, std::span<const std::byte> bytes) {

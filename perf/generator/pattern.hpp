@@ -6,8 +6,9 @@
 #include <cstring>
 #include <span>
 
-// What is in a payload: 8 bytes of stamp (stream << 48 | sequence), then a fixed pseudo-random pattern. So a block of
-// messages is built once, only stamps are renewed, and a receiver checks every byte with one comparison.
+// What is in a payload: 8 bytes of stamp (stream << 48 | sequence), then a fixed pseudo-random
+// pattern. So a block of messages is built once, only stamps are renewed, and a receiver checks
+// every byte with one comparison.
 
 namespace gimnet::perf {
 
@@ -22,8 +23,12 @@ using StreamId = std::uint16_t;
   return (static_cast<std::uint64_t>(stream) << 48) | sequence;
 }
 
-inline void store_u32(std::byte* to, std::uint32_t value) { std::memcpy(to, &value, sizeof(value)); }
-inline void store_u64(std::byte* to, std::uint64_t value) { std::memcpy(to, &value, sizeof(value)); }
+inline void store_u32(std::byte* to, std::uint32_t value) {
+  std::memcpy(to, &value, sizeof(value));
+}
+inline void store_u64(std::byte* to, std::uint64_t value) {
+  std::memcpy(to, &value, sizeof(value));
+}
 [[nodiscard]] inline std::uint32_t load_u32(const std::byte* from) {
   std::uint32_t value = 0;
   std::memcpy(&value, from, sizeof(value));

@@ -19,17 +19,18 @@ constexpr StreamId kThere = 1;
 constexpr StreamId kBack = 2;
 constexpr StreamId kBulk = 3;
 
-/// Clients 0 and 1, of which 1 sends a message back for each that it gets; beside them, perhaps, a flood of bulk.
+/// Clients 0 and 1, of which 1 sends a message back for each that it gets; beside them, perhaps, a
+/// flood of bulk.
 class PingPair {
  public:
   PingPair(Engine& engine, std::size_t payload_bytes)
       : engine_(engine),
         near_(engine.client(0)),
         far_(engine.client(1)),
-        there_(engine.wire(), near_, {Target{.recipients = {&far_}, .stream = kThere}}, shape(payload_bytes),
-               Writing::unbatched),
-        back_(engine.wire(), far_, {Target{.recipients = {&near_}, .stream = kBack}}, shape(payload_bytes),
-              Writing::unbatched) {
+        there_(engine.wire(), near_, {Target{.recipients = {&far_}, .stream = kThere}},
+               shape(payload_bytes), Writing::unbatched),
+        back_(engine.wire(), far_, {Target{.recipients = {&near_}, .stream = kBack}},
+              shape(payload_bytes), Writing::unbatched) {
     far_.inbox.expect(kThere, payload_bytes);
     near_.inbox.expect(kBack, payload_bytes);
   }
@@ -37,9 +38,10 @@ class PingPair {
   void add_bulk(double bytes_a_second) {
     engine_.client(3).inbox.expect(kBulk, kBulkBytes);
     std::vector<Publisher> publishers;
-    publishers.emplace_back(engine_.wire(), engine_.client(2),
-                            std::vector{Target{.recipients = {&engine_.client(3)}, .stream = kBulk}},
-                            MessageShape{.payload_bytes = kBulkBytes, .lane = kBulkLane}, Writing::batched);
+    publishers.emplace_back(
+        engine_.wire(), engine_.client(2),
+        std::vector{Target{.recipients = {&engine_.client(3)}, .stream = kBulk}},
+        MessageShape{.payload_bytes = kBulkBytes, .lane = kBulkLane}, Writing::batched);
     bulk_.emplace(engine_, std::move(publishers), 1, bytes_a_second);
   }
 
@@ -47,7 +49,8 @@ class PingPair {
   [[nodiscard]] std::optional<std::chrono::nanoseconds> round_trip() {
     const auto begin = Clock::now();
     const auto deadline = begin + engine_.patience();
-    if (!pass(there_, far_.inbox, deadline) || !pass(back_, near_.inbox, deadline)) return std::nullopt;
+    if (!pass(there_, far_.inbox, deadline) || !pass(back_, near_.inbox, deadline))
+      return std::nullopt;
     return Clock::now() - begin;
   }
 
@@ -60,7 +63,9 @@ class PingPair {
     if (bulk_) bulk_->drain();
   }
 
-  [[nodiscard]] std::uint64_t bulk_delivered() const { return bulk_ ? engine_.client(3).inbox.delivered() : 0; }
+  [[nodiscard]] std::uint64_t bulk_delivered() const {
+    return bulk_ ? engine_.client(3).inbox.delivered() : 0;
+  }
 
  private:
   static MessageShape shape(std::size_t payload_bytes) {
@@ -107,7 +112,8 @@ void connect(Engine& engine, std::size_t count) {
 }
 
 /// Round trips one after the other, at least `interval` from one beginning to the next.
-Findings measure(Engine& engine, const RunOptions& options, PingPair& pair, std::chrono::nanoseconds interval) {
+Findings measure(Engine& engine, const RunOptions& options, PingPair& pair,
+                 std::chrono::nanoseconds interval) {
   for (std::size_t count = 0; count < kWarmUpCount; ++count) {
     if (!pair.round_trip()) fail("a ping before the measurement got no answer in time");
   }
@@ -182,10 +188,12 @@ Findings ping_beside_joins(Engine& engine, const RunOptions& options) {
   };
   for (std::size_t i = 0; i < kWarmUpCount; ++i) measure_into(alone_ns);
   alone_ns.clear();
-  for (const auto end = Clock::now() + options.duration; Clock::now() < end;) measure_into(alone_ns);
+  for (const auto end = Clock::now() + options.duration; Clock::now() < end;)
+    measure_into(alone_ns);
   const auto begin = Clock::now();
   while (engine.wire().joined_count() < count) {
-    if (Clock::now() - begin > 3 * engine.answer_limit()) fail("the subject did not admit all clients in time");
+    if (Clock::now() - begin > 3 * engine.answer_limit())
+      fail("the subject did not admit all clients in time");
     const std::size_t joining = engine.client_count() - engine.wire().joined_count();
     if (engine.client_count() < count && joining < Engine::kJoiningMax) engine.begin_connect();
     measure_into(beside_ns);

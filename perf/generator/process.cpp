@@ -35,7 +35,8 @@ std::int64_t cpu_time_ns(pid_t process) {
 std::int64_t context_switches(pid_t process) {
   std::error_code error;
   std::int64_t sum = 0;
-  for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", error)) {
+  for (const auto& thread :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", error)) {
     std::ifstream status(thread.path() / "status");
     for (std::string word; status >> word;) {
       std::int64_t count = 0;

@@ -9,15 +9,18 @@ constexpr std::size_t kWriteBytes = 64 * 1024;
 
 }  // namespace
 
-Publisher::Publisher(Wire& wire, Client& from, const std::vector<Target>& targets, MessageShape shape, Writing writing)
+Publisher::Publisher(Wire& wire, Client& from, const std::vector<Target>& targets,
+                     MessageShape shape, Writing writing)
     : from_(from.publishing_side()), writing_(writing), messages_a_write_(1) {
   const auto payload = pattern_payload(shape.payload_bytes);
   // Whole rounds through the targets, so that each gets the same share.
   do {
-    for (const Target& target : targets) wire.append_message(from, target, shape.lane, payload, block_);
+    for (const Target& target : targets)
+      wire.append_message(from, target, shape.lane, payload, block_);
   } while (block_.bytes.size() + targets.size() * block_.message_bytes() <= kWriteBytes);
   if (writing == Writing::batched) {
-    messages_a_write_ = std::clamp<std::size_t>(kWriteBytes / block_.message_bytes(), 1, block_.message_count());
+    messages_a_write_ =
+        std::clamp<std::size_t>(kWriteBytes / block_.message_bytes(), 1, block_.message_count());
   }
   next_message_ = block_.message_count();
 }

@@ -23,11 +23,14 @@ struct MessageShape {
 /// Sends messages of one client to its targets in turns, as fast as it is asked to.
 class Publisher {
  public:
-  /// REQUIRES: `targets` is not empty; their streams are distinct; Engine::open_publisher(from) was called.
-  Publisher(Wire& wire, Client& from, const std::vector<Target>& targets, MessageShape shape, Writing writing);
+  /// REQUIRES: `targets` is not empty; their streams are distinct; Engine::open_publisher(from) was
+  /// called.
+  Publisher(Wire& wire, Client& from, const std::vector<Target>& targets, MessageShape shape,
+            Writing writing);
 
-  /// Begins at most one write. Returns the messages that were begun: 0 when the socket is full, the subject paused this
-  /// client, or `messages_max` is less than one write. A write of more than `cut_to` messages is cut to that.
+  /// Begins at most one write. Returns the messages that were begun: 0 when the socket is full, the
+  /// subject paused this client, or `messages_max` is less than one write. A write of more than
+  /// `cut_to` messages is cut to that.
   std::size_t publish(std::uint64_t messages_max, std::uint64_t cut_to = UINT64_MAX);
 
   /// Bytes of one message on the wire.

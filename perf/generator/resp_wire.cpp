@@ -18,13 +18,15 @@ std::string bulk_head(std::size_t size) { return "$" + std::to_string(size) + "\
 
 std::string command(std::initializer_list<std::string_view> words) {
   std::string text = "*" + std::to_string(words.size()) + "\r\n";
-  for (const std::string_view word : words) text += bulk_head(word.size()) + std::string{word} + "\r\n";
+  for (const std::string_view word : words)
+    text += bulk_head(word.size()) + std::string{word} + "\r\n";
   return text;
 }
 
 std::size_t number_in(std::string_view digits) {
   std::size_t number = 0;
-  if (std::from_chars(digits.data(), digits.data() + digits.size(), number).ec != std::errc{}) fail("a bad RESP size");
+  if (std::from_chars(digits.data(), digits.data() + digits.size(), number).ec != std::errc{})
+    fail("a bad RESP size");
   return number;
 }
 
@@ -71,10 +73,12 @@ void RespWire::open(Client& client) {
                                 command({"CLIENT", "REPLY", "OFF"})));
 }
 
-void RespWire::subscribe(Client& client) { client.write_control(as_bytes(command({"SUBSCRIBE", kGroupTopic}))); }
+void RespWire::subscribe(Client& client) {
+  client.write_control(as_bytes(command({"SUBSCRIBE", kGroupTopic})));
+}
 
-void RespWire::append_message(const Client&, const Target& target, std::uint8_t, std::span<const std::byte> payload,
-                              MessageBlock& block) {
+void RespWire::append_message(const Client&, const Target& target, std::uint8_t,
+                              std::span<const std::byte> payload, MessageBlock& block) {
   const std::string topic = topic_of(target);
   const std::string head = "*3\r\n$7\r\nPUBLISH\r\n" + bulk_head(topic.size()) + topic + "\r\n";
   append_around(head + bulk_head(payload.size()), payload, kLineEnd, target.stream, block);
@@ -109,7 +113,8 @@ std::size_t RespWire::take_message(Client& client, std::string_view text) {
 }
 
 void RespWire::take_other(Client& client, std::string_view value) {
-  if (value.starts_with('-')) fail("redis-server refused: " + std::string{value.substr(1, value.size() - 3)});
+  if (value.starts_with('-'))
+    fail("redis-server refused: " + std::string{value.substr(1, value.size() - 3)});
   if (!value.starts_with(kSubscribed)) return;
   client.is_joined ? static_cast<void>(client.is_in_group = true) : admit(client);
 }

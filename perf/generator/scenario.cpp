@@ -23,7 +23,8 @@ Findings ping_under_300MBps(Engine& engine, const RunOptions& options) {
   return ping_under_bulk(engine, paced);
 }
 
-// ping_one_cpu and ping_two_cpus are one scenario here: where the processes run is the driver's affair.
+// ping_one_cpu and ping_two_cpus are one scenario here: where the processes run is the driver's
+// affair.
 constexpr Named kScenarios[] = {
     {"one_to_one", one_to_one},
     {"one_to_one_unbatched", one_to_one_unbatched},
@@ -55,12 +56,14 @@ double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
 
 }  // namespace
 
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns, const std::string& suffix) {
-  constexpr std::pair<const char*, double> kShares[] = {{"p10_us", 0.1},    {"p25_us", 0.25}, {"p50_us", 0.5},
-                                                        {"p75_us", 0.75},   {"p90_us", 0.9},  {"p99_us", 0.99},
-                                                        {"p999_us", 0.999}, {"max_us", 1}};
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns,
+                     const std::string& suffix) {
+  constexpr std::pair<const char*, double> kShares[] = {
+      {"p10_us", 0.1}, {"p25_us", 0.25}, {"p50_us", 0.5},    {"p75_us", 0.75},
+      {"p90_us", 0.9}, {"p99_us", 0.99}, {"p999_us", 0.999}, {"max_us", 1}};
   std::sort(round_trips_ns.begin(), round_trips_ns.end());
-  for (const auto& [name, share] : kShares) findings.add(name + suffix, percentile_us(round_trips_ns, share));
+  for (const auto& [name, share] : kShares)
+    findings.add(name + suffix, percentile_us(round_trips_ns, share));
 }
 
 std::string Findings::json() const {
@@ -76,10 +79,11 @@ std::string Findings::json() const {
 void add_ledger(Engine& engine, Findings& findings) {
   if (!engine.wire().ask_for_ledger(engine.client(0))) return;
   const auto answered = [&engine] { return engine.wire().ledger().has_value(); };
-  if (!engine.poll_until(answered, engine.answer_limit())) fail("the subject did not answer STATISTICS in time");
+  if (!engine.poll_until(answered, engine.answer_limit()))
+    fail("the subject did not answer STATISTICS in time");
   const Ledger ledger = *engine.wire().ledger();
-  const auto gap =
-      static_cast<std::int64_t>(ledger.accepted + ledger.copies - ledger.delivered - ledger.dropped - ledger.queued);
+  const auto gap = static_cast<std::int64_t>(ledger.accepted + ledger.copies - ledger.delivered -
+                                             ledger.dropped - ledger.queued);
   findings.add("dropped_frames", static_cast<double>(ledger.dropped));
   findings.add("queued_frames", static_cast<double>(ledger.queued));
   findings.add("ledger_gap", static_cast<double>(gap));

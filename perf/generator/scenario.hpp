@@ -17,8 +17,9 @@ namespace gimnet::perf {
 struct RunOptions {
   std::size_t payload_bytes = 16;
   std::chrono::nanoseconds duration{1'000'000'000};
-  pid_t process = 0;               ///< the measured hub or relay
-  std::size_t client_count = 0;    ///< of idle, connect, join_under_load and ping_beside_joins; 0: the scenario's own
+  pid_t process = 0;  ///< the measured hub or relay
+  std::size_t client_count =
+      0;  ///< of idle, connect, join_under_load and ping_beside_joins; 0: the scenario's own
   double bulk_bytes_a_second = 0;  ///< of ping_under_bulk; 0: as fast as it goes
 };
 
@@ -32,10 +33,13 @@ class Findings {
   std::vector<std::pair<std::string, double>> values_;
 };
 
-/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`, each with `suffix` behind. Sorts them.
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns, const std::string& suffix = {});
+/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`, each with `suffix`
+/// behind. Sorts them.
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns,
+                     const std::string& suffix = {});
 
-/// Adds what the subject itself says that it dropped and kept, and `ledger_gap`: what its account does not explain.
+/// Adds what the subject itself says that it dropped and kept, and `ledger_gap`: what its account
+/// does not explain.
 void add_ledger(Engine& engine, Findings& findings);
 
 using Scenario = Findings (*)(Engine& engine, const RunOptions& options);

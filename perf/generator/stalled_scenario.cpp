@@ -7,7 +7,8 @@
 namespace gimnet::perf {
 namespace {
 
-/// Less than a lane of the hub holds: the healthy one loses nothing even while its process is not scheduled.
+/// Less than a lane of the hub holds: the healthy one loses nothing even while its process is not
+/// scheduled.
 constexpr std::size_t kWindowBytes = 1024 * 1024;
 /// Alone and beside a stalled one in turns, so that neither has the earlier, colder time to itself.
 constexpr int kTurns = 2;
@@ -89,7 +90,8 @@ class Stalling {
 
 }  // namespace
 
-/// Client 0 publishes at line rate to client 1, which reads: alone, and beside a third one that does not, in turns.
+/// Client 0 publishes at line rate to client 1, which reads: alone, and beside a third one that
+/// does not, in turns.
 Findings stalled_subscriber(Engine& engine, const RunOptions& options) {
   engine.connect(2);
   engine.open_publisher(engine.client(0));
@@ -113,8 +115,10 @@ Findings stalled_subscriber(Engine& engine, const RunOptions& options) {
   findings.add("messages_per_second", beside.messages_per_second());
   findings.add("messages_per_second_alone", alone.messages_per_second());
   findings.add("rate_kept", beside.messages_per_second() / alone.messages_per_second());
-  findings.add("publisher_pause_ms", std::chrono::duration<double, std::milli>(beside.longest_pause).count());
-  findings.add("publisher_pause_ms_alone", std::chrono::duration<double, std::milli>(alone.longest_pause).count());
+  findings.add("publisher_pause_ms",
+               std::chrono::duration<double, std::milli>(beside.longest_pause).count());
+  findings.add("publisher_pause_ms_alone",
+               std::chrono::duration<double, std::milli>(alone.longest_pause).count());
   findings.add("rss_growth_bytes", static_cast<double>(growth_bytes));
   findings.add("lost", static_cast<double>(stalling.healthy().lost() + stalling.missing()));
   findings.add("wrong", static_cast<double>(stalling.healthy().wrong()));

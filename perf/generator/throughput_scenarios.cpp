@@ -31,7 +31,8 @@ Counts count_inboxes(Engine& engine) {
   return counts;
 }
 
-/// Warms up, then measures from rest to rest, so that the processor time belongs to exactly the messages counted.
+/// Warms up, then measures from rest to rest, so that the processor time belongs to exactly the
+/// messages counted.
 Findings measure(Engine& engine, const RunOptions& options, Traffic traffic) {
   Flood flood(engine, std::move(traffic.publishers), traffic.recipients_a_message);
   flood.warm_up(std::min<std::chrono::nanoseconds>(kWarmUp, options.duration));
@@ -71,7 +72,8 @@ Findings pairs(Engine& engine, const RunOptions& options, std::size_t pair_count
 }
 
 /// One message of client 0 to all others.
-Findings to_all(Engine& engine, const RunOptions& options, Target target, std::size_t recipient_count) {
+Findings to_all(Engine& engine, const RunOptions& options, Target target,
+                std::size_t recipient_count) {
   for (std::size_t index = 1; index <= recipient_count; ++index) {
     engine.client(index).inbox.expect(target.stream, options.payload_bytes);
   }
@@ -79,19 +81,24 @@ Findings to_all(Engine& engine, const RunOptions& options, Target target, std::s
   Traffic traffic;
   traffic.recipients_a_message = recipient_count;
   traffic.publishers.emplace_back(engine.wire(), engine.client(0), std::vector{std::move(target)},
-                                  MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);
+                                  MessageShape{.payload_bytes = options.payload_bytes},
+                                  Writing::batched);
   return measure(engine, options, std::move(traffic));
 }
 
 }  // namespace
 
-Findings one_to_one(Engine& engine, const RunOptions& options) { return pairs(engine, options, 1, Writing::batched); }
+Findings one_to_one(Engine& engine, const RunOptions& options) {
+  return pairs(engine, options, 1, Writing::batched);
+}
 
 Findings one_to_one_unbatched(Engine& engine, const RunOptions& options) {
   return pairs(engine, options, 1, Writing::unbatched);
 }
 
-Findings four_to_four(Engine& engine, const RunOptions& options) { return pairs(engine, options, 4, Writing::batched); }
+Findings four_to_four(Engine& engine, const RunOptions& options) {
+  return pairs(engine, options, 4, Writing::batched);
+}
 
 Findings in_turns(Engine& engine, const RunOptions& options) {
   constexpr std::size_t kDestinations = 8;
@@ -106,7 +113,8 @@ Findings in_turns(Engine& engine, const RunOptions& options) {
   engine.open_publisher(engine.client(0));
   Traffic traffic;
   traffic.publishers.emplace_back(engine.wire(), engine.client(0), targets,
-                                  MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);
+                                  MessageShape{.payload_bytes = options.payload_bytes},
+                                  Writing::batched);
   return measure(engine, options, std::move(traffic));
 }
 
@@ -120,7 +128,8 @@ Findings list_100(Engine& engine, const RunOptions& options) {
   constexpr std::size_t kRecipients = 100;
   engine.connect(1 + kRecipients);
   Target target{.kind = Target::Kind::list, .recipients = {}};
-  for (std::size_t index = 1; index <= kRecipients; ++index) target.recipients.push_back(&engine.client(index));
+  for (std::size_t index = 1; index <= kRecipients; ++index)
+    target.recipients.push_back(&engine.client(index));
   return to_all(engine, options, std::move(target), kRecipients);
 }
 

@@ -7,14 +7,17 @@
 
 #include "generator/wire.hpp"
 
-// What the wires of the other hubs share: they know neither recipients nor lists, only topics. Every client subscribes
-// to a topic of its own, under which it is addressed, and the group of a run is one more topic.
+// What the wires of the other hubs share: they know neither recipients nor lists, only topics.
+// Every client subscribes to a topic of its own, under which it is addressed, and the group of a
+// run is one more topic.
 
 namespace gimnet::perf {
 
 inline constexpr std::string_view kGroupTopic = "g";
 
-[[nodiscard]] inline std::string topic_of(const Client& client) { return "n" + std::to_string(client.index()); }
+[[nodiscard]] inline std::string topic_of(const Client& client) {
+  return "n" + std::to_string(client.index());
+}
 
 /// Ends the program for a list or a broadcast, which these hubs do not have.
 [[nodiscard]] std::string topic_of(const Target& target);
@@ -28,11 +31,13 @@ inline constexpr std::string_view kGroupTopic = "g";
 inline void append(std::span<const std::byte> bytes, std::vector<std::byte>& to) {
   to.insert(to.end(), bytes.begin(), bytes.end());
 }
-inline void append(std::string_view text, std::vector<std::byte>& to) { append(as_bytes(text), to); }
+inline void append(std::string_view text, std::vector<std::byte>& to) {
+  append(as_bytes(text), to);
+}
 
 /// Appends a message whose payload is one piece between `head` and `tail`.
-inline void append_around(std::string_view head, std::span<const std::byte> payload, std::string_view tail,
-                          StreamId stream, MessageBlock& block) {
+inline void append_around(std::string_view head, std::span<const std::byte> payload,
+                          std::string_view tail, StreamId stream, MessageBlock& block) {
   append(head, block.bytes);
   block.mark_stamp(block.bytes.size(), stream);
   append(payload, block.bytes);

@@ -38,13 +38,15 @@ struct KeepAlives {
   std::uint64_t asked = 0;     ///< by the subject of its own accord; each is answered
 };
 
-/// How one subject is spoken to: the seam behind which each wire protocol is. Scenarios know clients, targets and
-/// messages; a wire knows bytes. Virtual calls are per read buffer and per block, never per message.
+/// How one subject is spoken to: the seam behind which each wire protocol is. Scenarios know
+/// clients, targets and messages; a wire knows bytes. Virtual calls are per read buffer and per
+/// block, never per message.
 class Wire {
  public:
   virtual ~Wire() = default;
 
-  /// Sends what `client` has to say first. take() admits it (client.is_joined) once the subject has.
+  /// Sends what `client` has to say first. take() admits it (client.is_joined) once the subject
+  /// has.
   virtual void open(Client& client) = 0;
   /// Sends what a publishing side has to say first, where the subject has such; take() admits it.
   virtual void open_side(Client& side) { side.is_joined = true; }
@@ -52,11 +54,12 @@ class Wire {
   virtual void provide(Client& client) = 0;
   /// Makes `client` a subscriber of that group. REQUIRES: the publisher is in the group.
   virtual void subscribe(Client& client) = 0;
-  /// Appends one message of `from` with `payload` to `block`, in lane `lane` where the subject has lanes.
+  /// Appends one message of `from` with `payload` to `block`, in lane `lane` where the subject has
+  /// lanes.
   virtual void append_message(const Client& from, const Target& target, std::uint8_t lane,
                               std::span<const std::byte> payload, MessageBlock& block) = 0;
-  /// Hands the messages in `bytes` to client.inbox and answers what asks for an answer. Returns the bytes done; the
-  /// rest is an incomplete message.
+  /// Hands the messages in `bytes` to client.inbox and answers what asks for an answer. Returns the
+  /// bytes done; the rest is an incomplete message.
   [[nodiscard]] virtual std::size_t take(Client& client, std::span<const std::byte> bytes) = 0;
   /// Called once a second for every client.
   virtual void keep_alive(Client& client) = 0;

@@ -16,7 +16,8 @@ constexpr std::uint8_t kCommand = 4;
 constexpr std::size_t kShortBytesMax = 255;
 constexpr char kSubscribe = 1;
 
-// Topics are matched by their beginning, so all have one length: what it is, and the client's index.
+// Topics are matched by their beginning, so all have one length: what it is, and the client's
+// index.
 constexpr std::size_t kTopicBytes = 3;
 constexpr char kOwn = 'n';
 constexpr char kMarker = 's';
@@ -33,13 +34,15 @@ std::string zmtp_topic_of(const Target& target) {
 std::string frame_head(std::uint8_t flags, std::size_t size) {
   if (size <= kShortBytesMax) return {static_cast<char>(flags), static_cast<char>(size)};
   std::string bytes(1, static_cast<char>(flags | kLong));
-  for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(static_cast<char>(size >> shift & 0xFF));
+  for (int shift = 56; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<char>(size >> shift & 0xFF));
   return bytes;
 }
 
 /// Signature, version 3.0, mechanism NULL, client; then READY with the socket's type.
 std::string greeting(const std::string& socket_type) {
-  std::string bytes = std::string{'\xFF'} + std::string(8, '\0') + "\x7F\x03" + std::string(1, '\0') + "NULL";
+  std::string bytes =
+      std::string{'\xFF'} + std::string(8, '\0') + "\x7F\x03" + std::string(1, '\0') + "NULL";
   bytes.resize(kGreetingBytes, '\0');
   const std::string ready = std::string{"\x05READY\x0BSocket-Type"} + std::string(3, '\0') +
                             static_cast<char>(socket_type.size()) + socket_type;
@@ -66,7 +69,8 @@ std::optional<Frame> find_frame(std::span<const std::byte> bytes) {
   if ((byte_at(bytes, 0) & kLong) != 0) {
     frame = {9, 0};
     if (bytes.size() < frame.body_at) return std::nullopt;
-    for (std::size_t at = 1; at < frame.body_at; ++at) frame.size = frame.size << 8 | byte_at(bytes, at);
+    for (std::size_t at = 1; at < frame.body_at; ++at)
+      frame.size = frame.size << 8 | byte_at(bytes, at);
   }
   return bytes.size() - frame.body_at >= frame.size ? std::optional(frame) : std::nullopt;
 }
@@ -86,13 +90,14 @@ void ZmtpWire::open(Client& client) {
 void ZmtpWire::open_side(Client& side) { side.write_control(as_bytes(greeting("PUB"))); }
 
 void ZmtpWire::subscribe(Client& client) {
-  client.write_control(
-      as_bytes(subscription(topic(kGroupTopic.front(), 0)) + subscription(topic(kMarker, client.index()))));
+  client.write_control(as_bytes(subscription(topic(kGroupTopic.front(), 0)) +
+                                subscription(topic(kMarker, client.index()))));
 }
 
-void ZmtpWire::append_message(const Client&, const Target& target, std::uint8_t, std::span<const std::byte> payload,
-                              MessageBlock& block) {
-  append_around(frame_head(0, kTopicBytes + payload.size()) + zmtp_topic_of(target), payload, {}, target.stream, block);
+void ZmtpWire::append_message(const Client&, const Target& target, std::uint8_t,
+                              std::span<const std::byte> payload, MessageBlock& block) {
+  append_around(frame_head(0, kTopicBytes + payload.size()) + zmtp_topic_of(target), payload, {},
+                target.stream, block);
 }
 
 std::size_t ZmtpWire::take(Client& client, std::span<const std::byte> bytes) {

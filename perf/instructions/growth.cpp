@@ -1,5 +1,6 @@
-// What strangers can make the hub look at, in any amount: instructions for each piece of it, counted as those of
-// scripts.cpp, must not grow with the amount. tests/perf/growth_test.py compares amounts.
+// What strangers can make the hub look at, in any amount: instructions for each piece of it,
+// counted as those of scripts.cpp, must not grow with the amount. tests/perf/growth_test.py
+// compares amounts.
 //
 //     growth_scripts SCRIPT:COUNT   runs it: once to warm up, then once counted; prints COUNT
 //     growth_scripts                prints what compiled it, and the scripts' names
@@ -34,7 +35,8 @@ extern "C" {
 /// Where callgrind switches its counting on and off: never inlined, known by this name.
 [[gnu::noinline]] void counted(const std::function<void()>& work) {
   work();
-  asm volatile("");  // keeps the call from becoming a jump, which callgrind would not see the end of
+  asm volatile(
+      "");  // keeps the call from becoming a jump, which callgrind would not see the end of
 }
 }
 
@@ -137,13 +139,14 @@ Work pauses(std::size_t count) {
     nif::PauseTable table;
     for (std::uint32_t i = 0; i < count; ++i) {
       table.pause({proto::Kind::unicast, proto::Lane::normal, i * kPlaces});
-      if (!table.is_paused(nif::stream_code(proto::Kind::unicast, 1, i * kPlaces))) wrong("it was paused");
+      if (!table.is_paused(nif::stream_code(proto::Kind::unicast, 1, i * kPlaces)))
+        wrong("it was paused");
     }
   };
 }
 
-/// Keys of messages that one node sends, each of which wants an ACK: the numbers of above before a multiplication by
-/// the golden section.
+/// Keys of messages that one node sends, each of which wants an ACK: the numbers of above before a
+/// multiplication by the golden section.
 Work acks(std::size_t count) {
   constexpr std::uint64_t kInverse = 0xF1DE83E19937733Du;
   static_assert(kInverse * 0x9E3779B97F4A7C15u == 1);
@@ -171,7 +174,8 @@ Work topics(std::size_t count) {
   return [world, all] {
     for (std::size_t i = 0; i < all->size(); ++i) {
       const auto node = static_cast<std::uint32_t>(i / kPerNode + 1);
-      if (!world->services.subscribe(node, (*all)[i], {}, world->effects)) wrong("a subscription was refused");
+      if (!world->services.subscribe(node, (*all)[i], {}, world->effects))
+        wrong("a subscription was refused");
     }
     for (std::size_t node = 1; node <= all->size() / kPerNode; ++node) {
       world->services.node_left(static_cast<std::uint32_t>(node), milliseconds{0}, world->effects);
@@ -184,7 +188,8 @@ Work topics(std::size_t count) {
 Work wrong_tokens(std::size_t count) {
   const Secret secret{};
   const TokenHolder holder{HubId{7}, "robot", "open"};
-  auto token = std::make_shared<std::vector<std::byte>>(write_token({1, 2, milliseconds{3}}, holder, secret));
+  auto token = std::make_shared<std::vector<std::byte>>(
+      write_token({1, 2, milliseconds{3}}, holder, secret));
   constexpr std::size_t kMacBytes = 32;
   if (count > kMacBytes) wrong("a MAC has 32 bytes");
   (*token)[token->size() - kMacBytes + count - 1] ^= std::byte{1};
@@ -195,8 +200,8 @@ Work wrong_tokens(std::size_t count) {
   };
 }
 
-/// Each of so many subscribers of one service ends its subscription and begins it again, and each time the table is
-/// published.
+/// Each of so many subscribers of one service ends its subscription and begins it again, and each
+/// time the table is published.
 Work subscribers(std::size_t count) {
   struct World {
     Limits limits;
@@ -215,9 +220,11 @@ Work subscribers(std::size_t count) {
     world->subscribers.push_back((*joined).session->index);
   }
   Services& services = world->membership.services();
-  if (!services.advertise(world->subscribers[0], "robot/odom", {}, milliseconds{0}, world->effects)) wrong("a service");
+  if (!services.advertise(world->subscribers[0], "robot/odom", {}, milliseconds{0}, world->effects))
+    wrong("a service");
   for (std::size_t i = 1; i <= count; ++i) {
-    if (!services.subscribe(world->subscribers[i], "robot/odom", {}, world->effects)) wrong("a subscription");
+    if (!services.subscribe(world->subscribers[i], "robot/odom", {}, world->effects))
+      wrong("a subscription");
   }
   world->publisher.publish_group(1, world->membership);
   world->effects.clear();
@@ -227,14 +234,16 @@ Work subscribers(std::size_t count) {
       const std::uint32_t node = world->subscribers[1 + i * 7'919 % count];
       if (services.unsubscribe(node, "robot/odom", world->effects)) wrong("it had subscribed");
       if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
-      if (!services.subscribe(node, "robot/odom", {}, world->effects)) wrong("a subscription was refused");
+      if (!services.subscribe(node, "robot/odom", {}, world->effects))
+        wrong("a subscription was refused");
       if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
       world->effects.clear();
     }
   };
 }
 
-/// Sessions of so many nodes end, one after the other, each with one service whose last message the hub keeps.
+/// Sessions of so many nodes end, one after the other, each with one service whose last message the
+/// hub keeps.
 Work retained(std::size_t count) {
   struct World {
     testing::RouteRig rig;
@@ -269,12 +278,14 @@ Work neighbours(std::size_t count) {
     if (!world->membership.join(request, milliseconds{0}, effects)) wrong("a node was refused");
   };
   join("hall-3/robot");
-  for (std::size_t i = 0; i < count; ++i) join((i % 2 == 0 ? "hall-3-" : "hall-3") + std::to_string(i));
+  for (std::size_t i = 0; i < count; ++i)
+    join((i % 2 == 0 ? "hall-3-" : "hall-3") + std::to_string(i));
   const auto pattern = proto::Pattern::parse(std::string{"hall-3/"} + '*');
   return [world, pattern, count] {
     const ListingRequest request{&*pattern, 0, false, 10, world->limits.scan_records};
     for (std::size_t i = 0; i < count; ++i) {
-      if (list_nodes(world->membership, request).indices.size() != 1) wrong("one node is in hall-3");
+      if (list_nodes(world->membership, request).indices.size() != 1)
+        wrong("one node is in hall-3");
     }
   };
 }
@@ -309,7 +320,8 @@ Work pattern_parts(std::size_t count) {
   };
 }
 
-/// So many frames of 16 bytes in turns to the same 8 nodes of a hub that has an eightieth as many nodes, 800 a turn.
+/// So many frames of 16 bytes in turns to the same 8 nodes of a hub that has an eightieth as many
+/// nodes, 800 a turn.
 Work forwarding(std::size_t count) {
   constexpr std::uint32_t kFirstNode = 2;
   constexpr std::uint32_t kDestinations = 8;
@@ -334,8 +346,8 @@ Work forwarding(std::size_t count) {
       if (i % 800 != 0) continue;
       for (Recipient* recipient : world->rig.recipients.dirty()) {
         recipient->dirty = false;
-        static_cast<void>(world->writers[recipient->slot.value()].flush(recipient->outbox, nullptr, world->transport,
-                                                                        world->rig.egress.context));
+        static_cast<void>(world->writers[recipient->slot.value()].flush(
+            recipient->outbox, nullptr, world->transport, world->rig.egress.context));
         recipient->outbox.on_emptied(world->rig.egress.context);
       }
       world->rig.recipients.dirty().clear();
@@ -393,7 +405,8 @@ int main(int argc, char** argv) {
 #else
   const char* const build = "other";
 #endif
-  std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build, ::gnu_get_libc_version());
+  std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build,
+              ::gnu_get_libc_version());
   for (const auto& script : gimnet::hub::kScripts) std::puts(std::string(script.name).c_str());
   return 0;
 }

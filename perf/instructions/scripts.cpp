@@ -1,8 +1,10 @@
-// Fixed pieces of the hub's work, whose instructions are counted (perf/driver/instructions.py) and compared with
-// perf/instructions/budget.json. Under valgrind's callgrind, which counts nothing but what runs below counted().
+// Fixed pieces of the hub's work, whose instructions are counted (perf/driver/instructions.py) and
+// compared with perf/instructions/budget.json. Under valgrind's callgrind, which counts nothing but
+// what runs below counted().
 //
-//     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames of the counted run
-//     instruction_scripts           prints what compiled it, and the scripts' names
+//     instruction_scripts SCRIPT    runs it: once to warm up, then once counted; prints the frames
+//     of the counted run instruction_scripts           prints what compiled it, and the scripts'
+//     names
 
 #include <gnu/libc-version.h>
 
@@ -25,7 +27,8 @@ extern "C" {
 /// Where callgrind switches its counting on and off: never inlined, known by this name.
 [[gnu::noinline]] void counted(const std::function<void()>& work) {
   work();
-  asm volatile("");  // keeps the call from becoming a jump, which callgrind would not see the end of
+  asm volatile(
+      "");  // keeps the call from becoming a jump, which callgrind would not see the end of
 }
 }
 
@@ -124,8 +127,8 @@ Work outbox() {
             const proto::FrameHeader header = run.header();
             for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
               outbox.push(run, header, {}, routing->rig.egress.context);
-              static_cast<void>(
-                  routing->writers.front().flush(outbox, nullptr, routing->transport, routing->rig.egress.context));
+              static_cast<void>(routing->writers.front().flush(outbox, nullptr, routing->transport,
+                                                               routing->rig.egress.context));
               outbox.on_emptied(routing->rig.egress.context);
             }
           }};
@@ -133,7 +136,8 @@ Work outbox() {
 
 Work fan_out() {
   auto routing = std::make_shared<Routing>(kFanOut);
-  routing->runs.push_back(routing->rig.make_run(node_id(1), {kPayload}, {.kind = proto::Kind::group}));
+  routing->runs.push_back(
+      routing->rig.make_run(node_id(1), {kPayload}, {.kind = proto::Kind::group}));
   constexpr std::uint32_t kFrames = 8;
   return {kFrames * kFanOut, [routing] {
             const hub::Run& run = routing->runs.front();
@@ -157,13 +161,15 @@ Work mailbox() {
             mail.size = 32;
             mail.frames = 1;
             std::uint64_t frames = 0;
-            for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) doors->mailbox.post(ShardIndex{1}, mail);
+            for (std::uint32_t i = 0; i < kFramesPerTurn; ++i)
+              doors->mailbox.post(ShardIndex{1}, mail);
             doors->mailbox.drain(10'000, [] {}, [&](const Mail& taken) { frames += taken.frames; });
             if (frames != kFramesPerTurn) std::abort();
           }};
 }
 
-/// One turn of a whole shard: from a connection's bytes in memory to other connections' bytes in memory.
+/// One turn of a whole shard: from a connection's bytes in memory to other connections' bytes in
+/// memory.
 Work hub_turn(std::uint32_t destinations) {
   auto rig = std::make_shared<testing::HubRig>();
   testing::FakeNode& sender = rig->join(0);
@@ -171,7 +177,8 @@ Work hub_turn(std::uint32_t destinations) {
   rig->settle();
   std::vector<std::byte> bytes;
   for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
-    const auto frame = testing::HubRig::frame(sender, sender.id.value() + 1 + i % destinations, kPayload);
+    const auto frame =
+        testing::HubRig::frame(sender, sender.id.value() + 1 + i % destinations, kPayload);
     bytes.insert(bytes.end(), frame.begin(), frame.end());
   }
   return {kFramesPerTurn, [rig, &sender, bytes] {
@@ -187,7 +194,8 @@ Work hub_turn_single() {
   testing::FakeNode& receiver = rig->join(0);
   rig->settle();
   constexpr std::uint32_t kTurns = 64;
-  return {kTurns, [rig, &sender, bytes = testing::HubRig::frame(sender, receiver.id.value(), kPayload)] {
+  return {kTurns,
+          [rig, &sender, bytes = testing::HubRig::frame(sender, receiver.id.value(), kPayload)] {
             for (std::uint32_t i = 0; i < kTurns; ++i) {
               rig->write(sender, bytes);
               const Ready ready{.token = rig->connection(sender)->token(), .readable = true};
@@ -202,13 +210,15 @@ Work hub_turn_fan_out(std::uint32_t services) {
   testing::FakeNode& provider = rig->join(0);
   std::vector<testing::FakeNode*> members;
   for (std::uint32_t i = 0; i < kFanOut; ++i) members.push_back(&rig->join(0));
-  for (std::uint32_t service = 1; service <= services; ++service) rig->publish_group(service, provider.id, members);
+  for (std::uint32_t service = 1; service <= services; ++service)
+    rig->publish_group(service, provider.id, members);
   rig->settle();
   constexpr std::uint32_t kFrames = 32;
   std::vector<std::byte> bytes;
   for (std::uint32_t i = 0; i < kFrames; ++i) {
     const auto group = testing::HubRig::group(1 + i % services);
-    const auto frame = testing::HubRig::frame(provider, group, kPayload, {.kind = proto::Kind::group});
+    const auto frame =
+        testing::HubRig::frame(provider, group, kPayload, {.kind = proto::Kind::group});
     bytes.insert(bytes.end(), frame.begin(), frame.end());
   }
   return {kFrames * kFanOut, [rig, &provider, bytes] {
@@ -228,10 +238,11 @@ Work hub_turn_full() {
   rig->publish_group(1, provider.id, members);
   rig->settle();
   for (testing::FakeNode* member : members) member->pipe.set_room(0);
-  const auto frame =
-      testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload, {.kind = proto::Kind::group});
+  const auto frame = testing::HubRig::frame(provider, testing::HubRig::group(1), kPayload,
+                                            {.kind = proto::Kind::group});
   std::vector<std::byte> bytes;
-  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) bytes.insert(bytes.end(), frame.begin(), frame.end());
+  for (std::uint32_t i = 0; i < kFramesPerTurn; ++i)
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
   const auto turn = [rig, &provider, bytes] {
     rig->write(provider, bytes);
     rig->shard(0).turn(rig->ready(0), ++rig->now_ms);
@@ -255,7 +266,8 @@ Work hub_turn_list() {
   constexpr std::uint32_t kFrames = 32;
   std::vector<std::byte> bytes;
   for (std::uint32_t i = 0; i < kFrames; ++i) {
-    const auto frame = testing::HubRig::frame(sender, kFanOut, ids_and_payload, {.kind = proto::Kind::list});
+    const auto frame =
+        testing::HubRig::frame(sender, kFanOut, ids_and_payload, {.kind = proto::Kind::list});
     bytes.insert(bytes.end(), frame.begin(), frame.end());
   }
   return {kFrames * kFanOut, [rig, &sender, bytes] {
@@ -296,7 +308,8 @@ int main(int argc, char** argv) {
 #else
     const char* const build = "other";
 #endif
-    std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build, ::gnu_get_libc_version());
+    std::printf("%s %s %s glibc-%s\n", __VERSION__, GIMNET_PROCESSOR, build,
+                ::gnu_get_libc_version());
     for (const auto& script : gimnet::hub::kScripts) std::puts(script.name);
     return 0;
   }

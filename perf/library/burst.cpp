@@ -99,7 +99,8 @@ class BurstSender {
 
 }  // namespace
 
-Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options) {
+Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
+                     const PairOptions& options) {
   BurstSender sender(client, std::move(setup), options);
   sender.run(options.duration / 5);  // to warm up
   sender.settle();

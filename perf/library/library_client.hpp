@@ -11,9 +11,9 @@
 
 namespace gimnet::perf {
 
-/// One program on a messaging library that talks with a partner, a program of the same kind, through a hub. Each
-/// library is used as its documentation would have it for messages that need not be kept, and in its favour. Every
-/// failure ends the program with a sentence.
+/// One program on a messaging library that talks with a partner, a program of the same kind,
+/// through a hub. Each library is used as its documentation would have it for messages that need
+/// not be kept, and in its favour. Every failure ends the program with a sentence.
 class LibraryClient {
  public:
   using Clock = std::chrono::steady_clock;
@@ -37,7 +37,8 @@ class LibraryClient {
   /// Sends to the partner. Thread safety: the main thread, and inside `on_message`.
   virtual void send(std::span<const std::byte> payload) = 0;
 
-  /// Lets messages come until wake() was called since the last wait(), or the time is up (false). The main thread.
+  /// Lets messages come until wake() was called since the last wait(), or the time is up (false).
+  /// The main thread.
   virtual bool wait(Clock::time_point deadline) {
     std::unique_lock lock(mutex_);
     const bool woken = changed_.wait_until(lock, deadline, [this] { return woken_; });

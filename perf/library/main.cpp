@@ -1,5 +1,6 @@
-// One of two programs that talk with each other through a hub by means of a library: which library is decided by what
-// this is linked with. perf/run.py starts both, first the one that answers, and the hub.
+// One of two programs that talk with each other through a hub by means of a library: which library
+// is decided by what this is linked with. perf/run.py starts both, first the one that answers, and
+// the hub.
 //
 //     library_client_nif --role receiver --connect tcp://127.0.0.1:7450
 //     library_client_nif --role sender --connect tcp://127.0.0.1:7450 --hub PID --partner PID
@@ -27,7 +28,9 @@ int main(int argc, char** argv) {
   PairOptions options;
   double seconds = 1;
   double patience = 2;
-  app.add_option("--role", role)->required()->check(CLI::IsMember({"sender", "receiver", "pinger", "echo"}));
+  app.add_option("--role", role)
+      ->required()
+      ->check(CLI::IsMember({"sender", "receiver", "pinger", "echo"}));
   app.add_option("--connect", setup.url, "tcp://HOST:PORT or unix:PATH")->required();
   app.add_option("--hub", options.hub, "process id of the hub, for who measures");
   app.add_option("--partner", options.partner, "process id of the partner, for who measures");
@@ -46,8 +49,8 @@ int main(int argc, char** argv) {
   const auto client = make_library_client();
   if (role == "receiver") receive_bursts(*client, setup, options);
   if (role == "echo") echo(*client, setup, options);
-  Findings findings =
-      role == "sender" ? send_bursts(*client, setup, options) : make_round_trips(*client, setup, options);
+  Findings findings = role == "sender" ? send_bursts(*client, setup, options)
+                                       : make_round_trips(*client, setup, options);
   findings.add("rss_peak_bytes", static_cast<double>(peak_resident_bytes(options.hub)));
   std::puts(findings.json().c_str());
 }

@@ -1,5 +1,5 @@
-// libmosquitto at QoS 0. Its loop runs in the main thread, so that a publish writes by itself and wakes nobody: with a
-// thread of its own every publish would also write to a pipe.
+// libmosquitto at QoS 0. Its loop runs in the main thread, so that a publish writes by itself and
+// wakes nobody: with a thread of its own every publish would also write to a pipe.
 
 #include <mosquitto.h>
 
@@ -37,21 +37,26 @@ class MosquittoClient final : public LibraryClient {
     mosquitto_ = mosquitto_new(nullptr, true, this);
     if (mosquitto_ == nullptr) fail("no memory");
     check(mosquitto_int_option(mosquitto_, MOSQ_OPT_TCP_NODELAY, 1), "TCP_NODELAY");
-    mosquitto_message_callback_set(mosquitto_, [](mosquitto*, void* self, const mosquitto_message* message) {
-      const auto* data = static_cast<const std::byte*>(message->payload);
-      static_cast<MosquittoClient*>(self)->on_message_({data, static_cast<std::size_t>(message->payloadlen)});
+    mosquitto_message_callback_set(
+        mosquitto_, [](mosquitto*, void* self, const mosquitto_message* message) {
+          const auto* data = static_cast<const std::byte*>(message->payload);
+          static_cast<MosquittoClient*>(self)->on_message_(
+              {data, static_cast<std::size_t>(message->payloadlen)});
+        });
+    mosquitto_subscribe_callback_set(mosquitto_, [](mosquitto*, void* self, int, int, const int*) {
+      static_cast<MosquittoClient*>(self)->wake();
     });
-    mosquitto_subscribe_callback_set(
-        mosquitto_, [](mosquitto*, void* self, int, int, const int*) { static_cast<MosquittoClient*>(self)->wake(); });
     const Endpoint endpoint = parse_endpoint(setup.url);
-    check(mosquitto_connect(mosquitto_, endpoint.host_or_path.c_str(), endpoint.port, kKeepAliveSeconds), "connect");
+    check(mosquitto_connect(mosquitto_, endpoint.host_or_path.c_str(), endpoint.port,
+                            kKeepAliveSeconds),
+          "connect");
     check(mosquitto_subscribe(mosquitto_, nullptr, setup.own.c_str(), 0), "subscribe");
     if (!wait(Clock::now() + kPatience)) fail("the hub did not answer the subscription in time");
   }
 
   void send(std::span<const std::byte> payload) override {
-    check(mosquitto_publish(mosquitto_, nullptr, partner_.c_str(), static_cast<int>(payload.size()), payload.data(), 0,
-                            false),
+    check(mosquitto_publish(mosquitto_, nullptr, partner_.c_str(), static_cast<int>(payload.size()),
+                            payload.data(), 0, false),
           "publish");
   }
 

@@ -1,5 +1,5 @@
-// nats.c: a subscription of its own with its thread. Single messages are sent at once (SendAsap), bursts are gathered
-// by the library, which is its default.
+// nats.c: a subscription of its own with its thread. Single messages are sent at once (SendAsap),
+// bursts are gathered by the library, which is its default.
 
 #include <nats/nats.h>
 
@@ -39,20 +39,25 @@ class NatsClient final : public LibraryClient {
     check(natsOptions_SetSendAsap(options, !setup.is_bursty), "send at once");
     check(natsConnection_Connect(&connection_, options), "connect");
     natsOptions_Destroy(options);
-    check(natsConnection_Subscribe(&subscription_, connection_, setup.own.c_str(), on_nats_message, this), "subscribe");
-    check(natsSubscription_SetPendingLimits(subscription_, -1, -1), "lift the limits of what may wait");
+    check(natsConnection_Subscribe(&subscription_, connection_, setup.own.c_str(), on_nats_message,
+                                   this),
+          "subscribe");
+    check(natsSubscription_SetPendingLimits(subscription_, -1, -1),
+          "lift the limits of what may wait");
     check(natsConnection_Flush(connection_), "wait until it is subscribed");
   }
 
   void send(std::span<const std::byte> payload) override {
-    check(natsConnection_Publish(connection_, partner_.c_str(), payload.data(), static_cast<int>(payload.size())),
+    check(natsConnection_Publish(connection_, partner_.c_str(), payload.data(),
+                                 static_cast<int>(payload.size())),
           "publish");
   }
 
  private:
   static void on_nats_message(natsConnection*, natsSubscription*, natsMsg* message, void* self) {
     const auto* data = reinterpret_cast<const std::byte*>(natsMsg_GetData(message));
-    static_cast<NatsClient*>(self)->on_message_({data, static_cast<std::size_t>(natsMsg_GetDataLength(message))});
+    static_cast<NatsClient*>(self)->on_message_(
+        {data, static_cast<std::size_t>(natsMsg_GetDataLength(message))});
     natsMsg_Destroy(message);
   }
 

@@ -45,7 +45,9 @@ class NifClient final : public LibraryClient {
   }
 
   void send(std::span<const std::byte> payload) override {
-    check(nif_send_to(node_.load(), partner_.load(std::memory_order_relaxed), payload.data(), payload.size()), "send");
+    check(nif_send_to(node_.load(), partner_.load(std::memory_order_relaxed), payload.data(),
+                      payload.size()),
+          "send");
   }
 
  private:

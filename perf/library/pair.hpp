@@ -8,7 +8,8 @@
 #include "generator/scenario.hpp"
 #include "library/library_client.hpp"
 
-// What two programs do with each other: one sends as fast as its library takes it, or round trips go one by one.
+// What two programs do with each other: one sends as fast as its library takes it, or round trips
+// go one by one.
 
 namespace gimnet::perf {
 
@@ -20,15 +21,21 @@ struct PairOptions {
   pid_t partner = 0;
 };
 
-/// Sends, with a bounded number of messages under way, for as long as asked, and says what it cost all three processes.
-[[nodiscard]] Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options);
-/// The other end of send_bursts(): checks every message and says from time to time how many it has. Does not return.
-[[noreturn]] void receive_bursts(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options);
+/// Sends, with a bounded number of messages under way, for as long as asked, and says what it cost
+/// all three processes.
+[[nodiscard]] Findings send_bursts(LibraryClient& client, LibraryClient::Setup setup,
+                                   const PairOptions& options);
+/// The other end of send_bursts(): checks every message and says from time to time how many it has.
+/// Does not return.
+[[noreturn]] void receive_bursts(LibraryClient& client, LibraryClient::Setup setup,
+                                 const PairOptions& options);
 
 /// Round trips one after the other, each begun where the last one ended: on the library's thread.
-[[nodiscard]] Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options);
+[[nodiscard]] Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup,
+                                        const PairOptions& options);
 /// The other end of make_round_trips(). Does not return.
-[[noreturn]] void echo(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options);
+[[noreturn]] void echo(LibraryClient& client, LibraryClient::Setup setup,
+                       const PairOptions& options);
 
 /// Says on standard output that the partner may be started.
 void say_ready();

@@ -43,7 +43,9 @@ class Pinger {
 
   void forget_round_trips() { round_trips_ns_.clear(); }
   [[nodiscard]] std::vector<std::int64_t>& round_trips_ns() { return round_trips_ns_; }
-  [[nodiscard]] std::uint64_t lost() const { return done_.load() ? inbox_.lost() : inbox_.lost() + 1; }
+  [[nodiscard]] std::uint64_t lost() const {
+    return done_.load() ? inbox_.lost() : inbox_.lost() + 1;
+  }
   [[nodiscard]] std::uint64_t wrong() const { return inbox_.wrong(); }
 
  private:
@@ -82,7 +84,8 @@ class Pinger {
 
 }  // namespace
 
-Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup, const PairOptions& options) {
+Findings make_round_trips(LibraryClient& client, LibraryClient::Setup setup,
+                          const PairOptions& options) {
   Pinger pinger(client, setup, options);
   pinger.run(options.duration / 5);  // to warm up
   pinger.forget_round_trips();

@@ -13,7 +13,9 @@ namespace gimnet::perf {
 class ThreeProcesses {
  public:
   ThreeProcesses(pid_t sender, pid_t receiver, pid_t hub)
-      : meters_{{{"sender", CpuMeter(sender)}, {"receiver", CpuMeter(receiver)}, {"hub", CpuMeter(hub)}}} {}
+      : meters_{{{"sender", CpuMeter(sender)},
+                 {"receiver", CpuMeter(receiver)},
+                 {"hub", CpuMeter(hub)}}} {}
 
   /// Adds user and system time of each, and those of all together, a message.
   void add_to(Findings& findings, double messages) const {

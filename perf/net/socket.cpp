@@ -36,7 +36,8 @@ Address make_address(const Endpoint& endpoint) {
   auto* const to = reinterpret_cast<sockaddr_in*>(&address.storage);
   to->sin_family = AF_INET;
   to->sin_port = htons(endpoint.port);
-  if (inet_pton(AF_INET, endpoint.host_or_path.c_str(), &to->sin_addr) != 1) fail("not an IPv4 address");
+  if (inet_pton(AF_INET, endpoint.host_or_path.c_str(), &to->sin_addr) != 1)
+    fail("not an IPv4 address");
   address.size = sizeof(sockaddr_in);
   return address;
 }
@@ -48,14 +49,16 @@ int make_socket(const Endpoint& endpoint) {
 }
 
 void make_nonblocking(int socket) {
-  if (::fcntl(socket, F_SETFL, ::fcntl(socket, F_GETFL) | O_NONBLOCK) != 0) fail("cannot set O_NONBLOCK", errno);
+  if (::fcntl(socket, F_SETFL, ::fcntl(socket, F_GETFL) | O_NONBLOCK) != 0)
+    fail("cannot set O_NONBLOCK", errno);
 }
 
 }  // namespace
 
 void fail(std::string_view what, int error) {
-  std::fprintf(stderr, "%s: %.*s%s%s\n", program_invocation_short_name, static_cast<int>(what.size()), what.data(),
-               error != 0 ? ": " : "", error != 0 ? std::strerror(error) : "");
+  std::fprintf(stderr, "%s: %.*s%s%s\n", program_invocation_short_name,
+               static_cast<int>(what.size()), what.data(), error != 0 ? ": " : "",
+               error != 0 ? std::strerror(error) : "");
   std::exit(1);
 }
 
@@ -70,7 +73,8 @@ Endpoint parse_endpoint(std::string_view url) {
   if (!url.starts_with("tcp://") || colon < 6) fail("an address is tcp://HOST:PORT or unix:PATH");
   endpoint.host_or_path = url.substr(6, colon - 6);
   const auto port = url.substr(colon + 1);
-  if (std::from_chars(port.data(), port.data() + port.size(), endpoint.port).ec != std::errc{}) fail("a bad port");
+  if (std::from_chars(port.data(), port.data() + port.size(), endpoint.port).ec != std::errc{})
+    fail("a bad port");
   return endpoint;
 }
 
@@ -86,7 +90,8 @@ int connect_to(const Endpoint& endpoint) {
   const int socket = make_socket(endpoint);
   Address address = make_address(endpoint);
   // Blocking: on a loopback the kernel completes it by itself, unless the backlog is full.
-  if (::connect(socket, address.get(), address.size) != 0) fail("cannot connect to " + endpoint.host_or_path, errno);
+  if (::connect(socket, address.get(), address.size) != 0)
+    fail("cannot connect to " + endpoint.host_or_path, errno);
   tune(socket, endpoint, 0);
   make_nonblocking(socket);
   return socket;
@@ -96,7 +101,8 @@ int listen_on(const Endpoint& endpoint) {
   const int listener = make_socket(endpoint);
   Address address = make_address(endpoint);
   if (endpoint.is_unix) ::unlink(endpoint.host_or_path.c_str());
-  if (::bind(listener, address.get(), address.size) != 0) fail("cannot bind " + endpoint.host_or_path, errno);
+  if (::bind(listener, address.get(), address.size) != 0)
+    fail("cannot bind " + endpoint.host_or_path, errno);
   if (::listen(listener, SOMAXCONN) != 0) fail("cannot listen on " + endpoint.host_or_path, errno);
   make_nonblocking(listener);
   return listener;
@@ -106,7 +112,8 @@ std::string local_url(int listener, const Endpoint& endpoint) {
   if (endpoint.is_unix) return "unix:" + endpoint.host_or_path;
   sockaddr_in address{};
   socklen_t size = sizeof(address);
-  if (::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size) != 0) fail("getsockname", errno);
+  if (::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size) != 0)
+    fail("getsockname", errno);
   return "tcp://" + endpoint.host_or_path + ":" + std::to_string(ntohs(address.sin_port));
 }
 

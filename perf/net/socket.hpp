@@ -5,12 +5,13 @@
 #include <string>
 #include <string_view>
 
-// Sockets of the measuring programs. Every failure ends the program with a sentence: a measurement that cannot be made
-// has no result. Thread safety: none; one thread.
+// Sockets of the measuring programs. Every failure ends the program with a sentence: a measurement
+// that cannot be made has no result. Thread safety: none; one thread.
 
 namespace gimnet::perf {
 
-/// Prints `program: what: reason` on standard error and exits with 1. With `error` 0 the reason is left out.
+/// Prints `program: what: reason` on standard error and exits with 1. With `error` 0 the reason is
+/// left out.
 [[noreturn]] void fail(std::string_view what, int error = 0);
 
 /// An address as the hub prints it: `tcp://127.0.0.1:7450` or `unix:/path`.

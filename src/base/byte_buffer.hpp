@@ -10,9 +10,9 @@
 
 namespace gimnet {
 
-/// Bytes that grow and are never filled with zeros first: for messages of up to a gigabyte, which realloc() can often
-/// extend by moving pages instead of bytes.
-/// Thread safety: one owner at a time. Ownership: move-only, frees its memory. Errors: false where memory is short.
+/// Bytes that grow and are never filled with zeros first: for messages of up to a gigabyte, which
+/// realloc() can often extend by moving pages instead of bytes. Thread safety: one owner at a time.
+/// Ownership: move-only, frees its memory. Errors: false where memory is short.
 class ByteBuffer {
  public:
   ByteBuffer() = default;
@@ -48,7 +48,8 @@ class ByteBuffer {
     return true;
   }
 
-  /// Copies `more` to the end; grows by doubling, but not over `capacity_max` as long as the bytes fit there.
+  /// Copies `more` to the end; grows by doubling, but not over `capacity_max` as long as the bytes
+  /// fit there.
   [[nodiscard]] bool append(std::span<const std::byte> more, std::size_t capacity_max = SIZE_MAX) {
     const std::size_t needed = size_ + more.size();
     if (needed > capacity_ &&

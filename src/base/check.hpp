@@ -5,7 +5,8 @@
 
 namespace gimnet {
 
-/// Says which invariant broke and where, and aborts: better a restart than a frame to the wrong node.
+/// Says which invariant broke and where, and aborts: better a restart than a frame to the wrong
+/// node.
 [[noreturn]] inline void broken_invariant(const char* condition, const char* file, int line) {
   std::fprintf(stderr, "gimnet: broken invariant: %s (%s:%d)\n", condition, file, line);
   std::abort();

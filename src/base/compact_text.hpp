@@ -10,14 +10,16 @@
 
 namespace gimnet {
 
-/// Text that is set rarely, read rarely and kept in great number: one pointer, and nothing behind it while it is empty,
-/// where a std::string takes four words. It is not changed in place. Thread safety: as std::string. Limits: 4 GiB.
+/// Text that is set rarely, read rarely and kept in great number: one pointer, and nothing behind
+/// it while it is empty, where a std::string takes four words. It is not changed in place. Thread
+/// safety: as std::string. Limits: 4 GiB.
 class CompactText {
  public:
   CompactText() = default;
   /// Implicit, as from one string to another.
   template <class Text>
-    requires std::convertible_to<const Text&, std::string_view> && (!std::same_as<Text, CompactText>)
+    requires std::convertible_to<const Text&, std::string_view> &&
+             (!std::same_as<Text, CompactText>)
   CompactText(const Text& text) {  // NOLINT(google-explicit-constructor)
     assign(text);
   }

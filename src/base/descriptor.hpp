@@ -8,7 +8,8 @@
 
 namespace gimnet {
 
-/// A file descriptor that is closed on the way out unless it was released; a negative one is none. Thread safety: none.
+/// A file descriptor that is closed on the way out unless it was released; a negative one is none.
+/// Thread safety: none.
 class Descriptor {
  public:
   explicit Descriptor(int value) : value_(value) {}
@@ -28,6 +29,8 @@ class Descriptor {
 };
 
 /// What the system calls an error, an errno: "No such file or directory".
-[[nodiscard]] inline std::string system_text(int error) { return std::generic_category().message(error); }
+[[nodiscard]] inline std::string system_text(int error) {
+  return std::generic_category().message(error);
+}
 
 }  // namespace gimnet

@@ -20,7 +20,8 @@ template <class Id>
 }
 
 /// Decimal digits only, at most `max`.
-[[nodiscard]] inline std::optional<std::uint32_t> parse_number(std::string_view text, std::uint32_t max) {
+[[nodiscard]] inline std::optional<std::uint32_t> parse_number(std::string_view text,
+                                                               std::uint32_t max) {
   std::uint32_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size() || number > max) return std::nullopt;

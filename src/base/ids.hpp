@@ -7,8 +7,8 @@
 
 namespace gimnet {
 
-/// A number that names one kind of thing only: two ids with different tags neither compare nor convert.
-/// Thread safety: a value type.
+/// A number that names one kind of thing only: two ids with different tags neither compare nor
+/// convert. Thread safety: a value type.
 template <class Tag, class Value>
 class StrongId {
  public:
@@ -21,7 +21,8 @@ class StrongId {
   Value value_{};
 };
 
-/// A hub: 12 bits, 1..4094; 0 is "the hub I am connected to", 4095 "every hub" (docs/protocol.md, section 1).
+/// A hub: 12 bits, 1..4094; 0 is "the hub I am connected to", 4095 "every hub" (docs/protocol.md,
+/// section 1).
 using HubId = StrongId<struct HubIdTag, std::uint16_t>;
 /// A node: hub << 20 | index.
 using NodeId = StrongId<struct NodeIdTag, std::uint32_t>;
@@ -59,5 +60,7 @@ template <class Id>
 
 template <class Tag, class Value>
 struct std::hash<gimnet::StrongId<Tag, Value>> {
-  std::size_t operator()(gimnet::StrongId<Tag, Value> id) const noexcept { return std::hash<Value>{}(id.value()); }
+  std::size_t operator()(gimnet::StrongId<Tag, Value> id) const noexcept {
+    return std::hash<Value>{}(id.value());
+  }
 };

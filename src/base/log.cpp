@@ -40,14 +40,17 @@ std::string time_stamp() {
   std::array<char, 40> text{};
   const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
   std::array<char, 8> fraction{};
-  std::snprintf(fraction.data(), fraction.size(), ".%03dZ", static_cast<int>(now % kSecond / 1'000'000));
+  std::snprintf(fraction.data(), fraction.size(), ".%03dZ",
+                static_cast<int>(now % kSecond / 1'000'000));
   return std::string{text.data(), size} + fraction.data();
 }
 
-std::chrono::milliseconds now_ms() { return std::chrono::milliseconds{steady_now_ns() / 1'000'000}; }
+std::chrono::milliseconds now_ms() {
+  return std::chrono::milliseconds{steady_now_ns() / 1'000'000};
+}
 
-/// A pipe that nobody reads, or a terminal that was stopped, takes nothing: who logs must not stand still with it. A
-/// line is shorter than the page that a pipe has free when it can be written.
+/// A pipe that nobody reads, or a terminal that was stopped, takes nothing: who logs must not stand
+/// still with it. A line is shorter than the page that a pipe has free when it can be written.
 bool stderr_takes_a_line() {
   pollfd out{STDERR_FILENO, POLLOUT, 0};
   return ::poll(&out, 1, 0) != 0;
@@ -65,7 +68,8 @@ void write_line(Writer& out, LogLevel level, std::string_view text, std::uint64_
     line += " (" + std::to_string(count) + " lines before this were left out)";
   }
   line += '\n';
-  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));  // nobody is left to tell about a failure
+  static_cast<void>(
+      !::write(STDERR_FILENO, line.data(), line.size()));  // nobody is left to tell about a failure
 }
 
 }  // namespace
@@ -104,7 +108,8 @@ void log_line(LogLevel level, const LogSubject& subject, std::string_view text) 
   Writer& out = writer();
   const std::lock_guard lock(out.mutex);
   const std::chrono::milliseconds now = now_ms();
-  const LogThrottle::Verdict verdict = out.throttle.take(subject.reason, subject.peer, out.rates.peer_per_s, now);
+  const LogThrottle::Verdict verdict =
+      out.throttle.take(subject.reason, subject.peer, out.rates.peer_per_s, now);
   if (verdict.write) write_line(out, level, text, verdict.left_out, now);
 }
 

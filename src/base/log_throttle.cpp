@@ -12,8 +12,8 @@ bool LogBudget::take(std::uint64_t per_s, std::chrono::milliseconds now) {
 
 std::uint64_t LogBudget::take_left_out() { return std::exchange(left_out_, 0); }
 
-LogThrottle::Verdict LogThrottle::take(std::string_view reason, std::string_view peer, std::uint64_t per_s,
-                                       std::chrono::milliseconds now) {
+LogThrottle::Verdict LogThrottle::take(std::string_view reason, std::string_view peer,
+                                       std::uint64_t per_s, std::chrono::milliseconds now) {
   std::string name{reason};
   name += '\0';
   name += peer;

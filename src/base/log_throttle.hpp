@@ -26,16 +26,17 @@ class LogBudget {
   std::uint64_t left_out_ = 0;
 };
 
-/// How many lines of one kind about one peer may be written now, so that nobody who makes the same mistake again and
-/// again fills the log, nor keeps others out of it.
-/// Thread safety: none. Limits: knows the latest 1,024 subjects; one that is forgotten begins anew.
+/// How many lines of one kind about one peer may be written now, so that nobody who makes the same
+/// mistake again and again fills the log, nor keeps others out of it. Thread safety: none. Limits:
+/// knows the latest 1,024 subjects; one that is forgotten begins anew.
 class LogThrottle {
  public:
   static constexpr std::size_t kSubjectsMax = 1'024;
 
   struct Verdict {
     bool write = false;
-    std::uint64_t left_out = 0;  ///< lines of this subject since the last one that was written; 0 unless `write`
+    std::uint64_t left_out =
+        0;  ///< lines of this subject since the last one that was written; 0 unless `write`
   };
   /// May a line of that kind about that peer be written? If not it is counted as left out.
   [[nodiscard]] Verdict take(std::string_view reason, std::string_view peer, std::uint64_t per_s,

@@ -7,7 +7,8 @@
 
 #include "base/thread_annotations.hpp"
 
-// A mutex, its lock and its condition, with the annotations that libstdc++ leaves out. For client and cold code only.
+// A mutex, its lock and its condition, with the annotations that libstdc++ leaves out. For client
+// and cold code only.
 
 namespace gimnet {
 
@@ -43,7 +44,8 @@ class Condition {
     condition_.wait(lock);
     lock.release();
   }
-  /// Until notified, or steady_now_ns() reaches `deadline_ns`; INT64_MAX: no limit. False: the time is up.
+  /// Until notified, or steady_now_ns() reaches `deadline_ns`; INT64_MAX: no limit. False: the time
+  /// is up.
   bool wait_until(Mutex& mutex, std::int64_t deadline_ns) GIMNET_REQUIRES(mutex) {
     if (deadline_ns == INT64_MAX) {
       wait(mutex);

@@ -16,11 +16,11 @@ enum class Takes : std::uint8_t {
   value,    ///< `--NAME VALUE` or `--NAME=VALUE`
 };
 
-/// Why a command line cannot be: the first word `--NAME=VALUE` whose value its option does not take, or `--NAME` whose
-/// value would be what reads as another option (begins with `--`, or is one); "": there is none.
-/// The library that reads command lines takes `--FLAG=` and `--FLAG=2` for true, and for `--NAME=` (of a shell variable
-/// that is not set, say) and `--NAME` the next word, whatever it is. What follows `--` is not looked at. Thread safety:
-/// that of `takes`.
+/// Why a command line cannot be: the first word `--NAME=VALUE` whose value its option does not
+/// take, or `--NAME` whose value would be what reads as another option (begins with `--`, or is
+/// one); "": there is none. The library that reads command lines takes `--FLAG=` and `--FLAG=2` for
+/// true, and for `--NAME=` (of a shell variable that is not set, say) and `--NAME` the next word,
+/// whatever it is. What follows `--` is not looked at. Thread safety: that of `takes`.
 [[nodiscard]] std::string wrong_option_word(std::span<const char* const> words,
                                             const std::function<Takes(std::string_view)>& takes);
 

@@ -6,8 +6,9 @@
 
 namespace gimnet {
 
-/// Whose it is: what belongs to one thread says check_here() wherever it is entered. Debug builds abort where another
-/// thread comes in; release builds check nothing. Thread safety: none, which is what it finds out.
+/// Whose it is: what belongs to one thread says check_here() wherever it is entered. Debug builds
+/// abort where another thread comes in; release builds check nothing. Thread safety: none, which is
+/// what it finds out.
 class OwnerThread {
  public:
   /// The first that comes is the owner.
@@ -18,7 +19,8 @@ class OwnerThread {
     GIMNET_ASSERT(owner_ == here);
 #endif
   }
-  /// The owner has ended, or hands over: the next that comes is the owner. REQUIRES: no call at the same time.
+  /// The owner has ended, or hands over: the next that comes is the owner. REQUIRES: no call at the
+  /// same time.
   void let_go() {
 #ifndef NDEBUG
     owner_ = std::thread::id{};

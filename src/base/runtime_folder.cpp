@@ -17,7 +17,8 @@ std::string absolute(const char* variable) {
 }  // namespace
 
 RuntimeFolder runtime_folder_of_user() {
-  if (std::string given = absolute("XDG_RUNTIME_DIR"); !given.empty()) return {std::move(given), "gimnet", true};
+  if (std::string given = absolute("XDG_RUNTIME_DIR"); !given.empty())
+    return {std::move(given), "gimnet", true};
   std::string temporary = absolute("TMPDIR");
   if (temporary.empty()) temporary = "/tmp";
   return {std::move(temporary), "gimnet-" + std::to_string(::geteuid()), false};

@@ -13,8 +13,8 @@ namespace gimnet {
 void hold_standard_descriptors() {
   for (int number = STDIN_FILENO; number <= STDERR_FILENO; ++number) {
     if (::fcntl(number, F_GETFD) != -1 || errno != EBADF) continue;
-    // open() gives the lowest free number, which is this one. Opened the wrong way round, and kept over exec() like any
-    // standard stream.
+    // open() gives the lowest free number, which is this one. Opened the wrong way round, and kept
+    // over exec() like any standard stream.
     static_cast<void>(::open("/dev/null", number == STDIN_FILENO ? O_WRONLY : O_RDONLY));
   }
 }

@@ -42,10 +42,12 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
   for (const std::string_view candidate : candidates) {
     if (candidate == word) continue;  // it came in the meantime: what was meant is what was said
     const std::size_t longer = std::max(word.size(), candidate.size());
-    if (longer - std::min(word.size(), candidate.size()) >= least) continue;  // so many letters differ at least
-    const std::size_t distance =
-        distance_between(word, candidate, [](char one, char other) { return lower(one) == lower(other); });
-    // Where every letter is another one nothing is near: a name of one letter is two steps from any two.
+    if (longer - std::min(word.size(), candidate.size()) >= least)
+      continue;  // so many letters differ at least
+    const std::size_t distance = distance_between(
+        word, candidate, [](char one, char other) { return lower(one) == lower(other); });
+    // Where every letter is another one nothing is near: a name of one letter is two steps from any
+    // two.
     if (distance < least && distance < longer) {
       least = distance;
       best = candidate;

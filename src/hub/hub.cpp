@@ -18,10 +18,11 @@ namespace {
 
 // A reader of STATISTICS takes sums for numbers with a sign.
 static_assert(kGapFramesMost <= std::uint64_t{INT64_MAX} / kShardsMax);
-static_assert(kShardCountMax <= kShardsMax);  // as many as the tables and sets of shards have room for
+static_assert(kShardCountMax <=
+              kShardsMax);  // as many as the tables and sets of shards have room for
 
-/// Nobody asked for the default socket: a place for it that cannot be used, as in the environment of a session that has
-/// ended, costs that socket and not the hub.
+/// Nobody asked for the default socket: a place for it that cannot be used, as in the environment
+/// of a session that has ended, costs that socket and not the hub.
 std::vector<ListenUrl> addresses_for(const HubOptions& options) {
   if (!options.listen.empty()) return options.listen;
   const Result<std::string> folder = runtime_folder();
@@ -36,8 +37,10 @@ std::vector<ListenUrl> addresses_for(const HubOptions& options) {
     }
   }
   if (!trouble.empty()) {
-    log_warning("listening on TCP only, without the Unix socket over which administrators connect: " + trouble +
-                "; --listen unix:/PATH names another place, beside --listen " + urls.front().text());
+    log_warning(
+        "listening on TCP only, without the Unix socket over which administrators connect: " +
+        trouble + "; --listen unix:/PATH names another place, beside --listen " +
+        urls.front().text());
   }
   return urls;
 }
@@ -47,7 +50,8 @@ class Shards final : public ShardProxy {
  public:
   Shards(const HubShared& shared, IoShard::Options options) {
     for (std::size_t i = 0; i < shared.mailboxes.size(); ++i) {
-      shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, shared, options));
+      shards_.push_back(
+          std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, shared, options));
     }
   }
   ~Shards() override { stop(); }
@@ -65,7 +69,9 @@ class Shards final : public ShardProxy {
     for (const auto& shard : shards_) shard->join();
     for (const auto& shard : shards_) shard->let_go();
   }
-  void send(ShardIndex shard, ShardCommand command) override { shards_[shard.value()]->send(std::move(command)); }
+  void send(ShardIndex shard, ShardCommand command) override {
+    shards_[shard.value()]->send(std::move(command));
+  }
   [[nodiscard]] std::size_t shards() const override { return shards_.size(); }
 
  private:
@@ -81,8 +87,8 @@ struct Ground {
     const std::uint64_t nodes_most = find_limit("nodes")->most + find_limit("administrators")->most;
     for (std::size_t i = 0; i < options.shards; ++i) {
       wakers.push_back(std::make_unique<Waker>());
-      mailboxes.push_back(
-          std::make_unique<Mailbox>(options.shards, Mailbox::bounds_from(options.limits), *wakers.back()));
+      mailboxes.push_back(std::make_unique<Mailbox>(
+          options.shards, Mailbox::bounds_from(options.limits), *wakers.back()));
       counters.push_back(std::make_unique<ShardCounters>());
       readable.push_back(counters.back().get());
       sessions.push_back(std::make_unique<SessionGauges>(nodes_most));
@@ -135,7 +141,8 @@ HubFacts facts_of(const HubOptions& options) {
 
 }  // namespace
 
-/// In the order in which they need each other: shards end before the conductor frees what they look at.
+/// In the order in which they need each other: shards end before the conductor frees what they look
+/// at.
 struct Hub::Parts {
   Parts(const HubOptions& given, const ConfigSources& sources, StartState from,
         std::vector<std::unique_ptr<Listener>> listeners)
@@ -159,8 +166,9 @@ struct Hub::Parts {
     for (const auto& listener : listeners) {
       addresses += (addresses.empty() ? "" : " ") + listener->url().text();
     }
-    loop = std::make_unique<ConductorLoop>(ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals},
-                                           std::move(listeners));
+    loop = std::make_unique<ConductorLoop>(
+        ConductorLoop::Wiring{conductor, ground.inbox, limits, ground.refusals},
+        std::move(listeners));
   }
 
   StateKeeper::Keep keep_state() {
@@ -196,7 +204,8 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
   const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
   Result<StartState> state = start_state({options.state_dir, options.id, urls.front(), wall});
   if (!state) return state.error();
-  std::unique_ptr<Hub> hub(new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));
+  std::unique_ptr<Hub> hub(
+      new Hub(std::make_unique<Parts>(options, sources, std::move(*state), std::move(listeners))));
   hub->parts_->shards.start();
   return hub;
 }

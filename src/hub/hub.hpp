@@ -13,9 +13,10 @@ namespace gimnet::hub {
 /// Thread safety: made, run and destroyed by one thread, which is the conductor's while it runs.
 class Hub {
  public:
-  /// Listens, and starts the shards. `sources` is where the options came from, to be read again at SIGHUP. Errors: a
-  /// sentence that says what could not be had.
-  [[nodiscard]] static Result<std::unique_ptr<Hub>> start(const HubOptions& options, const ConfigSources& sources = {});
+  /// Listens, and starts the shards. `sources` is where the options came from, to be read again at
+  /// SIGHUP. Errors: a sentence that says what could not be had.
+  [[nodiscard]] static Result<std::unique_ptr<Hub>> start(const HubOptions& options,
+                                                          const ConfigSources& sources = {});
   ~Hub();
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;

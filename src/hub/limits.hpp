@@ -6,14 +6,14 @@
 #include <string>
 #include <string_view>
 
-// Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp, shown by
-// `tcphub --help-limits`, and set by `tcphub --limit NAME=VALUE`, by TCPHUB_LIMITS_NAME or in the configuration's
-// [limits].
+// Everything that the hub bounds, with unit, default, range and reason: the table in limits.cpp,
+// shown by `tcphub --help-limits`, and set by `tcphub --limit NAME=VALUE`, by TCPHUB_LIMITS_NAME or
+// in the configuration's [limits].
 
 namespace gimnet::hub {
 
-/// The limits in force. Thread safety: each thread that looks at them has its own, which it changes between two steps
-/// of its work.
+/// The limits in force. Thread safety: each thread that looks at them has its own, which it changes
+/// between two steps of its work.
 struct Limits {
   // Frames and turns
   std::uint64_t frame_bytes = 65'536;
@@ -25,8 +25,8 @@ struct Limits {
   std::uint64_t handshake_bytes = 1'024;
   std::uint64_t handshake_ms = 5'000;
   std::uint64_t handshakes = 4'096;
-  // 3 % of `handshakes`, and more than the programs that a busy robot starts at once behind one address: its kernel has
-  // their connections before they run and say HELLO.
+  // 3 % of `handshakes`, and more than the programs that a busy robot starts at once behind one
+  // address: its kernel has their connections before they run and say HELLO.
   std::uint64_t handshakes_per_address = 128;
   std::uint64_t nodes = 100'000;
   std::uint64_t administrators = 8;
@@ -100,7 +100,8 @@ struct LimitInfo {
   std::uint64_t least;
   std::uint64_t most;
   std::string_view reason;
-  /// May it change while the hub runs? Not what memory was laid out by, nor what peers were told and rely on.
+  /// May it change while the hub runs? Not what memory was laid out by, nor what peers were told
+  /// and rely on.
   bool reloads = false;
 };
 
@@ -112,8 +113,8 @@ struct LimitInfo {
 /// "; did you mean nodes?" for the limit whose name is nearest, or "".
 [[nodiscard]] std::string nearest_limit(std::string_view name);
 
-/// Sets one limit to a whole number, with an optional suffix k, M or G for powers of 1,024 (not for times). Returns an
-/// empty string, or what is wrong and what to do.
+/// Sets one limit to a whole number, with an optional suffix k, M or G for powers of 1,024 (not for
+/// times). Returns an empty string, or what is wrong and what to do.
 [[nodiscard]] std::string set_limit(Limits& limits, const LimitInfo& limit, std::string_view value);
 
 }  // namespace gimnet::hub

@@ -33,7 +33,8 @@ TEST(ByteBuffer, GrowsByDoublingUpToTheMaximum) {
   ASSERT_TRUE(buffer.append(some, 500));
   EXPECT_EQ(buffer.capacity(), 500u);
   ASSERT_TRUE(buffer.append(some, 500));
-  EXPECT_EQ(buffer.size(), 600u) << "the maximum bounds what is reserved ahead, not what is asked for";
+  EXPECT_EQ(buffer.size(), 600u)
+      << "the maximum bounds what is reserved ahead, not what is asked for";
 }
 
 TEST(ByteBuffer, MovesItsMemory) {

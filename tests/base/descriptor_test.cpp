@@ -34,7 +34,9 @@ TEST(Descriptor, StaysOpenForWhomItWasReleasedTo) {
 
 TEST(Descriptor, MayBeNone) { EXPECT_FALSE(Descriptor(-1).is_open()); }
 
-TEST(SystemText, IsTheSystemsSentence) { EXPECT_EQ(system_text(ENOENT), "No such file or directory"); }
+TEST(SystemText, IsTheSystemsSentence) {
+  EXPECT_EQ(system_text(ENOENT), "No such file or directory");
+}
 
 }  // namespace
 }  // namespace gimnet

@@ -17,8 +17,8 @@ TEST(IdText, ReadsWhatItPrints) {
 }
 
 TEST(IdText, RefusesEverythingElse) {
-  for (const char* text : {"", ".", "7", "7.", ".17", "7#17", "7.17 ", " 7.17", "7.-1", "+7.1", "7.17.1", "4096.1",
-                           "7.1048576", "7.99999999999999999999", "robot"}) {
+  for (const char* text : {"", ".", "7", "7.", ".17", "7#17", "7.17 ", " 7.17", "7.-1", "+7.1",
+                           "7.17.1", "4096.1", "7.1048576", "7.99999999999999999999", "robot"}) {
     EXPECT_EQ(parse_node_id(text), std::nullopt) << text;
   }
 }

@@ -41,7 +41,8 @@ TEST(Log, WritesOneLineWithLevelAndText) {
   log_info("node 7.1 joined");
   const std::string text = log.text();
   EXPECT_THAT(text, ::testing::EndsWith("Z info node 7.1 joined\n"));
-  EXPECT_EQ(text.size(), std::string_view{"2026-01-02T03:04:05.678Z info node 7.1 joined\n"}.size());
+  EXPECT_EQ(text.size(),
+            std::string_view{"2026-01-02T03:04:05.678Z info node 7.1 joined\n"}.size());
 }
 
 TEST(Log, LeavesOutWhatIsAboveItsLevel) {
@@ -83,18 +84,22 @@ TEST(Log, KnowsItsLevelsByName) {
   EXPECT_EQ(level, LogLevel::off);
 }
 
-std::size_t lines_in(const std::string& text) { return static_cast<std::size_t>(std::ranges::count(text, '\n')); }
+std::size_t lines_in(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count(text, '\n'));
+}
 
 TEST(Log, WhatOnePeerCausesIsWrittenTenTimesASecondAndEscaped) {
   CapturedLog log(LogLevel::info);
   set_log_rates({1'000'000, 1});
-  for (int i = 0; i < 100'000; ++i) log_line(LogLevel::info, {"refused", "a test's peer"}, "no\n2026 info \x1b[2J");
+  for (int i = 0; i < 100'000; ++i)
+    log_line(LogLevel::info, {"refused", "a test's peer"}, "no\n2026 info \x1b[2J");
   log_line(LogLevel::info, {"refused", "a test's other peer"}, "yes");
   set_log_rates({});
   const std::string text = log.text();
   EXPECT_THAT(text, HasSubstr("no\\x0a2026 info \\x1b[2J\n"));
   EXPECT_THAT(text, HasSubstr(" yes"));
-  // How long this loop takes is not ours to say: a line a second of it, and all the others are counted.
+  // How long this loop takes is not ours to say: a line a second of it, and all the others are
+  // counted.
   EXPECT_LT(lines_in(text), 1'000u);
 }
 
@@ -118,7 +123,8 @@ TEST(Log, APipeThatNobodyReadsHoldsNobodyUp) {
     text.append(memory.data(), static_cast<std::size_t>(size));
   }
   ::close(pipe[0]);
-  EXPECT_THAT(text, ::testing::ContainsRegex("read again \\([0-9]+ lines before this were left out\\)\n"));
+  EXPECT_THAT(
+      text, ::testing::ContainsRegex("read again \\([0-9]+ lines before this were left out\\)\n"));
 }
 
 TEST(Log, WhatIsLeftOutIsCountedInTheNextLine) {
@@ -131,7 +137,8 @@ TEST(Log, WhatIsLeftOutIsCountedInTheNextLine) {
   }
   log_info("at last");
   set_log_rates({});
-  EXPECT_THAT(log.text(), ::testing::MatchesRegex("(.|\n)* at last \\([0-9]+ lines before this were left out\\)\n"));
+  EXPECT_THAT(log.text(), ::testing::MatchesRegex(
+                              "(.|\n)* at last \\([0-9]+ lines before this were left out\\)\n"));
 }
 
 }  // namespace

@@ -47,7 +47,8 @@ TEST(LogThrottle, NobodyKeepsOtherPeersOrReasonsOut) {
   EXPECT_EQ(written(throttle, "refused", "10.0.0.1", 100, 1s), 10);
   EXPECT_EQ(written(throttle, "refused", "10.0.0.2", 100, 1s), 10);
   EXPECT_EQ(written(throttle, "closed", "10.0.0.1", 100, 1s), 10);
-  EXPECT_EQ(written(throttle, "refused10.0.0.1", "", 100, 1s), 10) << "reason and peer are two things";
+  EXPECT_EQ(written(throttle, "refused10.0.0.1", "", 100, 1s), 10)
+      << "reason and peer are two things";
 }
 
 TEST(LogThrottle, KnowsSoManySubjectsAndNotOneMore) {

@@ -31,13 +31,18 @@ TEST(OptionWords, AnEmptyValueIsNotTheNextWord) {
 
 TEST(OptionWords, AnotherOptionIsNoValue) {
   EXPECT_EQ(wrong({"--name", "--spin"}),
-            "--name needs a value, and '--spin' looks like an option; if it is meant, write --name=--spin");
-  EXPECT_EQ(wrong({"-n", "--name=x"}),
-            "-n needs a value, and '--name=x' looks like an option; if it is meant, write -n--name=x");
-  for (const char* word : {"--", "--other", "--spin=2", "-n", "-n=3"}) EXPECT_NE(wrong({"--name", word}), "") << word;
-  for (const char* word : {"-", "-1", "-.5", "-x", "- no", "spin", "a--b"}) EXPECT_EQ(wrong({"--name", word}), "");
+            "--name needs a value, and '--spin' looks like an option; if it is meant, write "
+            "--name=--spin");
+  EXPECT_EQ(
+      wrong({"-n", "--name=x"}),
+      "-n needs a value, and '--name=x' looks like an option; if it is meant, write -n--name=x");
+  for (const char* word : {"--", "--other", "--spin=2", "-n", "-n=3"})
+    EXPECT_NE(wrong({"--name", word}), "") << word;
+  for (const char* word : {"-", "-1", "-.5", "-x", "- no", "spin", "a--b"})
+    EXPECT_EQ(wrong({"--name", word}), "");
   EXPECT_EQ(wrong({"--name=--spin", "--name=-n"}), "");
-  EXPECT_EQ(wrong({"--name", "x", "--spin", "-n"}), "") << "that one is missing is for others to say";
+  EXPECT_EQ(wrong({"--name", "x", "--spin", "-n"}), "")
+      << "that one is missing is for others to say";
 }
 
 TEST(OptionWords, WhatTakesNothingIsGivenNothing) {

@@ -20,7 +20,8 @@ TEST(Random, FillsAllOfAnySize) {
   fill_randomly(memory);
   for (std::size_t at = 0; at < memory.size(); at += 64) {
     const auto part = std::span(memory).subspan(at, 64);
-    EXPECT_TRUE(std::ranges::any_of(part, [](std::byte each) { return each != std::byte{0}; })) << at;
+    EXPECT_TRUE(std::ranges::any_of(part, [](std::byte each) { return each != std::byte{0}; }))
+        << at;
   }
   fill_randomly({});
 }

@@ -35,7 +35,8 @@ int hold_those_that_are_missing() {
 
 int leave_those_that_are_there() {
   std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO) return 1;
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO)
+    return 1;
   ::close(STDIN_FILENO);
   hold_standard_descriptors();
   if (!write_standard_output("here\n").empty()) return 2;
@@ -56,7 +57,8 @@ int write_beyond_the_limit_of_files(const std::string& file) {
 int write_to_a_reader_that_left() {
   have_failed_writes_told();
   std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO) return 1;
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO)
+    return 1;
   ::close(pipe[0]);
   return write_standard_output("unread").empty() ? kGood : 2;
 }
@@ -64,7 +66,8 @@ int write_to_a_reader_that_left() {
 /// More than fits into the pipe, which is read only when it is full.
 int write_to_a_full_pipe_that_does_not_block(WhenFull when_full) {
   std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO) return 1;
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0 || ::dup2(pipe[1], STDOUT_FILENO) != STDOUT_FILENO)
+    return 1;
   if (::fcntl(STDOUT_FILENO, F_SETFL, O_NONBLOCK) != 0) return 2;
   ::close(pipe[1]);
   const int room = ::fcntl(pipe[0], F_SETPIPE_SZ, 4096);
@@ -96,7 +99,8 @@ TEST(StandardStreams, ThoseThatAreThereAreLeftAlone) {
 }
 
 TEST(StandardStreams, AWriteBeyondTheLimitOfFilesIsToldInsteadOfEndingTheProcess) {
-  const std::string file = testing::TempDir() + "standard_streams_test." + std::to_string(::getpid());
+  const std::string file =
+      testing::TempDir() + "standard_streams_test." + std::to_string(::getpid());
   EXPECT_EXIT(::_exit(write_beyond_the_limit_of_files(file)), testing::ExitedWithCode(kGood), "");
   std::filesystem::remove(file);
 }
@@ -106,11 +110,13 @@ TEST(StandardStreams, AReaderThatLeftIsNoFailure) {
 }
 
 TEST(StandardStreams, OneThatDoesNotBlockIsWaitedFor) {
-  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::wait)), testing::ExitedWithCode(kGood), "");
+  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::wait)),
+              testing::ExitedWithCode(kGood), "");
 }
 
 TEST(StandardStreams, OneThatDoesNotBlockIsNotWaitedForWhereNobodyWants) {
-  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::fail)), testing::ExitedWithCode(kGood), "");
+  EXPECT_EXIT(::_exit(write_to_a_full_pipe_that_does_not_block(WhenFull::fail)),
+              testing::ExitedWithCode(kGood), "");
 }
 
 TEST(StandardStreams, AFullDiskIsTold) {

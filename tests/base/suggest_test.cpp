@@ -16,7 +16,9 @@ TEST(EditDistance, CountsLetters) {
   EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
 }
 
-TEST(EditDistance, CountsASwapOfNeighboursOnce) { EXPECT_EQ(edit_distance("lsiten", "listen"), 1u); }
+TEST(EditDistance, CountsASwapOfNeighboursOnce) {
+  EXPECT_EQ(edit_distance("lsiten", "listen"), 1u);
+}
 
 TEST(DidYouMean, NamesTheNearest) {
   constexpr std::array<std::string_view, 3> kWords{"--listen", "--limit", "--shards"};

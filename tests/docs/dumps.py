@@ -7,6 +7,7 @@
 import pathlib
 import re
 import struct
+import textwrap
 from dataclasses import dataclass
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -94,12 +95,13 @@ def rendered(shown):
         rows += [(piece, meaning if at == 0 else "") for at, piece in enumerate(pieces)]
     width = max(len(digits) for digits, _ in rows) + 3
     body = "".join(f"    {digits:{width}}{meaning}".rstrip() + "\n" for digits, meaning in rows)
-    return f"`{shown.name}` {shown.title}\n\n{body}"
+    title = "\n".join(textwrap.wrap(f"`{shown.name}` {shown.title}", 100, break_on_hyphens=False, break_long_words=False))
+    return f"{title}\n\n{body}"
 
 
 def section_of_protocol():
-    parts = [SECTION, "\nFrom 7.17, or to it, wherever that is possible; a line is a field, or a value of Bitestream. The dumps are those of"
-             " `tests/vectors`,\nwhich have the same names.\n"]
+    parts = [SECTION, "\nFrom 7.17, or to it, wherever that is possible; a line is a field, or a value of\nBitestream. The dumps"
+             " are those of `tests/vectors`, which have the same names.\n"]
     for folder, heading in FAMILIES.items():
         parts.append(f"\n### {heading}\n")
         parts += ["\n" + rendered(each) for each in vectors(folder)]
@@ -112,7 +114,7 @@ def section_of_bitestream():
 
 def dumps(page):
     """[(names of the vectors, bytes)]: of every indented block that begins with bytes."""
-    found, names, data = [], (), None
+    found, names, data, in_paragraph = [], (), None, False
     for text in page.splitlines() + [""]:
         match = _DUMP_LINE.match(text)
         if match and data is not None:
@@ -124,7 +126,8 @@ def dumps(page):
                 found.append((names, data))
                 data, names = None, ()
             if text.strip():
-                names = tuple(_NAME.findall(text))
+                names = (names if in_paragraph else ()) + tuple(_NAME.findall(text))
+        in_paragraph = bool(text.strip()) and not text.startswith("    ")
     return found
 
 

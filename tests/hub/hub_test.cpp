@@ -39,14 +39,16 @@ int dial_and_greet(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-  if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return -1;
+  if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    return -1;
   const std::vector<std::byte> hello = opening_and(proto::Hello{});
   if (::send(descriptor, hello.data(), hello.size(), MSG_NOSIGNAL) < 0) return -1;
   std::byte answer[1024];
   const ssize_t size = ::recv(descriptor, answer, sizeof answer, 0);
   constexpr std::size_t kBefore = proto::kOpeningSize + proto::kHeaderSize;
   if (size < static_cast<ssize_t>(kBefore)) return -1;
-  const std::span<const std::byte> payload = std::span{answer, static_cast<std::size_t>(size)}.subspan(kBefore);
+  const std::span<const std::byte> payload =
+      std::span{answer, static_cast<std::size_t>(size)}.subspan(kBefore);
   return proto::decode<proto::Welcome>(payload) ? descriptor : -1;
 }
 
@@ -112,7 +114,8 @@ TEST(Hub, WelcomesNodesAndDrainsAtASignal) {
   EXPECT_FALSE(std::filesystem::exists(folder.path("s")));
 }
 
-// A hub that ended with bytes of a node unread would reset the connection, and take GOODBYE with it.
+// A hub that ended with bytes of a node unread would reset the connection, and take GOODBYE with
+// it.
 TEST(Hub, EndsWhenThoseWhomItToldGoodbyeHaveLeft) {
   const TestFolder folder;
   HubOptions wanted = options(folder, {"unix:" + folder.path("s")});

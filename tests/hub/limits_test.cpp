@@ -18,7 +18,8 @@ std::string set(Limits& limits, std::string_view name, std::string_view value) {
 
 TEST(Limits, EveryFieldIsInTheTableOnce) {
   std::set<std::string_view> names;
-  for (const LimitInfo& limit : limit_table()) EXPECT_TRUE(names.insert(limit.name).second) << limit.name;
+  for (const LimitInfo& limit : limit_table())
+    EXPECT_TRUE(names.insert(limit.name).second) << limit.name;
   EXPECT_EQ(names.size() * sizeof(std::uint64_t), sizeof(Limits));
 }
 
@@ -68,8 +69,8 @@ TEST(Limits, SuffixesArePowersOf1024) {
 
 TEST(Limits, WhatIsNoNumberIsRefused) {
   Limits limits;
-  for (const char* bad :
-       {"", "abc", "-1", "1.5", "10T", "10kk", " 10", "99999999999999999999", "18446744073709551615G"}) {
+  for (const char* bad : {"", "abc", "-1", "1.5", "10T", "10kk", " 10", "99999999999999999999",
+                          "18446744073709551615G"}) {
     EXPECT_NE(set(limits, "nodes", bad), "") << bad;
   }
   EXPECT_EQ(limits.nodes, Limits{}.nodes);

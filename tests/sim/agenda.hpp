@@ -46,7 +46,9 @@ class Agenda {
     std::uint64_t number;
     Action action;
   };
-  static bool later(const Entry& a, const Entry& b) { return a.time != b.time ? a.time > b.time : a.number > b.number; }
+  static bool later(const Entry& a, const Entry& b) {
+    return a.time != b.time ? a.time > b.time : a.number > b.number;
+  }
 
   std::vector<Entry> entries_;  ///< a heap
   std::uint64_t last_ = 0;

@@ -8,8 +8,8 @@
 
 namespace gimnet::sim {
 
-/// The faults and collisions that a world brings about. A run of many seeds in which one of them never came proves
-/// nothing about it, and fails.
+/// The faults and collisions that a world brings about. A run of many seeds in which one of them
+/// never came proves nothing about it, and fails.
 enum class Happening : std::uint8_t {
   joined,
   name_collision,
@@ -143,7 +143,9 @@ class Census {
   void add(const Census& other) {
     for (std::size_t i = 0; i < kHappenings; ++i) counts_[i] += other.counts_[i];
   }
-  [[nodiscard]] std::uint64_t of(Happening happening) const { return counts_[static_cast<std::size_t>(happening)]; }
+  [[nodiscard]] std::uint64_t of(Happening happening) const {
+    return counts_[static_cast<std::size_t>(happening)];
+  }
   /// One line each: the count and the name.
   [[nodiscard]] std::string table() const;
   /// The names of those that never happened.

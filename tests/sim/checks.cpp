@@ -51,11 +51,12 @@ bool changes_groups(std::uint16_t answer) {
 std::string text_of(const DueEvent& event) {
   const bool moved = event.operation == ns::ServiceMoved::kOperation;
   return "to node " + std::to_string(event.to) + ": " +
-         (moved ? "SERVICE_MOVED '" + event.name + "' from group " + std::to_string(event.old_group) + " to " +
-                      std::to_string(event.new_group)
-                : (event.operation == ns::SubscriberJoined::kOperation ? "SUBSCRIBER_JOINED " : "SUBSCRIBER_LEFT ") +
-                      std::to_string(event.node) + " of group " + std::to_string(event.old_group) + ", now " +
-                      std::to_string(event.subscribers));
+         (moved ? "SERVICE_MOVED '" + event.name + "' from group " +
+                      std::to_string(event.old_group) + " to " + std::to_string(event.new_group)
+                : (event.operation == ns::SubscriberJoined::kOperation ? "SUBSCRIBER_JOINED "
+                                                                       : "SUBSCRIBER_LEFT ") +
+                      std::to_string(event.node) + " of group " + std::to_string(event.old_group) +
+                      ", now " + std::to_string(event.subscribers));
 }
 
 }  // namespace
@@ -64,7 +65,8 @@ void Checks::before_it_leaves(ShardIndex shard, const hub::ShardCommand& command
   if (conductor_ == nullptr || !out_of_order_.empty()) return;
   if (const auto* attach = std::get_if<hub::AttachCommand>(&command)) {
     const NodePlace place = subject_.nodes.find(index_of(attach->node));
-    if (place.generation != attach->session.generation) out_of_order_ = "WELCOME leaves before its node is published";
+    if (place.generation != attach->session.generation)
+      out_of_order_ = "WELCOME leaves before its node is published";
   } else if (const auto* control = std::get_if<hub::SendControlCommand>(&command)) {
     const auto view = proto::split_control(std::span{control->frame}.subspan(proto::kHeaderSize));
     if (control->answers != 0 && changes_groups(view->header.operation)) out_of_order_ = stale();
@@ -99,7 +101,8 @@ void Checks::after_drain() const {
   for (const SimShards::Sent& sent : subject_.shards.sent()) {
     if (std::holds_alternative<hub::DrainCommand>(*sent.command)) ++told[sent.shard.value()];
   }
-  const bool once = std::all_of(told.begin(), told.end(), [](std::size_t times) { return times == 1; });
+  const bool once =
+      std::all_of(told.begin(), told.end(), [](std::size_t times) { return times == 1; });
   require(once, Checker::drain, "the hub drains, and a shard is not told to have its nodes leave");
 }
 
@@ -143,7 +146,8 @@ void Checks::events() {
     }
   }
   counts(told, renumbered);
-  // Two who leave in one step may be told in any order: then the numbers are in the order of the telling.
+  // Two who leave in one step may be told in any order: then the numbers are in the order of the
+  // telling.
   const auto without_numbers = [](std::vector<DueEvent> list) {
     for (DueEvent& event : list) event.subscribers = 0;
     std::sort(list.begin(), list.end());
@@ -152,7 +156,8 @@ void Checks::events() {
   const std::vector<DueEvent> due = without_numbers(model_.take_due());
   const std::vector<DueEvent> plain = without_numbers(told);
   for (const DueEvent& event : due) {
-    if (!std::binary_search(plain.begin(), plain.end(), event)) broken(Checker::events, "not told " + text_of(event));
+    if (!std::binary_search(plain.begin(), plain.end(), event))
+      broken(Checker::events, "not told " + text_of(event));
   }
   for (const DueEvent& event : plain) {
     if (!std::binary_search(due.begin(), due.end(), event))
@@ -171,11 +176,15 @@ void Checks::counts(const std::vector<DueEvent>& told, const Model::Renumbered& 
   for (auto event = told.rbegin(); event != told.rend(); ++event) {
     if (event->operation == ns::ServiceMoved::kOperation) continue;
     const auto group = model_.groups().find(event->old_group);
-    const std::size_t now =
-        group == model_.groups().end() ? event->subscribers : group->second->second.subscribers.size();
-    std::uint32_t& number = numbers.try_emplace(event->old_group, static_cast<std::uint32_t>(now)).first->second;
-    if (event->subscribers != number) broken(Checker::events, "a wrong number of subscribers " + text_of(*event));
-    if (has_moved(event->node)) continue;  // comes under one id as it goes under the other: they are as many as before
+    const std::size_t now = group == model_.groups().end()
+                                ? event->subscribers
+                                : group->second->second.subscribers.size();
+    std::uint32_t& number =
+        numbers.try_emplace(event->old_group, static_cast<std::uint32_t>(now)).first->second;
+    if (event->subscribers != number)
+      broken(Checker::events, "a wrong number of subscribers " + text_of(*event));
+    if (has_moved(event->node))
+      continue;  // comes under one id as it goes under the other: they are as many as before
     number = event->operation == ns::SubscriberJoined::kOperation ? number - 1 : number + 1;
   }
 }
@@ -191,13 +200,15 @@ void Checks::sessions() const {
       broken(Checker::grace, "the session of node " + std::to_string(index) + " is gone too early");
     }
     if (actual->second.connected != expected.connected) {
-      broken(Checker::grace, "node " + std::to_string(index) + " counts as " +
-                                 (expected.connected ? "away, and is connected" : "connected, and is away"));
+      broken(Checker::grace,
+             "node " + std::to_string(index) + " counts as " +
+                 (expected.connected ? "away, and is connected" : "connected, and is away"));
     }
     ++actual;
   }
   if (actual != all.end()) {
-    broken(Checker::grace, "the session of node " + std::to_string(actual->first) + " ought to be over");
+    broken(Checker::grace,
+           "the session of node " + std::to_string(actual->first) + " ought to be over");
   }
 }
 
@@ -208,16 +219,18 @@ void Checks::names() const {
   for (const auto& [index, session] : membership.sessions().all()) {
     const std::string& name = (expected++)->second.name;
     if (session.name != name) {
-      broken(Checker::names,
-             "node " + std::to_string(index) + " has the name '" + session.name.str() + "', not '" + name + "'");
+      broken(Checker::names, "node " + std::to_string(index) + " has the name '" +
+                                 session.name.str() + "', not '" + name + "'");
     }
     if (name.empty()) continue;
     ++named;
     if (membership.directory().find(name) != index) {
-      broken(Checker::names, "the directory says of '" + name + "' another owner than node " + std::to_string(index));
+      broken(Checker::names, "the directory says of '" + name + "' another owner than node " +
+                                 std::to_string(index));
     }
   }
-  require(membership.directory().size() == named, Checker::names, "the directory has a name that nobody has");
+  require(membership.directory().size() == named, Checker::names,
+          "the directory has a name that nobody has");
 }
 
 void Checks::node_table() const {
@@ -225,13 +238,16 @@ void Checks::node_table() const {
   for (const auto& [index, session] : all) {
     const NodePlace place = subject_.nodes.find(index);
     const hub::Place& right = session.place;
-    if (!place.exists()) broken(Checker::node_table, "the table lacks node " + std::to_string(index));
-    require(place.shard == right.shard && place.slot == right.slot && place.generation == right.generation,
+    if (!place.exists())
+      broken(Checker::node_table, "the table lacks node " + std::to_string(index));
+    require(place.shard == right.shard && place.slot == right.slot &&
+                place.generation == right.generation,
             Checker::node_table, "the table has a node in another place than it is");
   }
   for (const std::uint32_t index : model_.nodes_given()) {
     if (subject_.nodes.find(index).exists() && !all.contains(index)) {
-      broken(Checker::node_table, "the table has node " + std::to_string(index) + ", which is not there");
+      broken(Checker::node_table,
+             "the table has node " + std::to_string(index) + ", which is not there");
     }
   }
 }
@@ -240,22 +256,25 @@ bool Checks::is_right(const hub::GroupMembers* members, const Model::Topic* topi
   if (topic == nullptr || members == nullptr) return topic == nullptr && members == nullptr;
   if (index_of(members->provider) != topic->service->provider) return false;
   if (!(members->provider_place == subject_.nodes.find(topic->service->provider))) return false;
-  if (members->accepts != (topic->service->terms.direction == proto::ns::Direction::accepts)) return false;
+  if (members->accepts != (topic->service->terms.direction == proto::ns::Direction::accepts))
+    return false;
   std::size_t count = 0;
   for (const auto& list : members->by_shard) count += list.size();
   for (const auto& list : members->paced_by_shard) count += list.size();
   if (count != topic->subscribers.size()) return false;
-  return std::all_of(topic->subscribers.begin(), topic->subscribers.end(), [&](const auto& subscriber) {
-    const NodePlace place = subject_.nodes.find(subscriber.first);
-    if (!Model::pace_of(*topic, subscriber.first)) {
-      const hub::GroupMember* member = members->by_shard[place.shard.value()].find(place.slot);
-      return member != nullptr && member->generation == place.generation;
-    }
-    if (members->paced_by_shard.empty()) return false;
-    const hub::PacedMember* member = members->paced_by_shard[place.shard.value()].find(place.slot);
-    return member != nullptr && member->generation == place.generation &&
-           member->was_plain == subscriber.second.once_plain;
-  });
+  return std::all_of(
+      topic->subscribers.begin(), topic->subscribers.end(), [&](const auto& subscriber) {
+        const NodePlace place = subject_.nodes.find(subscriber.first);
+        if (!Model::pace_of(*topic, subscriber.first)) {
+          const hub::GroupMember* member = members->by_shard[place.shard.value()].find(place.slot);
+          return member != nullptr && member->generation == place.generation;
+        }
+        if (members->paced_by_shard.empty()) return false;
+        const hub::PacedMember* member =
+            members->paced_by_shard[place.shard.value()].find(place.slot);
+        return member != nullptr && member->generation == place.generation &&
+               member->was_plain == subscriber.second.once_plain;
+      });
 }
 
 void Checks::group_table() {
@@ -268,14 +287,15 @@ void Checks::group_table() {
     if (!whole && seen == members && !touched_.contains(group)) continue;
     seen = members;
     if (!is_right(members, &topic->second)) {
-      broken(Checker::group_table,
-             "the table is wrong about group " + std::to_string(group) + ", '" + topic->first + "'");
+      broken(Checker::group_table, "the table is wrong about group " + std::to_string(group) +
+                                       ", '" + topic->first + "'");
     }
   }
   const auto gone = [this](std::uint32_t group) {
     const hub::GroupMembers* members = subject_.groups.find(group);
     if (members != nullptr && !members->ends() && !model_.groups().contains(group)) {
-      broken(Checker::group_table, "the table has group " + std::to_string(group) + ", which nobody provides");
+      broken(Checker::group_table,
+             "the table has group " + std::to_string(group) + ", which nobody provides");
     }
   };
   for (const std::uint32_t group : touched_) gone(group);
@@ -287,20 +307,24 @@ void Checks::commands() {
   std::set<std::uint32_t> released;
   for (const SimShards::Sent& sent : subject_.shards.sent()) {
     if (const auto* attach = std::get_if<hub::AttachCommand>(sent.command)) {
-      places_[index_of(attach->node)] = {sent.shard, attach->session.slot, attach->session.generation};
+      places_[index_of(attach->node)] = {sent.shard, attach->session.slot,
+                                         attach->session.generation};
     } else if (const auto* release = std::get_if<hub::ReleaseCommand>(sent.command)) {
-      require(released.insert(release->session.generation).second, Checker::seam, "a session is released twice");
+      require(released.insert(release->session.generation).second, Checker::seam,
+              "a session is released twice");
     }
   }
   for (const std::uint32_t index : model_.take_ended()) {
     const auto entry = places_.find(index);
     if (released.erase(entry->second.generation) == 0) {
-      broken(Checker::seam, "the shard of node " + std::to_string(index) + " is not told that its session is over");
+      broken(Checker::seam, "the shard of node " + std::to_string(index) +
+                                " is not told that its session is over");
     }
     // It may have an heir in the same step.
     if (!model_.sessions().contains(index)) places_.erase(entry);
   }
-  require(released.empty(), Checker::seam, "a session is released that goes on, or that no shard was given");
+  require(released.empty(), Checker::seam,
+          "a session is released that goes on, or that no shard was given");
 }
 
 void Checks::deadline(milliseconds now) const {

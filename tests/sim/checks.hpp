@@ -11,7 +11,8 @@
 
 namespace gimnet::sim {
 
-/// Compares a hub with the reference model after each of the conductor's steps. Thread safety: none. Errors: Broken.
+/// Compares a hub with the reference model after each of the conductor's steps. Thread safety:
+/// none. Errors: Broken.
 class Checks {
  public:
   struct Subject {

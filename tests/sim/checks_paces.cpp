@@ -1,6 +1,7 @@
 #include "tests/sim/checks.hpp"
 
-// What the shards are told of pace, against what the reference model says that subscribers are owed.
+// What the shards are told of pace, against what the reference model says that subscribers are
+// owed.
 
 namespace gimnet::sim {
 
@@ -34,12 +35,13 @@ void Checks::pace_of(std::uint32_t group, const Model::Topic& topic) const {
     const auto pace = Model::pace_of(topic, index);
     if (!pace) continue;
     const hub::Place& place = places_.at(index);
-    due[{place.shard.value(), place.slot.value(), place.generation}] = {{pace->window, pace->depth, pace->interval_us},
-                                                                        topic.service->terms.retain};
+    due[{place.shard.value(), place.slot.value(), place.generation}] = {
+        {pace->window, pace->depth, pace->interval_us}, topic.service->terms.retain};
   }
   const auto told = paces_.find(group);
   const bool right = told == paces_.end() ? due.empty() : told->second == due;
-  if (!right) broken(Checker::pace, "the shards are told another pace for group " + std::to_string(group));
+  if (!right)
+    broken(Checker::pace, "the shards are told another pace for group " + std::to_string(group));
 }
 
 }  // namespace gimnet::sim

@@ -19,29 +19,33 @@ struct TraceCommand {
   Trace& trace;
   std::uint64_t shard;
   void operator()(const hub::AttachCommand& command) const {
-    trace.note("conductor: shard {a}, attach node {b} by its connection {c}", shard, index_of(command.node),
-               command.attachment, command.welcome.name);
+    trace.note("conductor: shard {a}, attach node {b} by its connection {c}", shard,
+               index_of(command.node), command.attachment, command.welcome.name);
     trace.mix(command.welcome.token);
   }
   void operator()(const hub::SendControlCommand& command) const {
     const auto view = proto::split_control(std::span{command.frame}.subspan(proto::kHeaderSize));
-    trace.note("conductor: shard {a}, say operation {b} to node {c}", shard, view->header.operation & 0x7FFFu,
+    trace.note("conductor: shard {a}, say operation {b} to node {c}", shard,
+               view->header.operation & 0x7FFFu,
                index_of(NodeId{proto::load_header(command.frame.data()).dst}));
     trace.mix(command.frame);
   }
   void operator()(const hub::CloseCommand& command) const {
-    trace.note("conductor: shard {a}, close slot {b} with code {c}: {t}", shard, command.session.slot.value(),
-               static_cast<std::uint64_t>(command.code), command.sentence);
+    trace.note("conductor: shard {a}, close slot {b} with code {c}: {t}", shard,
+               command.session.slot.value(), static_cast<std::uint64_t>(command.code),
+               command.sentence);
   }
   void operator()(const hub::ReleaseCommand& command) const {
-    trace.note("conductor: shard {a}, release slot {b} of generation {c}", shard, command.session.slot.value(),
-               command.session.generation);
+    trace.note("conductor: shard {a}, release slot {b} of generation {c}", shard,
+               command.session.slot.value(), command.session.generation);
   }
   void operator()(const hub::RenumberCommand& command) const {
-    trace.note("conductor: shard {a}, slot {b} is node {c} now", shard, command.session.slot.value(),
-               index_of(command.node));
+    trace.note("conductor: shard {a}, slot {b} is node {c} now", shard,
+               command.session.slot.value(), index_of(command.node));
   }
-  void operator()(const hub::DrainCommand&) const { trace.note("conductor: shard {a}, drain", shard); }
+  void operator()(const hub::DrainCommand&) const {
+    trace.note("conductor: shard {a}, drain", shard);
+  }
   template <class Other>
   void operator()(const Other&) const {
     trace.note("conductor: shard {a}, another command", shard);
@@ -59,28 +63,31 @@ HubLife::HubLife(Setting& setting, const Around& around, const hub::HubStart& st
         return list;
       }()),
       model_(setting.plan.limits, setting.census, kHub, std::move(past)),
-      shards_(setting,
-              {kHub, setting.plan.shards, nodes_, groups_, quiescence_, around.network, around.conductor_wanted,
-               [this](ShardIndex shard, const hub::ShardCommand& command) { checks_.before_it_leaves(shard, command); },
-               around.is_slow}),
+      shards_(setting, {kHub, setting.plan.shards, nodes_, groups_, quiescence_, around.network,
+                        around.conductor_wanted,
+                        [this](ShardIndex shard, const hub::ShardCommand& command) {
+                          checks_.before_it_leaves(shard, command);
+                        },
+                        around.is_slow}),
       checks_({nodes_, groups_, shards_, kHub, model_.limits()}, model_),
       limits_(setting.plan.limits),
-      conductor_(facts(setting), hub::Placement::spread, limits_,
-                 hub::Conductor::Wiring{shards_,
-                                        {nodes_, groups_, quiescence_},
-                                        readable_,
-                                        start,
-                                        [this, keep = around.keep_state](const hub::HubState& state) {
-                                          std::string error = keep(state);
-                                          kept_ = error.empty();
-                                          if (kept_) model_.kept(state, setting_.agenda.now_ms());
-                                          if (!kept_) model_.keeping_failed();
-                                          return error;
-                                        },
-                                        {},
-                                        nullptr,
-                                        [this] { return read_again(); },
-                                        {}}) {
+      conductor_(
+          facts(setting), hub::Placement::spread, limits_,
+          hub::Conductor::Wiring{shards_,
+                                 {nodes_, groups_, quiescence_},
+                                 readable_,
+                                 start,
+                                 [this, keep = around.keep_state](const hub::HubState& state) {
+                                   std::string error = keep(state);
+                                   kept_ = error.empty();
+                                   if (kept_) model_.kept(state, setting_.agenda.now_ms());
+                                   if (!kept_) model_.keeping_failed();
+                                   return error;
+                                 },
+                                 {},
+                                 nullptr,
+                                 [this] { return read_again(); },
+                                 {}}) {
   checks_.watch(conductor_);
   shards_.believe(model_);
 }
@@ -136,7 +143,8 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
     for (const SimShards::Sent& sent : shards_.sent()) {
       if (const auto* found = std::get_if<hub::AttachCommand>(sent.command)) attach = found;
     }
-    require(attach != nullptr, Checker::seam, "somebody is let in, and no shard is given the connection");
+    require(attach != nullptr, Checker::seam,
+            "somebody is let in, and no shard is given the connection");
     model_.admitted(hello, *attach, now);
     newcomer.wire->session = model_.session_of(index_of(attach->node));
   }
@@ -154,13 +162,13 @@ void HubLife::take_event(std::size_t shard) {
   const auto* detached = std::get_if<hub::DetachedEvent>(&event.what);
   if (frame != nullptr) {
     asked = *frame;
-    setting_.trace.note("conductor: shard {a} has {b} bytes from node {c}", shard, frame->frame.size(),
-                        index_of(frame->node));
+    setting_.trace.note("conductor: shard {a} has {b} bytes from node {c}", shard,
+                        frame->frame.size(), index_of(frame->node));
     setting_.trace.mix(frame->frame);
   } else if (detached != nullptr) {
     ended = *detached;
-    setting_.trace.note("conductor: shard {a} lost connection {b} of node {c}: {t}", shard, detached->attachment,
-                        index_of(detached->node), detached->sentence);
+    setting_.trace.note("conductor: shard {a} lost connection {b} of node {c}: {t}", shard,
+                        detached->attachment, index_of(detached->node), detached->sentence);
   }
   std::optional<hub::HeardEvent> first;
   if (const auto* heard = std::get_if<hub::HeardEvent>(&event.what)) first = *heard;
@@ -189,7 +197,8 @@ void HubLife::take_event(std::size_t shard) {
 }
 
 void HubLife::stood_still(milliseconds time) {
-  setting_.trace.note("conductor: stood still for {a} ms", static_cast<std::uint64_t>(time.count()));
+  setting_.trace.note("conductor: stood still for {a} ms",
+                      static_cast<std::uint64_t>(time.count()));
   conductor_.stood_still(time, setting_.agenda.now_ms());
   model_.stood_still(time, setting_.agenda.now_ms());
 }

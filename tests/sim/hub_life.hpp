@@ -10,8 +10,8 @@
 
 namespace gimnet::sim {
 
-/// One life of the hub, from its start to its end or to kill -9: the real conductor, between simulated shards and the
-/// checkers. Thread safety: none.
+/// One life of the hub, from its start to its end or to kill -9: the real conductor, between
+/// simulated shards and the checkers. Thread safety: none.
 class HubLife {
  public:
   static constexpr HubId kHub{7};

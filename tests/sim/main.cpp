@@ -16,8 +16,10 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: gimnet-sim [--seeds N] [--from SEED] [--seed SEED] [--nodes N] [--without FAULT,...]\n"
-    "                  [--trace] [--hashes] [--hashes-to FILE] [--every-fault] [--expect CHECKER] [--checkers]\n"
-    "  --seeds N         so many worlds (500), from seed 1 on; in 500 each fault and collision must come\n"
+    "                  [--trace] [--hashes] [--hashes-to FILE] [--every-fault] [--expect CHECKER] "
+    "[--checkers]\n"
+    "  --seeds N         so many worlds (500), from seed 1 on; in 500 each fault and collision "
+    "must come\n"
     "  --from SEED       from that seed on\n"
     "  --seed SEED       that one world only\n"
     "  --nodes N         nodes in a world (200)\n"
@@ -64,7 +66,8 @@ std::string fault_names() {
 }
 
 void print_checkers() {
-  for (const std::string_view name : kCheckerNames) std::printf("%.*s\n", static_cast<int>(name.size()), name.data());
+  for (const std::string_view name : kCheckerNames)
+    std::printf("%.*s\n", static_cast<int>(name.size()), name.data());
 }
 
 void read_value(Arguments& arguments, std::string_view flag, const char* value) {
@@ -114,8 +117,8 @@ Arguments read(int count, char** values) {
       arguments.hashes = true;
     } else if (flag == "--every-fault") {
       arguments.every_fault = true;
-    } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" || flag == "--without" ||
-               flag == "--expect" || flag == "--hashes-to") {
+    } else if (flag == "--seeds" || flag == "--from" || flag == "--seed" || flag == "--nodes" ||
+               flag == "--without" || flag == "--expect" || flag == "--hashes-to") {
       read_value(arguments, flag, i + 1 < count ? values[i + 1] : nullptr);
       ++i;
     } else {
@@ -128,19 +131,23 @@ Arguments read(int count, char** values) {
 void print_failure(const World::Options& world, const Report& report) {
   for (const std::string& line : report.last) std::printf("%s\n", line.c_str());
   const std::string_view checker = name_of(report.broken->checker);
-  std::printf("\nseed %" PRIu64 " broke at event %" PRIu64 ", step %" PRIu64 " of the conductor\n", report.seed,
-              report.events, report.steps);
-  std::printf("checker %.*s: %s\n", static_cast<int>(checker.size()), checker.data(), report.broken->sentence.c_str());
+  std::printf("\nseed %" PRIu64 " broke at event %" PRIu64 ", step %" PRIu64 " of the conductor\n",
+              report.seed, report.events, report.steps);
+  std::printf("checker %.*s: %s\n", static_cast<int>(checker.size()), checker.data(),
+              report.broken->sentence.c_str());
   std::printf("again: ./dev sim %s --trace\n", arguments_of(world).c_str());
 }
 
 /// What breaks is looked for in the smallest world that breaks in the same way.
 void print_smallest(const World::Options& world, const Report& report) {
   const Shrunk smallest = shrink(world, report);
-  std::printf("smaller, of %" PRIu64 " worlds that were tried, after %" PRIu64 " events instead of %" PRIu64
-              ": ./dev sim %s --trace\n",
-              smallest.tried, smallest.report.events, report.events, arguments_of(smallest.world).c_str());
-  std::printf("its line in tests/sim/regression_seeds.txt says `SEED NODES [--without FAULT,...]` of that\n");
+  std::printf("smaller, of %" PRIu64 " worlds that were tried, after %" PRIu64
+              " events instead of %" PRIu64 ": ./dev sim %s --trace\n",
+              smallest.tried, smallest.report.events, report.events,
+              arguments_of(smallest.world).c_str());
+  std::printf(
+      "its line in tests/sim/regression_seeds.txt says `SEED NODES [--without FAULT,...]` of "
+      "that\n");
 }
 
 /// Must each fault and collision have come?
@@ -150,12 +157,14 @@ bool must_have_everything(const Arguments& arguments) {
 
 int judge(const Arguments& arguments, const Census& census, std::uint64_t steps) {
   if (!arguments.expect.empty()) {
-    std::printf("checker %.*s found nothing in %" PRIu64 " worlds\n", static_cast<int>(arguments.expect.size()),
-                arguments.expect.data(), arguments.seeds);
+    std::printf("checker %.*s found nothing in %" PRIu64 " worlds\n",
+                static_cast<int>(arguments.expect.size()), arguments.expect.data(),
+                arguments.seeds);
     return 1;
   }
   if (arguments.hashes) return 0;
-  std::printf("%s%" PRIu64 " worlds of %zu nodes, %" PRIu64 " steps of the conductor: nothing wrong\n",
+  std::printf("%s%" PRIu64 " worlds of %zu nodes, %" PRIu64
+              " steps of the conductor: nothing wrong\n",
               census.table().c_str(), arguments.seeds, arguments.world.nodes, steps);
   const std::vector<std::string> missing = census.missing();
   std::string names;
@@ -189,8 +198,10 @@ int run(const Arguments& arguments) {
     if (arguments.hashes) std::printf("%s", line);
     hashes += line;
     if (report.broken) {
-      // A planted bug shows itself in more than one way: another checker may be the first in this world.
-      if (!arguments.expect.empty() && arguments.expect != name_of(report.broken->checker)) continue;
+      // A planted bug shows itself in more than one way: another checker may be the first in this
+      // world.
+      if (!arguments.expect.empty() && arguments.expect != name_of(report.broken->checker))
+        continue;
       print_failure(options, report);
       if (!arguments.expect.empty()) return 0;
       if (!arguments.hashes && !arguments.world.print) print_smallest(options, report);

@@ -16,7 +16,8 @@ std::string quoted(const std::string& name) { return "'" + name + "'"; }
 /// Which one minds that a HELLO was refused with another code than is due, or let in.
 Checker checker_of(GoodbyeCode said, std::optional<GoodbyeCode> due) {
   if (said == GoodbyeCode::draining || due == GoodbyeCode::draining) return Checker::drain;
-  return said == GoodbyeCode::hub_full || due == GoodbyeCode::hub_full ? Checker::limits : Checker::names;
+  return said == GoodbyeCode::hub_full || due == GoodbyeCode::hub_full ? Checker::limits
+                                                                       : Checker::names;
 }
 
 }  // namespace
@@ -30,7 +31,8 @@ Model::Model(const hub::Limits& limits, Census& census, HubId hub, Past past)
   }
 }
 
-std::optional<GoodbyeCode> Model::judge_name(const std::string& name, std::uint32_t claimant) const {
+std::optional<GoodbyeCode> Model::judge_name(const std::string& name,
+                                             std::uint32_t claimant) const {
   if (proto::node_name_fault(name) != nullptr) return GoodbyeCode::bad_name;
   const auto holder = names_.find(name);
   if (holder == names_.end() || holder->second == claimant) return std::nullopt;
@@ -52,7 +54,8 @@ void Model::judge_token(const Hello& hello, Verdict& verdict) const {
     if (token.name == hello.hello.name) verdict.former = token;
     return;
   }
-  const std::uint64_t number = moved == moved_.end() ? holder->second.token_number : moved->second.token_number;
+  const std::uint64_t number =
+      moved == moved_.end() ? holder->second.token_number : moved->second.token_number;
   if (number == token.number && holder->second.token_name == token.name) verdict.session = index;
 }
 
@@ -62,14 +65,17 @@ void Model::count_token(const Hello& hello, const Verdict& verdict) {
   if (found == past_.tokens.end() || verdict.session != 0) return;
   if (verdict.former) {
     const bool earlier_life = past_.nodes.given.contains(found->second.index);
-    return census_.add(earlier_life ? Happening::restored_after_restart : Happening::restored_after_grace);
+    return census_.add(earlier_life ? Happening::restored_after_restart
+                                    : Happening::restored_after_grace);
   }
   if (found->second.expiry <= hello.wall) return census_.add(Happening::token_expired);
-  if (found->second.identity != hello.identity) return census_.add(Happening::token_of_another_identity);
+  if (found->second.identity != hello.identity)
+    return census_.add(Happening::token_of_another_identity);
   const auto kicked = [&](const Kicked& one) {
     return one.index == found->second.index && one.number >= found->second.number;
   };
-  if (std::any_of(past_.kicked.begin(), past_.kicked.end(), kicked)) census_.add(Happening::kicked_token_refused);
+  if (std::any_of(past_.kicked.begin(), past_.kicked.end(), kicked))
+    census_.add(Happening::kicked_token_refused);
   census_.add(Happening::token_of_the_past);
 }
 
@@ -79,7 +85,8 @@ Model::Verdict Model::judge(const Hello& hello) const {
     verdict.refusal = GoodbyeCode::draining;
     return verdict;
   }
-  const bool known_role = hello.hello.role == Role::node || (hello.hello.role == Role::admin && hello.may_administer);
+  const bool known_role =
+      hello.hello.role == Role::node || (hello.hello.role == Role::admin && hello.may_administer);
   if (!known_role) {
     verdict.refusal = GoodbyeCode::not_allowed;
     return verdict;
@@ -89,8 +96,10 @@ Model::Verdict Model::judge(const Hello& hello) const {
   if (verdict.refusal || verdict.session != 0) return verdict;
   const auto holder = names_.find(hello.hello.name);
   // With an administrator beyond the limit more would have to go than make way.
-  const std::size_t going = (holder != names_.end() ? 1u : 0u) + (longest_away_nameless() ? 1u : 0u);
-  if (sessions_.size() - going >= places_for(hello.hello.role)) verdict.refusal = GoodbyeCode::hub_full;
+  const std::size_t going =
+      (holder != names_.end() ? 1u : 0u) + (longest_away_nameless() ? 1u : 0u);
+  if (sessions_.size() - going >= places_for(hello.hello.role))
+    verdict.refusal = GoodbyeCode::hub_full;
   return verdict;
 }
 
@@ -111,7 +120,8 @@ void Model::refused(const Hello& hello, const proto::Goodbye& goodbye, milliseco
   broken(checker_of(goodbye.code, verdict.refusal),
          std::string{"a HELLO for the name "} + quoted(hello.hello.name) + " is refused with " +
              proto::goodbye_name(goodbye.code) + " (" + goodbye.sentence + "), where " +
-             (verdict.refusal ? std::string{proto::goodbye_name(*verdict.refusal)} + " is due" : "it is to be let in"));
+             (verdict.refusal ? std::string{proto::goodbye_name(*verdict.refusal)} + " is due"
+                              : "it is to be let in"));
 }
 
 void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milliseconds now) {
@@ -119,26 +129,30 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   const std::uint32_t index = index_of(attach.node);
   if (verdict.refusal) {
     // Its own name stands in nobody's way whose token counts: the hub took one that does not.
-    const bool by_token =
-        *verdict.refusal == GoodbyeCode::name_taken && !attach.new_session && verdict.session != index;
+    const bool by_token = *verdict.refusal == GoodbyeCode::name_taken && !attach.new_session &&
+                          verdict.session != index;
     broken(by_token ? Checker::tokens : checker_of(*verdict.refusal, verdict.refusal),
-           "a HELLO for the name " + quoted(hello.hello.name) + " is let in as node " + std::to_string(index) +
-               ", where " + proto::goodbye_name(*verdict.refusal) + " is due");
+           "a HELLO for the name " + quoted(hello.hello.name) + " is let in as node " +
+               std::to_string(index) + ", where " + proto::goodbye_name(*verdict.refusal) +
+               " is due");
   }
   const std::uint32_t due = verdict.former ? verdict.former->index : verdict.session;
-  const bool right = attach.new_session ? verdict.session == 0 && (due == 0 || due == index) : verdict.session == index;
+  const bool right = attach.new_session ? verdict.session == 0 && (due == 0 || due == index)
+                                        : verdict.session == index;
   if (!right) {
     broken(Checker::tokens, "a HELLO whose token is of " +
-                                (due == 0 ? std::string{"nobody"} : "node " + std::to_string(due)) + " gets " +
-                                (attach.new_session ? "a new session as" : "the session of") + " node " +
-                                std::to_string(index));
+                                (due == 0 ? std::string{"nobody"} : "node " + std::to_string(due)) +
+                                " gets " +
+                                (attach.new_session ? "a new session as" : "the session of") +
+                                " node " + std::to_string(index));
   }
   count_token(hello, verdict);
   make_way(hello, verdict, now);
   take_session(hello, verdict, index, now);
   Session& session = sessions_.at(index);
   generations_[index] = attach.session.generation;
-  if (!hello.hello.name.empty() && hello.hello.name != session.name) take_name(index, hello.hello.name, now);
+  if (!hello.hello.name.empty() && hello.hello.name != session.name)
+    take_name(index, hello.hello.name, now);
   session.role = hello.hello.role;
   session.description = hello.hello.description;
   session.place = hello.place;
@@ -158,7 +172,8 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   session.last_goodbye = 0;
 }
 
-void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now) {
+void Model::take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index,
+                         milliseconds now) {
   if (verdict.session == 0) {
     if (!verdict.former) take_new_index(index, now);
     give_node(index, !verdict.former);
@@ -236,11 +251,14 @@ void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
   Session& session = sessions_.at(index);
   const bool left = event.said_by_peer && event.code == GoodbyeCode::done;
   const bool misconduct =
-      !event.said_by_peer && (event.code == GoodbyeCode::malformed || event.code == GoodbyeCode::wrong_source ||
-                              event.code == GoodbyeCode::not_allowed || event.code == GoodbyeCode::too_many_requests ||
-                              event.code == GoodbyeCode::oddities);
+      !event.said_by_peer &&
+      (event.code == GoodbyeCode::malformed || event.code == GoodbyeCode::wrong_source ||
+       event.code == GoodbyeCode::not_allowed || event.code == GoodbyeCode::too_many_requests ||
+       event.code == GoodbyeCode::oddities);
   if (left) census_.add(Happening::goodbye);
-  if (misconduct) census_.add(session.name.empty() ? Happening::misconduct_nameless : Happening::misconduct_named);
+  if (misconduct)
+    census_.add(session.name.empty() ? Happening::misconduct_nameless
+                                     : Happening::misconduct_named);
   if (left || (misconduct && session.name.empty())) {
     least_[index] = session.token_number + 1;
     for (const std::uint32_t each : former(index)) least_[each] = moved_.at(each).token_number + 1;
@@ -261,7 +279,8 @@ void Model::stood_still(milliseconds time, milliseconds now) {
   for (auto& [index, session] : sessions_) {
     const bool was_over = session.away_until <= now;
     put_off(session.away_until);
-    if (!session.connected && was_over && session.away_until > now) census_.add(Happening::grace_put_off);
+    if (!session.connected && was_over && session.away_until > now)
+      census_.add(Happening::grace_put_off);
     put_off(session.declare_until);
   }
   put_off(past_.returns_until);
@@ -278,7 +297,8 @@ void Model::ticked(milliseconds now) {
   }
   std::vector<std::pair<std::uint64_t, std::uint32_t>> silent;
   for (const auto& [index, session] : sessions_) {
-    if (session.declares && session.declare_until <= now) silent.emplace_back(session.declare_order, index);
+    if (session.declares && session.declare_until <= now)
+      silent.emplace_back(session.declare_order, index);
   }
   std::sort(silent.begin(), silent.end());
   for (const auto& [order, index] : silent) {
@@ -303,8 +323,10 @@ void Model::end(std::uint32_t index, milliseconds now) {
   rest(resting_ids_, index, now);
 }
 
-void Model::rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index, milliseconds now) {
-  resting[index] = now + milliseconds{limits_.grace_ms + std::max(limits_.block_ms, limits_.slow_consumer_ms)};
+void Model::rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
+                 milliseconds now) {
+  resting[index] =
+      now + milliseconds{limits_.grace_ms + std::max(limits_.block_ms, limits_.slow_consumer_ms)};
 }
 
 const Model::Session* Model::known(const hub::SessionRef& ref, NodeId node) const {
@@ -317,7 +339,8 @@ std::optional<milliseconds> Model::next_deadline() const {
   std::optional<milliseconds> next;
   for (const auto& [index, session] : sessions_) {
     if (!session.connected && (!next || session.away_until < *next)) next = session.away_until;
-    if (session.connected && session.declares && (!next || session.declare_until < *next)) next = session.declare_until;
+    if (session.connected && session.declares && (!next || session.declare_until < *next))
+      next = session.declare_until;
   }
   return next;
 }

@@ -57,14 +57,16 @@ struct Kicked {
   milliseconds expiry{};
 };
 
-/// Indices that were given out in earlier lives, and that a hub must not give to newcomers as long as it has others,
-/// nor while those who had them may come back.
+/// Indices that were given out in earlier lives, and that a hub must not give to newcomers as long
+/// as it has others, nor while those who had them may come back.
 struct GivenIds {
   std::set<std::uint32_t> given;
   std::uint32_t old = 0;  ///< all up to this one were given before the world began
   hub::IndexSet used;     ///< what this life began with: those, and what was granted and not given
 
-  [[nodiscard]] bool contains(std::uint32_t index) const { return index <= old || given.contains(index); }
+  [[nodiscard]] bool contains(std::uint32_t index) const {
+    return index <= old || given.contains(index);
+  }
   /// So few others that the hub may run out of them.
   [[nodiscard]] bool few_left() const { return kEveryIndex - 1 - old < 1'000; }
 };
@@ -76,7 +78,8 @@ struct GivenProof {
   std::uint64_t forgettings = 0;  ///< of groups, until then
 };
 
-/// What outlives the hub: tokens that nodes hold, and the indices that it must not give to newcomers any more.
+/// What outlives the hub: tokens that nodes hold, and the indices that it must not give to
+/// newcomers any more.
 struct Past {
   std::map<std::vector<std::byte>, GivenToken> tokens;
   GivenIds nodes;
@@ -89,10 +92,10 @@ struct Past {
   milliseconds returns_until{};     ///< nodes of the past may come back under their ids
 };
 
-/// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was told and what it
-/// answered. It shares no code with the hub but the messages, names and patterns (src/proto). Where the hub may choose
-/// (a new id) the model takes the choice over and checks that it was allowed.
-/// Thread safety: none. Errors: Broken, thrown at the first difference.
+/// The reference: what a hub owes its nodes, kept in the plainest way, from what the conductor was
+/// told and what it answered. It shares no code with the hub but the messages, names and patterns
+/// (src/proto). Where the hub may choose (a new id) the model takes the choice over and checks that
+/// it was allowed. Thread safety: none. Errors: Broken, thrown at the first difference.
 class Model final : public Witness {
  public:
   Model(const hub::Limits& limits, Census& census, HubId hub, Past past);
@@ -121,7 +124,8 @@ class Model final : public Witness {
     std::uint64_t declare_order = 0;
     std::uint32_t life = 0;  ///< counts its returns
     bool declares = false;
-    std::map<std::string, std::uint32_t> provides;    ///< full name: life in which it was declared last
+    std::map<std::string, std::uint32_t>
+        provides;  ///< full name: life in which it was declared last
     std::map<std::string, std::uint32_t> subscribes;  ///< the same
     std::uint16_t last_goodbye = 0;
   };
@@ -142,7 +146,8 @@ class Model final : public Witness {
     Terms terms;
     // In the present group:
     bool once_plain = false;  ///< it got everything, and is paced now
-    bool once_paced = false;  ///< it was paced and wants no bound any more: it stays so, without one
+    bool once_paced =
+        false;  ///< it was paced and wants no bound any more: it stays so, without one
   };
   /// A full name that somebody provides or waits for.
   struct Topic {
@@ -170,8 +175,10 @@ class Model final : public Witness {
   void detached(const hub::DetachedEvent& event, milliseconds now);
   void ticked(milliseconds now);
   void stood_still(milliseconds time, milliseconds now);
-  /// The answer to a request, nothing if there was none. `closed`: its connection was closed for asking in vain.
-  void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer, bool closed, milliseconds now);
+  /// The answer to a request, nothing if there was none. `closed`: its connection was closed for
+  /// asking in vain.
+  void asked(const hub::ControlFrameEvent& event, const hub::SendControlCommand* answer,
+             bool closed, milliseconds now);
   /// The hub keeps that on its disk, in the midst of a step.
   void kept(const hub::HubState& state, milliseconds now);
   /// It could not, in the midst of a step.
@@ -199,7 +206,9 @@ class Model final : public Witness {
   /// nullptr: nobody provides it, and nobody waits for it.
   [[nodiscard]] const Topic* topic(const std::string& full_name) const;
   /// By group index. Never null.
-  [[nodiscard]] const std::map<std::uint32_t, const Topics::value_type*>& groups() const { return groups_; }
+  [[nodiscard]] const std::map<std::uint32_t, const Topics::value_type*>& groups() const {
+    return groups_;
+  }
   /// Group and node indices that were ever given out, in this order.
   [[nodiscard]] const std::vector<std::uint32_t>& groups_given() const { return groups_given_; }
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_given() const { return nodes_given_; }
@@ -229,8 +238,10 @@ class Model final : public Witness {
   [[nodiscard]] Verdict judge(const Hello& hello) const;
   void judge_token(const Hello& hello, Verdict& verdict) const;
   void count_token(const Hello& hello, const Verdict& verdict);
-  void take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index, milliseconds now);
-  [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name, std::uint32_t claimant) const;
+  void take_session(const Hello& hello, const Verdict& verdict, std::uint32_t index,
+                    milliseconds now);
+  [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name,
+                                                             std::uint32_t claimant) const;
   void make_way(const Hello& hello, const Verdict& verdict, milliseconds now);
   /// How many sessions there may be once somebody of that role was let in.
   [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
@@ -240,14 +251,16 @@ class Model final : public Witness {
   /// `granted`: that was kept before.
   void give_node(std::uint32_t index, bool granted);
   void keep_forgettings(const hub::HubState& state, milliseconds now);
-  void give_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof);
+  void give_proof(std::uint32_t group, const std::string& full_name,
+                  const std::vector<std::byte>& proof);
   /// Does the proof count that says so?
   [[nodiscard]] bool counts(std::uint32_t group, const GivenProof& proof) const;
-  [[nodiscard]] bool is_proven(const std::string& full_name, const proto::ns::Advertise& terms) const;
+  [[nodiscard]] bool is_proven(const std::string& full_name,
+                               const proto::ns::Advertise& terms) const;
   /// Can any service prove that the group is its own?
   [[nodiscard]] bool is_somebodys(std::uint32_t group) const;
-  [[nodiscard]] bool rests(const std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
-                           milliseconds now) const;
+  [[nodiscard]] bool rests(const std::map<std::uint32_t, milliseconds>& resting,
+                           std::uint32_t index, milliseconds now) const;
   void take_name(std::uint32_t index, const std::string& name, milliseconds now);
   void end(std::uint32_t index, milliseconds now);
   void rest(std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index, milliseconds now);
@@ -308,7 +321,9 @@ class Model final : public Witness {
   void judge_unsubscribe(const Asked& asked);
   void require_status(const Asked& asked, proto::Status status, Checker checker);
   [[nodiscard]] NodeId id(std::uint32_t index) const { return make_id<NodeId>(hub_, index); }
-  [[nodiscard]] GroupId group_id(std::uint32_t index) const { return make_id<GroupId>(hub_, index); }
+  [[nodiscard]] GroupId group_id(std::uint32_t index) const {
+    return make_id<GroupId>(hub_, index);
+  }
 
   /// Where a node went, and the number of the tokens that it had there.
   struct Moved {
@@ -328,14 +343,16 @@ class Model final : public Witness {
   std::vector<std::uint32_t> nodes_given_;
   std::vector<std::uint32_t> ended_;
   std::set<std::uint32_t> touched_;
-  Past past_;                                          ///< of earlier lives, and the tokens of this one
-  std::map<std::uint32_t, std::uint64_t> least_;       ///< index: sessions below that number are over for good
+  Past past_;  ///< of earlier lives, and the tokens of this one
+  std::map<std::uint32_t, std::uint64_t>
+      least_;  ///< index: sessions below that number are over for good
   std::map<std::uint32_t, milliseconds> resting_ids_;  ///< index: until when
   std::map<std::uint32_t, milliseconds> resting_groups_;
   std::map<std::uint32_t, Moved> moved_;  ///< by former index
-  std::set<std::uint32_t> unkept_;        ///< indices that were not granted, given while nothing can be kept
-  bool keeping_failed_ = false;           ///< in this step
-  bool few_nodes_left_ = false;           ///< when the last step was over: newcomers may be refused
+  std::set<std::uint32_t>
+      unkept_;                   ///< indices that were not granted, given while nothing can be kept
+  bool keeping_failed_ = false;  ///< in this step
+  bool few_nodes_left_ = false;  ///< when the last step was over: newcomers may be refused
   bool few_groups_left_ = false;
   std::set<std::uint32_t> forgotten_nodes_;  ///< given in this life, and not kept as used any more
   std::set<std::uint32_t> forgotten_groups_;

@@ -72,7 +72,8 @@ void Model::judge_reassign(const Asked& asked) {
   const HubId owner = hub_of(wanted->new_node);
   const std::uint32_t to = index_of(wanted->new_node);
   const bool legal = (owner == hub_ || owner == kOwnHub) && to != kHubIndex && to < kEveryIndex;
-  if (index == asked.index || !legal) return require_status(asked, Status::bad_request, Checker::answers);
+  if (index == asked.index || !legal)
+    return require_status(asked, Status::bad_request, Checker::answers);
   const bool rests = this->rests(resting_ids_, to, asked.now);
   const bool awaiting = asked.now < past_.returns_until;
   const bool awaited = awaiting && past_.nodes.used.contains(to);
@@ -111,7 +112,9 @@ void Model::renumber(std::uint32_t index, std::uint32_t to, milliseconds now) {
     auto subscriber = topics_.at(full_name).subscribers.extract(index);
     subscriber.key() = to;
     topics_.at(full_name).subscribers.insert(std::move(subscriber));
-    if (const Service* provided = service(full_name); provided != nullptr && provided->provider == to) continue;
+    if (const Service* provided = service(full_name);
+        provided != nullptr && provided->provider == to)
+      continue;
     tell_provider(full_name, to, true);
     tell_provider(full_name, index, false);
   }
@@ -134,14 +137,16 @@ std::vector<std::uint32_t> Model::former(std::uint32_t index) const {
 }
 
 void Model::judge_drain(const Asked& asked) {
-  if (!proto::decode<ctrl::Drain>(asked.payload)) return require_status(asked, Status::bad_request, Checker::answers);
+  if (!proto::decode<ctrl::Drain>(asked.payload))
+    return require_status(asked, Status::bad_request, Checker::answers);
   require_status(asked, Status::done, Checker::drain);
   census_.add(Happening::drain_asked_for);
   drain_wanted_ = true;
 }
 
 void Model::judge_reload(const Asked& asked) {
-  if (!proto::decode<ctrl::Reload>(asked.payload)) return require_status(asked, Status::bad_request, Checker::answers);
+  if (!proto::decode<ctrl::Reload>(asked.payload))
+    return require_status(asked, Status::bad_request, Checker::answers);
   if (!configuration_) {
     census_.add(Happening::configuration_refused);
     return require_status(asked, Status::bad_request, Checker::answers);

@@ -13,7 +13,8 @@ namespace ns = proto::ns;
 
 Status Model::judge_delivery(const ns::Advertise& offer) const {
   const bool counted = offer.delivery == ns::Delivery::sync;
-  if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
+  if (offer.direction == ns::Direction::accepts && (counted || offer.retain))
+    return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
   return counted && offer.window > limits_.sync_window ? Status::bad_request : Status::done;
 }
@@ -36,9 +37,10 @@ std::optional<Model::Terms> Model::pace_of(const Topic& topic, std::uint32_t sub
 
 bool Model::terms_fit(const ns::Subscribe& wanted) const {
   const double rate = wanted.rate_hz;
-  const bool rate_fits = rate == 0.0 || (rate >= 0.001 && rate <= static_cast<double>(limits_.subscription_rate_hz));
-  return wanted.window <= limits_.sync_window && wanted.depth >= 1 && wanted.depth <= limits_.subscription_depth &&
-         rate_fits;
+  const bool rate_fits =
+      rate == 0.0 || (rate >= 0.001 && rate <= static_cast<double>(limits_.subscription_rate_hz));
+  return wanted.window <= limits_.sync_window && wanted.depth >= 1 &&
+         wanted.depth <= limits_.subscription_depth && rate_fits;
 }
 
 void Model::judge_subscribe(const Asked& asked) {
@@ -49,14 +51,17 @@ void Model::judge_subscribe(const Asked& asked) {
     return require_status(asked, Status::bad_request, Checker::limits);
   }
   const double rate = wanted->rate_hz;
-  const Terms terms{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
+  const Terms terms{wanted->window, wanted->depth,
+                    rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
   Session& session = asked.session;
   const bool fresh = !session.subscribes.contains(wanted->name);
-  const bool said_before = !fresh && topics_.at(wanted->name).subscribers.at(asked.index).terms == terms;
+  const bool said_before =
+      !fresh && topics_.at(wanted->name).subscribers.at(asked.index).terms == terms;
   if (!said_before && !may_declare(asked, Happening::subscriptions_rate)) {
     return require_status(asked, Status::rate, Checker::limits);
   }
-  if (!proto::valid_name(wanted->name)) return require_status(asked, Status::bad_request, Checker::answers);
+  if (!proto::valid_name(wanted->name))
+    return require_status(asked, Status::bad_request, Checker::answers);
   if (fresh && session.subscribes.size() >= limits_.subscriptions_per_node) {
     census_.add(Happening::subscriptions_limit);
     return require_status(asked, Status::limit, Checker::limits);
@@ -104,8 +109,10 @@ void Model::judge_subscribe_answer(const Asked& asked, const Topic& topic) {
   }
   require(answer.has_value() && answer->group == due.group, Checker::answers,
           "SUBSCRIBE is answered with a wrong group");
-  require(answer->window == due.window, Checker::pace, "SUBSCRIBE is answered with another window than is in force");
-  require(*answer == due, Checker::answers, "SUBSCRIBE is answered with other terms than the provider's");
+  require(answer->window == due.window, Checker::pace,
+          "SUBSCRIBE is answered with another window than is in force");
+  require(*answer == due, Checker::answers,
+          "SUBSCRIBE is answered with other terms than the provider's");
 }
 
 void Model::judge_unsubscribe(const Asked& asked) {

@@ -13,12 +13,15 @@ namespace ns = proto::ns;
 
 void Model::judge_register(const Asked& asked) {
   const auto wanted = proto::decode<ns::RegisterName>(asked.payload);
-  if (!wanted || wanted->name.empty()) return require_status(asked, Status::bad_request, Checker::answers);
+  if (!wanted || wanted->name.empty())
+    return require_status(asked, Status::bad_request, Checker::answers);
   const std::string& name = wanted->name;
   if (name != asked.session.name) {
-    if (!may_declare(asked, Happening::names_rate)) return require_status(asked, Status::rate, Checker::limits);
+    if (!may_declare(asked, Happening::names_rate))
+      return require_status(asked, Status::rate, Checker::limits);
     const std::optional<GoodbyeCode> refusal = judge_name(name, asked.index);
-    if (refusal == GoodbyeCode::bad_name) return require_status(asked, Status::bad_request, Checker::names);
+    if (refusal == GoodbyeCode::bad_name)
+      return require_status(asked, Status::bad_request, Checker::names);
     if (refusal) return require_status(asked, Status::taken, Checker::names);
   }
   require_status(asked, Status::done, Checker::names);
@@ -34,7 +37,8 @@ void Model::judge_unregister(const Asked& asked) {
     return require_status(asked, Status::bad_request, Checker::answers);
   }
   if (asked.session.name.empty()) return require_status(asked, Status::not_found, Checker::names);
-  if (!may_declare(asked, Happening::names_rate)) return require_status(asked, Status::rate, Checker::limits);
+  if (!may_declare(asked, Happening::names_rate))
+    return require_status(asked, Status::rate, Checker::limits);
   require_status(asked, Status::done, Checker::names);
   const auto answer = proto::decode_answer<ns::UnregisterNameAnswer>(asked.answer);
   require(answer.has_value(), Checker::answers, "the answer to UNREGISTER cannot be read");
@@ -42,7 +46,8 @@ void Model::judge_unregister(const Asked& asked) {
   renamed(asked, "", answer->token);
 }
 
-void Model::renamed(const Asked& asked, const std::string& name, const std::vector<std::byte>& token) {
+void Model::renamed(const Asked& asked, const std::string& name,
+                    const std::vector<std::byte>& token) {
   if (name != asked.session.name) {
     const auto holder = name.empty() ? names_.end() : names_.find(name);
     if (holder != names_.end()) {
@@ -52,13 +57,14 @@ void Model::renamed(const Asked& asked, const std::string& name, const std::vect
     take_name(asked.index, name, asked.now);
     asked.session.token_name = name;
   }
-  past_.tokens[token] = {asked.index, asked.session.token_number, asked.session.token_name, asked.session.identity,
-                         asked.session.token_expiry};
+  past_.tokens[token] = {asked.index, asked.session.token_number, asked.session.token_name,
+                         asked.session.identity, asked.session.token_expiry};
 }
 
 void Model::judge_watch(const Asked& asked) {
   const auto wanted = proto::decode<ns::Watch>(asked.payload);
-  const bool legal = wanted && wanted->watch != 0 && (wanted->pattern.empty() || proto::valid_pattern(wanted->pattern));
+  const bool legal = wanted && wanted->watch != 0 &&
+                     (wanted->pattern.empty() || proto::valid_pattern(wanted->pattern));
   if (!legal) return require_status(asked, Status::bad_request, Checker::answers);
   std::size_t all = 0;
   for (const auto& [index, session] : sessions_) all += session.watches.size();

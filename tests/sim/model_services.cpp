@@ -17,8 +17,9 @@ void count_delivery(const ns::Advertise& terms, Census& census) {
 }
 
 bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
-  return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
-         a.delivery == b.delivery && Model::window_of(a) == Model::window_of(b) && a.retain == b.retain;
+  return a.message_type == b.message_type && a.instance == b.instance &&
+         a.direction == b.direction && a.delivery == b.delivery &&
+         Model::window_of(a) == Model::window_of(b) && a.retain == b.retain;
 }
 
 bool same_terms(const ns::Advertise& a, const ns::Advertise& b) {
@@ -47,8 +48,8 @@ void Model::forget_if_unused(const std::string& full_name) {
   if (!found->second.service && found->second.subscribers.empty()) topics_.erase(found);
 }
 
-void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
-                       const ns::Advertise& terms) {
+void Model::tell_moved(const std::string& full_name, std::uint32_t old_group,
+                       std::uint32_t new_group, const ns::Advertise& terms) {
   const Topic& topic = topics_.at(full_name);
   for (const auto& [subscriber, asked] : topic.subscribers) {
     DueEvent event;
@@ -61,7 +62,8 @@ void Model::tell_moved(const std::string& full_name, std::uint32_t old_group, st
     event.delivery = terms.delivery;
     event.retain = terms.retain;
     event.direction = terms.direction;
-    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt) event.window = pace->window;
+    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt)
+      event.window = pace->window;
     due_.push_back(std::move(event));
   }
 }
@@ -118,7 +120,8 @@ void Model::judge_advertise(const Asked& asked) {
   if (!offer) return require_status(asked, Status::bad_request, Checker::answers);
   Session& session = asked.session;
   const std::string full_name = proto::join_service_name(session.name, offer->service);
-  if (session.name.empty() || !proto::valid_service_name(offer->service) || !proto::valid_name(full_name)) {
+  if (session.name.empty() || !proto::valid_service_name(offer->service) ||
+      !proto::valid_name(full_name)) {
     return require_status(asked, Status::bad_request, Checker::answers);
   }
   if (const Status status = judge_delivery(*offer); status != Status::done) {
@@ -126,16 +129,19 @@ void Model::judge_advertise(const Asked& asked) {
     return require_status(asked, status, Checker::limits);
   }
   const Service* known = service(full_name);
-  const bool said_before = known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
+  const bool said_before =
+      known != nullptr && known->provider == asked.index && same_terms(known->terms, *offer);
   if (!said_before && !may_declare(asked, Happening::services_rate))
     return require_status(asked, Status::rate, Checker::limits);
-  if (known != nullptr && known->provider != asked.index) return require_status(asked, Status::taken, Checker::names);
+  if (known != nullptr && known->provider != asked.index)
+    return require_status(asked, Status::taken, Checker::names);
   if (known == nullptr && session.provides.size() >= limits_.services_per_node) {
     census_.add(Happening::services_limit);
     return require_status(asked, Status::limit, Checker::limits);
   }
   const bool needs_group = known == nullptr || !same_stream(known->terms, *offer);
-  const bool refused = proto::read_status(proto::split_control(asked.answer)->body).status == Status::limit;
+  const bool refused =
+      proto::read_status(proto::split_control(asked.answer)->body).status == Status::limit;
   if (needs_group && refused && few_groups_left_) {
     if (known != nullptr) session.provides[full_name] = session.life;
     return census_.add(Happening::waits_for_returns);
@@ -162,14 +168,18 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
   const bool claims = service(full_name) == nullptr && free(former);
   if (claims && is_proven(full_name, terms)) {
     census_.add(Happening::former_group_kept);
-    require(group == former, Checker::answers, "a service that came back does not get its former group");
+    require(group == former, Checker::answers,
+            "a service that came back does not get its former group");
   } else {
     if (claims) census_.add(Happening::former_group_unproven);
-    require(!past_.groups.contains(group), Checker::ids, "a new service gets a group given out before the restart");
-    require(!is_somebodys(group), Checker::ids, "a new service gets a group that another one can prove to have had");
+    require(!past_.groups.contains(group), Checker::ids,
+            "a new service gets a group given out before the restart");
+    require(!is_somebodys(group), Checker::ids,
+            "a new service gets a group that another one can prove to have had");
   }
   require(!groups_.contains(group), Checker::ids, "a service gets the group of another one");
-  require(!rests(resting_groups_, group, asked.now), Checker::ids, "a service gets a group that rests");
+  require(!rests(resting_groups_, group, asked.now), Checker::ids,
+          "a service gets a group that rests");
   const auto entry = topics_.try_emplace(full_name).first;
   const std::uint32_t old_group = entry->second.service ? entry->second.service->group : 0;
   if (old_group != 0) {
@@ -181,7 +191,8 @@ void Model::open_group(const Asked& asked, const std::string& full_name, std::ui
     census_.add(old_group != 0 ? Happening::service_moved : Happening::subscribed_before_service);
   }
   entry->second.service = Service{group, asked.index, terms, ++streams_};
-  for (auto& [index, subscriber] : entry->second.subscribers) subscriber.once_plain = subscriber.once_paced = false;
+  for (auto& [index, subscriber] : entry->second.subscribers)
+    subscriber.once_plain = subscriber.once_paced = false;
   count_delivery(terms, census_);
   touched_.insert(group);
   groups_[group] = &*entry;
@@ -194,10 +205,12 @@ void Model::judge_withdraw(const Asked& asked) {
   const auto wanted = proto::decode<ns::Withdraw>(asked.payload);
   if (!wanted) return require_status(asked, Status::bad_request, Checker::answers);
   const HubId owner = hub_of(wanted->group);
-  const auto found = owner == hub_ || owner == kOwnHub ? groups_.find(index_of(wanted->group)) : groups_.end();
+  const auto found =
+      owner == hub_ || owner == kOwnHub ? groups_.find(index_of(wanted->group)) : groups_.end();
   if (found == groups_.end()) return require_status(asked, Status::not_found, Checker::answers);
   const auto& [full_name, entry] = *found->second;
-  if (entry.service->provider != asked.index) return require_status(asked, Status::denied, Checker::answers);
+  if (entry.service->provider != asked.index)
+    return require_status(asked, Status::denied, Checker::answers);
   require_status(asked, Status::done, Checker::answers);
   withdraw(std::string{full_name}, asked.now);
 }

@@ -5,7 +5,8 @@
 namespace gimnet::sim {
 namespace {
 
-/// The kernel's least time until it sends again what was lost (Linux, TCP_RTO_MIN). What comes after it waits for it.
+/// The kernel's least time until it sends again what was lost (Linux, TCP_RTO_MIN). What comes
+/// after it waits for it.
 constexpr Time kResendAfter = std::chrono::milliseconds{200};
 constexpr Time kClogMost = std::chrono::seconds{5};
 
@@ -24,7 +25,8 @@ Time Network::arrival(Time& next) {
 }
 
 Time Network::time_under_way() {
-  const Time delay{setting_.random.between(20, static_cast<std::uint64_t>(setting_.plan.latency_most.count()))};
+  const Time delay{
+      setting_.random.between(20, static_cast<std::uint64_t>(setting_.plan.latency_most.count()))};
   const Time now = setting_.agenda.now();
   if (now >= setting_.plan.faults_until) return delay;
   if (setting_.random.chance(setting_.plan.clog)) {

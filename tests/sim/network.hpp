@@ -17,7 +17,8 @@ inline constexpr const char* kAdministrator = "uid 0";
 
 using Bytes = std::vector<std::byte>;
 
-/// A connection, with both its ends. Frames arrive in the order in which they were sent, after some time.
+/// A connection, with both its ends. Frames arrive in the order in which they were sent, after some
+/// time.
 struct Wire {
   std::uint64_t number = 0;
   std::uint32_t node = 0;    ///< who dialled
@@ -29,7 +30,8 @@ struct Wire {
   std::deque<Bytes> at_hub;  ///< arrived, not read
   Time next_at_hub{};
   Time next_at_node{};
-  std::uint64_t session = 0;  ///< that it was admitted for, as the reference model says; 0: not admitted
+  std::uint64_t session =
+      0;  ///< that it was admitted for, as the reference model says; 0: not admitted
   // Where its shard has it
   bool attached = false;
   std::size_t shard = 0;

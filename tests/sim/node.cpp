@@ -56,7 +56,9 @@ std::string SimNode::some_pattern(bool of_services) {
   }
 }
 
-bool SimNode::faulty() const { return around_.setting.agenda.now() < around_.setting.plan.faults_until; }
+bool SimNode::faulty() const {
+  return around_.setting.agenda.now() < around_.setting.plan.faults_until;
+}
 
 void SimNode::start() {
   around_.setting.agenda.after(Time{around_.setting.random.below(1'000'000)}, [this] {
@@ -86,7 +88,8 @@ void SimNode::act() {
   say_taken();
   const std::uint64_t administering = administers_ ? around_.setting.plan.administers : kTries;
   if (faulty() && around_.setting.random.chance(administering)) administer();
-  for (std::uint64_t count = around_.setting.random.between(1, 3); count > 0; --count) ask_something();
+  for (std::uint64_t count = around_.setting.random.between(1, 3); count > 0; --count)
+    ask_something();
 }
 
 bool SimNode::break_something() {
@@ -139,9 +142,11 @@ void SimNode::hang() {
   Setting& setting = around_.setting;
   const std::uint64_t silent_us = setting.plan.limits.silent_ms * 1'000;
   const bool brief = setting.random.chance(500);
-  const Time duration{brief ? setting.random.below(silent_us / 2) : silent_us + setting.random.below(silent_us)};
+  const Time duration{brief ? setting.random.below(silent_us / 2)
+                            : silent_us + setting.random.below(silent_us)};
   if (brief) setting.census.add(Happening::short_hang);
-  setting.trace.note("node {a} hangs for {b} us", number_, static_cast<std::uint64_t>(duration.count()));
+  setting.trace.note("node {a} hangs for {b} us", number_,
+                     static_cast<std::uint64_t>(duration.count()));
   hung_ = true;
   around_.set_mute(wire_, true);
   setting.agenda.after(duration, [this, wire = wire_] {
@@ -179,7 +184,8 @@ void SimNode::misbehave() {
   } else if (how == 2) {
     send(Kind::route, 0, proto::encode(ns::Resolve{"x"}, 1));
   } else {
-    for (std::uint64_t i = 0; i < setting.plan.limits.requests + 8; ++i) ask(ns::Resolve{"hall-0/robot-0"}, {});
+    for (std::uint64_t i = 0; i < setting.plan.limits.requests + 8; ++i)
+      ask(ns::Resolve{"hall-0/robot-0"}, {});
   }
 }
 
@@ -195,7 +201,8 @@ void SimNode::lose_connection() {
 }
 
 void SimNode::give_up_others() {
-  for (const auto& [number, other] : std::exchange(links_, {})) around_.network.close_by_node(other.wire, false);
+  for (const auto& [number, other] : std::exchange(links_, {}))
+    around_.network.close_by_node(other.wire, false);
 }
 
 void SimNode::forget_life() {
@@ -219,8 +226,8 @@ void SimNode::dial() {
   ++dials_;
   std::string identity = identity_;
   const proto::Hello said = hello(identity);
-  around_.setting.trace.note("node {a} dials, wire {b}, {c} bytes of token, as: {t}", number_, wire_->number,
-                             said.token.size(), said.name);
+  around_.setting.trace.note("node {a} dials, wire {b}, {c} bytes of token, as: {t}", number_,
+                             wire_->number, said.token.size(), said.name);
   around_.say_hello(wire_, said, identity);
 }
 
@@ -234,7 +241,8 @@ proto::Hello SimNode::hello(std::string& identity) {
   hello.description = "node " + std::to_string(number_);
   if (administers_) hello.role = proto::Role::admin;
   if (!faulty()) return hello;
-  if (!token_.empty() && random.chance(around_.setting.plan.bad_token)) spoil_token(hello, identity);
+  if (!token_.empty() && random.chance(around_.setting.plan.bad_token))
+    spoil_token(hello, identity);
   if (random.chance(around_.setting.plan.rename)) hello.name = some_name();
   if (!token_.empty() && random.chance(100)) hello.name.clear();
   if (random.chance(10)) hello.name = "no name at all";
@@ -269,7 +277,8 @@ void SimNode::hears(const WirePointer& wire, const Bytes& frame) {
   Link& from = found->second;
   require(from.welcomed, Checker::seam, "a frame comes before WELCOME");
   if (header.kind == Kind::ns || header.kind == Kind::ctrl) {
-    require(header.dst == from.id.value(), Checker::right_session, "a node gets a control frame for another one");
+    require(header.dst == from.id.value(), Checker::right_session,
+            "a node gets a control frame for another one");
     return on_control(from, payload);
   }
   if (header.kind == Kind::flow) return on_ping(from, frame);
@@ -285,7 +294,8 @@ void SimNode::sees_the_end(const WirePointer& wire) {
   if (wire_ == wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
-    // Without a word the hub is not there; it may be soon. A bad name or role it says in error only.
+    // Without a word the hub is not there; it may be soon. A bad name or role it says in error
+    // only.
     const GoodbyeCode told = link().told.value_or(GoodbyeCode::draining);
     const bool in_error = told == GoodbyeCode::bad_name || told == GoodbyeCode::not_allowed;
     const bool soon_again = refused && (told == GoodbyeCode::draining || in_error);
@@ -313,7 +323,8 @@ void SimNode::on_link(const WirePointer& wire, std::span<const std::byte> payloa
                              static_cast<std::uint64_t>(goodbye->code), wire->number);
   Link& from = links_.at(wire->number);
   from.told = goodbye->code;
-  if (goodbye->code == GoodbyeCode::draining && from.welcomed) around_.setting.census.add(Happening::told_draining);
+  if (goodbye->code == GoodbyeCode::draining && from.welcomed)
+    around_.setting.census.add(Happening::told_draining);
   if (wire != wire_) return;
   refusal_ = goodbye->code;
   was_kicked_ = goodbye->code == GoodbyeCode::kicked;
@@ -324,7 +335,8 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
   require(!to.welcomed, Checker::seam, "a node is told WELCOME twice");
   to.welcomed = true;
   to.id = welcome.node;
-  around_.setting.trace.note("node {a} is welcomed as {b}: {t}", number_, index_of(welcome.node), 0, welcome.name);
+  around_.setting.trace.note("node {a} is welcomed as {b}: {t}", number_, index_of(welcome.node), 0,
+                             welcome.name);
   if (wire != wire_) return;
   // Those of another session are not replaced by this one.
   if (welcome.node != id_) {
@@ -354,7 +366,8 @@ void SimNode::declare_again() {
     ns::Advertise offer = what.offer;
     offer.former_group = what.group;
     offer.former_proof = what.proof;
-    if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof)) spoil_proof(offer);
+    if (faulty() && around_.setting.random.chance(around_.setting.plan.bad_proof))
+      spoil_proof(offer);
     ask(offer, about(service, offer));
   }
   for (const auto& [full_name, before] : subscribed) {
@@ -362,7 +375,8 @@ void SimNode::declare_again() {
       forgot_ = true;
       continue;
     }
-    if (link().same_session && !unsubscribing_.contains(full_name)) link().before[full_name] = before.group;
+    if (link().same_session && !unsubscribing_.contains(full_name))
+      link().before[full_name] = before.group;
     subscribe(before.wanted);
   }
   unsubscribing_.clear();

@@ -17,15 +17,16 @@
 
 namespace gimnet::sim {
 
-/// A simulated node: it dials, joins, asks, sends, breaks and comes back as the seed says, and checks what it is told.
-/// Thread safety: none. Errors: Broken.
+/// A simulated node: it dials, joins, asks, sends, breaks and comes back as the seed says, and
+/// checks what it is told. Thread safety: none. Errors: Broken.
 class SimNode {
  public:
   /// What it needs of the world.
   struct Around {
     Setting& setting;
     Network& network;
-    std::function<void(const WirePointer&, const proto::Hello&, const std::string& identity)> say_hello;
+    std::function<void(const WirePointer&, const proto::Hello&, const std::string& identity)>
+        say_hello;
     std::function<void(const WirePointer&, bool mute)> set_mute;
   };
   SimNode(const Around& around, std::uint32_t number);
@@ -50,12 +51,16 @@ class SimNode {
     GroupId group;
     std::vector<std::byte> proof{};  ///< that the service has the group
   };
-  [[nodiscard]] const std::map<std::string, Provided>& provides() const { return provides_; }  ///< by service
+  [[nodiscard]] const std::map<std::string, Provided>& provides() const {
+    return provides_;
+  }  ///< by service
   struct Subscribed {
     proto::ns::Subscribe wanted;
     GroupId group;  ///< 0 while nobody provides it
   };
-  [[nodiscard]] const std::map<std::string, Subscribed>& subscribes() const { return subscribes_; }  ///< by full name
+  [[nodiscard]] const std::map<std::string, Subscribed>& subscribes() const {
+    return subscribes_;
+  }  ///< by full name
   /// What it knows by watching; nullptr if it does not watch.
   [[nodiscard]] const WatchView* view() const { return watches_ ? &view_ : nullptr; }
 
@@ -87,12 +92,14 @@ class SimNode {
     bool welcomed = false;
     std::optional<proto::GoodbyeCode> told;  ///< how the hub ended it
     NodeId id;
-    std::map<std::uint16_t, Open> open;     ///< by request number
-    std::map<std::uint32_t, Taken> taken;   ///< by group
-    std::set<std::uint32_t> gone;           ///< groups that ended: what still comes of them counts no more
-    std::map<std::string, GroupId> moved;   ///< where services are, by events of this connection
-    std::map<std::string, GroupId> before;  ///< of those that it declares again: where it knew them to be
-    bool same_session = false;              ///< as its last connection, and no other was dialled in vain between
+    std::map<std::uint16_t, Open> open;    ///< by request number
+    std::map<std::uint32_t, Taken> taken;  ///< by group
+    std::set<std::uint32_t> gone;  ///< groups that ended: what still comes of them counts no more
+    std::map<std::string, GroupId> moved;  ///< where services are, by events of this connection
+    std::map<std::string, GroupId>
+        before;  ///< of those that it declares again: where it knew them to be
+    bool same_session =
+        false;  ///< as its last connection, and no other was dialled in vain between
     Time dialled{};
     std::uint16_t last_request = 0;
   };
@@ -124,7 +131,8 @@ class SimNode {
   [[nodiscard]] proto::ns::Subscribe some_subscription(const std::string& full_name);
   void subscribe(const proto::ns::Subscribe& wanted);
   void send_something();
-  void send_message(proto::Kind kind, std::uint32_t dst, proto::Policy policy = proto::Policy::kind_default);
+  void send_message(proto::Kind kind, std::uint32_t dst,
+                    proto::Policy policy = proto::Policy::kind_default);
   void publish(const Provided& service);
   void tell_others(const std::string& full_name);
   [[nodiscard]] std::string some_service(std::uint64_t number);
@@ -143,7 +151,8 @@ class SimNode {
     ask_raw(kind, proto::encode(message, to.last_request), std::move(open));
   }
   void ask_raw(proto::Kind kind, const proto::Payload& payload, Open open);
-  void send(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload, std::uint8_t flags = 0);
+  void send(proto::Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
+            std::uint8_t flags = 0);
 
   void on_link(const WirePointer& wire, std::span<const std::byte> payload);
   void on_welcome(const WirePointer& wire, const proto::Welcome& welcome);
@@ -158,7 +167,8 @@ class SimNode {
   /// It may have subscribed to something on that connection and not know it.
   [[nodiscard]] static bool subscribes_now(const Link& link);
   void on_subscribed(const Open& asked, const proto::ns::SubscribeAnswer& answer);
-  void know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window, bool retained);
+  void know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window,
+                   bool retained);
   void take_message(Link& from, GroupId group, std::uint64_t message);
   void credit(Link& from, GroupId group);
   void credit_later(Link& from, GroupId group);
@@ -182,10 +192,10 @@ class SimNode {
   std::string registered_;  ///< the name that it has
   std::map<std::string, Provided> provides_;
   std::map<std::string, Subscribed> subscribes_;
-  std::set<std::string> unsubscribing_;                           ///< asked to, not answered: the hub may have ended it
+  std::set<std::string> unsubscribing_;  ///< asked to, not answered: the hub may have ended it
   std::map<std::string, std::set<std::uint32_t>> windows_asked_;  ///< ever, by full name
-  std::uint64_t session_ = 0;                                     ///< the latest, by the reference model
-  std::uint64_t dials_ = 0;                                       ///< since its last WELCOME
+  std::uint64_t session_ = 0;  ///< the latest, by the reference model
+  std::uint64_t dials_ = 0;    ///< since its last WELCOME
   // Of its connection
   WirePointer wire_;
   std::map<std::uint64_t, Link> links_;  ///< by wire; those that it replaced itself, too
@@ -199,7 +209,7 @@ class SimNode {
   bool watches_ = false;       ///< the hub has granted it, on this connection
   bool wants_watch_ = false;   ///< asked for it, and will again on the next one
   std::uint32_t untaken_ = 0;  ///< WATCH_EVENTS that it has not said to have taken
-  bool forgot_ = false;        ///< what it had subscribed to: the hub may send what it does not know
+  bool forgot_ = false;  ///< what it had subscribed to: the hub may send what it does not know
 };
 
 }  // namespace gimnet::sim

@@ -27,7 +27,9 @@ void SimNode::administer() {
 }
 
 bool SimNode::order_drain() {
-  if (!administers_ || hung_ || !is_up() || link().open.size() >= around_.setting.plan.limits.requests) return false;
+  if (!administers_ || hung_ || !is_up() ||
+      link().open.size() >= around_.setting.plan.limits.requests)
+    return false;
   ask(ctrl::Drain{}, {}, proto::Kind::ctrl);
   return true;
 }

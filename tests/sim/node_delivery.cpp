@@ -83,7 +83,8 @@ void SimNode::draw_delivery(ns::Advertise& offer) {
 /// Mostly one that somebody offers, or did.
 std::string SimNode::some_service(std::uint64_t number) {
   Setting& setting = around_.setting;
-  if (!setting.offered.empty() && setting.random.chance(700)) return setting.random.pick(setting.offered);
+  if (!setting.offered.empty() && setting.random.chance(700))
+    return setting.random.pick(setting.offered);
   return some_name() + "/s" + std::to_string(number);
 }
 
@@ -98,7 +99,8 @@ void SimNode::publish(const Provided& service) {
   Random& random = around_.setting.random;
   const ns::Delivery delivery = service.offer.delivery;
   for (std::uint64_t count = random.between(1, 6); count > 0; --count) {
-    const bool latest = delivery == ns::Delivery::latest || (delivery == ns::Delivery::sync && random.chance(300));
+    const bool latest =
+        delivery == ns::Delivery::latest || (delivery == ns::Delivery::sync && random.chance(300));
     send_message(proto::Kind::group, service.group.value(),
                  latest ? proto::Policy::latest : proto::Policy::kind_default);
   }
@@ -150,10 +152,12 @@ void SimNode::on_service_moved(Link& from, std::span<const std::byte> payload) {
     from.taken.erase(event->old_group.value());
     from.gone.insert(event->old_group.value());
   }
-  if (event->new_group != GroupId{}) know_window(from, event->name, event->new_group, event->window, event->retain);
+  if (event->new_group != GroupId{})
+    know_window(from, event->name, event->new_group, event->window, event->retain);
 }
 
-/// What an answer says of a service, an event said before: on this connection, or, where nothing changed, on the last.
+/// What an answer says of a service, an event said before: on this connection, or, where nothing
+/// changed, on the last.
 void SimNode::require_told(const Link& from, const std::string& full_name, GroupId group) const {
   const auto before = from.before.find(full_name);
   if (before == from.before.end()) return;
@@ -162,35 +166,39 @@ void SimNode::require_told(const Link& from, const std::string& full_name, Group
   if (around_.setting.agenda.now() - from.dialled >= grace) return;
   const auto moved = from.moved.find(full_name);
   if (group == (moved != from.moved.end() ? moved->second : before->second)) return;
-  broken(Checker::told, "program " + std::to_string(number_) + " came back, and was not told where '" + full_name +
+  broken(Checker::told, "program " + std::to_string(number_) +
+                            " came back, and was not told where '" + full_name +
                             "' is now before it asked");
 }
 
 bool SimNode::subscribes_now(const Link& link) {
-  return std::any_of(link.open.begin(), link.open.end(),
-                     [](const auto& entry) { return entry.second.operation == ns::Subscribe::kOperation; });
+  return std::any_of(link.open.begin(), link.open.end(), [](const auto& entry) {
+    return entry.second.operation == ns::Subscribe::kOperation;
+  });
 }
 
 void SimNode::on_subscribed(const Open& asked, const ns::SubscribeAnswer& answer) {
   require_told(link(), asked.subject, answer.group);
   subscribes_[asked.subject] = {asked.wanted, answer.group};
   known_groups_.insert(answer.group.value());
-  if (answer.group != GroupId{}) know_window(link(), asked.subject, answer.group, answer.window, answer.retain);
+  if (answer.group != GroupId{})
+    know_window(link(), asked.subject, answer.group, answer.window, answer.retain);
 }
 
-void SimNode::know_window(Link& link, const std::string& full_name, GroupId group, std::uint32_t window,
-                          bool retained) {
+void SimNode::know_window(Link& link, const std::string& full_name, GroupId group,
+                          std::uint32_t window, bool retained) {
   Taken& taken = link.taken[group.value()];
   link.gone.erase(group.value());
   taken.window = window;
   taken.retained = retained;
   if (window == 0) return;
-  // Who asked for several may have had any of them in force since; 0 is what the provider offers, which may be the
-  // most.
+  // Who asked for several may have had any of them in force since; 0 is what the provider offers,
+  // which may be the most.
   std::uint32_t most = window;
   const std::set<std::uint32_t>& asked = windows_asked_[full_name];
   if (asked.size() > 1) most = std::max(most, *asked.rbegin());
-  if (asked.size() > 1 && asked.contains(0)) most = static_cast<std::uint32_t>(around_.setting.plan.limits.sync_window);
+  if (asked.size() > 1 && asked.contains(0))
+    most = static_cast<std::uint32_t>(around_.setting.plan.limits.sync_window);
   taken.window_most = std::max(taken.window_most, most);
   if (taken.messages > taken.credited) credit_later(link, group);
 }
@@ -205,11 +213,14 @@ void SimNode::take_message(Link& from, GroupId group, std::uint64_t message) {
           "a subscriber gets an older message after a newer one");
   taken.last = message;
   ++taken.messages;
-  const bool asks = std::any_of(from.open.begin(), from.open.end(),
-                                [](const auto& entry) { return entry.second.operation == ns::Subscribe::kOperation; });
+  const bool asks = std::any_of(from.open.begin(), from.open.end(), [](const auto& entry) {
+    return entry.second.operation == ns::Subscribe::kOperation;
+  });
   // Before the answer it does not know what is in force.
-  const bool within = taken.window_most == 0 || asks || taken.messages - taken.credited <= taken.window_most;
-  require(within, Checker::credit, "a subscriber gets more messages than its window, not counting what it credited");
+  const bool within =
+      taken.window_most == 0 || asks || taken.messages - taken.credited <= taken.window_most;
+  require(within, Checker::credit,
+          "a subscriber gets more messages than its window, not counting what it credited");
   if (taken.window == 0) return;
   if (faulty() && around_.setting.random.chance(around_.setting.plan.late_credit)) {
     credit_later(from, group);
@@ -224,7 +235,8 @@ void SimNode::credit(Link& from, GroupId group) {
   if (found == from.taken.end()) return;
   Taken& taken = found->second;
   taken.credit_due = false;
-  if (wire_ == nullptr || from.wire != wire_ || !from.welcomed || taken.credited == taken.messages) return;
+  if (wire_ == nullptr || from.wire != wire_ || !from.welcomed || taken.credited == taken.messages)
+    return;
   taken.credited = taken.messages;
   std::array<std::byte, proto::flow::kSizeMax> bytes{};
   const std::size_t size = proto::flow::encode(proto::flow::Credit{group, taken.messages}, bytes);

@@ -27,7 +27,8 @@ void SimNode::watch_or_rename(std::uint64_t choice) {
   if (!wants_watch_ && number_ % kWatchers == 0) watch();
 }
 
-/// One thing after the other, as many at once as it may ask for: names, services, subscriptions, or what nobody grants.
+/// One thing after the other, as many at once as it may ask for: names, services, subscriptions, or
+/// what nobody grants.
 void SimNode::flood() {
   Random& random = around_.setting.random;
   const std::uint64_t with = random.below(4);
@@ -49,14 +50,17 @@ void SimNode::flood() {
 
 void SimNode::watch() {
   Random& random = around_.setting.random;
-  if (!wants_watch_) view_ = {some_pattern(random.chance(500)), static_cast<std::uint8_t>(random.between(1, 3))};
+  if (!wants_watch_)
+    view_ = {some_pattern(random.chance(500)), static_cast<std::uint8_t>(random.between(1, 3))};
   wants_watch_ = true;
   ask(view_.request(kWatch), {});
 }
 
-/// Sooner or later, so that the hub holds changes back and has to begin again. Never a request too many.
+/// Sooner or later, so that the hub holds changes back and has to begin again. Never a request too
+/// many.
 void SimNode::say_taken() {
-  if (untaken_ == 0 || !is_up() || link().open.size() >= around_.setting.plan.limits.requests) return;
+  if (untaken_ == 0 || !is_up() || link().open.size() >= around_.setting.plan.limits.requests)
+    return;
   ask(ns::WatchTaken{kWatch, untaken_}, {});
   untaken_ = 0;
 }

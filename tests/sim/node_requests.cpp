@@ -13,7 +13,8 @@ using proto::Kind;
 namespace ns = proto::ns;
 namespace ctrl = proto::ctrl;
 
-void SimNode::send(Kind kind, std::uint32_t dst, std::span<const std::byte> payload, std::uint8_t flags) {
+void SimNode::send(Kind kind, std::uint32_t dst, std::span<const std::byte> payload,
+                   std::uint8_t flags) {
   proto::FrameHeader header;
   header.dst = dst;
   header.src = link().id.value();
@@ -25,8 +26,8 @@ void SimNode::send(Kind kind, std::uint32_t dst, std::span<const std::byte> payl
 void SimNode::ask_raw(Kind kind, const proto::Payload& payload, Open open) {
   open.kind = kind;
   if (const auto view = proto::split_control(payload)) {
-    around_.setting.trace.note("node {a} asks operation {b} as request {c}: {t}", number_, view->header.operation,
-                               view->header.request, open.subject);
+    around_.setting.trace.note("node {a} asks operation {b} as request {c}: {t}", number_,
+                               view->header.operation, view->header.request, open.subject);
     link().open[view->header.request] = std::move(open);
   }
   send(kind, 0, payload);
@@ -120,7 +121,8 @@ void SimNode::send_something() {
   }
   for (const auto& [full_name, subscribed] : subscribes_) {
     if (subscribed.group == GroupId{}) continue;
-    // Only the provider may send to its subscribers; everybody may send to the provider, if its service takes data.
+    // Only the provider may send to its subscribers; everybody may send to the provider, if its
+    // service takes data.
     const bool legal = random.chance(700);
     return send_message(legal ? Kind::service : Kind::group, subscribed.group.value());
   }
@@ -131,9 +133,11 @@ void SimNode::on_control(Link& from, std::span<const std::byte> payload) {
   require(view.has_value(), Checker::answers, "a control frame cannot be read");
   if (!view->header.is_answer()) return on_event(from, view->header.operation, payload);
   const auto asked = from.open.find(view->header.request);
-  require(asked != from.open.end(), Checker::answers, "a node gets an answer to what it did not ask here");
+  require(asked != from.open.end(), Checker::answers,
+          "a node gets an answer to what it did not ask here");
   const Open open = asked->second;
-  around_.setting.trace.note("node {a} has its answer to request {b}: {c}", number_, view->header.request,
+  around_.setting.trace.note("node {a} has its answer to request {b}: {c}", number_,
+                             view->header.request,
                              static_cast<std::uint64_t>(proto::read_status(view->body).status));
   from.open.erase(asked);
   if (!faulty()) say_taken();
@@ -144,7 +148,8 @@ void SimNode::on_control(Link& from, std::span<const std::byte> payload) {
 }
 
 void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
-  const bool done = proto::read_status(proto::split_control(payload)->body).status == proto::Status::done;
+  const bool done =
+      proto::read_status(proto::split_control(payload)->body).status == proto::Status::done;
   switch (asked.operation) {
     case ns::Resolve::kOperation:
       if (done) learn(proto::decode_answer<ns::ResolveAnswer>(payload)->node);
@@ -184,7 +189,8 @@ void SimNode::on_answer(const Open& asked, std::span<const std::byte> payload) {
 
 void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std::byte> payload) {
   if (operation == ns::WatchEvents::kOperation) {
-    // Its watch ended with the connection; what that one still brings is older than what the next one told.
+    // Its watch ended with the connection; what that one still brings is older than what the next
+    // one told.
     if (wire_ != nullptr && &from == &link()) on_watch_events(payload);
   } else if (operation == ns::ServiceMoved::kOperation) {
     on_service_moved(from, payload);
@@ -198,15 +204,17 @@ void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std:
 void SimNode::on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame) {
   Census& census = around_.setting.census;
   if (header.kind == Kind::unicast) {
-    require(header.dst == from.id.value() || former_ids_.contains(NodeId{header.dst}), Checker::right_session,
-            "a node gets a frame for another one");
+    require(header.dst == from.id.value() || former_ids_.contains(NodeId{header.dst}),
+            Checker::right_session, "a node gets a frame for another one");
     census.add(Happening::unicast_delivered);
   } else if (header.kind == Kind::group) {
-    // A subscriber is in the table before its answer leaves, so that frames may come before the answer.
+    // A subscriber is in the table before its answer leaves, so that frames may come before the
+    // answer.
     const bool told = known_groups_.contains(header.dst) || subscribes_now(from) || forgot_;
     if (!told) {
       broken(Checker::told, "program " + std::to_string(number_) + " gets a frame of group " +
-                                std::to_string(index_of(GroupId{header.dst})) + ", of which it was not told");
+                                std::to_string(index_of(GroupId{header.dst})) +
+                                ", of which it was not told");
     }
     census.add(Happening::group_delivered);
     take_message(from, GroupId{header.dst}, message_of(frame));

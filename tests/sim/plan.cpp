@@ -59,12 +59,14 @@ Plan Plan::draw(Random& random, std::size_t nodes) {
   plan.nodes = nodes;
   plan.shards = static_cast<std::size_t>(random.between(1, 4));
   draw_limits(random, plan);
-  plan.names = static_cast<std::uint32_t>(std::max<std::uint64_t>(1, nodes * random.between(70, 200) / 100));
+  plan.names =
+      static_cast<std::uint32_t>(std::max<std::uint64_t>(1, nodes * random.between(70, 200) / 100));
   plan.nameless = random.between(0, 300);
   plan.waits_away = random.between(0, 1'000);
   plan.acts_ms = static_cast<std::uint32_t>(random.between(400, 1'500));
   plan.faults_until = 6s;
-  plan.end = plan.faults_until + std::chrono::milliseconds{3 * plan.limits.grace_ms + plan.limits.silent_ms} + 5s;
+  plan.end = plan.faults_until +
+             std::chrono::milliseconds{3 * plan.limits.grace_ms + plan.limits.silent_ms} + 5s;
   plan.latency_most = Time{random.between(200, 100'000)};
   plan.crash = sometimes(random, 40);
   plan.vanish = sometimes(random, 30);

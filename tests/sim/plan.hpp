@@ -12,8 +12,9 @@
 
 namespace gimnet::sim {
 
-/// What a seed makes of a world: sizes, limits, and how likely each fault is, in thousandths of a node's acts; 0
-/// switches a kind of fault off, which each seed does to some (swarm testing, Groce et al., ISSTA 2012).
+/// What a seed makes of a world: sizes, limits, and how likely each fault is, in thousandths of a
+/// node's acts; 0 switches a kind of fault off, which each seed does to some (swarm testing, Groce
+/// et al., ISSTA 2012).
 struct Plan {
   std::size_t nodes = 0;
   std::size_t shards = 1;
@@ -35,8 +36,9 @@ struct Plan {
   std::uint64_t administers = 0;  ///< of an administrator's acts
   std::uint64_t flood = 0;
   // Thousandths of other occasions
-  std::uint64_t bad_token = 0;          ///< of HELLOs
-  std::uint64_t bad_proof = 0;          ///< of ADVERTISEs: a former group that is another's, or is not proven
+  std::uint64_t bad_token = 0;  ///< of HELLOs
+  std::uint64_t bad_proof =
+      0;  ///< of ADVERTISEs: a former group that is another's, or is not proven
   std::uint64_t lost_token = 0;         ///< of crashes
   std::uint64_t rename = 0;             ///< of HELLOs
   std::uint64_t slow_reader = 0;        ///< of nodes

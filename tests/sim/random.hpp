@@ -8,10 +8,9 @@
 
 namespace gimnet::sim {
 
-/// xoshiro256**, seeded by splitmix64 (Blackman and Vigna, https://prng.di.unimi.it). The distributions of the standard
-/// library are not used: they differ between libraries. Two draws never stand in one expression of which the order of
-/// evaluation is open.
-/// Thread safety: none.
+/// xoshiro256**, seeded by splitmix64 (Blackman and Vigna, https://prng.di.unimi.it). The
+/// distributions of the standard library are not used: they differ between libraries. Two draws
+/// never stand in one expression of which the order of evaluation is open. Thread safety: none.
 class Random {
  public:
   explicit Random(std::uint64_t seed) {
@@ -41,7 +40,9 @@ class Random {
     return next() % bound;
   }
   /// least..most, both included.
-  std::uint64_t between(std::uint64_t least, std::uint64_t most) { return least + below(most - least + 1); }
+  std::uint64_t between(std::uint64_t least, std::uint64_t most) {
+    return least + below(most - least + 1);
+  }
   bool chance(std::uint64_t per_thousand) { return below(1'000) < per_thousand; }
   /// REQUIRES: not empty; random access.
   template <class List>

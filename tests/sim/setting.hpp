@@ -22,8 +22,10 @@ struct Setting {
   Agenda agenda;
   Trace trace;
   Census census;
-  std::vector<std::string> offered;  ///< full names of services that nodes advertised, of which others hear
-  std::uint64_t messages = 0;        ///< that nodes sent: each says its number, so that their order can be checked
+  std::vector<std::string>
+      offered;  ///< full names of services that nodes advertised, of which others hear
+  std::uint64_t messages =
+      0;  ///< that nodes sent: each says its number, so that their order can be checked
 
  private:
   [[nodiscard]] static Plan draw(Random& random, std::size_t nodes, const Faults& without) {

@@ -3,8 +3,8 @@
 #include "proto/frame/flow.hpp"
 #include "tests/sim/shards.hpp"
 
-// How simulated shards pace subscriptions and keep last messages: what hub/data/fanout/pacer.cpp and
-// retained_messages.cpp do, for messages of one frame each.
+// How simulated shards pace subscriptions and keep last messages: what hub/data/fanout/pacer.cpp
+// and retained_messages.cpp do, for messages of one frame each.
 
 namespace gimnet::sim {
 
@@ -21,9 +21,10 @@ SimShards::Pace* SimShards::find_pace(const Seat& seat, GroupId group) {
 
 void SimShards::begin_pace(std::size_t index, const hub::PaceCommand& command) {
   Seat* seat = find(index, command.session.slot, command.session.generation);
-  require(seat != nullptr, Checker::seam, "a subscription is paced of a session that the shard does not know");
-  setting_.trace.note("shard {a} paces group {b} by a window of {c}", index, index_of(command.group),
-                      command.terms.window);
+  require(seat != nullptr, Checker::seam,
+          "a subscription is paced of a session that the shard does not know");
+  setting_.trace.note("shard {a} paces group {b} by a window of {c}", index,
+                      index_of(command.group), command.terms.window);
   std::unique_ptr<Pace>& pace = seat->paces[command.group.value()];
   const bool begins = pace == nullptr || !pace->counts.active;
   if (pace == nullptr) pace = std::make_unique<Pace>(nobody_, command.group, command.terms);
@@ -110,7 +111,8 @@ void SimShards::wait_until_due(std::size_t index, Seat& seat, Pace& pace) {
   const Time now = setting_.agenda.now();
   require(now < latest_due(pace), Checker::pace,
           "a subscriber waits longer for a message than its maximal rate demands");
-  const Time due = std::min(latest_due(pace), Time{static_cast<std::int64_t>(pace.counts.due_us())});
+  const Time due =
+      std::min(latest_due(pace), Time{static_cast<std::int64_t>(pace.counts.due_us())});
   if (pace.wakes && *pace.wakes <= due) return;
   pace.wakes = due;
   setting_.agenda.at(due, [this, index, due, session = seat.session, group = pace.counts.group()] {
@@ -133,10 +135,11 @@ void SimShards::on_credit(std::size_t index, Seat& seat, const proto::flow::Cred
 
 void SimShards::count_anew(std::size_t index, Seat& seat) {
   for (auto& [group, pace] : seat.paces) {
-    const auto waiting = std::count_if(seat.data.begin(), seat.data.end(), [key = group](const Data& each) {
-      const proto::FrameHeader header = proto::load_header(each.frame.data());
-      return header.kind == proto::Kind::group && header.dst == key;
-    });
+    const auto waiting =
+        std::count_if(seat.data.begin(), seat.data.end(), [key = group](const Data& each) {
+          const proto::FrameHeader header = proto::load_header(each.frame.data());
+          return header.kind == proto::Kind::group && header.dst == key;
+        });
     setting_.census.add(Happening::counted_anew);
     pace->counts.on_new_epoch(static_cast<std::uint64_t>(waiting));
     release_held(index, seat, *pace);
@@ -159,7 +162,8 @@ void SimShards::ask_start(std::size_t index, const Seat& seat, Pace& pace) {
   pace.counts.awaits_start = true;
   if (members == nullptr) return;  // the subscription is about to end
   const ShardIndex self{static_cast<std::uint8_t>(index)};
-  const hub::GroupStart start{group, seat.session.slot, seat.session.generation, pace.counts.start_ticket, self};
+  const hub::GroupStart start{group, seat.session.slot, seat.session.generation,
+                              pace.counts.start_ticket, self};
   const std::size_t provider = members->provider_place.shard.value();
   if (provider == index) return on_start_wanted(index, start);
   setting_.census.add(Happening::start_across_shards);
@@ -177,7 +181,8 @@ void SimShards::on_start_wanted(std::size_t index, const hub::GroupStart& start)
     return;
   }
   post(to, {.kind = hub::MailKind::start, .frame = {}, .start = start});
-  if (kept != nullptr) post(to, {.kind = hub::MailKind::retained, .frame = kept->frame, .start = start});
+  if (kept != nullptr)
+    post(to, {.kind = hub::MailKind::retained, .frame = kept->frame, .start = start});
 }
 
 void SimShards::require_last(const hub::GroupStart& start, const Kept* kept) const {
@@ -186,7 +191,8 @@ void SimShards::require_last(const hub::GroupStart& start, const Kept* kept) con
   const auto last = last_.find(index_of(start.group));
   const bool any = last != last_.end() && last->second.stream == stream;
   require(any == (kept != nullptr), Checker::retained,
-          any ? "the last message of a retained service is not kept" : "what is kept is not of this service");
+          any ? "the last message of a retained service is not kept"
+              : "what is kept is not of this service");
   require(!any || message_of(kept->frame) == last->second.message, Checker::retained,
           "what is kept is not the last message of a retained service");
 }

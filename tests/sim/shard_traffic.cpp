@@ -36,7 +36,8 @@ void SimShards::serve_one(std::size_t index) {
 
 void SimShards::read(std::size_t index, Seat& seat) {
   const WirePointer wire = seat.wire;
-  for (std::uint64_t most = setting_.random.between(1, 6); most > 0 && !wire->at_hub.empty(); --most) {
+  for (std::uint64_t most = setting_.random.between(1, 6); most > 0 && !wire->at_hub.empty();
+       --most) {
     Bytes frame = std::move(wire->at_hub.front());
     wire->at_hub.pop_front();
     if (std::exchange(seat.tell_heard, false)) {
@@ -58,12 +59,15 @@ bool SimShards::handle(std::size_t index, Seat& seat, Bytes frame) {
     return false;
   }
   if (header.src != seat.node.value()) {
-    close(index, seat, GoodbyeCode::wrong_source, "a frame's source is not this connection's node id");
+    close(index, seat, GoodbyeCode::wrong_source,
+          "a frame's source is not this connection's node id");
     return false;
   }
   if (header.kind == Kind::link) {
-    const auto goodbye = proto::decode<proto::Goodbye>(std::span{frame}.subspan(proto::kHeaderSize));
-    require(goodbye.has_value(), Checker::seam, "a simulated node said a GOODBYE that cannot be read");
+    const auto goodbye =
+        proto::decode<proto::Goodbye>(std::span{frame}.subspan(proto::kHeaderSize));
+    require(goodbye.has_value(), Checker::seam,
+            "a simulated node said a GOODBYE that cannot be read");
     detach(seat, std::nullopt);
     tell(index, seat, true, goodbye->code, goodbye->sentence);
     return false;
@@ -80,14 +84,18 @@ bool SimShards::handle(std::size_t index, Seat& seat, Bytes frame) {
 
 void SimShards::on_flow(std::size_t index, Seat& seat, const Bytes& frame) {
   const auto message = proto::flow::decode(std::span{frame}.subspan(proto::kHeaderSize));
-  require(message.has_value(), Checker::seam, "a simulated node said something of FLOW that cannot be read");
-  if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) return on_credit(index, seat, *credit);
+  require(message.has_value(), Checker::seam,
+          "a simulated node said something of FLOW that cannot be read");
+  if (const auto* credit = std::get_if<proto::flow::Credit>(&*message))
+    return on_credit(index, seat, *credit);
   const auto* pong = std::get_if<proto::flow::Pong>(&*message);
-  require(pong != nullptr, Checker::seam, "a simulated node said something of FLOW that is no CREDIT and no PONG");
+  require(pong != nullptr, Checker::seam,
+          "a simulated node said something of FLOW that is no CREDIT and no PONG");
   const auto asked = seat.reading.extract(pong->sequence);
   if (!asked) return;  // of an earlier connection
-  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
-                     hub::MovesReadEvent{seat.session, seat.attachment, seat.node, asked.mapped()}});
+  push_event(index,
+             {ShardIndex{static_cast<std::uint8_t>(index)},
+              hub::MovesReadEvent{seat.session, seat.attachment, seat.node, asked.mapped()}});
 }
 
 bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {
@@ -96,8 +104,9 @@ bool SimShards::handle_control(std::size_t index, Seat& seat, Bytes frame) {
     close(index, seat, GoodbyeCode::too_many_requests, "too many requests are unanswered");
     return false;
   }
-  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
-                     hub::ControlFrameEvent{seat.session, seat.attachment, seat.node, std::move(frame)}});
+  push_event(index,
+             {ShardIndex{static_cast<std::uint8_t>(index)},
+              hub::ControlFrameEvent{seat.session, seat.attachment, seat.node, std::move(frame)}});
   return true;
 }
 
@@ -109,7 +118,8 @@ void SimShards::take_mail(std::size_t index) {
     shard.mail.pop_front();
     switch (mail.kind) {
       case hub::MailKind::fence:
-        push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)}, hub::FencePassedEvent{mail.fence}});
+        push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                           hub::FencePassedEvent{mail.fence}});
         break;
       case hub::MailKind::last:
         ++shards_[index].lasts;
@@ -155,7 +165,8 @@ void SimShards::route(std::size_t index, const Bytes& frame, bool handed_over) {
   }
 }
 
-void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t node, bool handed_over) {
+void SimShards::to_node(std::size_t index, const Bytes& frame, std::uint32_t node,
+                        bool handed_over) {
   const NodePlace place = parts_.nodes.find(node);
   if (!place.exists()) {
     setting_.census.add(Happening::unicast_to_departed);
@@ -179,7 +190,8 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   const proto::FrameHeader header = proto::load_header(frame.data());
   const std::uint32_t group = index_of(GroupId{header.dst});
   const GroupMembers* members = parts_.groups.find(group);
-  if (members != nullptr && members->ends()) return;  // the model knows of it no more, nor who subscribed
+  if (members != nullptr && members->ends())
+    return;  // the model knows of it no more, nor who subscribed
   if (members == nullptr || members->provider.value() != header.src) {
     if (members != nullptr) setting_.census.add(Happening::group_of_another);
     return;
@@ -196,14 +208,17 @@ void SimShards::to_group(std::size_t index, const Bytes& frame, bool handed_over
   if (paced) to_paced(index, frame, members->paced_by_shard[index]);
   if (handed_over) return;
   for (std::size_t other = 0; other < shards_.size(); ++other) {
-    const bool any = !members->by_shard[other].empty() || (paced && !members->paced_by_shard[other].empty());
+    const bool any =
+        !members->by_shard[other].empty() || (paced && !members->paced_by_shard[other].empty());
     if (other != index && any) post(other, {.frame = frame});
   }
   if (members->retain) keep_last(index, frame);
-  if (const std::uint64_t stream = witness_->retained_stream(group)) last_[group] = {stream, message_of(frame)};
+  if (const std::uint64_t stream = witness_->retained_stream(group))
+    last_[group] = {stream, message_of(frame)};
 }
 
-void SimShards::to_paced(std::size_t index, const Bytes& frame, const hub::MemberList<hub::PacedMember>& members) {
+void SimShards::to_paced(std::size_t index, const Bytes& frame,
+                         const hub::MemberList<hub::PacedMember>& members) {
   const GroupId group{proto::load_header(frame.data()).dst};
   members.for_each([&](const hub::PacedMember& member) {
     Seat* seat = find(index, member.slot, member.generation);
@@ -225,13 +240,17 @@ void SimShards::require_subscribed(const Seat& seat, std::uint32_t group) const 
 }
 
 void SimShards::to_provider(std::size_t index, const Bytes& frame, bool handed_over) {
-  const GroupMembers* members = parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
+  const GroupMembers* members =
+      parts_.groups.find(index_of(GroupId{proto::load_header(frame.data()).dst}));
   if (members == nullptr || members->ends()) return;
   if (!members->accepts) return setting_.census.add(Happening::service_frame_refused);
-  to_place(index, frame, {members->provider_place, witness_->session_of(index_of(members->provider))}, handed_over);
+  to_place(index, frame,
+           {members->provider_place, witness_->session_of(index_of(members->provider))},
+           handed_over);
 }
 
-void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::uint64_t for_session) {
+void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame,
+                        std::uint64_t for_session) {
   require_for(seat, for_session);
   if (!seat.wire && !seat.waits_when_away) {
     setting_.census.add(Happening::unicast_dropped_away);
@@ -241,8 +260,10 @@ void SimShards::deliver(std::size_t index, Seat& seat, const Bytes& frame, std::
 }
 
 void SimShards::require_for(const Seat& seat, std::uint64_t session) {
-  require(session != 0, Checker::right_session, "a frame for a node that is not there waits for another one");
-  require(seat.number == session, Checker::right_session, "a frame waits for another session than the one it is for");
+  require(session != 0, Checker::right_session,
+          "a frame for a node that is not there waits for another one");
+  require(seat.number == session, Checker::right_session,
+          "a frame waits for another session than the one it is for");
 }
 
 void SimShards::push(std::size_t index, Seat& seat, Data data) {
@@ -258,16 +279,18 @@ void SimShards::push(std::size_t index, Seat& seat, Data data) {
   }
 }
 
-/// What goes for what comes: an older LATEST message of the same stream, full or not, or the oldest of a service at a
-/// full queue. Returns their groups.
+/// What goes for what comes: an older LATEST message of the same stream, full or not, or the oldest
+/// of a service at a full queue. Returns their groups.
 std::vector<GroupId> SimShards::make_room(Seat& seat, const proto::FrameHeader& header) {
   std::vector<GroupId> lost;
   if (header.kind != Kind::group) return lost;
   std::size_t groups = 0;
   for (auto entry = seat.data.begin(); entry != seat.data.end();) {
     const proto::FrameHeader waiting = proto::load_header(entry->frame.data());
-    const bool same = waiting.kind == header.kind && waiting.dst == header.dst && waiting.src == header.src;
-    if (same && header.policy() == proto::Policy::latest && waiting.policy() == proto::Policy::latest) {
+    const bool same =
+        waiting.kind == header.kind && waiting.dst == header.dst && waiting.src == header.src;
+    if (same && header.policy() == proto::Policy::latest &&
+        waiting.policy() == proto::Policy::latest) {
       setting_.census.add(Happening::latest_replaced);
       lost.push_back(GroupId{waiting.dst});
       entry = seat.data.erase(entry);

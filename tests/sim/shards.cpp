@@ -29,7 +29,9 @@ Bytes link_frame(NodeId to, HubId hub, const proto::Payload& payload) {
   return frame_of(header, payload);
 }
 
-std::uint64_t message_of(const Bytes& frame) { return load_le<std::uint64_t>(frame.data() + proto::kHeaderSize); }
+std::uint64_t message_of(const Bytes& frame) {
+  return load_le<std::uint64_t>(frame.data() + proto::kHeaderSize);
+}
 
 SimShards::SimShards(Setting& setting, Parts parts)
     : setting_(setting), parts_(std::move(parts)), shards_(parts_.shards) {}
@@ -66,10 +68,12 @@ void SimShards::want_turn(std::size_t index) {
   if (shards_[index].turn_due) return;
   shards_[index].turn_due = true;
   Time delay{setting_.random.between(1, 400)};
-  if (setting_.random.chance(setting_.plan.shard_pause) && setting_.agenda.now() < setting_.plan.faults_until) {
+  if (setting_.random.chance(setting_.plan.shard_pause) &&
+      setting_.agenda.now() < setting_.plan.faults_until) {
     delay = Time{setting_.random.between(20'000, 600'000)};
     setting_.census.add(Happening::shard_paused);
-    setting_.trace.note("shard {a} pauses for {b} us", index, static_cast<std::uint64_t>(delay.count()));
+    setting_.trace.note("shard {a} pauses for {b} us", index,
+                        static_cast<std::uint64_t>(delay.count()));
   }
   setting_.agenda.after(delay, [this, index] {
     shards_[index].turn_due = false;
@@ -93,7 +97,8 @@ void SimShards::turn(std::size_t index) {
     take_commands(index, shard.commands.size());
     take_mail(index);
   }
-  if (!shard.commands.empty() || !shard.mail.empty() || !shard.ready.empty()) return want_turn(index);
+  if (!shard.commands.empty() || !shard.mail.empty() || !shard.ready.empty())
+    return want_turn(index);
   parts_.quiescence.leave(index);
 }
 
@@ -113,10 +118,12 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
     say(index, *control);
   } else if (const auto* closing = std::get_if<hub::CloseCommand>(&command)) {
     Seat* seat = find(index, closing->session.slot, closing->session.generation);
-    if (seat != nullptr && seat->wire) close(index, *seat, closing->code, closing->sentence.c_str());
+    if (seat != nullptr && seat->wire)
+      close(index, *seat, closing->code, closing->sentence.c_str());
   } else if (const auto* renumbered = std::get_if<hub::RenumberCommand>(&command)) {
     Seat* seat = find(index, renumbered->session.slot, renumbered->session.generation);
-    require(seat != nullptr, Checker::seam, "a session gets another id that the shard does not know");
+    require(seat != nullptr, Checker::seam,
+            "a session gets another id that the shard does not know");
     for (auto& [group, kept] : shards_[index].kept) {
       if (kept.provider == seat->node) kept.provider = renumbered->node;
     }
@@ -148,10 +155,12 @@ SimShards::Seat& SimShards::seat_for(std::size_t index, const AttachCommand& com
   }
   std::unique_ptr<Seat>& seat = shard.seats[slot];
   if (seat != nullptr && seat->session.generation != command.session.generation) {
-    broken(Checker::seam, "a connection comes to a slot that an earlier session was not released from");
+    broken(Checker::seam,
+           "a connection comes to a slot that an earlier session was not released from");
   }
   require((seat == nullptr) == command.new_session, Checker::seam,
-          "a connection for a new session comes to one that is there, or for an old one to one that is not");
+          "a connection for a new session comes to one that is there, or for an old one to one "
+          "that is not");
   if (seat == nullptr) {
     if (shard.used[slot]) setting_.census.add(Happening::slot_reused);
     shard.used[slot] = true;
@@ -159,15 +168,18 @@ SimShards::Seat& SimShards::seat_for(std::size_t index, const AttachCommand& com
     seat->session = command.session;
     seat->node = command.node;
   }
-  require(seat->node == command.node, Checker::seam, "a session's connection comes for another node");
-  require(command.attachment == seat->attachment + 1, Checker::seam, "a session's connections are not counted by ones");
+  require(seat->node == command.node, Checker::seam,
+          "a session's connection comes for another node");
+  require(command.attachment == seat->attachment + 1, Checker::seam,
+          "a session's connections are not counted by ones");
   return *seat;
 }
 
 void SimShards::attach(std::size_t index, AttachCommand& command) {
   const WirePointer wire = static_cast<const WireTransport&>(*command.transport).wire();
   Seat& seat = seat_for(index, command);
-  setting_.trace.note("shard {a} attaches wire {b} as node {c}", index, wire->number, index_of(command.node));
+  setting_.trace.note("shard {a} attaches wire {b} as node {c}", index, wire->number,
+                      index_of(command.node));
   if (seat.wire) {
     detach(seat, proto::Goodbye{GoodbyeCode::replaced, "a newer connection took its place"});
   } else if (!seat.data.empty()) {
@@ -181,7 +193,8 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   wire->attached = true;
   wire->shard = index;
   wire->slot = command.session.slot.value();
-  parts_.network.to_node(wire, link_frame(command.node, parts_.hub, proto::encode(command.welcome)));
+  parts_.network.to_node(wire,
+                         link_frame(command.node, parts_.hub, proto::encode(command.welcome)));
   for (std::size_t at = 0; at < command.told.size();) {
     const std::size_t size = proto::load_header(command.told.data() + at).frame_size();
     seat.control.emplace_back(command.told.data() + at, command.told.data() + at + size);
@@ -202,7 +215,8 @@ void SimShards::say(std::size_t index, const hub::SendControlCommand& command) {
   Seat* seat = find(index, command.session.slot, command.session.generation);
   if (seat == nullptr || !seat->wire) return;
   if (command.attachment != 0 && command.attachment != seat->attachment) return;
-  require(seat->requests >= command.answers, Checker::answers, "more answers than requests on a connection");
+  require(seat->requests >= command.answers, Checker::answers,
+          "more answers than requests on a connection");
   seat->requests -= command.answers;
   seat->control.push_back(command.frame);
   if (command.move != 0) ask_whether_read(*seat, command.move);
@@ -223,7 +237,8 @@ void SimShards::release(std::size_t index, hub::SessionRef session) {
   require(seat != nullptr, Checker::seam, "a session is released that the shard does not know");
   setting_.trace.note("shard {a} releases slot {b}", index, session.slot.value());
   if (seat->wire) detach(*seat, proto::Goodbye{GoodbyeCode::kicked, "the session is over"});
-  std::erase_if(shards_[index].kept, [seat](const auto& entry) { return entry.second.provider == seat->node; });
+  std::erase_if(shards_[index].kept,
+                [seat](const auto& entry) { return entry.second.provider == seat->node; });
   shards_[index].seats[session.slot.value()].reset();
 }
 
@@ -275,22 +290,25 @@ void SimShards::detach(Seat& seat, std::optional<proto::Goodbye> told) {
   seat.data.clear();
 }
 
-void SimShards::tell(std::size_t index, const Seat& seat, bool said_by_peer, GoodbyeCode code, std::string sentence) {
-  push_event(index,
-             {ShardIndex{static_cast<std::uint8_t>(index)},
-              hub::DetachedEvent{seat.session, seat.attachment, seat.node, said_by_peer, code, std::move(sentence)}});
+void SimShards::tell(std::size_t index, const Seat& seat, bool said_by_peer, GoodbyeCode code,
+                     std::string sentence) {
+  push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
+                     hub::DetachedEvent{seat.session, seat.attachment, seat.node, said_by_peer,
+                                        code, std::move(sentence)}});
 }
 
 void SimShards::set_mute(const WirePointer& wire, bool mute) {
   wire->mute = mute;
   const std::uint64_t silence = ++wire->mutes;
   if (!mute) return;
-  setting_.agenda.after(std::chrono::milliseconds{setting_.plan.limits.silent_ms}, [this, wire, silence] {
-    if (dead_ || !wire->attached || !wire->mute || wire->mutes != silence) return;
-    Seat& seat = *shards_[wire->shard].seats[wire->slot];
-    setting_.census.add(Happening::silent);
-    close(wire->shard, seat, GoodbyeCode::silent, "nothing was heard");
-  });
+  setting_.agenda.after(std::chrono::milliseconds{setting_.plan.limits.silent_ms},
+                        [this, wire, silence] {
+                          if (dead_ || !wire->attached || !wire->mute || wire->mutes != silence)
+                            return;
+                          Seat& seat = *shards_[wire->shard].seats[wire->slot];
+                          setting_.census.add(Happening::silent);
+                          close(wire->shard, seat, GoodbyeCode::silent, "nothing was heard");
+                        });
 }
 
 void SimShards::die() {
@@ -311,14 +329,16 @@ void SimShards::die() {
 
 bool SimShards::idle() const {
   return std::all_of(shards_.begin(), shards_.end(), [](const Shard& shard) {
-    return shard.commands.empty() && shard.mail.empty() && shard.ready.empty() && shard.events.empty();
+    return shard.commands.empty() && shard.mail.empty() && shard.ready.empty() &&
+           shard.events.empty();
   });
 }
 
 std::size_t SimShards::connected() const {
   std::size_t count = 0;
   for (const Shard& shard : shards_) {
-    for (const std::unique_ptr<Seat>& seat : shard.seats) count += seat != nullptr && seat->wire ? 1 : 0;
+    for (const std::unique_ptr<Seat>& seat : shard.seats)
+      count += seat != nullptr && seat->wire ? 1 : 0;
   }
   return count;
 }

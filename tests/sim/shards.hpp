@@ -33,10 +33,10 @@ class Witness {
   [[nodiscard]] virtual std::uint64_t retained_stream(std::uint32_t group) const = 0;
 };
 
-/// The shards of a hub as the conductor sees them: commands are carried out in order, at any time later; events come
-/// back in order; tables are read at any time between; all commands that wait are carried out before mail is taken
-/// (hub/shard/commands.hpp). Frames go where the published tables say.
-/// Thread safety: none. Lifetime: one life of the hub.
+/// The shards of a hub as the conductor sees them: commands are carried out in order, at any time
+/// later; events come back in order; tables are read at any time between; all commands that wait
+/// are carried out before mail is taken (hub/shard/commands.hpp). Frames go where the published
+/// tables say. Thread safety: none. Lifetime: one life of the hub.
 class SimShards final : public hub::ShardProxy {
  public:
   struct Parts {
@@ -78,7 +78,8 @@ class SimShards final : public hub::ShardProxy {
   /// Nothing waits to be done.
   [[nodiscard]] bool idle() const;
   [[nodiscard]] std::size_t connected() const;
-  /// All that was sent was taken and credited, nothing is held, and nothing is kept of services that are gone.
+  /// All that was sent was taken and credited, nothing is held, and nothing is kept of services
+  /// that are gone.
   void require_at_rest() const;
 
  private:
@@ -86,9 +87,11 @@ class SimShards final : public hub::ShardProxy {
     Bytes frame;
     std::uint64_t for_session = 0;
   };
-  /// A paced subscription. What may go when is decided by the hub's own counts; the frames wait here.
+  /// A paced subscription. What may go when is decided by the hub's own counts; the frames wait
+  /// here.
   struct Pace {
-    Pace(hub::Recipient& nobody, GroupId group, const hub::PaceTerms& terms) : counts(nobody, group, terms) {}
+    Pace(hub::Recipient& nobody, GroupId group, const hub::PaceTerms& terms)
+        : counts(nobody, group, terms) {}
     hub::PacedSubscription counts;
     std::deque<Data> held;
     std::optional<Time> wakes;  ///< when it is looked at next
@@ -109,7 +112,8 @@ class SimShards final : public hub::ShardProxy {
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
     std::uint32_t pings = 0;
-    std::map<std::uint32_t, std::uint64_t> reading;  ///< moves that the conductor wants to know read, by PING
+    std::map<std::uint32_t, std::uint64_t>
+        reading;  ///< moves that the conductor wants to know read, by PING
     std::deque<Data> data;
     std::map<std::uint32_t, std::unique_ptr<Pace>> paces;  ///< by group
     bool ready = false;
@@ -162,7 +166,8 @@ class SimShards final : public hub::ShardProxy {
   bool handle_control(std::size_t shard, Seat& seat, Bytes frame);
   void close(std::size_t shard, Seat& seat, proto::GoodbyeCode code, const char* sentence);
   void detach(Seat& seat, std::optional<proto::Goodbye> told);
-  void tell(std::size_t shard, const Seat& seat, bool said_by_peer, proto::GoodbyeCode code, std::string sentence);
+  void tell(std::size_t shard, const Seat& seat, bool said_by_peer, proto::GoodbyeCode code,
+            std::string sentence);
   void push_event(std::size_t shard, hub::ShardEvent event);
 
   void route(std::size_t shard, const Bytes& frame, bool handed_over);
@@ -174,7 +179,8 @@ class SimShards final : public hub::ShardProxy {
   void to_place(std::size_t shard, const Bytes& frame, const To& to, bool handed_over);
   void to_group(std::size_t shard, const Bytes& frame, bool handed_over);
   void to_provider(std::size_t shard, const Bytes& frame, bool handed_over);
-  void to_paced(std::size_t shard, const Bytes& frame, const hub::MemberList<hub::PacedMember>& members);
+  void to_paced(std::size_t shard, const Bytes& frame,
+                const hub::MemberList<hub::PacedMember>& members);
   void require_subscribed(const Seat& seat, std::uint32_t group) const;
   void deliver(std::size_t shard, Seat& seat, const Bytes& frame, std::uint64_t for_session);
   static void require_for(const Seat& seat, std::uint64_t session);
@@ -213,7 +219,8 @@ class SimShards final : public hub::ShardProxy {
   const Witness* witness_ = nullptr;
   std::vector<Shard> shards_;
   std::vector<Sent> sent_;
-  /// The last message of each retained group that was routed, and of which stream: what a new subscriber is owed.
+  /// The last message of each retained group that was routed, and of which stream: what a new
+  /// subscriber is owed.
   struct Last {
     std::uint64_t stream = 0;
     std::uint64_t message = 0;

@@ -53,7 +53,8 @@ Shrunk shrink(const World::Options& world, const Report& report) {
 }
 
 std::string arguments_of(const World::Options& world) {
-  std::string words = "--seed " + std::to_string(world.seed) + " --nodes " + std::to_string(world.nodes);
+  std::string words =
+      "--seed " + std::to_string(world.seed) + " --nodes " + std::to_string(world.nodes);
   const char* before = " --without ";
   for (std::size_t i = 0; i < kFaults.size(); ++i) {
     if (!world.without[i]) continue;

@@ -25,7 +25,8 @@ void Trace::mix(std::span<const std::byte> bytes) {
   }
 }
 
-void Trace::note(const char* words, std::uint64_t a, std::uint64_t b, std::uint64_t c, std::string_view text) {
+void Trace::note(const char* words, std::uint64_t a, std::uint64_t b, std::uint64_t c,
+                 std::string_view text) {
   Entry& entry = last_[events_ % last_.size()];
   entry.time = agenda_.now();
   entry.number = ++events_;
@@ -45,7 +46,8 @@ void Trace::note(const char* words, std::uint64_t a, std::uint64_t b, std::uint6
 
 std::string Trace::in_words(const Entry& entry) {
   char head[64];
-  std::snprintf(head, sizeof head, "%7llu %10.3f ms  ", static_cast<unsigned long long>(entry.number),
+  std::snprintf(head, sizeof head, "%7llu %10.3f ms  ",
+                static_cast<unsigned long long>(entry.number),
                 static_cast<double>(entry.time.count()) / 1'000);
   std::string line = head;
   for (const char* next = entry.words; *next != '\0'; ++next) {
@@ -74,7 +76,8 @@ std::string Trace::in_words(const Entry& entry) {
 std::vector<std::string> Trace::last() const {
   std::vector<std::string> lines;
   const std::uint64_t count = std::min<std::uint64_t>(events_, last_.size());
-  for (std::uint64_t i = events_ - count; i < events_; ++i) lines.push_back(in_words(last_[i % last_.size()]));
+  for (std::uint64_t i = events_ - count; i < events_; ++i)
+    lines.push_back(in_words(last_[i % last_.size()]));
   return lines;
 }
 

@@ -11,12 +11,13 @@
 
 namespace gimnet::sim {
 
-/// Everything that happens, as a hash of all of it and the last of it in words. Equal seeds have equal hashes on every
-/// run and with every compiler: no addresses, no real time, no order of a hash table enters it.
-/// Thread safety: none.
+/// Everything that happens, as a hash of all of it and the last of it in words. Equal seeds have
+/// equal hashes on every run and with every compiler: no addresses, no real time, no order of a
+/// hash table enters it. Thread safety: none.
 class Trace {
  public:
-  explicit Trace(const Agenda& agenda, bool print) : agenda_(agenda), print_(print), last_(kLastEvents) {}
+  explicit Trace(const Agenda& agenda, bool print)
+      : agenda_(agenda), print_(print), last_(kLastEvents) {}
 
   /// `words` in which {a}, {b}, {c} and {t} stand for what follows. Lifetime: `words` is a literal.
   void note(const char* words, std::uint64_t a = 0, std::uint64_t b = 0, std::uint64_t c = 0,

@@ -21,8 +21,10 @@ ns::Watch WatchView::request(std::uint32_t number) const {
 void WatchView::take(const ns::WatchEvents& events, Census& census) {
   const bool begins = !events.changes.empty() && events.changes.front().kind == ChangeKind::begin;
   if (!begins) {
-    require(!awaits_snapshot_, Checker::events, "a watch does not begin with the snapshot that it was promised");
-    require(events.epoch == epoch_ && events.after == version_, Checker::events, "a watch is told changes with a gap");
+    require(!awaits_snapshot_, Checker::events,
+            "a watch does not begin with the snapshot that it was promised");
+    require(events.epoch == epoch_ && events.after == version_, Checker::events,
+            "a watch is told changes with a gap");
   } else if (!awaits_snapshot_ && complete_) {
     census.add(Happening::watch_began_again);
   }
@@ -62,7 +64,8 @@ bool WatchView::fits(const std::string& name) const {
 }
 
 void WatchView::require_agreed(const Model& model) const {
-  require(complete_ && !awaits_snapshot_, Checker::convergence, "a snapshot does not come to its end");
+  require(complete_ && !awaits_snapshot_, Checker::convergence,
+          "a snapshot does not come to its end");
   require_nodes(model);
   require_services(model);
 }
@@ -73,7 +76,8 @@ void WatchView::require_nodes(const Model& model) const {
     if ((subjects_ & ns::kWatchNodes) == 0 || !fits(session.name)) continue;
     ++due;
     const auto found = nodes_.find(index);
-    if (found == nodes_.end() || found->second.name != session.name || found->second.connected != session.connected) {
+    if (found == nodes_.end() || found->second.name != session.name ||
+        found->second.connected != session.connected) {
       broken(Checker::convergence, "a watch is wrong about node " + std::to_string(index));
     }
   }
@@ -92,7 +96,8 @@ void WatchView::require_services(const Model& model) const {
       broken(Checker::convergence, "a watch is wrong about the service '" + topic->first + "'");
     }
   }
-  require(services_.size() == due, Checker::convergence, "a watch knows other services than there are");
+  require(services_.size() == due, Checker::convergence,
+          "a watch knows other services than there are");
 }
 
 }  // namespace gimnet::sim

@@ -9,13 +9,14 @@
 
 namespace gimnet::sim {
 
-/// What a node knows of nodes and services by watching them, all or those that fit a pattern. Thread safety: none.
-/// Errors: Broken.
+/// What a node knows of nodes and services by watching them, all or those that fit a pattern.
+/// Thread safety: none. Errors: Broken.
 class WatchView {
  public:
   WatchView() = default;
   /// `pattern`: "" for all. `subjects` as in WATCH.
-  WatchView(std::string pattern, std::uint8_t subjects) : pattern_(std::move(pattern)), subjects_(subjects) {}
+  WatchView(std::string pattern, std::uint8_t subjects)
+      : pattern_(std::move(pattern)), subjects_(subjects) {}
 
   /// The node asked to be told everything from here on.
   [[nodiscard]] proto::ns::Watch request(std::uint32_t number) const;

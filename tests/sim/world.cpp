@@ -9,16 +9,21 @@ using proto::GoodbyeCode;
 using namespace std::chrono_literals;
 
 World::World(const Options& options)
-    : options_(options), setting_(options.seed, options.nodes, options.without, options.print), network_(setting_) {
+    : options_(options),
+      setting_(options.seed, options.nodes, options.without, options.print),
+      network_(setting_) {
   network_.connect({[this](Wire& wire) { life_->shards().has_something(wire); },
-                    [this](const WirePointer& wire, const Bytes& frame) { nodes_[wire->node]->hears(wire, frame); },
+                    [this](const WirePointer& wire, const Bytes& frame) {
+                      nodes_[wire->node]->hears(wire, frame);
+                    },
                     [this](const WirePointer& wire) { nodes_[wire->node]->sees_the_end(wire); }});
   begin_life(make_disk());
-  const SimNode::Around around{setting_, network_,
-                               [this](const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
-                                 say_hello(wire, hello, identity);
-                               },
-                               [this](const WirePointer& wire, bool mute) { life_->shards().set_mute(wire, mute); }};
+  const SimNode::Around around{
+      setting_, network_,
+      [this](const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
+        say_hello(wire, hello, identity);
+      },
+      [this](const WirePointer& wire, bool mute) { life_->shards().set_mute(wire, mute); }};
   for (std::uint32_t i = 0; i < options.nodes; ++i) {
     nodes_.push_back(std::make_unique<SimNode>(around, i));
     nodes_.back()->start();
@@ -28,7 +33,8 @@ World::World(const Options& options)
 
 namespace {
 
-/// Some worlds come to the end of the indices, and begin again at 1; those who had the first ones may still have them.
+/// Some worlds come to the end of the indices, and begin again at 1; those who had the first ones
+/// may still have them.
 void draw_used(Random& random, std::uint32_t& mark, hub::IndexSet& used, GivenIds& given) {
   constexpr std::uint32_t kLast = kEveryIndex - 1;
   const auto left = static_cast<std::uint32_t>(random.between(1, 400));
@@ -66,10 +72,12 @@ std::string World::keep(const hub::HubState& state) {
 
 void World::begin_life(Past past) {
   ++lives_;
-  Result<hub::HubStart> start = hub::next_start(disk_, milliseconds{HubLife::wall_ns(setting_) / 1'000'000});
+  Result<hub::HubStart> start =
+      hub::next_start(disk_, milliseconds{HubLife::wall_ns(setting_) / 1'000'000});
   require(start.has_value(), Checker::convergence, "the hub cannot start again");
   disk_ = start->state;
-  if (disk_.boot > 1) past.returns_until = setting_.agenda.now_ms() + milliseconds{setting_.plan.limits.grace_ms};
+  if (disk_.boot > 1)
+    past.returns_until = setting_.agenda.now_ms() + milliseconds{setting_.plan.limits.grace_ms};
   past.nodes.used = start->nodes.used;
   past.groups.used = start->groups.used;
   // Fewer than a real start grants, so that more are asked for.
@@ -77,11 +85,12 @@ void World::begin_life(Past past) {
     const std::uint64_t fewer = hub::IndexPool::kBlock / 2 - setting_.random.between(1, 200);
     if (range->count >= hub::IndexPool::kBlock) range->count -= fewer;
   }
-  life_ = std::make_unique<HubLife>(setting_,
-                                    HubLife::Around{network_, [this] { want_conductor(Time{0}); },
-                                                    [this](std::uint32_t node) { return nodes_[node]->is_slow(); },
-                                                    [this](const hub::HubState& state) { return keep(state); }},
-                                    *start, std::move(past));
+  life_ = std::make_unique<HubLife>(
+      setting_,
+      HubLife::Around{network_, [this] { want_conductor(Time{0}); },
+                      [this](std::uint32_t node) { return nodes_[node]->is_slow(); },
+                      [this](const hub::HubState& state) { return keep(state); }},
+      *start, std::move(past));
 }
 
 void World::plan_endings() {
@@ -114,14 +123,16 @@ void World::stop_hub() {
 
 void World::start_hub() {
   down_ = false;
-  // What is still on its way to the old life finds its wires closed; the old shards stay until then.
+  // What is still on its way to the old life finds its wires closed; the old shards stay until
+  // then.
   dead_.push_back(std::move(life_));
   Past past = dead_.back()->model().past();
   // Who was kicked while the disk was full is forgotten.
   std::erase_if(past.kicked, [this](const Kicked& one) {
-    return std::none_of(disk_.kicked.begin(), disk_.kicked.end(), [&one](const hub::SessionToken& kept) {
-      return kept.index == one.index && kept.expiry == one.expiry;
-    });
+    return std::none_of(disk_.kicked.begin(), disk_.kicked.end(),
+                        [&one](const hub::SessionToken& kept) {
+                          return kept.index == one.index && kept.expiry == one.expiry;
+                        });
   });
   begin_life(std::move(past));
 }
@@ -146,8 +157,8 @@ void World::begin_drain() {
 void World::look_at_drain() {
   if (life_->conductor().drain_wanted() && !life_->drains()) {
     // The other events of its batch come first.
-    for (auto shards = life_->shards().with_events(); !shards.empty() && setting_.random.chance(500);
-         shards = life_->shards().with_events()) {
+    for (auto shards = life_->shards().with_events();
+         !shards.empty() && setting_.random.chance(500); shards = life_->shards().with_events()) {
       ++steps_;
       life_->take_event(setting_.random.pick(shards));
     }
@@ -155,8 +166,8 @@ void World::look_at_drain() {
   }
   if (!life_->conductor().drained()) return;
   const auto& sessions = life_->model().sessions();
-  const bool all_gone =
-      std::none_of(sessions.begin(), sessions.end(), [](const auto& entry) { return entry.second.connected; });
+  const bool all_gone = std::none_of(sessions.begin(), sessions.end(),
+                                     [](const auto& entry) { return entry.second.connected; });
   require(all_gone, Checker::drain, "the hub ends before everybody has gone");
   if (last_life_) return;
   setting_.trace.note("the hub has drained and ends");
@@ -168,22 +179,26 @@ void World::look_at_drain() {
   });
 }
 
-void World::say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
-  setting_.agenda.at(network_.arrival(wire->next_at_hub), [this, wire, hello, identity, life = lives_] {
-    if (life != lives_ || down_) return network_.close_by_hub(wire);
-    newcomers_.push_back({wire, hello, identity});
-    want_conductor(Time{0});
-  });
+void World::say_hello(const WirePointer& wire, const proto::Hello& hello,
+                      const std::string& identity) {
+  setting_.agenda.at(network_.arrival(wire->next_at_hub),
+                     [this, wire, hello, identity, life = lives_] {
+                       if (life != lives_ || down_) return network_.close_by_hub(wire);
+                       newcomers_.push_back({wire, hello, identity});
+                       want_conductor(Time{0});
+                     });
 }
 
 void World::want_conductor(Time delay) {
   if (turn_due_) return;
   turn_due_ = true;
   Time time = delay + Time{setting_.random.between(1, 200)};
-  if (setting_.random.chance(setting_.plan.conductor_pause) && setting_.agenda.now() < setting_.plan.faults_until) {
+  if (setting_.random.chance(setting_.plan.conductor_pause) &&
+      setting_.agenda.now() < setting_.plan.faults_until) {
     time += Time{setting_.random.between(10'000, 400'000)};
     setting_.census.add(Happening::conductor_paused);
-    setting_.trace.note("the conductor pauses for {a} us", static_cast<std::uint64_t>(time.count()));
+    setting_.trace.note("the conductor pauses for {a} us",
+                        static_cast<std::uint64_t>(time.count()));
   }
   setting_.agenda.after(time, [this] {
     turn_due_ = false;
@@ -225,7 +240,8 @@ void World::conductor_turn() {
   }
   watches_due_ = more_watching;
   arm_clock();
-  if (choices.size() > 1 || watches_due_ || !newcomers_.empty() || !life_->shards().with_events().empty())
+  if (choices.size() > 1 || watches_due_ || !newcomers_.empty() ||
+      !life_->shards().with_events().empty())
     want_conductor(Time{0});
 }
 
@@ -244,7 +260,8 @@ void World::admit() {
 
 void World::look_whether_it_stood() {
   if (!clock_) return;
-  const milliseconds stood = setting_.agenda.now_ms() - std::chrono::duration_cast<milliseconds>(*clock_);
+  const milliseconds stood =
+      setting_.agenda.now_ms() - std::chrono::duration_cast<milliseconds>(*clock_);
   if (stood <= hub::Conductor::kLookEvery) return;
   clock_ = setting_.agenda.now();
   life_->stood_still(stood);
@@ -291,9 +308,11 @@ void World::live() {
 
 /// The faults stopped long ago: everybody who can be served is.
 void World::converge() {
-  require(newcomers_.empty() && life_->shards().idle(), Checker::convergence, "something waits to be done for ever");
+  require(newcomers_.empty() && life_->shards().idle(), Checker::convergence,
+          "something waits to be done for ever");
   life_->shards().require_at_rest();
-  require(!life_->conductor().has_garbage(), Checker::convergence, "lists that nobody reads any more are not freed");
+  require(!life_->conductor().has_garbage(), Checker::convergence,
+          "lists that nobody reads any more are not freed");
   std::set<std::uint32_t> up;
   for (const auto& node : nodes_) {
     require_served(*node);
@@ -303,17 +322,21 @@ void World::converge() {
   }
   for (const auto& [index, session] : life_->model().sessions()) {
     if (!up.contains(index))
-      broken(Checker::convergence, "node " + std::to_string(index) + " is a session without a program");
+      broken(Checker::convergence,
+             "node " + std::to_string(index) + " is a session without a program");
   }
-  require(life_->shards().connected() == up.size(), Checker::convergence, "there are connections without a program");
+  require(life_->shards().connected() == up.size(), Checker::convergence,
+          "there are connections without a program");
 }
 
 void World::require_served(const SimNode& node) const {
   if (node.is_up()) {
-    return require(!node.waits_for_answers(), Checker::answers, "a node waits for an answer that does not come");
+    return require(!node.waits_for_answers(), Checker::answers,
+                   "a node waits for an answer that does not come");
   }
   const bool room = life_->model().sessions().size() < setting_.plan.limits.nodes;
-  const bool refused = node.refusal() == GoodbyeCode::name_taken || (node.refusal() == GoodbyeCode::hub_full && !room);
+  const bool refused = node.refusal() == GoodbyeCode::name_taken ||
+                       (node.refusal() == GoodbyeCode::hub_full && !room);
   if (refused) return;
   broken(Checker::convergence, "program " + std::to_string(node.number()) + ", last refused with " +
                                    proto::goodbye_name(node.refusal()) +
@@ -326,21 +349,25 @@ void World::require_agreed(const SimNode& node) const {
   const std::uint32_t index = index_of(node.id());
   const auto session = model.sessions().find(index);
   if (session == model.sessions().end() || session->second.name != node.name()) {
-    broken(Checker::convergence, "node " + std::to_string(index) + " believes that it is a member, and is not");
+    broken(Checker::convergence,
+           "node " + std::to_string(index) + " believes that it is a member, and is not");
   }
   if (node.view() != nullptr) node.view()->require_agreed(model);
   for (const auto& [service, provided] : node.provides()) {
     const Model::Topic* topic = model.topic(node.name() + "/" + service);
     const bool same = topic != nullptr && topic->service && topic->service->provider == index &&
                       topic->service->group == index_of(provided.group);
-    if (!same) broken(Checker::convergence, "node " + std::to_string(index) + " is wrong about its service " + service);
+    if (!same)
+      broken(Checker::convergence,
+             "node " + std::to_string(index) + " is wrong about its service " + service);
   }
   for (const auto& [full_name, subscribed_to] : node.subscribes()) {
     const Model::Topic* topic = model.topic(full_name);
     const bool subscribed = topic != nullptr && topic->subscribers.contains(index);
     const std::uint32_t right = subscribed && topic->service ? topic->service->group : 0;
     if (!subscribed || index_of(subscribed_to.group) != right) {
-      broken(Checker::convergence, "node " + std::to_string(index) + " is wrong about the service " + full_name);
+      broken(Checker::convergence,
+             "node " + std::to_string(index) + " is wrong about the service " + full_name);
     }
   }
 }

@@ -22,8 +22,8 @@ struct Report {
   std::vector<std::string> last;  ///< the last events in words, if it broke
 };
 
-/// A hub and its nodes in simulated time: one seed gives the load, the timing, the faults and the collisions.
-/// Thread safety: none; worlds share nothing.
+/// A hub and its nodes in simulated time: one seed gives the load, the timing, the faults and the
+/// collisions. Thread safety: none; worlds share nothing.
 class World {
  public:
   struct Options {
@@ -52,7 +52,8 @@ class World {
   /// An administrator or a signal has the hub drain.
   void want_drain();
   void begin_drain();
-  /// What the conductor's loop does after events: begins to drain, or ends (hub/control/conductor_loop.cpp).
+  /// What the conductor's loop does after events: begins to drain, or ends
+  /// (hub/control/conductor_loop.cpp).
   void look_at_drain();
   void say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity);
   void want_conductor(Time delay);
@@ -72,8 +73,9 @@ class World {
   Network network_;
   std::vector<std::unique_ptr<SimNode>> nodes_;
   std::unique_ptr<HubLife> life_;
-  std::vector<std::unique_ptr<HubLife>> dead_;  ///< earlier lives; something may still be under way to them
-  hub::HubState disk_;                          ///< what the hub kept last
+  std::vector<std::unique_ptr<HubLife>>
+      dead_;            ///< earlier lives; something may still be under way to them
+  hub::HubState disk_;  ///< what the hub kept last
   std::deque<HubLife::Newcomer> newcomers_;
   bool turn_due_ = false;
   bool clock_due_ = false;

@@ -14,9 +14,10 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// The shards' threads allocate nothing while data flows, as jemalloc itself counts it in the running hub. A round of
-// the same traffic is repeated until one allocated no byte: memory that a fuller queue needed for the first time is
-// kept, so the rounds before it are the warm-up. What is allocated again and again never has such a round.
+// The shards' threads allocate nothing while data flows, as jemalloc itself counts it in the
+// running hub. A round of the same traffic is repeated until one allocated no byte: memory that a
+// fuller queue needed for the first time is kept, so the rounds before it are the warm-up. What is
+// allocated again and again never has such a round.
 
 namespace gimnet::stress {
 namespace {
@@ -57,7 +58,8 @@ class Traffic {
 
   Statistics round() {
     for (std::size_t i = 0; i < times_; ++i) {
-      for (std::size_t node = 0; node < nodes_.size(); ++node) nodes_[node].put_bytes(blocks_[node]);
+      for (std::size_t node = 0; node < nodes_.size(); ++node)
+        nodes_[node].put_bytes(blocks_[node]);
       write_all();
     }
     sent_ += times_ * frames_;
@@ -97,7 +99,8 @@ class Traffic {
     return sum;
   }
   static std::vector<std::string> arguments() {
-    // On a slow machine a round has pauses: what the hub takes for idle gives memory back, and needs it anew.
+    // On a slow machine a round has pauses: what the hub takes for idle gives memory back, and
+    // needs it anew.
     return {"--shards",    "3",
             "--placement", "hint",
             "--limit",     "keep_alive_ms=3000000",
@@ -151,21 +154,23 @@ TEST(ShardsAllocateNothing, AndTheirCounterRisesWhenSomethingDoes) {
   Traffic traffic;
   RawNode& node = traffic.join(0);
   const auto of_shard_0 = [](const Statistics& now) { return now.of_shard(0, "allocated_bytes"); };
-  const Statistics before =
-      wait_for(node, [&](const Statistics& now) { return of_shard_0(now) > 0; }, "a hub that is linked with jemalloc");
+  const Statistics before = wait_for(
+      node, [&](const Statistics& now) { return of_shard_0(now) > 0; },
+      "a hub that is linked with jemalloc");
   // Each request is handed to the conductor in memory of its own.
   static_cast<void>(wait_for(
-      node, [&](const Statistics& now) { return of_shard_0(now) > of_shard_0(before); }, "a request that allocates"));
+      node, [&](const Statistics& now) { return of_shard_0(now) > of_shard_0(before); },
+      "a request that allocates"));
 }
 
 TEST(ShardsAllocateNothing, ForAMillionSmallFramesInTurns) {
   Traffic traffic;
   for (std::size_t i = 0; i < 8; ++i) traffic.join(i % 2);
   for (std::size_t i = 0; i < 1'000; ++i) {
-    traffic.add(
-        i % 2,
-        parts_of(proto::Kind::unicast, traffic.id(i % 8), proto::Policy::kind_default, static_cast<proto::Lane>(i % 4)),
-        16);
+    traffic.add(i % 2,
+                parts_of(proto::Kind::unicast, traffic.id(i % 8), proto::Policy::kind_default,
+                         static_cast<proto::Lane>(i % 4)),
+                16);
   }
   traffic.repeat(1'000);
   traffic.expect_a_round_without();
@@ -206,8 +211,9 @@ TEST(ShardsAllocateNothing, ForFragmentsThatWait) {
   for (std::uint32_t offset = 0; offset < kTotal; offset += kPiece) {
     for (std::size_t message = 0; message < 4; ++message) {
       const std::uint32_t size = std::min(kPiece, kTotal - offset);
-      proto::FrameParts parts = parts_of(proto::Kind::unicast, traffic.id(2 + message % 2), proto::Policy::kind_default,
-                                         message < 2 ? proto::Lane::normal : proto::Lane::bulk);
+      proto::FrameParts parts =
+          parts_of(proto::Kind::unicast, traffic.id(2 + message % 2), proto::Policy::kind_default,
+                   message < 2 ? proto::Lane::normal : proto::Lane::bulk);
       parts.fragment = proto::FragmentHeader{static_cast<std::uint32_t>(message), offset, kTotal};
       traffic.add(message / 2, parts, size);
     }
@@ -221,7 +227,8 @@ TEST(ShardsAllocateNothing, ForLatestMessagesThatAreReplaced) {
   for (std::size_t i = 0; i < 4; ++i) traffic.join(i % 2);
   traffic.let_receivers_wait();
   for (std::size_t i = 0; i < 2'000; ++i) {
-    proto::FrameParts parts = parts_of(proto::Kind::unicast, traffic.id(2 + i % 2), proto::Policy::latest);
+    proto::FrameParts parts =
+        parts_of(proto::Kind::unicast, traffic.id(2 + i % 2), proto::Policy::latest);
     parts.key = i % 60;
     traffic.add(i / 2 % 2, parts, 1'000);
   }
@@ -236,7 +243,8 @@ TEST(ShardsAllocateNothing, ForSendersThatArePausedAndResumed) {
   traffic.let_receivers_wait();
   // More than a lane takes, less than its reserve on top.
   for (std::size_t i = 0; i < 400; ++i) {
-    traffic.add(i % 2, parts_of(proto::Kind::unicast, traffic.id(2 + i % 2)), i % 8 == 0 ? 60'000 : 4'000);
+    traffic.add(i % 2, parts_of(proto::Kind::unicast, traffic.id(2 + i % 2)),
+                i % 8 == 0 ? 60'000 : 4'000);
   }
   traffic.repeat(scaled(10));
   const Statistics end = traffic.expect_a_round_without();
@@ -263,10 +271,11 @@ TEST(ShardsAllocateNothing, ForAGroupOnTwoShards) {
   RawNode& provider = traffic.join(0, "provider");
   proto::ns::Advertise service;
   service.service = "stream";
-  const std::uint32_t group = provider.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, service).group.value();
+  const std::uint32_t group =
+      provider.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, service).group.value();
   for (std::size_t i = 0; i < 20; ++i) {
-    static_cast<void>(
-        traffic.join(i % 2).ask<proto::ns::SubscribeAnswer>(proto::Kind::ns, proto::ns::Subscribe{"provider/stream"}));
+    static_cast<void>(traffic.join(i % 2).ask<proto::ns::SubscribeAnswer>(
+        proto::Kind::ns, proto::ns::Subscribe{"provider/stream"}));
   }
   for (std::size_t i = 0; i < 100; ++i) traffic.add(0, parts_of(proto::Kind::group, group), 16);
   traffic.add(0, parts_of(proto::Kind::group, group), 1'000);

@@ -12,8 +12,8 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// A thousand receivers that have stopped, behind a sender that has not: provable is that the hub's memory stays within
-// its budget, and that the one healthy receiver gets everything.
+// A thousand receivers that have stopped, behind a sender that has not: provable is that the hub's
+// memory stays within its budget, and that the one healthy receiver gets everything.
 
 namespace gimnet::stress {
 namespace {
@@ -34,27 +34,34 @@ std::vector<std::string> with_budget(std::int64_t bytes) {
 
 class Crowd {
  public:
-  explicit Crowd(std::int64_t budget = kBudget, const std::vector<std::string>& arguments = with_budget(kBudget))
-      : budget_(budget), hub_(arguments), publisher_(hub_.unix_url(), named("publisher")), healthy_(hub_.unix_url()) {
+  explicit Crowd(std::int64_t budget = kBudget,
+                 const std::vector<std::string>& arguments = with_budget(kBudget))
+      : budget_(budget),
+        hub_(arguments),
+        publisher_(hub_.unix_url(), named("publisher")),
+        healthy_(hub_.unix_url()) {
     raise_descriptor_limit();
     proto::ns::Advertise service;
     service.service = "stream";
     group_ = publisher_.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, service).group.value();
     subscribe(healthy_);
     for (std::size_t i = 0; i < kStopped; ++i) {
-      // Over the Unix socket what the kernel holds for a receiver is bounded by the hub's own buffer.
+      // Over the Unix socket what the kernel holds for a receiver is bounded by the hub's own
+      // buffer.
       stopped_.emplace_back(hub_.unix_url());
       subscribe(stopped_.back());
     }
   }
 
-  /// What the hub has with a thousand connected and a little of the same traffic, which the kernels still take.
+  /// What the hub has with a thousand connected and a little of the same traffic, which the kernels
+  /// still take.
   void measure_base() { base_ = hub_.resident_bytes(); }
 
   /// Publishes so many messages of that size, as fast as the healthy subscriber takes them.
   void publish(std::size_t messages, std::size_t size) {
     while (messages > 0) {
-      const std::size_t batch = std::clamp<std::size_t>(kBatchBytes / (size + proto::kHeaderSize), 1, messages);
+      const std::size_t batch =
+          std::clamp<std::size_t>(kBatchBytes / (size + proto::kHeaderSize), 1, messages);
       for (std::size_t i = 0; i < batch; ++i) put(parts_of(proto::Kind::group, group_), size);
       expected_ += batch;
       messages -= batch;
@@ -94,7 +101,8 @@ class Crowd {
   }
 
   void subscribe(RawNode& node) {
-    static_cast<void>(node.ask<proto::ns::SubscribeAnswer>(proto::Kind::ns, proto::ns::Subscribe{"publisher/stream"}));
+    static_cast<void>(node.ask<proto::ns::SubscribeAnswer>(
+        proto::Kind::ns, proto::ns::Subscribe{"publisher/stream"}));
   }
 
   void put(const proto::FrameParts& parts, std::size_t size) {
@@ -176,7 +184,8 @@ TEST(Budget, HoldsForLargeFrames) {
   crowd.expect_bounded();
 }
 
-// Neighbours of different lanes form no runs: each frame has an entry of its own, which is larger than the frame.
+// Neighbours of different lanes form no runs: each frame has an entry of its own, which is larger
+// than the frame.
 TEST(Budget, HoldsForUnicastOfSixteenBytes) {
   Crowd crowd;
   crowd.unicast(64, 16);

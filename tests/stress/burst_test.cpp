@@ -15,8 +15,9 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// The smallest frames there are, 16 bytes, in one burst: they cost the hub most for each byte. Provable is that two
-// others have their turns meanwhile, since the flood goes on until they have had them, and that no frame is lost.
+// The smallest frames there are, 16 bytes, in one burst: they cost the hub most for each byte.
+// Provable is that two others have their turns meanwhile, since the flood goes on until they have
+// had them, and that no frame is lost.
 
 namespace gimnet::stress {
 namespace {
@@ -24,7 +25,9 @@ namespace {
 constexpr std::chrono::seconds kPatience{120};
 constexpr std::uint64_t kSteered = 100;
 
-std::int32_t in_ms(std::chrono::milliseconds time) { return static_cast<std::int32_t>(time.count()); }
+std::int32_t in_ms(std::chrono::milliseconds time) {
+  return static_cast<std::int32_t>(time.count());
+}
 
 std::uint64_t burst_frames() { return is_full_size() ? 1'000'000 : 200'000; }
 
@@ -49,7 +52,8 @@ class Flood {
     to_.push_back(at_shard(hub, second_shard));
   }
 
-  /// The burst, then more of the same until `is_over`. Returns how many frames were sent; all have come then.
+  /// The burst, then more of the same until `is_over`. Returns how many frames were sent; all have
+  /// come then.
   std::uint64_t run(const std::atomic<bool>& is_over) {
     constexpr std::uint64_t kMore = 10'000;
     put(burst_frames());
@@ -94,7 +98,8 @@ class Flood {
 std::uint64_t steer(const NifNode& operator_node, const NifNode& robot) {
   std::thread answering([&] {
     Incoming in;
-    for (std::uint64_t answered = 0; answered != kSteered && in.receive(robot, in_ms(kPatience)) == NIF_OK;) {
+    for (std::uint64_t answered = 0;
+         answered != kSteered && in.receive(robot, in_ms(kPatience)) == NIF_OK;) {
       if (in->type != NIF_MESSAGE) continue;
       std::memcpy(&answered, in->payload, sizeof answered);
       static_cast<void>(nif_send_to(robot.get(), in->from, in->payload, in->size));
@@ -105,8 +110,8 @@ std::uint64_t steer(const NifNode& operator_node, const NifNode& robot) {
     const std::uint64_t number = steered + 1;
     Incoming in;
     is_answered = nif_send_to(operator_node.get(), robot.id(), &number, sizeof number) == NIF_OK &&
-                  in.receive(operator_node, in_ms(kPatience)) == NIF_OK && in->type == NIF_MESSAGE &&
-                  std::memcmp(in->payload, &number, sizeof number) == 0;
+                  in.receive(operator_node, in_ms(kPatience)) == NIF_OK &&
+                  in->type == NIF_MESSAGE && std::memcmp(in->payload, &number, sizeof number) == 0;
     steered += is_answered ? 1 : 0;
   }
   answering.join();
@@ -119,13 +124,15 @@ void expect_turns_for_others(std::uint16_t second_shard, std::uint64_t in_a_row)
   const NifNode robot = named_at_shard(hub, "robot", static_cast<std::uint8_t>(second_shard));
   Flood flood(hub, second_shard, in_a_row);
   std::atomic<bool> is_over{false};
-  std::future<std::uint64_t> flooding = std::async(std::launch::async, [&] { return flood.run(is_over); });
+  std::future<std::uint64_t> flooding =
+      std::async(std::launch::async, [&] { return flood.run(is_over); });
   EXPECT_EQ(steer(operator_node, robot), kSteered);
   is_over.store(true);
   const std::uint64_t frames = flooding.get();
   EXPECT_GE(frames, burst_frames());
   RawNode observer(hub.unix_url());
-  const Statistics end = wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
+  const Statistics end =
+      wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
   EXPECT_EQ(end["accepted"], frames + 2 * kSteered);
   EXPECT_EQ(end["delivered"], end["accepted"]);
   EXPECT_EQ(end.dropped(), 0u) << end.text();

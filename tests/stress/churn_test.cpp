@@ -14,9 +14,10 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// Nodes come and go while frames are under way, to one node, to several (LIST), to a service's provider (SERVICE) and
-// to its subscribers (GROUP): provable is that a frame reaches nobody but those whom its payload names, not even the
-// next one with that node's id, and that the ledger agrees with what senders and receivers counted.
+// Nodes come and go while frames are under way, to one node, to several (LIST), to a service's
+// provider (SERVICE) and to its subscribers (GROUP): provable is that a frame reaches nobody but
+// those whom its payload names, not even the next one with that node's id, and that the ledger
+// agrees with what senders and receivers counted.
 
 namespace gimnet::stress {
 namespace {
@@ -34,8 +35,8 @@ struct Address {
   std::uint32_t service = 0;  ///< the group of what it provides, which takes data
 };
 
-/// What every frame says about whom it is for: these nodes (LIST), this one (UNICAST), the provider of this service
-/// (SERVICE), or the subscribers of one sender (GROUP, whose group it is).
+/// What every frame says about whom it is for: these nodes (LIST), this one (UNICAST), the provider
+/// of this service (SERVICE), or the subscribers of one sender (GROUP, whose group it is).
 struct Letter {
   proto::Kind kind = proto::Kind::unicast;
   std::uint32_t group = 0;
@@ -54,9 +55,11 @@ struct Recipient {
 
 class Churn {
  public:
-  explicit Churn(const HubProcess& hub, std::vector<Leaving> leavings) : hub_(hub), leavings_(std::move(leavings)) {
+  explicit Churn(const HubProcess& hub, std::vector<Leaving> leavings)
+      : hub_(hub), leavings_(std::move(leavings)) {
     for (std::uint16_t i = 0; i < kSenders; ++i) {
-      RawNode& sender = senders_.emplace_back(hub_.unix_url(), at_shard(i, "sender-" + std::to_string(i)));
+      RawNode& sender =
+          senders_.emplace_back(hub_.unix_url(), at_shard(i, "sender-" + std::to_string(i)));
       proto::ns::Advertise news;
       news.service = "news";
       groups_[i] = sender.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, news).group.value();
@@ -76,7 +79,8 @@ class Churn {
     }
   }
 
-  /// Reads until the hub has nothing left to deliver and everybody has read it. Returns the final counters.
+  /// Reads until the hub has nothing left to deliver and everybody has read it. Returns the final
+  /// counters.
   Statistics settle(RawNode& observer) {
     const auto is_settled = [&](const Statistics& now) {
       turn();
@@ -109,16 +113,20 @@ class Churn {
   void join() {
     auto made = std::make_unique<Recipient>();
     const std::string name = "recipient-" + std::to_string(joins_);
-    made->node = RawNode(joins_ % 3 == 0 ? hub_.tcp_url() : hub_.unix_url(), at_shard(joins_ % 2, name));
-    // In turns to the one sender and to the other, on whatever shard: whoever follows in a slot has another group.
+    made->node =
+        RawNode(joins_ % 3 == 0 ? hub_.tcp_url() : hub_.unix_url(), at_shard(joins_ % 2, name));
+    // In turns to the one sender and to the other, on whatever shard: whoever follows in a slot has
+    // another group.
     declare(*made, "sender-" + std::to_string(joins_ / 2 % kSenders) + "/news");
     made->epoch = static_cast<std::uint32_t>(++joins_);
-    // Those who have left are written to as well: the latest at each place of this list, present or not.
+    // Those who have left are written to as well: the latest at each place of this list, present or
+    // not.
     addresses_[joins_ % addresses_.size()] = {made->node.id().value(), made->epoch, made->service};
     present_.push_back(std::move(made));
   }
 
-  /// Provides a service, and subscribes to one. What comes before the answers counts like all that comes later.
+  /// Provides a service, and subscribes to one. What comes before the answers counts like all that
+  /// comes later.
   void declare(Recipient& recipient, const std::string& subscribed) {
     proto::ns::Advertise box;
     box.service = "box";
@@ -132,7 +140,8 @@ class Churn {
       deadline.check("answers to ADVERTISE and SUBSCRIBE");
       turn();
       take(recipient);
-      if (recipient.service == 0 || recipient.subscribed == 0) wait_readable({recipient.node.descriptor()}, 10);
+      if (recipient.service == 0 || recipient.subscribed == 0)
+        wait_readable({recipient.node.descriptor()}, 10);
     }
   }
 
@@ -160,7 +169,8 @@ class Churn {
     for (std::size_t i = 0; i < kBatch; ++i) {
       constexpr std::array kKinds{proto::Kind::list, proto::Kind::group, proto::Kind::service};
       const std::uint64_t choice = random_() % 10;  // most are to one node
-      send(senders_[sender], groups_[sender], choice < kKinds.size() ? kKinds[choice] : proto::Kind::unicast);
+      send(senders_[sender], groups_[sender],
+           choice < kKinds.size() ? kKinds[choice] : proto::Kind::unicast);
     }
     while (!senders_[sender].flush()) turn();
   }
@@ -252,13 +262,16 @@ class Churn {
     std::memcpy(&letter, frame.body().data(), sizeof letter);
     if (letter.kind != frame.header.kind) return false;
     const std::uint32_t id = recipient.node.id().value();
-    const auto names = [&](const Address& to) { return to.node == id && to.epoch == recipient.epoch; };
+    const auto names = [&](const Address& to) {
+      return to.node == id && to.epoch == recipient.epoch;
+    };
     switch (letter.kind) {
       case proto::Kind::list:
         return frame.header.dst == 0 && std::any_of(letter.to.begin(), letter.to.end(), names);
       case proto::Kind::group:
         // The answer may be behind the first of them.
-        return frame.header.dst == letter.group && (recipient.subscribed == 0 || recipient.subscribed == letter.group);
+        return frame.header.dst == letter.group &&
+               (recipient.subscribed == 0 || recipient.subscribed == letter.group);
       case proto::Kind::service:
         return frame.header.dst == recipient.service && names(letter.to[0]);
       default:
@@ -289,13 +302,15 @@ class Churn {
 };
 
 void expect_every_kind(const Churn& churn, const Statistics& end) {
-  for (const proto::Kind kind : {proto::Kind::unicast, proto::Kind::list, proto::Kind::group, proto::Kind::service}) {
+  for (const proto::Kind kind :
+       {proto::Kind::unicast, proto::Kind::list, proto::Kind::group, proto::Kind::service}) {
     EXPECT_GT(churn.received(kind), 0u) << static_cast<int>(kind);
   }
   EXPECT_GT(end["copies"], churn.list_copies()) << "and what groups add";
 }
 
-const std::vector<std::string> kTwoShards{"--shards", "2", "--placement", "hint", "--limit", "grace_ms=50"};
+const std::vector<std::string> kTwoShards{"--shards", "2",       "--placement",
+                                          "hint",     "--limit", "grace_ms=50"};
 
 std::size_t half_of_all() { return is_full_size() ? 5'000'000 : 500'000; }
 

@@ -11,8 +11,8 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// A large message to many is copied by nobody: one buffer, a reference for each. And the counter that says so does
-// count, where the hub means to copy.
+// A large message to many is copied by nobody: one buffer, a reference for each. And the counter
+// that says so does count, where the hub means to copy.
 
 namespace gimnet::stress {
 namespace {
@@ -32,8 +32,8 @@ class Audience {
     group_ = publisher_.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, service).group.value();
     for (std::size_t i = 0; i < kSubscribers; ++i) {
       subscribers_.emplace_back(hub_.tcp_url());
-      static_cast<void>(subscribers_.back().ask<proto::ns::SubscribeAnswer>(proto::Kind::ns,
-                                                                            proto::ns::Subscribe{"publisher/stream"}));
+      static_cast<void>(subscribers_.back().ask<proto::ns::SubscribeAnswer>(
+          proto::Kind::ns, proto::ns::Subscribe{"publisher/stream"}));
     }
   }
 
@@ -52,7 +52,8 @@ class Audience {
   }
   /// To one of them alone.
   void send_to_one(std::size_t size) {
-    publisher_.put(parts_of(proto::Kind::unicast, subscribers_.front().id().value()), std::vector<std::byte>(size));
+    publisher_.put(parts_of(proto::Kind::unicast, subscribers_.front().id().value()),
+                   std::vector<std::byte>(size));
     publisher_.flush_all();
     static_cast<void>(subscribers_.front().wait_next());
   }
@@ -89,14 +90,17 @@ void expect_no_payload_byte_copied(const char* shards) {
 
 TEST(Copying, NoPayloadByteFor64KiBToAHundredSubscribers) { expect_no_payload_byte_copied("1"); }
 
-TEST(Copying, NoPayloadByteFor64KiBToAHundredSubscribersOnTwoShards) { expect_no_payload_byte_copied("2"); }
+TEST(Copying, NoPayloadByteFor64KiBToAHundredSubscribersOnTwoShards) {
+  expect_no_payload_byte_copied("2");
+}
 
 TEST(Copying, ShowsInItsCounterWhereTheHubMeansToCopy) {
   Audience audience("1");
   const Statistics before = audience.statistics();
   audience.send_to_one(100);
   const Statistics after = audience.statistics();
-  EXPECT_EQ(after["copied_bytes"], before["copied_bytes"] + proto::kHeaderSize + 100) << "a small frame to one";
+  EXPECT_EQ(after["copied_bytes"], before["copied_bytes"] + proto::kHeaderSize + 100)
+      << "a small frame to one";
   audience.send_to_one(65'536);
   EXPECT_EQ(audience.statistics()["copied_bytes"], after["copied_bytes"]) << "a large one";
 }

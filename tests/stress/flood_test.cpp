@@ -13,8 +13,8 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// Senders that block: provable is that two who flood each other both get to their end, and that who waits for a slow
-// peer is held up by nothing else.
+// Senders that block: provable is that two who flood each other both get to their end, and that who
+// waits for a slow peer is held up by nothing else.
 
 namespace gimnet::stress {
 namespace {
@@ -33,8 +33,8 @@ nif_options at_shard(std::uint8_t shard) {
 
 std::vector<std::string> two_shards() { return {"--shards", "2", "--placement", "hint"}; }
 
-/// How a program sends and receives: in turns, everything that is there before the next message; or with a thread that
-/// sends and waits in nif_send() beside one that receives.
+/// How a program sends and receives: in turns, everything that is there before the next message; or
+/// with a thread that sends and waits in nif_send() beside one that receives.
 enum class Threads { one, two };
 
 struct Flooder {
@@ -72,7 +72,8 @@ struct Flooder {
     });
     Incoming in;
     nif_status status = NIF_OK;
-    while (received < flood_count() && (status = in.receive(node, kPatienceMs)) == NIF_OK) take(*in.operator->());
+    while (received < flood_count() && (status = in.receive(node, kPatienceMs)) == NIF_OK)
+      take(*in.operator->());
     sending.join();
     if (status != NIF_OK) error = nif_status_text(status);
   }
@@ -83,7 +84,8 @@ struct Flooder {
       if (sent < flood_count() && !send_next(node, peer)) return;
       const std::int32_t patience = sent < flood_count() ? 0 : kPatienceMs;
       nif_status status = NIF_OK;
-      while (received < flood_count() && (status = in.receive(node, patience)) == NIF_OK) take(*in.operator->());
+      while (received < flood_count() && (status = in.receive(node, patience)) == NIF_OK)
+        take(*in.operator->());
       if (status != NIF_OK && status != NIF_TIMEOUT) error = nif_status_text(status);
       if (patience != 0 && status == NIF_TIMEOUT) error = "waited in vain";
     }
@@ -109,7 +111,8 @@ void expect_both_end(const HubProcess& hub, std::uint8_t second_shard, Threads t
 
 void expect_exact(const HubProcess& hub, std::uint64_t frames) {
   RawNode observer(hub.unix_url());
-  const Statistics end = wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
+  const Statistics end =
+      wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
   EXPECT_EQ(end["accepted"], frames);
   EXPECT_EQ(end["delivered"], frames);
   EXPECT_EQ(end.dropped(), 0u) << end.text();
@@ -156,12 +159,14 @@ TEST(Flood, TwoWhoIgnorePauseBothEnd) {
       RawNode& node = nodes[i];
       if (node.flush()) {
         for (int burst = 0; burst < 64 && sent[i] < count; ++burst, ++sent[i]) {
-          node.put(parts_of(proto::Kind::unicast, nodes[1 - i].id().value(), proto::Policy::block), payload);
+          node.put(parts_of(proto::Kind::unicast, nodes[1 - i].id().value(), proto::Policy::block),
+                   payload);
         }
       }
       node.keep_alive();
       node.read_some();
-      while (const auto frame = node.next()) received[i] += frame->header.kind == proto::Kind::unicast ? 1 : 0;
+      while (const auto frame = node.next())
+        received[i] += frame->header.kind == proto::Kind::unicast ? 1 : 0;
     }
     if (nodes[0].unwritten() > 0 && nodes[1].unwritten() > 0) {
       wait_readable({nodes[0].descriptor(), nodes[1].descriptor()}, 1);
@@ -170,8 +175,8 @@ TEST(Flood, TwoWhoIgnorePauseBothEnd) {
   expect_exact(hub, 2 * count);
 }
 
-// One thread waits in nif_send() for a peer that does not read; another steers a fast peer and gets its answers; the
-// library keeps alive meanwhile, for longer than the silent time.
+// One thread waits in nif_send() for a peer that does not read; another steers a fast peer and gets
+// its answers; the library keeps alive meanwhile, for longer than the silent time.
 TEST(Flood, WhoWaitsForASlowPeerSteersAFastOne) {
   std::vector<std::string> arguments = two_shards();
   arguments.insert(arguments.end(), {"--limit", "keep_alive_ms=100", "--limit", "silent_ms=1000"});
@@ -214,9 +219,10 @@ TEST(Flood, WhoWaitsForASlowPeerSteersAFastOne) {
     slow.keep_alive();
     ++steered;
     const bool is_paused = operator_node.counters().pauses > 0;
-    is_answered = nif_send_to(operator_node.get(), robot.id(), &steered, sizeof steered) == NIF_OK &&
-                  in.receive(operator_node, 10'000) == NIF_OK && in->type == NIF_MESSAGE &&
-                  std::memcmp(in->payload, &steered, sizeof steered) == 0;
+    is_answered =
+        nif_send_to(operator_node.get(), robot.id(), &steered, sizeof steered) == NIF_OK &&
+        in.receive(operator_node, 10'000) == NIF_OK && in->type == NIF_MESSAGE &&
+        std::memcmp(in->payload, &steered, sizeof steered) == 0;
     steered_while_paused += is_paused && is_answered ? 1 : 0;
   }
   is_over.store(true);
@@ -245,12 +251,14 @@ void take_the_rest(Incoming& in, const NifNode& node) {
   }
 }
 
-void broadcast_until(const std::atomic<bool>& is_over, std::atomic<std::uint64_t>& broadcasts, RawNode storm) {
+void broadcast_until(const std::atomic<bool>& is_over, std::atomic<std::uint64_t>& broadcasts,
+                     RawNode storm) {
   constexpr int kBurst = 64;
   const std::vector<std::byte> payload(1'000);
   while (!is_over.load()) {
     if (storm.flush()) {
-      for (int i = 0; i < kBurst; ++i) storm.put(parts_of(proto::Kind::broadcast, 0xFFFFFFFF), payload);
+      for (int i = 0; i < kBurst; ++i)
+        storm.put(parts_of(proto::Kind::broadcast, 0xFFFFFFFF), payload);
       broadcasts.fetch_add(kBurst);
     } else {
       wait_readable({storm.descriptor()}, 1);
@@ -263,8 +271,9 @@ void broadcast_until(const std::atomic<bool>& is_over, std::atomic<std::uint64_t
   storm.flush_all();
 }
 
-// One node broadcasts as fast as it can, and one of those who get it takes nothing: two others steer each other all the
-// while, since what they send waits for nobody and is dropped for nobody's sake.
+// One node broadcasts as fast as it can, and one of those who get it takes nothing: two others
+// steer each other all the while, since what they send waits for nobody and is dropped for nobody's
+// sake.
 TEST(Flood, ABroadcastStormHindersNobody) {
   const HubProcess hub(two_shards());
   const NifNode operator_node(hub.tcp_url(), "operator", at_shard(0));
@@ -290,8 +299,10 @@ TEST(Flood, ABroadcastStormHindersNobody) {
       deaf.keep_alive();
       std::this_thread::yield();
     } while (broadcasts.load() * kSteered < flood_count() * steered);
-    is_answered = nif_send_to(operator_node.get(), robot.id(), &steered, sizeof steered) == NIF_OK &&
-                  receive_unicast(in, operator_node) && std::memcmp(in->payload, &steered, sizeof steered) == 0;
+    is_answered =
+        nif_send_to(operator_node.get(), robot.id(), &steered, sizeof steered) == NIF_OK &&
+        receive_unicast(in, operator_node) &&
+        std::memcmp(in->payload, &steered, sizeof steered) == 0;
   }
   EXPECT_TRUE(is_answered) << in->text;
   is_over.store(true);

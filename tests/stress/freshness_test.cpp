@@ -17,8 +17,9 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// A reader of 1 MB/s behind senders of far more: provable is how many bytes come before what matters, counted where
-// the reader reads them, from the moment at which the sender has given it to its kernel.
+// A reader of 1 MB/s behind senders of far more: provable is how many bytes come before what
+// matters, counted where the reader reads them, from the moment at which the sender has given it to
+// its kernel.
 
 namespace gimnet::stress {
 namespace {
@@ -47,7 +48,8 @@ class Reader {
 
   /// Reads what it may by now, and gives every frame with its position in the stream to `take`.
   void turn(const std::function<void(const Frame&, std::uint64_t position)>& take) {
-    const auto passed = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - begun_).count();
+    const auto passed =
+        std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - begun_).count();
     const std::uint64_t allowed = static_cast<std::uint64_t>(passed) * kReadBytesPerS / 1'000;
     node_.keep_alive();
     if (allowed > node_.bytes_read()) node_.read_some(allowed - node_.bytes_read());
@@ -69,7 +71,8 @@ std::vector<std::string> two_shards() { return {"--shards", "2", "--placement", 
 class BulkScene {
  public:
   explicit BulkScene(const HubProcess& hub) : reader_(hub), bulk_(hub.unix_url(), at_shard(0)) {
-    for (std::uint16_t shard = 0; shard < 2; ++shard) urgent_.emplace_back(hub.unix_url(), at_shard(shard));
+    for (std::uint16_t shard = 0; shard < 2; ++shard)
+      urgent_.emplace_back(hub.unix_url(), at_shard(shard));
   }
 
   /// Until so many real-time messages from each shard have arrived, while bulk waits all the time.
@@ -81,7 +84,8 @@ class BulkScene {
         deadline.check("a real-time message");
         turn();
       }
-      // Some bulk between two of them, so that each finds the queues as they are when nothing urgent comes.
+      // Some bulk between two of them, so that each finds the queues as they are when nothing
+      // urgent comes.
       const std::uint64_t enough = reader_.node().bytes_read() + 100'000;
       while (reader_.node().bytes_read() < enough) {
         deadline.check("bulk");
@@ -98,13 +102,15 @@ class BulkScene {
     }
   }
 
-  [[nodiscard]] std::uint64_t most_before(std::size_t shard) const { return most_before_.at(shard); }
+  [[nodiscard]] std::uint64_t most_before(std::size_t shard) const {
+    return most_before_.at(shard);
+  }
 
  private:
   void send_urgent(std::uint64_t number) {
     RawNode& node = urgent_[number % 2];
-    node.put(parts_of(proto::Kind::unicast, reader_.node().id().value(), proto::Policy::kind_default,
-                      proto::Lane::real_time),
+    node.put(parts_of(proto::Kind::unicast, reader_.node().id().value(),
+                      proto::Policy::kind_default, proto::Lane::real_time),
              std::as_bytes(std::span(&number, 1)));
     node.flush_all();
     sent_at_ = reader_.node().bytes_read();
@@ -113,10 +119,12 @@ class BulkScene {
   void turn() {
     const std::uint32_t reader = reader_.node().id().value();
     const bool is_paused = bulk_.is_paused(proto::Kind::unicast, 2, reader);
-    // As much as the hub takes, however long it lasts: bulk waits before each of the real-time messages.
+    // As much as the hub takes, however long it lasts: bulk waits before each of the real-time
+    // messages.
     if (!is_paused && bulk_.unwritten() == 0) {
       const std::vector<std::byte> payload(kBulkPayload);
-      bulk_.put(parts_of(proto::Kind::unicast, reader, proto::Policy::block, proto::Lane::bulk), payload);
+      bulk_.put(parts_of(proto::Kind::unicast, reader, proto::Policy::block, proto::Lane::bulk),
+                payload);
     }
     bulk_.flush();
     for (RawNode* node : {&bulk_, &urgent_[0], &urgent_[1]}) {
@@ -167,8 +175,8 @@ class LatestScene {
     service.service = "scan";
     service.delivery = proto::ns::Delivery::latest;
     group_ = publisher_.ask<proto::ns::AdvertiseAnswer>(proto::Kind::ns, service).group.value();
-    static_cast<void>(
-        reader_.node().ask<proto::ns::SubscribeAnswer>(proto::Kind::ns, proto::ns::Subscribe{"publisher/scan"}));
+    static_cast<void>(reader_.node().ask<proto::ns::SubscribeAnswer>(
+        proto::Kind::ns, proto::ns::Subscribe{"publisher/scan"}));
   }
 
   void run(std::size_t messages) {
@@ -189,7 +197,9 @@ class LatestScene {
     }
   }
 
-  [[nodiscard]] std::uint64_t highest_age_bytes() const { return *std::max_element(ages_.begin(), ages_.end()); }
+  [[nodiscard]] std::uint64_t highest_age_bytes() const {
+    return *std::max_element(ages_.begin(), ages_.end());
+  }
   [[nodiscard]] std::uint64_t published() const { return published_; }
   /// Frames.
   [[nodiscard]] std::uint64_t sent() const { return publisher_.frames_sent(); }
@@ -208,7 +218,8 @@ class LatestScene {
     const std::vector<std::uint64_t> words(kFragmentBytes / sizeof(std::uint64_t), published_);
     for (std::uint32_t offset = 0; offset < kLatestBytes; offset += kFragmentBytes) {
       auto parts = parts_of(proto::Kind::group, group_, proto::Policy::latest);
-      parts.fragment = proto::FragmentHeader{static_cast<std::uint32_t>(published_), offset, kLatestBytes};
+      parts.fragment =
+          proto::FragmentHeader{static_cast<std::uint32_t>(published_), offset, kLatestBytes};
       publisher_.put(parts, std::as_bytes(std::span(words)));
     }
     publisher_.flush_all();
@@ -218,13 +229,15 @@ class LatestScene {
   void take(const Frame& frame, std::uint64_t position) {
     const auto view = proto::parse_frame(frame.bytes, proto::Origin::hub);
     if (!view || !view->fragment) return;
-    const auto result = reassembler_.take(proto::FragmentStream::of(view->header), *view->fragment, view->payload);
+    const auto result =
+        reassembler_.take(proto::FragmentStream::of(view->header), *view->fragment, view->payload);
     if (result.state != proto::Reassembled::State::whole) return;
     std::vector<std::uint64_t> words(result.message.size() / sizeof(std::uint64_t));
     std::memcpy(words.data(), result.message.data(), result.message.size());
     const std::uint64_t number = words.front();
-    const bool is_whole = result.message.size() == kLatestBytes &&
-                          std::all_of(words.begin(), words.end(), [&](std::uint64_t word) { return word == number; });
+    const bool is_whole =
+        result.message.size() == kLatestBytes &&
+        std::all_of(words.begin(), words.end(), [&](std::uint64_t word) { return word == number; });
     is_whole_and_newer_ = is_whole_and_newer_ && is_whole && number > last_;
     last_ = number;
     ages_.push_back(position - published_at_[number]);
@@ -235,8 +248,9 @@ class LatestScene {
   std::uint32_t group_ = 0;
   proto::Reassembler reassembler_;
   std::uint64_t published_ = 0;
-  std::map<std::uint64_t, std::uint64_t> published_at_;  ///< number, and what the reader had read by then
-  std::vector<std::uint64_t> ages_;                      ///< bytes read from publication to the last byte
+  std::map<std::uint64_t, std::uint64_t>
+      published_at_;                 ///< number, and what the reader had read by then
+  std::vector<std::uint64_t> ages_;  ///< bytes read from publication to the last byte
   std::uint64_t last_ = 0;
   bool is_whole_and_newer_ = true;
 };
@@ -252,7 +266,8 @@ void expect_fresh(std::uint16_t publisher_shard) {
   EXPECT_GT(scene.published(), 100u);
   RawNode observer(hub.unix_url());
   const Statistics end = wait_for(
-      observer, [&](const Statistics& now) { return now["accepted"] == scene.sent(); }, "all that was published");
+      observer, [&](const Statistics& now) { return now["accepted"] == scene.sent(); },
+      "all that was published");
   EXPECT_EQ(end["copies"], 0u);
   EXPECT_GE(end["delivered"], scene.received());
 }

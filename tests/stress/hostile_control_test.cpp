@@ -9,7 +9,8 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// Nodes that ask and do not take the answers: provable is that they are closed, and that the hub's memory is bounded.
+// Nodes that ask and do not take the answers: provable is that they are closed, and that the hub's
+// memory is bounded.
 
 namespace gimnet::stress {
 namespace {
@@ -50,11 +51,13 @@ TEST(Requests, AMillionThatNobodyWaitsForAreCapped) {
   EXPECT_LE(hub.resident_bytes() - before, 8 * kMiB);
 }
 
-// One that never has more than one request unanswered, and reads nothing: its answers are what piles up.
+// One that never has more than one request unanswered, and reads nothing: its answers are what
+// piles up.
 TEST(Requests, AnswersThatAreNeverTakenAreCapped) {
   constexpr std::size_t kNodes = 100;
-  const HubProcess hub({"--shards", "2", "--limit", "control_bytes=64k", "--limit", "socket_send_bytes=16k", "--limit",
-                        "silent_ms=600000", "--limit", "keep_alive_ms=300000"});
+  const HubProcess hub({"--shards", "2", "--limit", "control_bytes=64k", "--limit",
+                        "socket_send_bytes=16k", "--limit", "silent_ms=600000", "--limit",
+                        "keep_alive_ms=300000"});
   std::vector<RawNode> nodes;
   for (std::size_t i = 0; i < kNodes; ++i) {
     JoinOptions options;
@@ -75,12 +78,16 @@ TEST(Requests, AnswersThatAreNeverTakenAreCapped) {
     silent[0].flush();
     ++asked;
     static_cast<void>(wait_for(
-        observer, [&](const Statistics& now) { return now["too_many_requests"] != 0 || now["names.list"] >= asked; },
+        observer,
+        [&](const Statistics& now) {
+          return now["too_many_requests"] != 0 || now["names.list"] >= asked;
+        },
         "the hub's answer"));
   }
   EXPECT_GT(asked, 1u);
   EXPECT_LE(hub.resident_bytes() - before, 8 * kMiB);
-  EXPECT_EQ(asking.ask<proto::ns::ListAnswer>(proto::Kind::ns, proto::ns::List{}).nodes.size(), kNodes + 2);
+  EXPECT_EQ(asking.ask<proto::ns::ListAnswer>(proto::Kind::ns, proto::ns::List{}).nodes.size(),
+            kNodes + 2);
 }
 
 }  // namespace

@@ -17,15 +17,17 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// Strangers and nodes that mean no good, in numbers: provable is that good nodes join and talk all the while, and that
-// the hub's memory is bounded by its limits and given back.
+// Strangers and nodes that mean no good, in numbers: provable is that good nodes join and talk all
+// the while, and that the hub's memory is bounded by its limits and given back.
 
 namespace gimnet::stress {
 namespace {
 
 constexpr std::int64_t kMiB = 1 << 20;
 
-std::size_t stranger_count() { return std::min<std::size_t>(10'000, raise_descriptor_limit() - 200); }
+std::size_t stranger_count() {
+  return std::min<std::size_t>(10'000, raise_descriptor_limit() - 200);
+}
 
 void write(const Descriptor& socket, std::span<const std::byte> bytes) {
   // What a closed connection does not take any more is as good as written.
@@ -110,7 +112,9 @@ TEST(Strangers, GarbageIsEndedAndCostsNothing) {
   EXPECT_LE(hub.resident_bytes() - before, 8 * kMiB);
   RawNode observer(hub.unix_url());
   const Statistics end = Statistics::of(observer);
-  EXPECT_EQ(end.told("refused.garbage") + end.told("refused.malformed") + end.told("refused.unfinished"), sent);
+  EXPECT_EQ(
+      end.told("refused.garbage") + end.told("refused.malformed") + end.told("refused.unfinished"),
+      sent);
 }
 
 TEST(Strangers, AHelloThatNeverEndsIsEnded) {
@@ -139,12 +143,13 @@ TEST(Strangers, AHelloThatNeverEndsIsEnded) {
   EXPECT_EQ(Statistics::of(observer).told("refused.hello_timeout"), slow.size());
 }
 
-// Each keeps 64 KiB of a frame in the hub that it never ends, all together more than the hub allows.
+// Each keeps 64 KiB of a frame in the hub that it never ends, all together more than the hub
+// allows.
 TEST(BegunFrames, AreBoundedTogetherAndEndInTime) {
   constexpr std::size_t kNodes = 1'000;
   constexpr std::int64_t kPartial = 16 * kMiB;
-  const HubProcess hub({"--shards", "2", "--limit", "partial_bytes=16M", "--limit", "stalled_frame_ms=1500", "--limit",
-                        "silent_ms=60000"});
+  const HubProcess hub({"--shards", "2", "--limit", "partial_bytes=16M", "--limit",
+                        "stalled_frame_ms=1500", "--limit", "silent_ms=60000"});
   std::deque<RawNode> nodes;
   for (std::size_t i = 0; i < kNodes; ++i) nodes.emplace_back(hub.tcp_url());
   RawNode observer(hub.tcp_url());
@@ -182,11 +187,13 @@ TEST(BegunFrames, AreBoundedTogetherAndEndInTime) {
   expect_good_nodes_are_served(hub);
 }
 
-// Beginnings of messages that never end, pieces of one byte between those of others, for a node that does not read.
+// Beginnings of messages that never end, pieces of one byte between those of others, for a node
+// that does not read.
 TEST(Fragments, ThatNeverEndAreBoundedByTheBudget) {
   constexpr std::int64_t kBudget = 16 * kMiB;
-  const HubProcess hub({"--shards", "2", "--limit", "budget_bytes=16M", "--limit", "lane1_bytes=64M", "--limit",
-                        "silent_ms=600000", "--limit", "slow_consumer_ms=600000"});
+  const HubProcess hub({"--shards", "2", "--limit", "budget_bytes=16M", "--limit",
+                        "lane1_bytes=64M", "--limit", "silent_ms=600000", "--limit",
+                        "slow_consumer_ms=600000"});
   RawNode liar(hub.unix_url());
   RawNode stopped(hub.unix_url());
   RawNode observer(hub.unix_url());
@@ -197,10 +204,12 @@ TEST(Fragments, ThatNeverEndAreBoundedByTheBudget) {
   constexpr std::uint32_t kMessages = 200'000;  // several times what the budget has room for
   std::uint64_t sent = 0;
   for (std::uint32_t piece = 0; piece < kPieces; ++piece) {
-    for (std::uint32_t message = piece * kMessages / kPieces; message < (piece + 1) * kMessages / kPieces; ++message) {
+    for (std::uint32_t message = piece * kMessages / kPieces;
+         message < (piece + 1) * kMessages / kPieces; ++message) {
       for (const std::uint32_t offset : {0u, 1u, 2u}) {
         for (const std::uint32_t back : {0u, 50u}) {
-          proto::FrameParts parts = parts_of(proto::Kind::unicast, stopped.id().value(), proto::Policy::drop);
+          proto::FrameParts parts =
+              parts_of(proto::Kind::unicast, stopped.id().value(), proto::Policy::drop);
           parts.fragment = proto::FragmentHeader{message - std::min(back, message), offset, kTotal};
           liar.put(parts, std::vector<std::byte>(1));
           ++sent;
@@ -214,7 +223,8 @@ TEST(Fragments, ThatNeverEndAreBoundedByTheBudget) {
   EXPECT_LE(highest - before, kBudget + kBudget / 10 + 24 * kMiB);
   expect_good_nodes_are_served(hub);
   const Statistics now = wait_for(
-      observer, [&](const Statistics& each) { return each["accepted"] == sent + 1; }, "all that the liar sent");
+      observer, [&](const Statistics& each) { return each["accepted"] == sent + 1; },
+      "all that the liar sent");
   EXPECT_GT(now["queued"], 0u);
   EXPECT_GT(now["dropped.over_budget"], 0u) << "the test is too small";
   EXPECT_TRUE(now.is_balanced()) << now.text();
@@ -238,12 +248,17 @@ std::vector<Wrong> wrongs() {
   using proto::FrameHeader;
   using proto::Kind;
   return {
-      {"a length of 2^32-1", "malformed", [](RawNode& n) { send_header(n, {.length = 0xFFFFFFFF}); }},
-      {"an unknown kind", "malformed", [](RawNode& n) { send_header(n, {.length = 4, .kind = Kind{77}}); }},
-      {"reserved flags", "malformed", [](RawNode& n) { send_header(n, {.length = 4, .flags = 0x40}); }},
-      {"a reserved lane", "malformed", [](RawNode& n) { send_header(n, {.length = 4, .lane = 9}); }},
+      {"a length of 2^32-1", "malformed",
+       [](RawNode& n) { send_header(n, {.length = 0xFFFFFFFF}); }},
+      {"an unknown kind", "malformed",
+       [](RawNode& n) { send_header(n, {.length = 4, .kind = Kind{77}}); }},
+      {"reserved flags", "malformed",
+       [](RawNode& n) { send_header(n, {.length = 4, .flags = 0x40}); }},
+      {"a reserved lane", "malformed",
+       [](RawNode& n) { send_header(n, {.length = 4, .lane = 9}); }},
       {"hops", "malformed", [](RawNode& n) { send_header(n, {.length = 4, .hops = 1}); }},
-      {"1,025 ids", "malformed", [](RawNode& n) { send_header(n, {.length = 4, .dst = 1'025, .kind = Kind::list}); }},
+      {"1,025 ids", "malformed",
+       [](RawNode& n) { send_header(n, {.length = 4, .dst = 1'025, .kind = Kind::list}); }},
       {"another source", "wrong_source",
        [](RawNode& n) { send_header(n, {.length = 4, .dst = 1, .src = 0x00700099}); }},
       {"an extension beyond its frame", "malformed",
@@ -277,8 +292,9 @@ TEST(WrongBytes, EndTheConnectionAndAreCounted) {
       }
     }
     ASSERT_TRUE(node.goodbye());
-    EXPECT_EQ(node.goodbye()->code, std::string(wrong.counter) == "malformed" ? proto::GoodbyeCode::malformed
-                                                                              : proto::GoodbyeCode::wrong_source);
+    EXPECT_EQ(node.goodbye()->code, std::string(wrong.counter) == "malformed"
+                                        ? proto::GoodbyeCode::malformed
+                                        : proto::GoodbyeCode::wrong_source);
     EXPECT_FALSE(node.goodbye()->sentence.empty());
     const Statistics after = Statistics::of(observer);
     EXPECT_EQ(after[wrong.counter], before + 1);

@@ -42,7 +42,8 @@ class Holder {
     ::close(ends[1]);
     told_ = Descriptor(ends[0]);
   }
-  Holder(Holder&& other) noexcept : pid_(std::exchange(other.pid_, -1)), told_(std::move(other.told_)) {}
+  Holder(Holder&& other) noexcept
+      : pid_(std::exchange(other.pid_, -1)), told_(std::move(other.told_)) {}
   ~Holder() {
     if (pid_ <= 0) return;
     ::kill(pid_, SIGKILL);
@@ -88,8 +89,10 @@ class Holder {
 };
 
 TEST(IdleNodes, CostTheHubAtMostOneKibibyteEach) {
-  if (raise_descriptor_limit() < kNodes + 100) GTEST_SKIP() << "the hub may hold too few descriptors here";
-  // Keep-alive goes on as always; only its end waits longer, for holders that a busy machine does not schedule in time.
+  if (raise_descriptor_limit() < kNodes + 100)
+    GTEST_SKIP() << "the hub may hold too few descriptors here";
+  // Keep-alive goes on as always; only its end waits longer, for holders that a busy machine does
+  // not schedule in time.
   const HubProcess hub({"--shards", "2", "--limit", "silent_ms=60000"});
   const std::int64_t before = hub.resident_bytes();
   std::vector<Holder> holders;

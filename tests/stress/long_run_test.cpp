@@ -1,6 +1,6 @@
-// A hub's control plane after very many reconnects is as large as it was after few: what its nodes come back to, lose,
-// leave behind and declare anew is counted in bytes that are allocated and not freed, at operator new. The conductor
-// alone, in simulated time.
+// A hub's control plane after very many reconnects is as large as it was after few: what its nodes
+// come back to, lose, leave behind and declare anew is counted in bytes that are allocated and not
+// freed, at operator new. The conductor alone, in simulated time.
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -18,9 +18,10 @@ namespace {
 std::int64_t live_bytes = 0;
 
 void* allocate(std::size_t size, std::size_t alignment) {
-  void* memory = alignment <= alignof(std::max_align_t)
-                     ? std::malloc(size)
-                     : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  void* memory =
+      alignment <= alignof(std::max_align_t)
+          ? std::malloc(size)
+          : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
   if (memory == nullptr) std::abort();
   live_bytes += static_cast<std::int64_t>(malloc_usable_size(memory));
   return memory;
@@ -49,11 +50,14 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::size_t kNodes = 100;
-/// Then the journal of changes is full, and the indices have come round: nothing has a reason to grow any more.
+/// Then the journal of changes is full, and the indices have come round: nothing has a reason to
+/// grow any more.
 constexpr std::uint64_t kWarmUp = 60'000;
-/// What each index that was ever given out takes for good: the number of its last session (NumberFloor), 8 MiB of all.
+/// What each index that was ever given out takes for good: the number of its last session
+/// (NumberFloor), 8 MiB of all.
 constexpr std::int64_t kBytesOfAnIndex = 8;
-/// Two pages of these, and rounding of what grows by doubling. A leak of one byte a reconnect is more.
+/// Two pages of these, and rounding of what grows by doubling. A leak of one byte a reconnect is
+/// more.
 constexpr std::int64_t kSlackBytes = 80 * 1024;
 
 class LongRun : public ::testing::Test {
@@ -99,7 +103,8 @@ class LongRun : public ::testing::Test {
     member.group = offered->group;
     member.proof = offered->proof;
     // Of one that is there, of one that may not be, and of a name that nobody has.
-    for (const std::size_t other : {random_() % kNodes, random_() % kNodes, kNodes + random_() % 50}) {
+    for (const std::size_t other :
+         {random_() % kNodes, random_() % kNodes, kNodes + random_() % 50}) {
       const auto wanted = hub_.ask<proto::ns::SubscribeAnswer>(
           member.node, proto::ns::Subscribe{.name = "node-" + std::to_string(other) + "/data"});
       ASSERT_TRUE(wanted) << wanted.error().sentence;
@@ -119,7 +124,8 @@ class LongRun : public ::testing::Test {
       for (const FakeShards::Sent& each : sent) again = react(each) || again;
       hub_.kept.clear();
     }
-    if (const auto due = hub_.conductor.next_deadline(); due && *due <= hub_.now) hub_.conductor.tick(hub_.now);
+    if (const auto due = hub_.conductor.next_deadline(); due && *due <= hub_.now)
+      hub_.conductor.tick(hub_.now);
   }
   bool react(const FakeShards::Sent& sent) {
     if (const auto* fence = std::get_if<FenceCommand>(&sent.command)) {
@@ -133,8 +139,10 @@ class LongRun : public ::testing::Test {
     if (view->header.operation != proto::ns::WatchEvents::kOperation) return false;
     for (const Member& member : members_) {
       if (!member.connected || member.node.attachment != said->attachment) continue;
-      if (member.node.session.slot != said->session.slot || member.node.shard != sent.shard) continue;
-      hub_.send_frame(member.node, proto::Kind::ns, proto::encode(proto::ns::WatchTaken{.watch = 1}, 1));
+      if (member.node.session.slot != said->session.slot || member.node.shard != sent.shard)
+        continue;
+      hub_.send_frame(member.node, proto::Kind::ns,
+                      proto::encode(proto::ns::WatchTaken{.watch = 1}, 1));
     }
     return true;
   }
@@ -184,7 +192,8 @@ TEST_F(LongRun, ReconnectsLeaveNothingBehind) {
   }
 }
 
-/// However often connections flap within the grace time: what runs out later for each of them is not kept.
+/// However often connections flap within the grace time: what runs out later for each of them is
+/// not kept.
 TEST_F(LongRun, FlappingWithinTheGraceTimeTakesNoMemory) {
   for (std::size_t i = 0; i < kNodes; ++i) {
     members_[i].name = "node-" + std::to_string(i);

@@ -12,7 +12,8 @@
 #include "tests/stress/support/size.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// A hub that is killed with everybody on it: provable is that each gets its own id and name back, and nobody else's.
+// A hub that is killed with everybody on it: provable is that each gets its own id and name back,
+// and nobody else's.
 
 namespace gimnet::stress {
 namespace {
@@ -56,9 +57,11 @@ void join(const HubProcess& hub, std::vector<Member>& members) {
 
 TEST(Rejoin, EverybodyHasIdAndNameAgainAfterTheHubWasKilled) {
   const std::size_t count = is_full_size() ? 10'000 : 1'000;
-  if (raise_descriptor_limit() < count + 100) GTEST_SKIP() << "the hub may hold too few descriptors here";
+  if (raise_descriptor_limit() < count + 100)
+    GTEST_SKIP() << "the hub may hold too few descriptors here";
   // Nobody keeps alive here: silence is not what is looked at.
-  HubProcess hub({"--shards", "2", "--limit", "keep_alive_ms=600000", "--limit", "silent_ms=3000000"});
+  HubProcess hub(
+      {"--shards", "2", "--limit", "keep_alive_ms=600000", "--limit", "silent_ms=3000000"});
   std::vector<Member> members(count);
   for (std::size_t i = 0; i < count; ++i) members[i].name = "node/" + std::to_string(i);
   join(hub, members);

@@ -18,9 +18,10 @@
 #include "tests/stress/support/size.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// The configuration is read again and again while data flows: provable is that no connection ends, no frame is lost or
-// overtaken, the ledger is exact, and that what every configuration forbids, and what nobody may who is no
-// administrator, never once succeeds, whoever tries it at whatever moment.
+// The configuration is read again and again while data flows: provable is that no connection ends,
+// no frame is lost or overtaken, the ledger is exact, and that what every configuration forbids,
+// and what nobody may who is no administrator, never once succeeds, whoever tries it at whatever
+// moment.
 
 namespace gimnet::stress {
 namespace {
@@ -36,7 +37,8 @@ constexpr std::uint64_t kBatch = 64;
 class ConfigFile {
  public:
   ConfigFile() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "gimnet-reload-XXXXXX").string();
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "gimnet-reload-XXXXXX").string();
     if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp");
     folder_ = pattern;
     write_good(0);
@@ -49,15 +51,19 @@ class ConfigFile {
   ConfigFile& operator=(const ConfigFile&) = delete;
 
   [[nodiscard]] std::string path() const { return folder_ + "/hub.toml"; }
-  /// Two that allow different things, neither of them more than kServicesMost services and watches over 4 messages.
+  /// Two that allow different things, neither of them more than kServicesMost services and watches
+  /// over 4 messages.
   void write_good(std::size_t number) const {
     const std::size_t odd = number % 2;
     write("[limits]\nservices_per_node = " + std::to_string(kServicesMost - odd) +
-          "\nlane1_bytes = " + std::to_string((1 + odd) << 20) + "\nturn_bytes = " + std::to_string(65'536 << odd) +
+          "\nlane1_bytes = " + std::to_string((1 + odd) << 20) +
+          "\nturn_bytes = " + std::to_string(65'536 << odd) +
           "\nnodes = " + std::to_string(50 + odd) + "\nsync_window = 1000\n");
   }
   /// It would allow everything, and has a fault at its end.
-  void write_bad() const { write("[limits]\nservices_per_node = 1000\nnodes = 1000\nsync_window = 1000\nnods = 3\n"); }
+  void write_bad() const {
+    write("[limits]\nservices_per_node = 1000\nnodes = 1000\nsync_window = 1000\nnods = 3\n");
+  }
 
  private:
   void write(const std::string& text) const {
@@ -72,7 +78,8 @@ class ConfigFile {
   std::string folder_;
 };
 
-/// Sends numbered frames from one shard to the other, and back, and counts them, until it is told to stop.
+/// Sends numbered frames from one shard to the other, and back, and counts them, until it is told
+/// to stop.
 class Load {
  public:
   explicit Load(const HubProcess& hub)
@@ -82,7 +89,9 @@ class Load {
     while (!stop.load()) exchange();
   }
   [[nodiscard]] std::uint64_t sent() const { return sent_[0] + sent_[1]; }
-  [[nodiscard]] bool is_whole() const { return received_ == sent_ && !nodes_[0].is_closed() && !nodes_[1].is_closed(); }
+  [[nodiscard]] bool is_whole() const {
+    return received_ == sent_ && !nodes_[0].is_closed() && !nodes_[1].is_closed();
+  }
 
  private:
   static JoinOptions at_shard(std::uint16_t shard) {
@@ -115,7 +124,8 @@ class Load {
         if (frame->header.kind != Kind::unicast) continue;
         std::uint64_t sequence = 0;
         std::memcpy(&sequence, frame->body().data(), sizeof sequence);
-        if (sequence != ++received_[1 - to]) throw std::runtime_error("a frame was lost or overtaken");
+        if (sequence != ++received_[1 - to])
+          throw std::runtime_error("a frame was lost or overtaken");
       }
     }
     if (nodes_[to].is_closed()) throw std::runtime_error("a connection was dropped");
@@ -159,7 +169,8 @@ class Rival {
     wide.window = 5;
     refused(node_.try_ask<ns::SubscribeAnswer>(Kind::ns, wide), proto::Status::bad_request);
     refused(node_.try_ask<ctrl::ReloadAnswer>(Kind::ctrl, ctrl::Reload{}), proto::Status::denied);
-    refused(node_.try_ask<ctrl::KickAnswer>(Kind::ctrl, ctrl::Kick{node_.id(), "myself"}), proto::Status::denied);
+    refused(node_.try_ask<ctrl::KickAnswer>(Kind::ctrl, ctrl::Kick{node_.id(), "myself"}),
+            proto::Status::denied);
     if (rounds_.load() % 8 == 0) try_to_administer();
     rounds_.fetch_add(1);
   }
@@ -219,7 +230,8 @@ class Reloads {
     const auto answer = admin_.try_ask<ctrl::ReloadAnswer>(Kind::ctrl, ctrl::Reload{});
     ASSERT_FALSE(answer.has_value());
     EXPECT_EQ(answer.error().status, proto::Status::bad_request);
-    EXPECT_NE(answer.error().sentence.find("hub.toml:5:1"), std::string::npos) << answer.error().sentence;
+    EXPECT_NE(answer.error().sentence.find("hub.toml:5:1"), std::string::npos)
+        << answer.error().sentence;
   }
 
   const HubProcess& hub_;
@@ -236,9 +248,10 @@ TEST(Reload, NothingEndsAndNothingForbiddenSucceedsWhileItIsReadAgainAndAgain) {
   const std::size_t count = is_full_size() ? 10'000 : 300;
   const ConfigFile file;
   // Who tries what is forbidden as often as he can is not to be sent away for that.
-  HubProcess hub({"--shards", "2", "--placement", "hint", "--config", file.path(), "--limit", "sync_window=4",
-                  "--limit", "oddities_per_s=1000000", "--limit", "oddities_burst=1000000", "--limit",
-                  "declarations_per_s=1000000", "--limit", "declarations_burst=10000000"});
+  HubProcess hub({"--shards", "2", "--placement", "hint", "--config", file.path(), "--limit",
+                  "sync_window=4", "--limit", "oddities_per_s=1000000", "--limit",
+                  "oddities_burst=1000000", "--limit", "declarations_per_s=1000000", "--limit",
+                  "declarations_burst=10000000"});
   Load load(hub);
   Rival rival(hub);
   Reloads reloads(hub, file);
@@ -253,9 +266,11 @@ TEST(Reload, NothingEndsAndNothingForbiddenSucceedsWhileItIsReadAgainAndAgain) {
   const Clock::time_point began = Clock::now();
   for (std::size_t i = 0; i < count && !HasFailure(); ++i) {
     reloads.one(i);
-    // Everything was tried at least once between two of them, and most often while one was under way.
+    // Everything was tried at least once between two of them, and most often while one was under
+    // way.
     const Deadline deadline;
-    for (const std::uint64_t before = rival.rounds(); rival.rounds() == before && is_running(trying);) {
+    for (const std::uint64_t before = rival.rounds();
+         rival.rounds() == before && is_running(trying);) {
       deadline.check("somebody who tries what is forbidden");
       wait_readable({}, 1);
     }
@@ -272,12 +287,15 @@ TEST(Reload, NothingEndsAndNothingForbiddenSucceedsWhileItIsReadAgainAndAgain) {
   EXPECT_GE(rival.rounds(), count);
   EXPECT_GE(reloads.changes(), count) << "too little changed to be a test";
   const Statistics end = wait_for(
-      reloads.admin(), [&](const Statistics& now) { return now["queued"] == 0 && now.is_balanced(); }, "a quiet hub");
+      reloads.admin(),
+      [&](const Statistics& now) { return now["queued"] == 0 && now.is_balanced(); },
+      "a quiet hub");
   EXPECT_EQ(end["accepted"], load.sent());
   EXPECT_EQ(end["delivered"], load.sent());
   EXPECT_EQ(end.dropped(), 0u) << end.text();
-  std::printf("%zu reloads in %.1f s, %llu frames, %llu rounds of forbidden things\n", count, seconds,
-              static_cast<unsigned long long>(load.sent()), static_cast<unsigned long long>(rival.rounds()));
+  std::printf("%zu reloads in %.1f s, %llu frames, %llu rounds of forbidden things\n", count,
+              seconds, static_cast<unsigned long long>(load.sent()),
+              static_cast<unsigned long long>(rival.rounds()));
 }
 
 }  // namespace

@@ -15,8 +15,9 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// A connection that is cut at random bytes, a hundred times, with resume on: provable is that each message arrives
-// once and in order, and that where the buffer is too small for that, the gaps that are announced equal what is lost.
+// A connection that is cut at random bytes, a hundred times, with resume on: provable is that each
+// message arrives once and in order, and that where the buffer is too small for that, the gaps that
+// are announced equal what is lost.
 
 namespace gimnet::stress {
 namespace {
@@ -27,7 +28,8 @@ constexpr std::int32_t kPatienceMs = 60'000;
 
 std::uint64_t message_count() { return is_full_size() ? 1'000'000 : 100'000; }
 
-// A node that was connected for a keep-alive interval dials again at once; otherwise it waits for up to a second.
+// A node that was connected for a keep-alive interval dials again at once; otherwise it waits for
+// up to a second.
 constexpr std::chrono::milliseconds kLeastLife{20};
 const std::vector<std::string> kTwoShards{"--shards", "2", "--limit", "keep_alive_ms=10"};
 
@@ -51,7 +53,8 @@ void send_numbers(const NifNode& from, std::uint32_t to, std::uint64_t count) {
   for (std::uint64_t number = 1; number <= count; ++number) {
     char payload[kPayloadBytes] = {};
     std::memcpy(payload, &number, sizeof number);
-    if (nif_send_to(from.get(), to, payload, sizeof payload) != NIF_OK) throw std::runtime_error(nif_error_text());
+    if (nif_send_to(from.get(), to, payload, sizeof payload) != NIF_OK)
+      throw std::runtime_error(nif_error_text());
   }
 }
 
@@ -87,7 +90,8 @@ Received receive_until(const NifNode& node, std::uint64_t last) {
   while (received.last < last) {
     const nif_status status = in.receive(node, kPatienceMs);
     if (status != NIF_OK) {
-      throw std::runtime_error(std::string(nif_status_text(status)) + " after " + std::to_string(received.messages));
+      throw std::runtime_error(std::string(nif_status_text(status)) + " after " +
+                               std::to_string(received.messages));
     }
     take(*in.operator->(), received);
   }
@@ -104,8 +108,9 @@ void expect_each_once(const Received& received) {
 
 void expect_balanced(const HubProcess& hub) {
   RawNode observer(hub.unix_url());
-  const Statistics end =
-      wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "confirmation of the last frames");
+  const Statistics end = wait_for(
+      observer, [](const Statistics& now) { return now["queued"] == 0; },
+      "confirmation of the last frames");
   EXPECT_TRUE(end.is_balanced()) << end.text();
   EXPECT_EQ(end["accepted"], message_count());
   EXPECT_EQ(end["delivered"], message_count());
@@ -168,7 +173,8 @@ TEST(Resume, TheAnnouncedGapIsTheLossWhereTheBufferIsSmall) {
       ASSERT_EQ(nif_send(publisher.get(), &message, kPatienceMs), NIF_OK);
     }
     const std::uint64_t sent = number;
-    static_cast<void>(wait_for(observer, [&](const Statistics& now) { return now["accepted"] == sent; }, "all sent"));
+    static_cast<void>(wait_for(
+        observer, [&](const Statistics& now) { return now["accepted"] == sent; }, "all sent"));
     proxy.cut_now();
     const std::size_t cuts = proxy.cuts();
     const Deadline deadline;
@@ -182,7 +188,8 @@ TEST(Resume, TheAnnouncedGapIsTheLossWhereTheBufferIsSmall) {
       take(*in.operator->(), received);
     }
   }
-  const Statistics end = wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "confirmation");
+  const Statistics end =
+      wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "confirmation");
   EXPECT_FALSE(received.is_gap_unknown);
   EXPECT_GT(received.announced, 0u) << "nothing was lost: the test is too small";
   EXPECT_EQ(received.out_of_order + received.repeated, 0u);

@@ -14,7 +14,8 @@
 #include "tests/stress/support/size.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// Large messages from library to library: provable is that every byte arrives, through one shard and through two.
+// Large messages from library to library: provable is that every byte arrives, through one shard
+// and through two.
 
 namespace gimnet::stress {
 namespace {
@@ -26,12 +27,13 @@ constexpr std::int32_t kPatienceMs = 60'000;
 std::vector<std::uint64_t> pattern(std::size_t bytes) {
   std::vector<std::uint64_t> words(bytes / sizeof(std::uint64_t));
   std::uint64_t word = bytes;
-  for (std::uint64_t& each : words) each = word = word * 6'364'136'223'846'793'005u + 1'442'695'040'888'963'407u;
+  for (std::uint64_t& each : words)
+    each = word = word * 6'364'136'223'846'793'005u + 1'442'695'040'888'963'407u;
   return words;
 }
 
-/// What the receiver's library says to the sender's goes in lane 0: when this has come, so has that, and the sender may
-/// go without frames to it being dropped.
+/// What the receiver's library says to the sender's goes in lane 0: when this has come, so has
+/// that, and the sender may go without frames to it being dropped.
 void expect_last_word(const NifNode& from, const NifNode& to) {
   nif_outgoing word = NIF_OUTGOING_INIT;
   word.to = to.id();
@@ -77,14 +79,17 @@ void expect_all_arrive(const std::vector<std::string>& arguments) {
     expect_arrives(hub, bytes);
   }
   RawNode observer(hub.unix_url());
-  const Statistics end = wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
+  const Statistics end =
+      wait_for(observer, [](const Statistics& now) { return now["queued"] == 0; }, "the end");
   EXPECT_TRUE(end.is_balanced()) << end.text();
   EXPECT_EQ(end.dropped(), 0u) << end.text();
 }
 
 TEST(Sizes, LargeMessagesArriveThroughOneShard) { expect_all_arrive({"--shards", "1"}); }
 
-TEST(Sizes, LargeMessagesArriveThroughTwoShards) { expect_all_arrive({"--shards", "2", "--placement", "hint"}); }
+TEST(Sizes, LargeMessagesArriveThroughTwoShards) {
+  expect_all_arrive({"--shards", "2", "--placement", "hint"});
+}
 
 }  // namespace
 }  // namespace gimnet::stress

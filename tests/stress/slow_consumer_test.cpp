@@ -13,8 +13,8 @@
 #include "tests/stress/support/raw_node.hpp"
 #include "tests/stress/support/statistics.hpp"
 
-// One receiver stops, the others do not notice: provable is that they get everything, in order, that the stopped one
-// is closed and told why, and that the ledger knows where its frames are.
+// One receiver stops, the others do not notice: provable is that they get everything, in order,
+// that the stopped one is closed and told why, and that the ledger knows where its frames are.
 
 namespace gimnet::stress {
 namespace {
@@ -40,8 +40,11 @@ JoinOptions stopped_options() {
 class Scene {
  public:
   Scene(const HubProcess& hub, proto::Policy policy)
-      : policy_(policy), sender_(hub.tcp_url(), at_shard(0)), stopped_(hub.tcp_url(), stopped_options()) {
-    for (std::size_t i = 0; i < kHealthy; ++i) healthy_.emplace_back(hub.tcp_url(), at_shard(i % 2));
+      : policy_(policy),
+        sender_(hub.tcp_url(), at_shard(0)),
+        stopped_(hub.tcp_url(), stopped_options()) {
+    for (std::size_t i = 0; i < kHealthy; ++i)
+      healthy_.emplace_back(hub.tcp_url(), at_shard(i % 2));
     received_.resize(kHealthy);
   }
 
@@ -62,14 +65,16 @@ class Scene {
     ++rounds_;
   }
 
-  /// Reads what the kernel still holds for the stopped node, to the end of the stream. Returns its data frames.
+  /// Reads what the kernel still holds for the stopped node, to the end of the stream. Returns its
+  /// data frames.
   std::uint64_t read_stopped_to_its_end() {
     std::uint64_t frames = 0;
     const Deadline deadline;
     while (!stopped_.is_closed()) {
       deadline.check("end of the closed connection");
       if (!stopped_.read_some()) wait_readable({stopped_.descriptor()}, 100);
-      while (const auto frame = stopped_.next()) frames += frame->header.kind == proto::Kind::unicast ? 1 : 0;
+      while (const auto frame = stopped_.next())
+        frames += frame->header.kind == proto::Kind::unicast ? 1 : 0;
     }
     return frames;
   }
@@ -88,7 +93,8 @@ class Scene {
   }
 
   [[nodiscard]] bool have_all() const {
-    return std::all_of(received_.begin(), received_.end(), [&](std::uint64_t n) { return n == to_each_; });
+    return std::all_of(received_.begin(), received_.end(),
+                       [&](std::uint64_t n) { return n == to_each_; });
   }
 
   void take() {
@@ -150,7 +156,8 @@ void expect_closed(const std::vector<std::string>& arguments, const Case& expect
   scene.round();
   const std::uint64_t stopped_received = scene.read_stopped_to_its_end();
   const Statistics end = wait_for(
-      observer, [&](const Statistics& now) { return now["queued"] == 0 && now["accepted"] == scene.sent(); },
+      observer,
+      [&](const Statistics& now) { return now["queued"] == 0 && now["accepted"] == scene.sent(); },
       "the ledger after " + std::to_string(scene.sent()));
   EXPECT_TRUE(scene.is_in_order());
   EXPECT_GT(scene.rounds(), 10u);
@@ -176,7 +183,8 @@ TEST(StoppedReceiver, IsClosedAsSlowThoughItKeepsAlive) {
                 {proto::Policy::drop, true, "slow_consumers", proto::GoodbyeCode::slow_consumer});
 }
 
-// Messages sent with BLOCK are dropped before the slow consumer's time is over; they waited all the same.
+// Messages sent with BLOCK are dropped before the slow consumer's time is over; they waited all the
+// same.
 TEST(StoppedReceiver, IsClosedAsSlowThoughItsMessagesTimeOut) {
   expect_closed({"--limit", "slow_consumer_ms=1000", "--limit", "block_ms=500"},
                 {proto::Policy::block, true, "slow_consumers", proto::GoodbyeCode::slow_consumer});

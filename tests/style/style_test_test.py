@@ -112,6 +112,13 @@ CASES = {
         [{"src/a.cpp": "int a;\n" * rules.FILE_LINES_MAX}, {"docs/a.md": "a\n" * 1000}],
         [{"src/a.cpp": "int a;\n" * (rules.FILE_LINES_MAX + 1)}, {"perf/a.py": "a = 1\n" * (rules.FILE_LINES_MAX + 1)}],
     ),
+    rules.line_length: (
+        [{"src/a.cpp": "// " + "a" * (rules.LINE_COLUMNS_MAX - 3) + "\n"},
+         {"src/a.cpp": 'const char* a = R"(\n' + "b" * 120 + '\n)";\n'},
+         {"README.md": "| " + "word " * 30 + "|\n    " + "code " * 30 + "\n"}],
+        [{"src/a.cpp": "// " + "a" * rules.LINE_COLUMNS_MAX + "\n"}, {"README.md": "word " * 30 + "\n"},
+         {"src/a.cpp": 'const char* a = R"(\n)";\nint ' + "b" * rules.LINE_COLUMNS_MAX + ";\n"}],
+    ),
     rules.function_length: (
         [
             {"src/a.cpp": long_function(rules.FUNCTION_LINES_MAX) * 2},

@@ -39,7 +39,9 @@ class Plan {
     sizes_ = std::move(sizes);
     next_ = 0;
   }
-  [[nodiscard]] std::size_t next() { return next_ < sizes_.size() ? sizes_[next_++] : ~std::size_t{0}; }
+  [[nodiscard]] std::size_t next() {
+    return next_ < sizes_.size() ? sizes_[next_++] : ~std::size_t{0};
+  }
 
  private:
   std::vector<std::size_t> sizes_;
@@ -110,7 +112,9 @@ void MemoryTransport::limit_unacknowledged(std::uint32_t ms) { pipe_->unacknowle
 
 MemoryPeer::MemoryPeer(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
 
-void MemoryPeer::write(std::span<const std::byte> bytes) { pipe_->to_hub.append(bytes.data(), bytes.size()); }
+void MemoryPeer::write(std::span<const std::byte> bytes) {
+  pipe_->to_hub.append(bytes.data(), bytes.size());
+}
 
 std::size_t MemoryPeer::read(std::vector<std::byte>& into, std::size_t most) {
   const std::size_t size = std::min(most, pipe_->to_peer.size());
@@ -134,9 +138,13 @@ void MemoryPeer::set_room(std::size_t bytes) { pipe_->room = bytes; }
 
 void MemoryPeer::plan_sends(std::vector<std::size_t> bytes) { pipe_->sends.set(std::move(bytes)); }
 
-void MemoryPeer::plan_receives(std::vector<std::size_t> bytes) { pipe_->receives.set(std::move(bytes)); }
+void MemoryPeer::plan_receives(std::vector<std::size_t> bytes) {
+  pipe_->receives.set(std::move(bytes));
+}
 
-bool MemoryPeer::transport_readable() const { return pipe_->failed || pipe_->closed || pipe_->to_hub.size() != 0; }
+bool MemoryPeer::transport_readable() const {
+  return pipe_->failed || pipe_->closed || pipe_->to_hub.size() != 0;
+}
 
 bool MemoryPeer::transport_writable() const { return pipe_->failed || pipe_->free_room() != 0; }
 

@@ -13,8 +13,8 @@ namespace gimnet::hub {
 
 struct MemoryPipe;
 
-/// The hub's end of a pipe in memory, which does what its peer says: short reads and writes, no room, faults.
-/// Thread safety: none; both ends belong to one thread.
+/// The hub's end of a pipe in memory, which does what its peer says: short reads and writes, no
+/// room, faults. Thread safety: none; both ends belong to one thread.
 class MemoryTransport final : public Transport {
  public:
   explicit MemoryTransport(std::shared_ptr<MemoryPipe> pipe);
@@ -34,8 +34,8 @@ class MemoryTransport final : public Transport {
   std::shared_ptr<MemoryPipe> pipe_;
 };
 
-/// The other end, from which a test or a fuzzer plays a node. Outlives the transport: what that had sent can still be
-/// read. Thread safety: as MemoryTransport.
+/// The other end, from which a test or a fuzzer plays a node. Outlives the transport: what that had
+/// sent can still be read. Thread safety: as MemoryTransport.
 class MemoryPeer {
  public:
   static constexpr std::size_t kAll = ~std::size_t{0};
@@ -58,7 +58,8 @@ class MemoryPeer {
 
   /// So many bytes wait unread at most; beyond it the transport would block.
   void set_room(std::size_t bytes);
-  /// The next calls of send() take at most so many bytes each (0: would block); later ones as many as there is room.
+  /// The next calls of send() take at most so many bytes each (0: would block); later ones as many
+  /// as there is room.
   void plan_sends(std::vector<std::size_t> bytes);
   /// The next calls of receive() give at most so many bytes each (0: would block).
   void plan_receives(std::vector<std::size_t> bytes);

@@ -8,7 +8,9 @@
 namespace gimnet::hub {
 namespace {
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
 
 std::string read_all(MemoryPeer& peer) {
   std::vector<std::byte> bytes;

@@ -22,7 +22,8 @@ namespace {
 constexpr int kNotYet = -1;
 constexpr int kNever = -2;
 
-/// Calls that go on without being told: of the allocator, and of a clock that is not read in the program's own memory.
+/// Calls that go on without being told: of the allocator, and of a clock that is not read in the
+/// program's own memory.
 constexpr std::uint32_t kUntold[] = {SYS_brk,     SYS_mmap,     SYS_munmap,       SYS_mremap,
                                      SYS_madvise, SYS_mprotect, SYS_clock_gettime};
 
@@ -31,15 +32,18 @@ bool kernel_tells() {
   utsname system{};
   int major = 0;
   int minor = 0;
-  if (::uname(&system) != 0 || std::sscanf(system.release, "%d.%d", &major, &minor) != 2) return false;
+  if (::uname(&system) != 0 || std::sscanf(system.release, "%d.%d", &major, &minor) != 2)
+    return false;
   return major > 5 || (major == 5 && minor >= 9);
 }
 
-constexpr sock_filter statement(unsigned code, std::uint32_t value, std::uint8_t skipped_if_not = 0) {
+constexpr sock_filter statement(unsigned code, std::uint32_t value,
+                                std::uint8_t skipped_if_not = 0) {
   return {static_cast<std::uint16_t>(code), 0, skipped_if_not, value};
 }
 
-/// From now on each system call of this thread waits until the one who has the descriptor lets it go on.
+/// From now on each system call of this thread waits until the one who has the descriptor lets it
+/// go on.
 int begin_telling() {
   std::vector<sock_filter> program{statement(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
   for (const std::uint32_t number : kUntold) {
@@ -49,7 +53,8 @@ int begin_telling() {
   program.push_back(statement(BPF_RET | BPF_K, SECCOMP_RET_USER_NOTIF));
   sock_fprog filter{static_cast<std::uint16_t>(program.size()), program.data()};
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return kNever;
-  const long listener = ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_NEW_LISTENER, &filter);
+  const long listener =
+      ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_NEW_LISTENER, &filter);
   return listener < 0 ? kNever : static_cast<int>(listener);
 }
 

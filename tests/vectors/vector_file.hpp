@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-// Golden vectors: files of hex digits with comments, from `#` to the end of the line. They are written down apart from
-// the code, so that code and document cannot drift together.
+// Golden vectors: files of hex digits with comments, from `#` to the end of the line. They are
+// written down apart from the code, so that code and document cannot drift together.
 
 namespace gimnet::test {
 
@@ -42,8 +42,10 @@ using Bytes = std::vector<std::byte>;
 /// Names of all vectors in a folder, for example "frame/unicast".
 [[nodiscard]] inline std::vector<std::string> vectors_in(const std::string& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(GIMNET_VECTORS_DIR) + "/" + folder)) {
-    if (entry.path().extension() == ".hex") names.push_back(folder + "/" + entry.path().stem().string());
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(GIMNET_VECTORS_DIR) + "/" + folder)) {
+    if (entry.path().extension() == ".hex")
+      names.push_back(folder + "/" + entry.path().stem().string());
   }
   return names;
 }
@@ -52,6 +54,8 @@ using Bytes = std::vector<std::byte>;
   const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
   return {bytes, bytes + text.size()};
 }
-[[nodiscard]] inline Bytes to_bytes(std::span<const std::byte> bytes) { return {bytes.begin(), bytes.end()}; }
+[[nodiscard]] inline Bytes to_bytes(std::span<const std::byte> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
 
 }  // namespace gimnet::test

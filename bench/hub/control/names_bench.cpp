@@ -1,4 +1,5 @@
-// What names and services cost the conductor, and how that grows: 1,000, 10,000 and 100,000 of each.
+// What names and services cost the conductor, and how that grows: 1,000, 10,000 and 100,000 of
+// each.
 
 #include <benchmark/benchmark.h>
 
@@ -39,19 +40,23 @@ struct World {
     return session;
   }
   void leave(Session& session) {
-    membership.connection_ended(session, {true, proto::GoodbyeCode::done, ""}, milliseconds{0}, effects);
+    membership.connection_ended(session, {true, proto::GoodbyeCode::done, ""}, milliseconds{0},
+                                effects);
     note();
   }
   void advertise(std::size_t i) {
     const std::string full_name = name(i / kServicesPerNode) + "/service-" + std::to_string(i);
     const auto provider = static_cast<std::uint32_t>(i / kServicesPerNode + 1);
-    static_cast<void>(membership.services().advertise(provider, full_name, {}, milliseconds{0}, effects));
+    static_cast<void>(
+        membership.services().advertise(provider, full_name, {}, milliseconds{0}, effects));
     note();
   }
   void note() {
     for (const Effect& effect : effects) {
-      if (const auto* node = std::get_if<NodeNoted>(&effect)) watches.note(*node, membership, milliseconds{0});
-      if (const auto* service = std::get_if<ServiceNoted>(&effect)) watches.note(*service, membership, milliseconds{0});
+      if (const auto* node = std::get_if<NodeNoted>(&effect))
+        watches.note(*node, membership, milliseconds{0});
+      if (const auto* service = std::get_if<ServiceNoted>(&effect))
+        watches.note(*service, membership, milliseconds{0});
     }
     effects.clear();
   }
@@ -70,7 +75,9 @@ World& world(benchmark::State& state) {
 }
 
 /// Names in an order that no cache foresees.
-std::size_t scattered(std::size_t step, std::int64_t count) { return step * 7'919 % static_cast<std::size_t>(count); }
+std::size_t scattered(std::size_t step, std::int64_t count) {
+  return step * 7'919 % static_cast<std::size_t>(count);
+}
 
 void sizes(benchmark::internal::Benchmark* bench) { bench->Arg(1'000)->Arg(10'000)->Arg(100'000); }
 
@@ -78,7 +85,8 @@ void resolve(benchmark::State& state) {
   const World& hub = world(state);
   std::size_t step = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(hub.membership.directory().find(World::name(scattered(++step, state.range(0)))));
+    benchmark::DoNotOptimize(
+        hub.membership.directory().find(World::name(scattered(++step, state.range(0)))));
   }
 }
 BENCHMARK(resolve)->Apply(sizes);
@@ -95,7 +103,8 @@ void register_name(benchmark::State& state) {
   Session& session = *hub.membership.sessions().find(static_cast<std::uint32_t>(state.range(0)));
   const std::string own = World::name(static_cast<std::size_t>(state.range(0)) - 1);
   for (auto _ : state) {
-    static_cast<void>(hub.membership.rename(session, "hall-0/another", milliseconds{0}, hub.effects));
+    static_cast<void>(
+        hub.membership.rename(session, "hall-0/another", milliseconds{0}, hub.effects));
     static_cast<void>(hub.membership.rename(session, own, milliseconds{0}, hub.effects));
     hub.note();
   }
@@ -108,8 +117,8 @@ void advertise_and_withdraw(benchmark::State& state) {
   std::size_t step = 0;
   for (auto _ : state) {
     const auto provider = static_cast<std::uint32_t>(scattered(++step, state.range(0)) + 1);
-    const auto added =
-        services.advertise(provider, World::name(provider - 1) + "/extra", {}, milliseconds{0}, hub.effects);
+    const auto added = services.advertise(provider, World::name(provider - 1) + "/extra", {},
+                                          milliseconds{0}, hub.effects);
     static_cast<void>(services.withdraw(provider, added->group, milliseconds{0}, hub.effects));
     hub.note();
   }
@@ -120,7 +129,8 @@ void list_page(benchmark::State& state, const char* text) {
   const World& hub = world(state);
   const auto pattern = proto::Pattern::parse(text);
   for (auto _ : state) {
-    const ListingRequest request{&*pattern, 0, false, hub.limits.page_records, hub.limits.scan_records};
+    const ListingRequest request{&*pattern, 0, false, hub.limits.page_records,
+                                 hub.limits.scan_records};
     benchmark::DoNotOptimize(list_nodes(hub.membership, request));
   }
 }
@@ -154,15 +164,18 @@ void watch_snapshot(benchmark::State& state, const char* pattern) {
     std::size_t frames = 1;
     while (frames != 0) {
       frames = 0;
-      static_cast<void>(hub.watches.serve(hub.membership, milliseconds{0},
-                                          [&frames](std::uint32_t, const proto::Payload&) { ++frames; }));
+      static_cast<void>(
+          hub.watches.serve(hub.membership, milliseconds{0},
+                            [&frames](std::uint32_t, const proto::Payload&) { ++frames; }));
       hub.watches.taken(1, {1, 4});
     }
     static_cast<void>(hub.watches.unwatch(1, 1));
   }
 }
 BENCHMARK_CAPTURE(watch_snapshot, all, "")->Apply(sizes)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(watch_snapshot, one_hall, "hall-3/**")->Apply(sizes)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(watch_snapshot, one_hall, "hall-3/**")
+    ->Apply(sizes)
+    ->Unit(benchmark::kMillisecond);
 
 /// A node joins and leaves before 100 watches of which one is about it.
 void tell_100_watches(benchmark::State& state) {
@@ -178,7 +191,8 @@ void tell_100_watches(benchmark::State& state) {
     wanted.epoch = hub.watches.journal().epoch();
     wanted.version = hub.watches.journal().version();
     wanted.pattern =
-        "hall-" + std::to_string(static_cast<std::size_t>(state.range(0)) / kRobotsPerHall + node - 1) + "/*";
+        "hall-" +
+        std::to_string(static_cast<std::size_t>(state.range(0)) / kRobotsPerHall + node - 1) + "/*";
     static_cast<void>(hub.watches.watch(node, wanted));
   }
   for (auto _ : state) {

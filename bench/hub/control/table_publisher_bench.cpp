@@ -1,5 +1,5 @@
-// What one subscriber more or less of a group costs the conductor, in groups of 10, 1,000 and 10,000: published alone,
-// or with the group as a whole, as it is when the service begins.
+// What one subscriber more or less of a group costs the conductor, in groups of 10, 1,000 and
+// 10,000: published alone, or with the group as a whole, as it is when the service begins.
 
 #include <benchmark/benchmark.h>
 
@@ -22,7 +22,8 @@ struct World {
     for (std::size_t i = 0; i <= count; ++i) {
       subscribers.push_back((*membership.join({}, milliseconds{0}, effects)).session->index);
     }
-    static_cast<void>(membership.services().advertise(subscribers[0], "robot/odom", {}, milliseconds{0}, effects));
+    static_cast<void>(membership.services().advertise(subscribers[0], "robot/odom", {},
+                                                      milliseconds{0}, effects));
     for (std::size_t i = 1; i <= count; ++i) {
       static_cast<void>(membership.services().subscribe(subscribers[i], "robot/odom", {}, effects));
     }
@@ -53,7 +54,8 @@ void change(benchmark::State& state, Publish publish) {
   Services& services = hub.membership.services();
   std::size_t step = 0;
   for (auto _ : state) {
-    const std::uint32_t node = hub.subscribers[1 + ++step * 7'919 % static_cast<std::size_t>(state.range(0))];
+    const std::uint32_t node =
+        hub.subscribers[1 + ++step * 7'919 % static_cast<std::size_t>(state.range(0))];
     static_cast<void>(services.unsubscribe(node, "robot/odom", hub.effects));
     publish(hub, node);
     static_cast<void>(services.subscribe(node, "robot/odom", {}, hub.effects));
@@ -68,7 +70,8 @@ void change_member(benchmark::State& state) {
   });
 }
 void change_group(benchmark::State& state) {
-  change(state, [](World& hub, std::uint32_t) { hub.publisher.publish_group(kGroup, hub.membership); });
+  change(state,
+         [](World& hub, std::uint32_t) { hub.publisher.publish_group(kGroup, hub.membership); });
 }
 
 void sizes(benchmark::internal::Benchmark* bench) { bench->Arg(10)->Arg(1'000)->Arg(10'000); }

@@ -1,6 +1,7 @@
-// What one hop of a small message costs by the way readiness is awaited: level-triggered epoll, as the shards do it, or
-// Boost.Asio's async_wait with its handlers run in one batch. A single thread plays sender, hub and receiver, so nobody
-// sleeps and only the work is measured. The figures stand in docs/adr/0005-readiness-by-epoll.md.
+// What one hop of a small message costs by the way readiness is awaited: level-triggered epoll, as
+// the shards do it, or Boost.Asio's async_wait with its handlers run in one batch. A single thread
+// plays sender, hub and receiver, so nobody sleeps and only the work is measured. The figures stand
+// in docs/adr/0005-readiness-by-epoll.md.
 
 #include <benchmark/benchmark.h>
 #include <netinet/in.h>
@@ -37,7 +38,8 @@ Pair connect_loopback() {
   socklen_t size = sizeof address;
   Pair pair;
   pair.outside = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (::bind(listener, reinterpret_cast<sockaddr*>(&address), size) != 0 || ::listen(listener, 1) != 0 ||
+  if (::bind(listener, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      ::listen(listener, 1) != 0 ||
       ::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
       ::connect(pair.outside, reinterpret_cast<sockaddr*>(&address), size) != 0) {
     throw std::runtime_error("no loopback connection");
@@ -55,7 +57,8 @@ class Relay {
  public:
   Relay() : from_(connect_loopback()), to_(connect_loopback()), buffer_(kBufferBytes) {}
   ~Relay() {
-    for (const int descriptor : {from_.outside, from_.inside, to_.outside, to_.inside}) ::close(descriptor);
+    for (const int descriptor : {from_.outside, from_.inside, to_.outside, to_.inside})
+      ::close(descriptor);
   }
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
@@ -64,10 +67,16 @@ class Relay {
   [[nodiscard]] int to() const { return to_.inside; }
   void relay() {
     const ssize_t bytes = ::recv(from_.inside, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
-    if (bytes > 0) static_cast<void>(::send(to_.inside, buffer_.data(), static_cast<std::size_t>(bytes), MSG_NOSIGNAL));
+    if (bytes > 0)
+      static_cast<void>(
+          ::send(to_.inside, buffer_.data(), static_cast<std::size_t>(bytes), MSG_NOSIGNAL));
   }
-  void send_outside() { static_cast<void>(::send(from_.outside, message_.data(), message_.size(), MSG_NOSIGNAL)); }
-  void receive_outside() { static_cast<void>(::recv(to_.outside, message_.data(), message_.size(), MSG_WAITALL)); }
+  void send_outside() {
+    static_cast<void>(::send(from_.outside, message_.data(), message_.size(), MSG_NOSIGNAL));
+  }
+  void receive_outside() {
+    static_cast<void>(::recv(to_.outside, message_.data(), message_.size(), MSG_WAITALL));
+  }
 
  private:
   Pair from_;
@@ -103,7 +112,8 @@ void bm_hop_asio_wait(benchmark::State& state) {
     ready = false;
     from.async_wait(boost::asio::posix::stream_descriptor::wait_read,
                     [&ready](const boost::system::error_code&) { ready = true; });
-    // A turn is what is ready now: one handler to sleep for, and the rest of the batch without sleeping.
+    // A turn is what is ready now: one handler to sleep for, and the rest of the batch without
+    // sleeping.
     context.restart();
     context.run_one();
     context.poll();

@@ -1,4 +1,5 @@
-// What it costs to find frames in a read buffer of 256 KiB. Goal: 2 to 3 ns a frame of 32 bytes inside a run.
+// What it costs to find frames in a read buffer of 256 KiB. Goal: 2 to 3 ns a frame of 32 bytes
+// inside a run.
 
 #include <benchmark/benchmark.h>
 
@@ -47,8 +48,8 @@ void read_runs(benchmark::State& state, const std::vector<std::byte>& buffer) {
     }
   }
   state.SetItemsProcessed(frames);
-  state.counters["per_frame"] =
-      benchmark::Counter(static_cast<double>(frames), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["per_frame"] = benchmark::Counter(
+      static_cast<double>(frames), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void BM_NextRunToOne(benchmark::State& state) {

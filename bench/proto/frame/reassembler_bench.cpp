@@ -22,7 +22,8 @@ void BM_Fragmenter(benchmark::State& state) {
     Fragmenter fragmenter(total);
     while (!fragmenter.done()) benchmark::DoNotOptimize(fragmenter.next());
   }
-  state.SetItemsProcessed(state.iterations() * ((state.range(0) + kFragmentPayload - 1) / kFragmentPayload));
+  state.SetItemsProcessed(state.iterations() *
+                          ((state.range(0) + kFragmentPayload - 1) / kFragmentPayload));
 }
 BENCHMARK(BM_Fragmenter)->Arg(1 << 20)->Arg(1 << 30);
 

@@ -5,8 +5,9 @@
 #include <span>
 #include <string_view>
 
-// The file that a program left behind. Whatever it holds is refused, or is what a node writes, byte for byte; and
-// whatever a node and its hub are called, the file's name is one that a file system takes as it is.
+// The file that a program left behind. Whatever it holds is refused, or is what a node writes, byte
+// for byte; and whatever a node and its hub are called, the file's name is one that a file system
+// takes as it is.
 
 namespace {
 

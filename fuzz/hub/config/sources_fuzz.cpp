@@ -1,6 +1,6 @@
-// A configuration file of any bytes, read as the hub reads it: a configuration within all limits, which comes out the
-// same after printing and reading it again, or faults, each with a place of its own in the file. A fault more does not
-// hide the others. Input: the file.
+// A configuration file of any bytes, read as the hub reads it: a configuration within all limits,
+// which comes out the same after printing and reading it again, or faults, each with a place of its
+// own in the file. A fault more does not hide the others. Input: the file.
 
 #include "hub/config/sources.hpp"
 
@@ -28,7 +28,9 @@ using namespace gimnet::hub;
 /// A file in memory that has a path.
 class File {
  public:
-  File() : descriptor_(::memfd_create("hub.toml", MFD_CLOEXEC)), path_("/proc/self/fd/" + std::to_string(descriptor_)) {
+  File()
+      : descriptor_(::memfd_create("hub.toml", MFD_CLOEXEC)),
+        path_("/proc/self/fd/" + std::to_string(descriptor_)) {
     FUZZ_MUST(descriptor_ >= 0);
   }
   ~File() { ::close(descriptor_); }
@@ -37,7 +39,8 @@ class File {
 
   ReadConfiguration read(std::string_view text) const {
     FUZZ_MUST(::ftruncate(descriptor_, 0) == 0);
-    FUZZ_MUST(::pwrite(descriptor_, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size()));
+    FUZZ_MUST(::pwrite(descriptor_, text.data(), text.size(), 0) ==
+              static_cast<ssize_t>(text.size()));
     ReadConfiguration read = read_configuration({path_, {}, {}});
     FUZZ_MUST(read.files.size() == 1 && read.files.front() == path_);
     return read;
@@ -91,7 +94,8 @@ void check_options(const HubOptions& options) {
   FUZZ_MUST(options.id.value() >= 1 && options.id.value() <= kHubIdMax);
   FUZZ_MUST(proto::valid_name(options.name));
   FUZZ_MUST(options.limits.silent_ms > options.limits.keep_alive_ms);
-  const bool local = std::ranges::all_of(options.listen, [](const ListenUrl& url) { return url.is_local(); });
+  const bool local =
+      std::ranges::all_of(options.listen, [](const ListenUrl& url) { return url.is_local(); });
   FUZZ_MUST(local || options.insecure);
 }
 
@@ -100,7 +104,8 @@ void check_printed(const Configuration& configuration, const File& file) {
   const ReadConfiguration again = file.read(print(configuration));
   FUZZ_MUST(again.faults.empty());
   const HubOptions& options = again.configuration.options;
-  for (const Setting& setting : settings()) FUZZ_MUST(setting.show(options) == setting.show(configuration.options));
+  for (const Setting& setting : settings())
+    FUZZ_MUST(setting.show(options) == setting.show(configuration.options));
   for (const LimitInfo& limit : limit_table()) {
     FUZZ_MUST(options.limits.*limit.field == configuration.options.limits.*limit.field);
   }
@@ -112,8 +117,8 @@ bool is_about_a_value(const Fault& fault) {
          fault.sentence.find("is given twice") == std::string::npos;
 }
 
-/// The faults of the same text with a wrong line before it: that one, and all the others, a line further down. What is
-/// left of a text that is no TOML is guessed, and may be guessed otherwise.
+/// The faults of the same text with a wrong line before it: that one, and all the others, a line
+/// further down. What is left of a text that is no TOML is guessed, and may be guessed otherwise.
 void check_one_fault_more(const Faults& faults, std::string_view text, const File& file) {
   constexpr std::string_view kWrong = "a_key_that_nobody_knows = 1\n";
   if (!std::ranges::all_of(faults, is_about_a_value)) return;

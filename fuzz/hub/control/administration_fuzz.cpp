@@ -1,7 +1,8 @@
-// HubCtrl: every request of section 9 of docs/protocol.md, by those who may and those who may not, among joins, leaves
-// and services, in any order, through the hub's control library, compared after each with a reference of maps: who may,
-// what follows, that no id is given twice, and that a node which was kicked has no token any more.
-// Input: a byte that chooses the limits, then operations of {u8 which, ...}.
+// HubCtrl: every request of section 9 of docs/protocol.md, by those who may and those who may not,
+// among joins, leaves and services, in any order, through the hub's control library, compared after
+// each with a reference of maps: who may, what follows, that no id is given twice, and that a node
+// which was kicked has no token any more. Input: a byte that chooses the limits, then operations of
+// {u8 which, ...}.
 
 #include <cstddef>
 #include <cstdint>

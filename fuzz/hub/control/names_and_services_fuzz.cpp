@@ -1,6 +1,6 @@
-// HubNS: joins, leaves, replaced connections, time and every request of section 8 of docs/protocol.md, in any order,
-// through the hub's control library, compared after each with a reference of maps.
-// Input: a byte that chooses the limits, then operations of {u8 which, ...}.
+// HubNS: joins, leaves, replaced connections, time and every request of section 8 of
+// docs/protocol.md, in any order, through the hub's control library, compared after each with a
+// reference of maps. Input: a byte that chooses the limits, then operations of {u8 which, ...}.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Any bytes as a Bitestream: every value lies within them, checking and walking agree, a look-up finds the first, and
-// numbers convert as exact arithmetic says. Input: a Bitestream.
+// Any bytes as a Bitestream: every value lies within them, checking and walking agree, a look-up
+// finds the first, and numbers convert as exact arithmetic says. Input: a Bitestream.
 
 #include <cstddef>
 #include <cstdint>
@@ -49,14 +49,16 @@ void check_value(Bytes bytes, const Value& value) {
   FUZZ_MUST(value.as_text().has_value() <= (value.type() == BITESTREAM_TEXT));
 }
 
-/// Walks everything; recursion is bounded, because a reader at the largest depth gives no nested value.
+/// Walks everything; recursion is bounded, because a reader at the largest depth gives no nested
+/// value.
 bool walk(Bytes bytes, Reader reader, unsigned depth) {
   FUZZ_MUST(depth <= BITESTREAM_DEPTH_MAX);
   bool valid = true;
   while (const auto value = reader.next()) {
     check_value(bytes, *value);
     const auto found = reader.find(value->key());
-    FUZZ_MUST(found && found->bytes().data() <= value->bytes().data() && found->key() == value->key());
+    FUZZ_MUST(found && found->bytes().data() <= value->bytes().data() &&
+              found->key() == value->key());
     if (const auto nested = value->as_nested()) valid = walk(bytes, *nested, depth + 1) && valid;
     if (value->type() == BITESTREAM_TEXT) valid = value->as_text() && valid;
     if (value->type() != BITESTREAM_BOOL_ARRAY) continue;

@@ -1,5 +1,6 @@
-// Any sequence of calls of the writer: what it says is fine reads back equal, the same into memory of any size, and
-// copying a valid stream value by value gives a valid stream of the same values. Input: calls, see put_next().
+// Any sequence of calls of the writer: what it says is fine reads back equal, the same into memory
+// of any size, and copying a valid stream value by value gives a valid stream of the same values.
+// Input: calls, see put_next().
 
 #include <algorithm>
 #include <cstddef>
@@ -61,7 +62,8 @@ class Caller {
   [[nodiscard]] std::vector<Entry> expected() const { return entries_; }
 
  private:
-  /// A byte that chooses begin, end or a type; the key; then a size and the value's bytes, which are repeated.
+  /// A byte that chooses begin, end or a type; the key; then a size and the value's bytes, which
+  /// are repeated.
   void put_next(Writer& writer) {
     const std::uint32_t choice = choices_.below(40);
     if (choice >= 36) return end(writer);
@@ -83,7 +85,8 @@ class Caller {
     std::vector<std::byte> bytes(unit * count, std::byte{0});
     const bool plain = element_type(type) == BITESTREAM_BOOL || type == BITESTREAM_TEXT;
     for (std::size_t i = 0; i < bytes.size() && !pattern.empty(); ++i) {
-      bytes[i] = pattern[i % pattern.size()] & std::byte{static_cast<unsigned char>(plain ? 1 : 255)};
+      bytes[i] =
+          pattern[i % pattern.size()] & std::byte{static_cast<unsigned char>(plain ? 1 : 255)};
     }
     return bytes;
   }
@@ -102,7 +105,8 @@ class Caller {
     writer.end_nested();
     --depth_;
     // A nested stream without values is left out.
-    if (entries_.back().type == BITESTREAM_NESTED && entries_.back().depth == depth_) entries_.pop_back();
+    if (entries_.back().type == BITESTREAM_NESTED && entries_.back().depth == depth_)
+      entries_.pop_back();
   }
 
   fuzz::Choices choices_;

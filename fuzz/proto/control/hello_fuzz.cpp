@@ -1,4 +1,5 @@
-// Any bytes as the opening and as the payload of a LINK frame (HELLO, WELCOME, GOODBYE). Input: a payload.
+// Any bytes as the opening and as the payload of a LINK frame (HELLO, WELCOME, GOODBYE). Input: a
+// payload.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Any text as pattern and name: accepted and matched as by the plainest code. Input: pattern, newline, name.
+// Any text as pattern and name: accepted and matched as by the plainest code. Input: pattern,
+// newline, name.
 
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +18,8 @@ using namespace gimnet;
 using namespace gimnet::proto;
 using Parts = std::vector<std::string>;
 
-constexpr std::string_view kAllowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+constexpr std::string_view kAllowed =
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
 
 Parts split_naively(std::string_view text) {
   Parts parts(1);
@@ -37,7 +39,8 @@ bool valid_naively(std::string_view text, bool wildcards) {
   if (parts.size() > 16) return false;
   for (const auto& part : parts) {
     if (wildcards && (part == "*" || part == "**")) continue;
-    if (part.empty() || part == "." || part == ".." || part.find_first_not_of(kAllowed) != std::string::npos)
+    if (part.empty() || part == "." || part == ".." ||
+        part.find_first_not_of(kAllowed) != std::string::npos)
       return false;
   }
   return true;
@@ -45,14 +48,16 @@ bool valid_naively(std::string_view text, bool wildcards) {
 
 /// fits[i][j]: the pattern from part i on fits the name from part j on.
 bool matches_naively(const Parts& pattern, const Parts& name) {
-  std::vector<std::vector<bool>> fits(pattern.size() + 1, std::vector<bool>(name.size() + 1, false));
+  std::vector<std::vector<bool>> fits(pattern.size() + 1,
+                                      std::vector<bool>(name.size() + 1, false));
   fits[pattern.size()][name.size()] = true;
   for (std::size_t i = pattern.size(); i-- > 0;) {
     for (std::size_t j = name.size() + 1; j-- > 0;) {
       if (pattern[i] == "**") {
         fits[i][j] = fits[i + 1][j] || (j < name.size() && fits[i][j + 1]);
       } else {
-        fits[i][j] = j < name.size() && (pattern[i] == "*" || pattern[i] == name[j]) && fits[i + 1][j + 1];
+        fits[i][j] =
+            j < name.size() && (pattern[i] == "*" || pattern[i] == name[j]) && fits[i + 1][j + 1];
       }
     }
   }
@@ -66,7 +71,8 @@ void check_pattern(std::string_view text, std::string_view name) {
   if (!pattern) return;
   FUZZ_MUST(pattern->text() == text && text.starts_with(pattern->beginning()));
   FUZZ_MUST(pattern->is_name() == valid_naively(text, false));
-  if (valid_naively(name, false) && pattern->matches(name)) FUZZ_MUST(name.starts_with(pattern->beginning()));
+  if (valid_naively(name, false) && pattern->matches(name))
+    FUZZ_MUST(name.starts_with(pattern->beginning()));
 }
 
 void check_service_name(std::string_view name) {
@@ -84,11 +90,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const std::size_t newline = text.find('\n');
   const std::string_view pattern = text.substr(0, newline);
-  const std::string_view name = newline == std::string_view::npos ? std::string_view() : text.substr(newline + 1);
+  const std::string_view name =
+      newline == std::string_view::npos ? std::string_view() : text.substr(newline + 1);
   FUZZ_MUST(valid_name(name) == valid_naively(name, false));
   FUZZ_MUST(valid_pattern(pattern) == valid_naively(pattern, true));
   const bool legal = valid_naively(name, false) && valid_naively(pattern, true);
-  FUZZ_MUST(matches(pattern, name) == (legal && matches_naively(split_naively(pattern), split_naively(name))));
+  FUZZ_MUST(matches(pattern, name) ==
+            (legal && matches_naively(split_naively(pattern), split_naively(name))));
   check_pattern(pattern, name);
   check_service_name(name);
   return 0;

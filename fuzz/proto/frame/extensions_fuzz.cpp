@@ -1,5 +1,5 @@
-// Any bytes as the extensions of a frame: read as by the plainest code, and a TRACE filled nowhere but in its slot.
-// Input: extensions without the u16 in front.
+// Any bytes as the extensions of a frame: read as by the plainest code, and a TRACE filled nowhere
+// but in its slot. Input: extensions without the u16 in front.
 
 #include <cstddef>
 #include <cstdint>
@@ -44,7 +44,8 @@ void check_reading(Bytes bytes, const std::optional<std::vector<Found>>& expecte
   while (const auto extension = reader.next()) {
     if (expected) {
       const Found& found = (*expected)[count];
-      FUZZ_MUST(static_cast<int>(extension->type) == found.type && extension->value.size() == found.size);
+      FUZZ_MUST(static_cast<int>(extension->type) == found.type &&
+                extension->value.size() == found.size);
       FUZZ_MUST(extension->value.data() == bytes.data() + found.at);
     }
     ++count;

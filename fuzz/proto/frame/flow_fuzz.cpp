@@ -1,5 +1,5 @@
-// Any bytes as the payload of FLOW, REPORT and TAKEN: what is read comes out the same after writing it.
-// Input: a payload.
+// Any bytes as the payload of FLOW, REPORT and TAKEN: what is read comes out the same after writing
+// it. Input: a payload.
 
 #include <array>
 #include <cstddef>

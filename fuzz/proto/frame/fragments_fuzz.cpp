@@ -1,5 +1,6 @@
-// Any sequence of fragments: the messages that come out are those that a naive receiver gets, lost ones are counted the
-// same, and no limit is ever passed. Input: 5 bytes a fragment {stream, message, offset, total, size}.
+// Any sequence of fragments: the messages that come out are those that a naive receiver gets, lost
+// ones are counted the same, and no limit is ever passed. Input: 5 bytes a fragment {stream,
+// message, offset, total, size}.
 
 #include <cstddef>
 #include <cstdint>
@@ -108,7 +109,8 @@ void check_against_naive(const std::vector<Step>& steps) {
 }
 
 void check_limits(const std::vector<Step>& steps) {
-  const ReassemblyLimits limits{.message_bytes_max = kMessageMax, .waiting_bytes_max = 64, .streams_max = 3};
+  const ReassemblyLimits limits{
+      .message_bytes_max = kMessageMax, .waiting_bytes_max = 64, .streams_max = 3};
   Reassembler reassembler(limits);
   std::uint64_t lost = 0;
   for (const Step& step : steps) {

@@ -1,5 +1,6 @@
-// Any bytes as a node's stream: the same frames however they are split, the same parts after taking a frame apart and
-// building it again, and nothing accepted that section 2 of the protocol forbids. Input: frames, one after the other.
+// Any bytes as a node's stream: the same frames however they are split, the same parts after taking
+// a frame apart and building it again, and nothing accepted that section 2 of the protocol forbids.
+// Input: frames, one after the other.
 
 #include <cstddef>
 #include <cstdint>
@@ -67,7 +68,8 @@ Cut cut_in_pieces(Bytes stream, std::size_t piece) {
     for (;;) {
       const NextRun next = next_run(begin, end, kLengthMax);
       cut.too_long = next.found == Found::too_long;
-      if (next.found == Found::need_more) FUZZ_MUST(next.needed > static_cast<std::size_t>(end - begin));
+      if (next.found == Found::need_more)
+        FUZZ_MUST(next.needed > static_cast<std::size_t>(end - begin));
       if (next.found != Found::run) break;
       add_run(cut, next.run);
       begin += next.run.size;
@@ -77,7 +79,8 @@ Cut cut_in_pieces(Bytes stream, std::size_t piece) {
 }
 
 void check_legal(const FrameView& frame) {
-  FUZZ_MUST(frame.header.lane < kLaneCount && frame.header.hops == 0 && (frame.header.flags & 0xC0) == 0);
+  FUZZ_MUST(frame.header.lane < kLaneCount && frame.header.hops == 0 &&
+            (frame.header.flags & 0xC0) == 0);
   FUZZ_MUST(frame.header.kind != Kind::list || frame.recipients.size() == frame.header.dst);
   for (std::uint32_t i = 1; i < frame.recipients.size(); ++i) {
     FUZZ_MUST(frame.recipients[i - 1] < frame.recipients[i]);
@@ -101,7 +104,8 @@ void check_rebuilt(const FrameView& frame) {
   const auto again = parse_frame(bytes, Origin::hub);
   FUZZ_MUST(again.has_value());
   FUZZ_MUST(again->fragment == frame.fragment && again->key == frame.key);
-  FUZZ_MUST(fuzz::same(again->payload, frame.payload) && fuzz::same(again->extensions, frame.extensions));
+  FUZZ_MUST(fuzz::same(again->payload, frame.payload) &&
+            fuzz::same(again->extensions, frame.extensions));
   FUZZ_MUST(again->recipients.size() == frame.recipients.size());
 }
 

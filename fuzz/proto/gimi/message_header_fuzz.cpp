@@ -1,4 +1,5 @@
-// Any bytes as a GIMI message: its parts lie within it, and come out the same after writing them. Input: a payload.
+// Any bytes as a GIMI message: its parts lie within it, and come out the same after writing them.
+// Input: a payload.
 
 #include <array>
 #include <cstddef>
@@ -18,11 +19,13 @@ using Bytes = std::span<const std::byte>;
 void check_rewritten(const MessageView& message) {
   std::array<std::byte, kMessagePrefixMax> prefix{};
   const std::size_t size = write_message_prefix(message.header, message.timestamp_ns, prefix);
-  std::vector<std::byte> written(prefix.begin(), prefix.begin() + static_cast<std::ptrdiff_t>(size));
+  std::vector<std::byte> written(prefix.begin(),
+                                 prefix.begin() + static_cast<std::ptrdiff_t>(size));
   written.insert(written.end(), message.data.begin(), message.data.end());
   const auto again = parse_message(written);
   FUZZ_MUST(again && again->header.sequence == message.header.sequence);
-  FUZZ_MUST(again->header.operation == message.header.operation && again->header.flags == message.header.flags);
+  FUZZ_MUST(again->header.operation == message.header.operation &&
+            again->header.flags == message.header.flags);
   FUZZ_MUST(again->timestamp_ns == message.timestamp_ns && fuzz::same(again->data, message.data));
 }
 
@@ -36,7 +39,8 @@ void check_data(const MessageView& message) {
     const auto again = encode_failure(*failure);
     // A group id of 0 may come, and is not written.
     const bool same = fuzz::same(std::span(again), message.data);
-    FUZZ_MUST(same || (failure->group == 0 && again.size() + sizeof failure->group == message.data.size()));
+    FUZZ_MUST(same ||
+              (failure->group == 0 && again.size() + sizeof failure->group == message.data.size()));
   }
 }
 

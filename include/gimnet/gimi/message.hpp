@@ -25,7 +25,8 @@ struct Peer {
   friend constexpr auto operator<=>(const Peer&, const Peer&) = default;
 };
 
-/// What a message is: which queue of its receiver it belongs to. The numbers, any of 32 bits, are the application's.
+/// What a message is: which queue of its receiver it belongs to. The numbers, any of 32 bits, are
+/// the application's.
 struct MessageKey {
   std::uint32_t type = 0;
   std::uint32_t instance = 0;
@@ -40,14 +41,16 @@ class BytesView {
  public:
   BytesView() = default;
   BytesView(const char* text) : BytesView(std::string_view{text}) {}
-  BytesView(std::string_view text) : data_(reinterpret_cast<const std::byte*>(text.data())), size_(text.size()) {}
+  BytesView(std::string_view text)
+      : data_(reinterpret_cast<const std::byte*>(text.data())), size_(text.size()) {}
   BytesView(const std::string& text) : BytesView(std::string_view{text}) {}
   template <class Range>
     requires(!std::convertible_to<const Range&, std::string_view>) && requires(const Range& range) {
       std::as_bytes(std::span{range.data(), range.size()});
       requires sizeof(*range.data()) == 1;
     }
-  BytesView(const Range& range) : data_(reinterpret_cast<const std::byte*>(range.data())), size_(range.size()) {}
+  BytesView(const Range& range)
+      : data_(reinterpret_cast<const std::byte*>(range.data())), size_(range.size()) {}
 
   [[nodiscard]] const std::byte* data() const { return data_; }
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -58,9 +61,10 @@ class BytesView {
   std::size_t size_ = 0;
 };
 
-/// A message that was received. Owns its bytes, which stay where the network put them; it may share a block of
-/// 256 KiB with its neighbours, so a program that keeps few of many for long copies those.
-/// Thread safety: a value that can be moved; one thread at a time. Lifetime: may outlive the node.
+/// A message that was received. Owns its bytes, which stay where the network put them; it may share
+/// a block of 256 KiB with its neighbours, so a program that keeps few of many for long copies
+/// those. Thread safety: a value that can be moved; one thread at a time. Lifetime: may outlive the
+/// node.
 class Message {
  public:
   Message() = default;
@@ -76,25 +80,29 @@ class Message {
 
   /// Valid until: this message is destroyed or moved from.
   [[nodiscard]] std::span<const std::byte> data() const { return data_; }
-  [[nodiscard]] std::string_view text() const { return {reinterpret_cast<const char*>(data_.data()), data_.size()}; }
+  [[nodiscard]] std::string_view text() const {
+    return {reinterpret_cast<const char*>(data_.data()), data_.size()};
+  }
   [[nodiscard]] std::size_t size() const { return data_.size(); }
 
   /// Who sent it: the first hub vouches for it.
   [[nodiscard]] Peer from() const { return from_; }
   [[nodiscard]] MessageKey key() const { return key_; }
   [[nodiscard]] Lane lane() const { return lane_; }
-  /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its subscribers; after
-  /// 2^32 - 1 comes 0.
+  /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its
+  /// subscribers; after 2^32 - 1 comes 0.
   [[nodiscard]] std::uint32_t sequence() const { return sequence_; }
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
   /// When it was read from the network, by this machine's clock in ns since 1970.
   [[nodiscard]] std::int64_t arrival_ns() const { return arrival_ns_; }
-  /// How often its node had connected anew when it came, as NodeState::reconnects: where it grows from one message to
-  /// the next the connection to the hub was broken between them.
+  /// How often its node had connected anew when it came, as NodeState::reconnects: where it grows
+  /// from one message to the next the connection to the hub was broken between them.
   [[nodiscard]] std::uint32_t reconnects() const { return reconnects_; }
   /// Full name of the service it was published by; "" for one that was sent to this node.
-  [[nodiscard]] std::string_view service() const { return service_ ? std::string_view{*service_} : ""; }
+  [[nodiscard]] std::string_view service() const {
+    return service_ ? std::string_view{*service_} : "";
+  }
 
  private:
   friend struct MessageAccess;

@@ -13,56 +13,66 @@ namespace gimnet {
 
 /// Most messages of one (destination, key) that may wait for their ACK: what one ACK can speak of.
 inline constexpr std::size_t kWindowMax = 64;
-/// Most payload bytes of them. A message that would be more, of any size, goes when no other waits for its ACK: where
-/// the sender does not wait (AtFullWindow) or several threads send, small ones can keep it from going.
-/// The receiver's library holds NodeOptions::receive_bytes for a program that stands still: 16 such windows by default.
-/// What comes beyond waits in its hub, which does not hold it for ever.
+/// Most payload bytes of them. A message that would be more, of any size, goes when no other waits
+/// for its ACK: where the sender does not wait (AtFullWindow) or several threads send, small ones
+/// can keep it from going. The receiver's library holds NodeOptions::receive_bytes for a program
+/// that stands still: 16 such windows by default. What comes beyond waits in its hub, which does
+/// not hold it for ever.
 inline constexpr std::size_t kWindowBytesMax = std::size_t{1} << 20;
 /// Messages that a queue keeps if nobody says otherwise.
 inline constexpr std::size_t kQueueMessagesDefault = 64;
 /// Most messages that a queue can be told to keep.
 inline constexpr std::size_t kQueueMessagesMax = std::size_t{1} << 24;
 
-// Every member has an initialiser, so that `{.window = 1}` names what is meant and no compiler misses the others.
+// Every member has an initialiser, so that `{.window = 1}` names what is meant and no compiler
+// misses the others.
 
 /// How to join. Everything has a default that works on one machine.
 struct NodeOptions {
-  /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a name, found by its
-  /// id only.
+  /// At most 255 bytes: up to 16 parts of A-Z a-z 0-9 . _ -, separated by `/`. "": a node without a
+  /// name, found by its id only.
   std::string name{};
-  /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this machine.
+  /// `tcp://host:port` or `unix:/path`. "": the environment's GIMNET_HUB, else the hub of this
+  /// machine.
   std::string hub{};
   std::string description{};  ///< for people, at most 256 bytes
   Timeout timeout{5000};      ///< for joining, in ms
   bool wait_for_hub = false;  ///< dial again until `timeout` if there is no hub yet
-  /// Dial again after a break, after a random time below 50 ms, 100 ms ... 1 s. false: a break is the end.
+  /// Dial again after a break, after a random time below 50 ms, 100 ms ... 1 s. false: a break is
+  /// the end.
   bool reconnect = true;
-  /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed. Default: nodes with a
-  /// name.
+  /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed.
+  /// Default: nodes with a name.
   std::optional<bool> resume{};
-  /// A node with a name that crashed has its id and name again at once: its session token stands in a file of the
-  /// user's runtime folder while it lives. false: in memory only.
+  /// A node with a name that crashed has its id and name again at once: its session token stands in
+  /// a file of the user's runtime folder while it lives. false: in memory only.
   bool keep_token = true;
   /// Shard of the hub wished for; honoured by a hub started with `--placement hint`.
   std::optional<std::uint8_t> shard{};
-  /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it. Else: denied.
+  /// Join as one who may change the hub: over its Unix socket, as root or as the user that runs it.
+  /// Else: denied.
   bool administrator = false;
-  /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped; its sender is told if it
-  /// waits for an ACK.
+  /// Largest message taken, in bytes of the application, up to 1 GiB. A larger one is dropped; its
+  /// sender is told if it waits for an ACK.
   std::size_t message_bytes_max = std::size_t{64} << 20;
-  std::size_t receive_bytes = std::size_t{16} << 20;   ///< may wait unread when a queue holds the reading back
-  std::size_t queue_messages = kQueueMessagesDefault;  ///< size of queues that nobody asked for, 1..kQueueMessagesMax
-  std::uint32_t socket_receive_bytes = 0;              ///< SO_RCVBUF, in bytes; 0: the system's
-  /// Bytes of the largest last message of an own service with `retain` that is kept for a hub that was started again:
-  /// as much as hubs keep themselves unless they are told otherwise (`retained_bytes`). 1..64 MiB, which all services
-  /// have together. NodeState::last_messages_not_kept counts what was not.
+  std::size_t receive_bytes = std::size_t{16}
+                              << 20;  ///< may wait unread when a queue holds the reading back
+  std::size_t queue_messages =
+      kQueueMessagesDefault;  ///< size of queues that nobody asked for, 1..kQueueMessagesMax
+  std::uint32_t socket_receive_bytes = 0;  ///< SO_RCVBUF, in bytes; 0: the system's
+  /// Bytes of the largest last message of an own service with `retain` that is kept for a hub that
+  /// was started again: as much as hubs keep themselves unless they are told otherwise
+  /// (`retained_bytes`). 1..64 MiB, which all services have together.
+  /// NodeState::last_messages_not_kept counts what was not.
   std::uint32_t last_message_bytes = std::uint32_t{1} << 20;
 };
 
 /// What a queue does when a message comes and it is full.
 enum class AtFullQueue : std::uint8_t {
-  overwrite_oldest,  ///< a ring buffer: the oldest goes and is counted; of size 1 it holds the newest
-  /// Nothing goes: the node stops reading from the hub, for all its queues, until there is room. Keep-alive goes on.
+  overwrite_oldest,  ///< a ring buffer: the oldest goes and is counted; of size 1 it holds the
+                     ///< newest
+  /// Nothing goes: the node stops reading from the hub, for all its queues, until there is room.
+  /// Keep-alive goes on.
   stop_reading,
 };
 
@@ -75,29 +85,35 @@ struct QueueOptions {
 enum class AtFullWindow : std::uint8_t {
   wait,         ///< until there is room, at most the time given to send()
   skip,         ///< send nothing and answer Status::window_full
-  hold_latest,  ///< keep this one, in place of one that is kept already, and send it when there is room
+  hold_latest,  ///< keep this one, in place of one that is kept already, and send it when there is
+                ///< room
 };
 
-/// How much of a service a subscriber wants. The program takes a message when it fetches it from the queue, or when the
-/// queue overwrites it.
+/// How much of a service a subscriber wants. The program takes a message when it fetches it from
+/// the queue, or when the queue overwrites it.
 struct PaceOptions {
-  std::uint32_t window = 0;  ///< of Delivery::sync: fewer untaken messages than the service allows; 0: as it allows
-  std::uint32_t depth = 1;   ///< newest messages that the hub holds meanwhile; 1: always the latest. At most 64
-  double rate_hz = 0.0;      ///< messages a second at most, the newest at each due time, 0.001..1,000; 0: no bound
+  std::uint32_t window =
+      0;  ///< of Delivery::sync: fewer untaken messages than the service allows; 0: as it allows
+  std::uint32_t depth =
+      1;  ///< newest messages that the hub holds meanwhile; 1: always the latest. At most 64
+  double rate_hz =
+      0.0;  ///< messages a second at most, the newest at each due time, 0.001..1,000; 0: no bound
 };
 
 struct SendOptions {
   MessageKey key{};
   Lane lane = Lane::normal;
-  /// 1..kWindowMax: synchronized, at most that many, and kWindowBytesMax of them, are not acknowledged; data do not
-  /// pile up on the way, and each receiver sets its own pace. 0: unsynchronized, as fast as the network takes it;
-  /// nothing is acknowledged.
+  /// 1..kWindowMax: synchronized, at most that many, and kWindowBytesMax of them, are not
+  /// acknowledged; data do not pile up on the way, and each receiver sets its own pace. 0:
+  /// unsynchronized, as fast as the network takes it; nothing is acknowledged.
   std::size_t window = 0;
   AtFullWindow at_full = AtFullWindow::wait;
-  bool timestamp = false;        ///< tell the receiver when it was sent: 8 bytes more
-  std::uint32_t age_max_ms = 0;  ///< not 0: dropped on the way when older, by the clocks of this node and the hubs
-  /// Of a synchronized stream: once a message was lost, send() sends nothing more and answers not_delivered, for
-  /// streams in which what comes later is worth nothing without what came before.
+  bool timestamp = false;  ///< tell the receiver when it was sent: 8 bytes more
+  std::uint32_t age_max_ms =
+      0;  ///< not 0: dropped on the way when older, by the clocks of this node and the hubs
+  /// Of a synchronized stream: once a message was lost, send() sends nothing more and answers
+  /// not_delivered, for streams in which what comes later is worth nothing without what came
+  /// before.
   bool end_at_loss = false;
 };
 
@@ -106,8 +122,9 @@ struct PublishOptions {
   MessageKey key{};
   Lane lane = Lane::normal;
   bool timestamp = true;
-  std::string metadata{};    ///< for people and tools, at most 4,096 bytes of UTF-8
-  std::uint32_t window = 1;  ///< of Delivery::sync: messages not taken by a subscriber, 1..1,024 (a hub's limit)
+  std::string metadata{};  ///< for people and tools, at most 4,096 bytes of UTF-8
+  std::uint32_t window =
+      1;  ///< of Delivery::sync: messages not taken by a subscriber, 1..1,024 (a hub's limit)
   /// The hub keeps the last message, up to 1 MiB, and gives it to each new subscriber first.
   bool retain = false;
 };
@@ -125,8 +142,8 @@ struct WatchOptions {
   bool services = true;
 };
 
-/// Whether more messages follow at once: those marked so are written together with the next one that is not. A program
-/// that stops there calls Node::flush().
+/// Whether more messages follow at once: those marked so are written together with the next one
+/// that is not. A program that stops there calls Node::flush().
 enum class More : std::uint8_t { no, yes };
 
 }  // namespace gimnet

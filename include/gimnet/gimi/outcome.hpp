@@ -26,12 +26,13 @@ enum class Status : std::uint8_t {
   bad_version,    ///< The hub speaks another major version of the protocol.
   name_taken,     ///< Another live node holds the name.
   bad_name,       ///< The name breaks the rules (docs/protocol.md, section 8).
-  refused,        ///< The hub is full, draining, or ended the session: kicked, or replaced by another connection.
-  not_found,      ///< No node or service of that name.
-  taken,          ///< This node has such a service already.
-  denied,         ///< This node may not do that.
-  limit,          ///< A limit of the hub or of the library was reached.
-  too_large,      ///< The message is larger than allowed.
+  refused,    ///< The hub is full, draining, or ended the session: kicked, or replaced by another
+              ///< connection.
+  not_found,  ///< No node or service of that name.
+  taken,      ///< This node has such a service already.
+  denied,     ///< This node may not do that.
+  limit,      ///< A limit of the hub or of the library was reached.
+  too_large,  ///< The message is larger than allowed.
   not_delivered,  ///< The message is known not to have arrived.
   window_full,    ///< AtFullWindow::skip: nothing was sent.
   protocol,       ///< The peer sent bytes that docs/protocol.md forbids.
@@ -66,7 +67,7 @@ enum class LossReason : std::uint8_t {
   not_received = 64,     ///< Its receiver answered a later question, but did not get it.
   refused = 65,          ///< Its receiver does not take it: it is too large.
   connection_lost = 66,  ///< The own connection broke, or ended.
-  service_gone = 67,     ///< The service was withdrawn or is somewhere else, and cannot tell any more.
+  service_gone = 67,  ///< The service was withdrawn or is somewhere else, and cannot tell any more.
 };
 
 /// A short English text, for example "name taken". Static.
@@ -81,7 +82,8 @@ struct Failure {
 /// What the throwing forms of the API throw.
 class GimnetError : public std::runtime_error {
  public:
-  explicit GimnetError(Failure failure) : std::runtime_error(failure.sentence), failure_(std::move(failure)) {}
+  explicit GimnetError(Failure failure)
+      : std::runtime_error(failure.sentence), failure_(std::move(failure)) {}
   [[nodiscard]] const Failure& failure() const { return failure_; }
   [[nodiscard]] Status status() const { return failure_.status; }
 
@@ -120,7 +122,9 @@ class [[nodiscard]] Outcome {
 
   /// REQUIRES: !ok(). With a value: a Failure without words.
   [[nodiscard]] Failure failure() const { return ok() ? Failure{} : *std::get_if<1>(&state_); }
-  [[nodiscard]] bool is(Status status) const { return !ok() && std::get_if<1>(&state_)->status == status; }
+  [[nodiscard]] bool is(Status status) const {
+    return !ok() && std::get_if<1>(&state_)->status == status;
+  }
 
  private:
   void check() const {

@@ -13,9 +13,10 @@
 
 namespace gimnet {
 
-/// What a subscriber gets: `stream` every message, in order, the oldest going when its queue at the hub is full;
-/// `latest` only the newest of those that wait; `sync` at most a window of messages that it has not taken, its hub
-/// holding the newest meanwhile, so that each subscriber gets fresh ones at its own rate.
+/// What a subscriber gets: `stream` every message, in order, the oldest going when its queue at the
+/// hub is full; `latest` only the newest of those that wait; `sync` at most a window of messages
+/// that it has not taken, its hub holding the newest meanwhile, so that each subscriber gets fresh
+/// ones at its own rate.
 enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// A service gives data to its subscribers, or takes data that others send to it.
@@ -49,9 +50,10 @@ struct ServiceRecord {
 
 /// What a watch tells.
 enum class Change : std::uint8_t {
-  snapshot_begins = 0,  ///< what was told before is void: at first, and when the watch was too far behind
-  present = 1,          ///< part of the snapshot
-  snapshot_ends = 2,    ///< all that is there was told; changes follow
+  snapshot_begins =
+      0,        ///< what was told before is void: at first, and when the watch was too far behind
+  present = 1,  ///< part of the snapshot
+  snapshot_ends = 2,  ///< all that is there was told; changes follow
   joined = 3,
   left = 4,  ///< a node, for good: only its id, name and hub id are told
   away = 5,  ///< a node whose connection broke: its grace time runs
@@ -87,10 +89,11 @@ struct HubRecord {
   std::uint32_t services = 0;
 };
 
-/// The counters of one of the hub's io threads, by the names of docs/operations.md, in the hub's order.
+/// The counters of one of the hub's io threads, by the names of docs/operations.md, in the hub's
+/// order.
 struct ShardCounts {
-  /// The number of the record that is no io thread's: what the hub counted of peers that it did not admit. It is there
-  /// once there is something to count.
+  /// The number of the record that is no io thread's: what the hub counted of peers that it did not
+  /// admit. It is there once there is something to count.
   static constexpr std::uint32_t kConductor = 65'535;
 
   std::uint32_t shard = 0;  ///< or kConductor
@@ -122,12 +125,14 @@ struct ConnectionRecord {
   std::string peer;       ///< its address
   bool connected = false;
   std::uint64_t queued_bytes = 0;  ///< waiting for it at the hub
-  // Since its session began, over all its connections; as the hub's counters of the same names. 0: the hub is older.
+  // Since its session began, over all its connections; as the hub's counters of the same names. 0:
+  // the hub is older.
   std::uint64_t accepted = 0;        ///< frames that the hub took from it
   std::uint64_t received_bytes = 0;  ///< that the hub had from it
-  std::uint64_t delivered = 0;       ///< frames handed to its connection; where resume is on, confirmed by it
-  std::uint64_t sent_bytes = 0;      ///< that the hub wrote to it
-  std::uint64_t dropped = 0;         ///< frames that were for it
+  std::uint64_t delivered =
+      0;  ///< frames handed to its connection; where resume is on, confirmed by it
+  std::uint64_t sent_bytes = 0;  ///< that the hub wrote to it
+  std::uint64_t dropped = 0;     ///< frames that were for it
 };
 
 }  // namespace gimnet

@@ -37,7 +37,8 @@ bool AckBook::take(const StreamName& sender, std::uint32_t sequence) {
   if (distance > 0) {
     advance(entry, sequence);
   } else if (distance < -static_cast<std::int32_t>(kBits) || (sequence == 1 && has(entry, 1))) {
-    entry = {sequence, 0, true};  // a stream that begins again: its sender is a new one under an old id
+    entry = {sequence, 0,
+             true};  // a stream that begins again: its sender is a new one under an old id
   } else if (distance < 0) {
     entry.bitmap |= std::uint64_t{1} << (static_cast<std::uint32_t>(-distance) - 1);
   }

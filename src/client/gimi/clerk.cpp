@@ -53,7 +53,8 @@ nif_status Clerk::acknowledge(const StreamName& sender, Lane lane, std::uint32_t
   const std::size_t size = proto::gimi::encode_ack({entry.bitmap, pong, sender.group}, memory);
   const std::span<const std::byte> data = std::span(memory).first(size);
   const Envelope envelope{sender.peer.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, sender.key, 0, 0};
-  return uplink_.transmit(envelope, {entry.sequence, proto::gimi::Operation::ack, 0, 0}, false, data, 0);
+  return uplink_.transmit(envelope, {entry.sequence, proto::gimi::Operation::ack, 0, 0}, false,
+                          data, 0);
 }
 
 void Clerk::attend(bool at_once) {
@@ -110,7 +111,8 @@ void Clerk::run() {
 }
 
 void Clerk::send_due(std::vector<Due>& due) {
-  std::erase_if(due, [this](const Due& ack) { return acknowledge(ack.sender, ack.lane, 0) != NIF_TIMEOUT; });
+  std::erase_if(
+      due, [this](const Due& ack) { return acknowledge(ack.sender, ack.lane, 0) != NIF_TIMEOUT; });
 }
 
 }  // namespace gimnet::gimi

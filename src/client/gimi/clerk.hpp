@@ -12,8 +12,9 @@ namespace gimnet::gimi {
 
 class StreamTable;
 
-/// A node's own thread: acknowledges what was taken, one ACK for as many messages as came meanwhile, and lets streams
-/// ask for the ACKs that they miss. It sleeps while there is nothing to do. Thread safety: any thread.
+/// A node's own thread: acknowledges what was taken, one ACK for as many messages as came
+/// meanwhile, and lets streams ask for the ACKs that they miss. It sleeps while there is nothing to
+/// do. Thread safety: any thread.
 class Clerk {
  public:
   Clerk(Uplink& uplink, StreamTable& streams) : uplink_(uplink), streams_(streams) {}
@@ -24,8 +25,10 @@ class Clerk {
 
   /// A DATA that asked for an ACK is in its queue.
   void take(const StreamName& sender, Lane lane, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
-  /// Sends the ACK that goes before the PONG with that number, from the thread of the caller. Does not wait.
-  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane, std::uint32_t pong) GIMNET_EXCLUDES(mutex_);
+  /// Sends the ACK that goes before the PONG with that number, from the thread of the caller. Does
+  /// not wait.
+  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane, std::uint32_t pong)
+      GIMNET_EXCLUDES(mutex_);
   /// Streams want to be looked after, soon or at once.
   void attend(bool at_once) GIMNET_EXCLUDES(mutex_);
 

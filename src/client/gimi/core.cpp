@@ -24,10 +24,11 @@ constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
 /// Of what another node says, so many bytes are kept.
 constexpr std::size_t kPeerWordsMax = 256;
 
-/// NIF refuses what its sender still waits with. Less than its window is on its way already: that comes whole, so that
-/// this library can tell the sender of which message it speaks.
+/// NIF refuses what its sender still waits with. Less than its window is on its way already: that
+/// comes whole, so that this library can tell the sender of which message it speaks.
 std::size_t nif_bytes_max(std::size_t message_bytes_max) {
-  const std::size_t whole = std::max<std::size_t>(message_bytes_max, proto::kWindowDefault) + kHeaderRoom;
+  const std::size_t whole =
+      std::max<std::size_t>(message_bytes_max, proto::kWindowDefault) + kHeaderRoom;
   return std::min<std::size_t>(whole, NIF_MESSAGE_BYTES_MAX);
 }
 
@@ -73,13 +74,15 @@ class AckReceipt final : public Receipt {
   const std::uint32_t sequence_;
 };
 
-/// The GIMI header in the 16 bytes that a report repeats: behind the key, where nothing stands before it. NIF takes the
-/// fragment header away of what it remembers.
+/// The GIMI header in the 16 bytes that a report repeats: behind the key, where nothing stands
+/// before it. NIF takes the fragment header away of what it remembers.
 std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
   const auto bytes = payload_of(in);
-  if (bytes.size() < proto::kHeaderSize + proto::kKeySize + proto::gimi::kMessageHeaderSize) return std::nullopt;
+  if (bytes.size() < proto::kHeaderSize + proto::kKeySize + proto::gimi::kMessageHeaderSize)
+    return std::nullopt;
   const proto::FrameHeader header = proto::load_header(bytes.data());
-  if (!header.has(proto::kFlagKeyed) || header.has(proto::kFlagFragment) || header.has(proto::kFlagExt)) {
+  if (!header.has(proto::kFlagKeyed) || header.has(proto::kFlagFragment) ||
+      header.has(proto::kFlagExt)) {
     return std::nullopt;
   }
   return proto::gimi::load_message_header(bytes.data() + proto::kHeaderSize + proto::kKeySize);
@@ -90,13 +93,17 @@ std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in
 Core::Core(const NodeOptions& options)
     : message_bytes_max_(options.message_bytes_max),
       inbox_(
-          options.queue_messages, options.receive_bytes, [this] { static_cast<void>(nif_deliver(node())); },
+          options.queue_messages, options.receive_bytes,
+          [this] { static_cast<void>(nif_deliver(node())); },
           [this](const TakenMessages& taken, bool more) {
-            static_cast<void>(nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
+            static_cast<void>(
+                nif_credit(node(), taken.group, taken.epoch, taken.count, more ? 1 : 0));
           }),
       streams_(uplink_, [this](bool at_once) { clerk_.attend(at_once); }),
       services_(uplink_, inbox_,
-                [this](const std::string& name, const ServicePlace& place) { streams_.on_service_moved(name, place); }),
+                [this](const std::string& name, const ServicePlace& place) {
+                  streams_.on_service_moved(name, place);
+                }),
       watches_(uplink_),
       clerk_(uplink_, streams_) {}
 
@@ -109,7 +116,8 @@ Outcome<std::shared_ptr<Core>> Core::join(const NodeOptions& options) {
   core->closed_ = true;
   const char* words = nif_error_text();
   if (*words != '\0') return Failure{status_of(status), words};
-  return failure_of(status, "join " + (options.hub.empty() ? "the hub of this machine" : options.hub));
+  return failure_of(status,
+                    "join " + (options.hub.empty() ? "the hub of this machine" : options.hub));
 }
 
 nif_status Core::connect(const NodeOptions& options) {
@@ -190,7 +198,8 @@ NodeState Core::state_now() const {
   }
   nif_counters counters{};
   counters.struct_size = sizeof counters;
-  if (nif_get_counters(node(), &counters) == NIF_OK) state.last_messages_not_kept = counters.last_messages_not_kept;
+  if (nif_get_counters(node(), &counters) == NIF_OK)
+    state.last_messages_not_kept = counters.last_messages_not_kept;
   state.trouble = uplink_.trouble();
   return state;
 }
@@ -203,8 +212,8 @@ Outcome<std::int64_t> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView 
   const std::uint32_t number = uplink_.next_ping();
   pings_.expect(number, to);
   const Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
-  const nif_status status =
-      uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0}, false, data, nif_timeout(timeout));
+  const nif_status status = uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0},
+                                             false, data, nif_timeout(timeout));
   if (status == NIF_OK) return pings_.wait(number, deadline, timeout);
   pings_.forget(number);
   return failure_of(status, "ping " + to.text());
@@ -239,8 +248,8 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
     case NIF_SERVICE_MOVED:
       return verdict_of(services_.on_service_moved(in));
     case NIF_OWN_SERVICE_MOVED:
-      return verdict_of(
-          services_.on_own_service_moved(in.text, {in.former_group, in.group, ServiceTable::refusal_of(in)}));
+      return verdict_of(services_.on_own_service_moved(
+          in.text, {in.former_group, in.group, ServiceTable::refusal_of(in)}));
     case NIF_NAME_LOST:
       on_renamed();
       return NIF_DONE;
@@ -253,7 +262,8 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
 
 nif_verdict Core::on_message(const nif_incoming& in) {
   using proto::gimi::Operation;
-  const auto view = (in.flags & NIF_FLAG_KEYED) != 0 ? proto::gimi::parse_message(payload_of(in)) : std::nullopt;
+  const auto view =
+      (in.flags & NIF_FLAG_KEYED) != 0 ? proto::gimi::parse_message(payload_of(in)) : std::nullopt;
   if (!view) {
     inbox_.count_dropped();
     return NIF_DONE;
@@ -295,7 +305,8 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
   const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
   if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
   if (service == nullptr) return verdict_of(place);
-  // After a break the hub gives the last message of a retained service again: it does not know who had it.
+  // After a break the hub gives the last message of a retained service again: it does not know who
+  // had it.
   if (service->is_repeated(in.from, view.header.sequence)) return NIF_DONE;
   Message message = MessageAccess::make(in, view, service->shared_name(), reconnects_);
   if (!inbox_.put(service->queue(), message, nullptr)) {
@@ -310,21 +321,26 @@ nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView&
   inbox_.count_dropped();
   losses_.add(proto::DropReason::too_large, 1);
   if (!is_for_one(in) || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
-  const std::string sentence = "it takes messages of at most " + std::to_string(message_bytes_max_) +
-                               " bytes, and this one has " + std::to_string(view.data.size());
+  const std::string sentence = "it takes messages of at most " +
+                               std::to_string(message_bytes_max_) + " bytes, and this one has " +
+                               std::to_string(view.data.size());
   const StreamName name = received_stream_of(in);
-  const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
-  // Where there is no room for it, the sender learns from the next PONG that the message is not here.
-  static_cast<void>(uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
-                                     proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
+  const Envelope envelope{
+      in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
+  // Where there is no room for it, the sender learns from the next PONG that the message is not
+  // here.
+  static_cast<void>(
+      uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
+                       proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
   return NIF_DONE;
 }
 
 void Core::on_error(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto failure = proto::gimi::decode_failure(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
-  streams_.on_refused(stream_of(in, in.from, failure->group), view.header.sequence,
-                      {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
+  streams_.on_refused(
+      stream_of(in, in.from, failure->group), view.header.sequence,
+      {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
 }
 
 void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -337,12 +353,13 @@ void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view)
   const StreamName name = received_stream_of(in);
   const auto lane = static_cast<Lane>(in.lane);
   // Both fit or neither arrives: whoever misses them asks again.
-  if (view.header.has(proto::gimi::kFlagAckWanted) && clerk_.acknowledge(name, lane, view.header.sequence) != NIF_OK) {
+  if (view.header.has(proto::gimi::kFlagAckWanted) &&
+      clerk_.acknowledge(name, lane, view.header.sequence) != NIF_OK) {
     return;
   }
   const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
-  static_cast<void>(
-      uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0}, false, view.data, 0));
+  static_cast<void>(uplink_.transmit(
+      envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0}, false, view.data, 0));
 }
 
 void Core::on_report(const nif_incoming& in) {
@@ -354,7 +371,8 @@ void Core::on_report(const nif_incoming& in) {
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
   const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;
   StreamTable::Report report{name, keyed, in.reason, in.count, 0, in.text};
-  if (header && header->operation == proto::gimi::Operation::data) report.sequence = header->sequence;
+  if (header && header->operation == proto::gimi::Operation::data)
+    report.sequence = header->sequence;
   if (header && header->operation == proto::gimi::Operation::ping) {
     pings_.on_lost(header->sequence, report_words(report.text));
   }
@@ -364,7 +382,8 @@ void Core::on_report(const nif_incoming& in) {
 void Core::on_gap(const nif_incoming& in) {
   // From itself: what this node sent. Its streams learn of the break by themselves.
   if (in.from == nif_id(node())) return;
-  losses_.add(static_cast<proto::DropReason>(in.reason), in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
+  losses_.add(static_cast<proto::DropReason>(in.reason),
+              in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
 }
 
 void Core::on_connected(const nif_incoming& in) {
@@ -372,7 +391,8 @@ void Core::on_connected(const nif_incoming& in) {
   streams_.on_interrupted(0);
   services_.on_reconnected();
   if ((in.flags & NIF_CONNECTED_RESUMED) != 0) return;
-  streams_.on_broken({LossReason::connection_lost, "the connection to the hub broke, and what was on its way is lost"});
+  streams_.on_broken({LossReason::connection_lost,
+                      "the connection to the hub broke, and what was on its way is lost"});
 }
 
 void Core::on_disconnected(const nif_incoming& in) {
@@ -388,7 +408,8 @@ void Core::on_disconnected(const nif_incoming& in) {
   info.struct_size = sizeof info;
   const bool kept = nif_get_info(node(), &info) == NIF_OK && info.resume != 0;
   if (kept) return streams_.on_interrupted(steady_now_ns());
-  streams_.on_broken({LossReason::connection_lost, std::string("the connection to the hub broke: ") + in.text});
+  streams_.on_broken(
+      {LossReason::connection_lost, std::string("the connection to the hub broke: ") + in.text});
 }
 
 }  // namespace gimnet::gimi

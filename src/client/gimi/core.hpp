@@ -18,8 +18,8 @@
 
 namespace gimnet::gimi {
 
-/// A node: NIF's handle, and who takes what it delivers. Everything received comes on the library's thread to
-/// on_incoming(), which sorts it and never waits. Thread safety: any thread.
+/// A node: NIF's handle, and who takes what it delivers. Everything received comes on the library's
+/// thread to on_incoming(), which sorts it and never waits. Thread safety: any thread.
 class Core {
  public:
   static Outcome<std::shared_ptr<Core>> join(const NodeOptions& options);
@@ -50,7 +50,8 @@ class Core {
   [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
-  [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
+                                          const proto::gimi::MessageView& view);
   void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
   /// A message that is larger than this node takes: its sender is told.
@@ -71,7 +72,8 @@ class Core {
   PingTable pings_;
   LossTally losses_;
   Clerk clerk_;
-  std::uint32_t reconnects_ = 0;  ///< the library's thread: as the messages that come now count them
+  std::uint32_t reconnects_ =
+      0;  ///< the library's thread: as the messages that come now count them
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};
   mutable Mutex mutex_;

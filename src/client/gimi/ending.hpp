@@ -8,8 +8,8 @@
 
 namespace gimnet::gimi {
 
-/// Why a node gives and takes nothing more: the program closed it, or no connection to the hub will come any more.
-/// A value type; by itself: it goes on.
+/// Why a node gives and takes nothing more: the program closed it, or no connection to the hub will
+/// come any more. A value type; by itself: it goes on.
 class Ending {
  public:
   Ending() = default;

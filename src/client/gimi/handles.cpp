@@ -8,7 +8,9 @@
 
 namespace gimnet {
 
-Outcome<Message> Queue::receive(Timeout timeout) const { return queue_->inbox().receive(*queue_, timeout); }
+Outcome<Message> Queue::receive(Timeout timeout) const {
+  return queue_->inbox().receive(*queue_, timeout);
+}
 std::optional<Message> Queue::try_receive() const { return queue_->inbox().try_receive(*queue_); }
 std::optional<Message> Queue::take_newest() const { return queue_->inbox().take_newest(*queue_); }
 void Queue::resize(std::size_t messages) const { queue_->inbox().resize(*queue_, messages); }
@@ -46,7 +48,9 @@ std::optional<Message> Subscription::try_receive() const {
 Queue Subscription::queue() const { return Queue({service_, &service_->queue()}); }
 bool Subscription::exists() const { return service_->exists(); }
 bool Subscription::accepts() const { return service_->accepts(); }
-Outcome<void> Subscription::wait_until_exists(Timeout timeout) const { return service_->wait_until_exists(timeout); }
+Outcome<void> Subscription::wait_until_exists(Timeout timeout) const {
+  return service_->wait_until_exists(timeout);
+}
 const std::string& Subscription::name() const { return service_->name(); }
 std::uint64_t Subscription::missed() const { return service_->missed(); }
 Outcome<void> Subscription::standing() const { return service_->standing(); }

@@ -21,11 +21,12 @@ proto::bitestream::Writer body_of(const Request& request) {
 
 /// Asks the hub and reads its answer.
 template <class Answer, class Request>
-Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing, Timeout timeout) {
+Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& doing,
+                    Timeout timeout) {
   const auto body = body_of(request);
   nif_reply* reply = nullptr;
-  const nif_status status =
-      nif_request(node, NIF_CTRL, Request::kOperation, body.bytes().data(), body.size(), &reply, nif_timeout(timeout));
+  const nif_status status = nif_request(node, NIF_CTRL, Request::kOperation, body.bytes().data(),
+                                        body.size(), &reply, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, doing);
   const std::unique_ptr<nif_reply, void (*)(nif_reply*)> owner(reply, &nif_free_reply);
   if (reply->status != 0) {
@@ -34,7 +35,8 @@ Outcome<Answer> ask(nif_node* node, const Request& request, const std::string& d
   }
   proto::Fields fields({static_cast<const std::byte*>(reply->content), reply->size}, Answer::kName);
   Answer answer = Answer::read(fields);
-  if (fields.failed()) return Failure{Status::protocol, "cannot " + doing + ": " + fields.error().sentence};
+  if (fields.failed())
+    return Failure{Status::protocol, "cannot " + doing + ": " + fields.error().sentence};
   return answer;
 }
 
@@ -74,44 +76,51 @@ ServiceRecord record_of(const nif_service_record& found) {
           found.retain != 0};
 }
 
-Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern, Timeout timeout) {
+Outcome<std::vector<NodeRecord>> list_nodes(nif_node* node, const std::string& pattern,
+                                            Timeout timeout) {
   nif_node_list* list = nullptr;
   const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
   const nif_status status = nif_list_nodes(node, wanted, &list, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "list the nodes");
   const std::unique_ptr<nif_node_list, void (*)(nif_node_list*)> owner(list, &nif_free_nodes);
   std::vector<NodeRecord> records;
-  for (const nif_node_record& found : std::span(list->records, list->count)) records.push_back(record_of(found));
+  for (const nif_node_record& found : std::span(list->records, list->count))
+    records.push_back(record_of(found));
   return records;
 }
 
-Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern, Timeout timeout) {
+Outcome<std::vector<ServiceRecord>> list_services(nif_node* node, const std::string& pattern,
+                                                  Timeout timeout) {
   nif_service_list* list = nullptr;
   const char* wanted = pattern.empty() ? nullptr : pattern.c_str();
   const nif_status status = nif_list_services(node, wanted, &list, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "list the services");
-  const std::unique_ptr<nif_service_list, void (*)(nif_service_list*)> owner(list, &nif_free_services);
+  const std::unique_ptr<nif_service_list, void (*)(nif_service_list*)> owner(list,
+                                                                             &nif_free_services);
   std::vector<ServiceRecord> records;
-  for (const nif_service_record& found : std::span(list->records, list->count)) records.push_back(record_of(found));
+  for (const nif_service_record& found : std::span(list->records, list->count))
+    records.push_back(record_of(found));
   return records;
 }
 
 Outcome<HubRecord> ask_hub(nif_node* node, Timeout timeout) {
-  const auto answer = ask<proto::ctrl::HubInfoAnswer>(node, proto::ctrl::HubInfo{}, "ask the hub who it is", timeout);
+  const auto answer = ask<proto::ctrl::HubInfoAnswer>(node, proto::ctrl::HubInfo{},
+                                                      "ask the hub who it is", timeout);
   if (!answer) return answer.failure();
   return HubRecord{answer->hub.value(), answer->hub_name, answer->version, answer->shards,
                    answer->uptime_ms,   answer->nodes,    answer->services};
 }
 
 Outcome<std::vector<ShardCounts>> ask_counters(nif_node* node, Timeout timeout) {
-  auto answer =
-      ask<proto::ctrl::StatisticsAnswer>(node, proto::ctrl::Statistics{}, "ask the hub for its counters", timeout);
+  auto answer = ask<proto::ctrl::StatisticsAnswer>(node, proto::ctrl::Statistics{},
+                                                   "ask the hub for its counters", timeout);
   if (!answer) return answer.failure();
   std::vector<ShardCounts> shards;
   for (const auto& shard : answer->shards) {
     ShardCounts& counts = shards.emplace_back();
     counts.shard = shard.shard;
-    for (const auto& counter : shard.counters) counts.counters.emplace_back(counter.name, counter.value);
+    for (const auto& counter : shard.counters)
+      counts.counters.emplace_back(counter.name, counter.value);
   }
   return shards;
 }
@@ -121,28 +130,31 @@ Outcome<std::vector<ConnectionRecord>> ask_connections(nif_node* node, Timeout t
   std::vector<ConnectionRecord> records;
   proto::ctrl::Connections request;
   for (;;) {
-    const auto page = ask<proto::ctrl::ConnectionsAnswer>(node, request, "ask the hub for its connections",
-                                                          Timeout{nif_timeout_until(deadline)});
+    const auto page = ask<proto::ctrl::ConnectionsAnswer>(
+        node, request, "ask the hub for its connections", Timeout{nif_timeout_until(deadline)});
     if (!page) return page.failure();
     for (const auto& found : page->connections) {
-      if (found.node <= request.after) return records;  // a hub that goes round in circles is not followed
+      if (found.node <= request.after)
+        return records;  // a hub that goes round in circles is not followed
       request.after = found.node;
       const proto::ctrl::ConnectionCounts& counts = found.counts;
-      records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport, found.peer,
-                         found.connected, counts.queued_bytes, counts.accepted, counts.received_bytes, counts.delivered,
-                         counts.sent_bytes, counts.dropped});
+      records.push_back({Peer{found.node.value()}, found.name, found.shard, found.transport,
+                         found.peer, found.connected, counts.queued_bytes, counts.accepted,
+                         counts.received_bytes, counts.delivered, counts.sent_bytes,
+                         counts.dropped});
     }
     if (!page->more || page->connections.empty()) return records;
   }
 }
 
 Outcome<std::vector<RouteRecord>> ask_routes(nif_node* node, Timeout timeout) {
-  const auto answer =
-      ask<proto::ctrl::RoutesAnswer>(node, proto::ctrl::Routes{}, "ask the hub for its routes", timeout);
+  const auto answer = ask<proto::ctrl::RoutesAnswer>(node, proto::ctrl::Routes{},
+                                                     "ask the hub for its routes", timeout);
   if (!answer) return answer.failure();
   std::vector<RouteRecord> routes;
   for (const auto& route : answer->routes) {
-    routes.push_back({route.hub.value(), route.hub_name, route.next_hop.value(), route.cost, route.nodes});
+    routes.push_back(
+        {route.hub.value(), route.hub_name, route.next_hop.value(), route.cost, route.nodes});
   }
   return routes;
 }
@@ -151,7 +163,8 @@ Outcome<std::string> kick(nif_node* node, Peer peer, std::string_view reason, Ti
   if (reason.size() > proto::kRemarkBytesMax) {
     return Failure{Status::bad_argument, "cannot kick " + peer.text() + ": the reason has " +
                                              std::to_string(reason.size()) + " bytes, and " +
-                                             std::to_string(proto::kRemarkBytesMax) + " are the most; shorten it"};
+                                             std::to_string(proto::kRemarkBytesMax) +
+                                             " are the most; shorten it"};
   }
   const proto::ctrl::Kick request{NodeId{peer.id}, std::string(reason)};
   const auto answer = ask<proto::ctrl::KickAnswer>(node, request, "kick " + peer.text(), timeout);
@@ -168,7 +181,8 @@ Outcome<void> reassign(nif_node* node, Peer peer, Peer new_id, Timeout timeout) 
 }
 
 Outcome<void> drain_hub(nif_node* node, Timeout timeout) {
-  const auto answer = ask<proto::ctrl::DrainAnswer>(node, proto::ctrl::Drain{}, "drain the hub", timeout);
+  const auto answer =
+      ask<proto::ctrl::DrainAnswer>(node, proto::ctrl::Drain{}, "drain the hub", timeout);
   if (!answer) return answer.failure();
   return {};
 }
@@ -179,14 +193,16 @@ Outcome<std::vector<HubChange>> reload_hub(nif_node* node, Timeout timeout) {
   if (!answer) return answer.failure();
   std::vector<HubChange> changes;
   for (auto& change : answer->changes) {
-    changes.push_back({std::move(change.key), std::move(change.from), std::move(change.to), change.needs_restart});
+    changes.push_back({std::move(change.key), std::move(change.from), std::move(change.to),
+                       change.needs_restart});
   }
   return changes;
 }
 
 Outcome<std::string> set_hub_log_level(nif_node* node, std::string_view level, Timeout timeout) {
   const proto::ctrl::SetLogLevel request{std::string(level)};
-  const auto answer = ask<proto::ctrl::SetLogLevelAnswer>(node, request, "set the hub's log level", timeout);
+  const auto answer =
+      ask<proto::ctrl::SetLogLevelAnswer>(node, request, "set the hub's log level", timeout);
   if (!answer) return answer.failure();
   return answer->before;
 }

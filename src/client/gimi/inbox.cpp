@@ -8,7 +8,8 @@ namespace gimnet::gimi {
 namespace {
 
 Failure none(Timeout timeout) {
-  return {Status::timeout, "nothing was received within " + std::to_string(timeout.count()) + " ms"};
+  return {Status::timeout,
+          "nothing was received within " + std::to_string(timeout.count()) + " ms"};
 }
 
 }  // namespace
@@ -91,8 +92,8 @@ bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
     return true;
   }
   ++unasked_keys_;
-  MessageQueue& queue =
-      queues_.emplace_back(*this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
+  MessageQueue& queue = queues_.emplace_back(
+      *this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
   by_key_.emplace(key, &queue);
   return push(queue, message, receipt);
 }
@@ -107,7 +108,9 @@ std::uint64_t Inbox::dropped() {
   return dropped_;
 }
 
-Inbox::News Inbox::news_of(MessageQueue& queue) { return {is_room_wanted(queue), !queue.empty(), queue.take_taken()}; }
+Inbox::News Inbox::news_of(MessageQueue& queue) {
+  return {is_room_wanted(queue), !queue.empty(), queue.take_taken()};
+}
 
 void Inbox::tell(const News& news) const {
   if (news.room) on_room_();
@@ -142,7 +145,8 @@ Outcome<Message> Inbox::receive(MessageQueue& queue, Timeout timeout) {
 MessageQueue* Inbox::first_waiting() {
   MessageQueue* first = nullptr;
   for (MessageQueue& queue : queues_) {
-    if (!queue.empty() && (first == nullptr || queue.first_arrival() < first->first_arrival())) first = &queue;
+    if (!queue.empty() && (first == nullptr || queue.first_arrival() < first->first_arrival()))
+      first = &queue;
   }
   return first;
 }

@@ -14,7 +14,8 @@
 
 namespace gimnet::gimi {
 
-/// Told that a message found its place, before anybody can take it out again. Called with the inbox locked.
+/// Told that a message found its place, before anybody can take it out again. Called with the inbox
+/// locked.
 class Receipt {
  public:
   virtual void on_kept() = 0;
@@ -23,7 +24,8 @@ class Receipt {
   ~Receipt() = default;
 };
 
-/// All queues of a node. Thread safety: any thread. Queues live as long as the inbox, but for those of subscriptions.
+/// All queues of a node. Thread safety: any thread. Queues live as long as the inbox, but for those
+/// of subscriptions.
 class Inbox {
  public:
   /// Keys for which nobody asked that get a queue.
@@ -31,9 +33,10 @@ class Inbox {
 
   /// Called without a lock. `more`: others wait in the same queue.
   using OnTaken = std::function<void(const TakenMessages& taken, bool more)>;
-  /// `on_room` is called without a lock when a queue that refused has room again; `on_taken` with what went out of a
-  /// queue and counts in a window.
-  Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room, OnTaken on_taken = {})
+  /// `on_room` is called without a lock when a queue that refused has room again; `on_taken` with
+  /// what went out of a queue and counts in a window.
+  Inbox(std::size_t unasked_messages, std::size_t bytes_max, std::function<void()> on_room,
+        OnTaken on_taken = {})
       : unasked_messages_(unasked_messages),
         bytes_max_(bytes_max),
         on_room_(std::move(on_room)),
@@ -43,20 +46,24 @@ class Inbox {
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
   /// A queue for a subscription, until remove().
   MessageQueue& add_queue(const QueueOptions& options) GIMNET_EXCLUDES(mutex_);
-  /// Nobody takes messages out of it any more: what waits there is dropped, and what comes, until set() opens it again.
+  /// Nobody takes messages out of it any more: what waits there is dropped, and what comes, until
+  /// set() opens it again.
   void close(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   /// REQUIRES: add_queue() made it, and nobody uses it any more.
   void remove(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t queues() GIMNET_EXCLUDES(mutex_);
 
   /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
-  [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt)
+      GIMNET_EXCLUDES(mutex_);
   /// As put() to the queue of the key; of too many keys it is dropped, and true.
-  [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt)
+      GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t dropped() GIMNET_EXCLUDES(mutex_);
 
-  [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<Message> receive(MessageQueue& queue, Timeout timeout)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<Message> receive_any(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::optional<Message> try_receive(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::optional<Message> take_newest(MessageQueue& queue) GIMNET_EXCLUDES(mutex_);
@@ -74,7 +81,8 @@ class Inbox {
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
-  [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
   /// What a change of a queue has to be told, without the lock.
@@ -98,7 +106,8 @@ class Inbox {
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
   std::size_t unasked_keys_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
-  MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) = nullptr;  ///< at most one: nothing comes while one refuses
+  MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) =
+      nullptr;  ///< at most one: nothing comes while one refuses
   std::uint64_t arrivals_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t dropped_ GIMNET_GUARDED_BY(mutex_) = 0;
   Ending end_ GIMNET_GUARDED_BY(mutex_);

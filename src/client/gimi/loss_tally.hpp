@@ -8,8 +8,8 @@
 
 namespace gimnet::gimi {
 
-/// What was on its way to this node and was lost, by why. Thread safety: add() from the library's thread,
-/// counts() from any.
+/// What was on its way to this node and was lost, by why. Thread safety: add() from the library's
+/// thread, counts() from any.
 class LossTally {
  public:
   /// `count` as NIF_GAP has it: messages, or frames that went with a connection.
@@ -22,12 +22,16 @@ class LossTally {
   /// A message of a group that no subscription of this node has.
   void add_unknown_service() {
     // See add().
-    unknown_service_.store(unknown_service_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    unknown_service_.store(unknown_service_.load(std::memory_order_relaxed) + 1,
+                           std::memory_order_relaxed);
   }
 
   [[nodiscard]] LostCounts counts() const {
-    return {incomplete_.load(std::memory_order_relaxed), too_large_.load(std::memory_order_relaxed),  // see add()
-            frames_broken_off_.load(std::memory_order_relaxed), unknown_service_.load(std::memory_order_relaxed)};
+    // relaxed: see add()
+    return {incomplete_.load(std::memory_order_relaxed),
+            too_large_.load(std::memory_order_relaxed),  // see add()
+            frames_broken_off_.load(std::memory_order_relaxed),
+            unknown_service_.load(std::memory_order_relaxed)};
   }
 
  private:

@@ -13,7 +13,8 @@ namespace gimnet {
 struct MessageAccess {
   /// Takes over the storage of `in`, which is released with the message.
   [[nodiscard]] static Message make(const nif_incoming& in, const proto::gimi::MessageView& view,
-                                    std::shared_ptr<const std::string> service, std::uint32_t reconnects);
+                                    std::shared_ptr<const std::string> service,
+                                    std::uint32_t reconnects);
   /// The group and epoch in which it counts; epoch 0: in none.
   [[nodiscard]] static std::uint32_t group_of(const Message& message) { return message.group_; }
   [[nodiscard]] static std::uint32_t epoch_of(const Message& message) { return message.epoch_; }

@@ -22,8 +22,8 @@ struct TakenMessages {
   std::uint32_t count = 0;
 };
 
-/// Received messages of one key or subscription: a ring buffer, or one that refuses when it is full.
-/// Thread safety: guarded by the mutex of its Inbox, through which programs come to it.
+/// Received messages of one key or subscription: a ring buffer, or one that refuses when it is
+/// full. Thread safety: guarded by the mutex of its Inbox, through which programs come to it.
 class MessageQueue {
  public:
   MessageQueue(Inbox& inbox, const QueueOptions& options, std::size_t bytes_max)

@@ -22,7 +22,8 @@ NodeOptions options_of(std::string_view name, std::string_view hub) {
 
 }  // namespace
 
-Node::Node(std::string_view name, std::string_view hub) : core_(gimi::Core::join(options_of(name, hub)).or_throw()) {}
+Node::Node(std::string_view name, std::string_view hub)
+    : core_(gimi::Core::join(options_of(name, hub)).or_throw()) {}
 
 Outcome<Node> Node::join(const NodeOptions& options) {
   auto core = gimi::Core::join(options);
@@ -56,24 +57,28 @@ Outcome<Sender> Node::sender(Peer to, const SendOptions& options) const {
   return Sender({core_, *stream});
 }
 
-Outcome<Sender> Node::sender(std::string_view to, const SendOptions& options, Timeout timeout) const {
+Outcome<Sender> Node::sender(std::string_view to, const SendOptions& options,
+                             Timeout timeout) const {
   const auto peer = find(to, timeout);
   if (!peer) return peer.failure();
   return sender(*peer, options);
 }
 
-Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOptions& options, Timeout timeout) const {
+Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOptions& options,
+                                        Timeout timeout) const {
   const auto found = services(full_name, timeout);
   if (!found) return found.failure();
   const std::string name(full_name);
   // The listing takes patterns, too: only the service of that very name counts.
   const auto service = std::ranges::find(*found, name, &ServiceRecord::name);
   if (service == found->end()) {
-    return Failure{Status::not_found, "cannot send to '" + name +
-                                          "': there is no such service at the moment; watch() tells when there is"};
+    return Failure{Status::not_found,
+                   "cannot send to '" + name +
+                       "': there is no such service at the moment; watch() tells when there is"};
   }
   if (service->direction != Direction::accepts) {
-    return Failure{Status::not_found, "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
+    return Failure{Status::not_found,
+                   "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
   }
   auto stream = core().services().follow(name, timeout, [&](const gimi::ServicePlace& place) {
     return core().streams().service_stream(name, place, options);
@@ -82,13 +87,15 @@ Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOp
   return Sender({core_, *stream});
 }
 
-Outcome<void> Node::send(Peer to, BytesView data, const SendOptions& options, Timeout timeout) const {
+Outcome<void> Node::send(Peer to, BytesView data, const SendOptions& options,
+                         Timeout timeout) const {
   const auto stream = sender(to, options);
   if (!stream) return stream.failure();
   return stream->send(data, timeout);
 }
 
-Outcome<void> Node::send(std::string_view to, BytesView data, const SendOptions& options, Timeout timeout) const {
+Outcome<void> Node::send(std::string_view to, BytesView data, const SendOptions& options,
+                         Timeout timeout) const {
   const auto stream = sender(to, options, timeout);
   if (!stream) return stream.failure();
   return stream->send(data, timeout);
@@ -114,37 +121,47 @@ Outcome<Message> Node::receive(MessageKey key, Timeout timeout) const {
   return core().inbox().receive(core().inbox().queue(key, nullptr), timeout);
 }
 
-Outcome<Message> Node::receive(Timeout timeout) const { return core().inbox().receive_any(timeout); }
+Outcome<Message> Node::receive(Timeout timeout) const {
+  return core().inbox().receive_any(timeout);
+}
 std::uint64_t Node::dropped() const { return core().inbox().dropped(); }
 LostCounts Node::lost() const { return core().lost(); }
 
-Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options, Timeout timeout) const {
-  auto service = core().services().advertise(core().state().name, std::string(name), options, timeout);
+Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options,
+                                   Timeout timeout) const {
+  auto service =
+      core().services().advertise(core().state().name, std::string(name), options, timeout);
   if (!service) return service.failure();
-  return Publisher({*service, [core = core_](gimi::PublishedService* done) { core->services().withdraw(*done); }});
+  return Publisher({*service, [core = core_](gimi::PublishedService* done) {
+                      core->services().withdraw(*done);
+                    }});
 }
 
-Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options, Timeout timeout) const {
+Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options,
+                            Timeout timeout) const {
   Queue made = queue(options.key, options.queue);
-  auto accepted = core().services().accept(core().state().name, std::string(name), options, timeout);
+  auto accepted =
+      core().services().accept(core().state().name, std::string(name), options, timeout);
   if (!accepted) return accepted.failure();
   return made;
 }
 
-Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options, Timeout timeout,
-                                      const PaceOptions& pace) const {
+Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options,
+                                      Timeout timeout, const PaceOptions& pace) const {
   auto service = core().services().subscribe(std::string(full_name), options, pace, timeout);
   if (!service) return service.failure();
   gimi::ServiceTable::Subscribed subscribed = *service;
   gimi::SubscribedService* const handle = subscribed.get();
-  return Subscription({handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) {
-                         core->services().unsubscribe(subscribed);
-                       }});
+  return Subscription(
+      {handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) {
+         core->services().unsubscribe(subscribed);
+       }});
 }
 
 Outcome<void> Node::take_name(std::string_view name, Timeout timeout) const {
   const std::string text(name);
-  const nif_status status = nif_register(core().node(), text.c_str(), nullptr, nif_timeout(timeout));
+  const nif_status status =
+      nif_register(core().node(), text.c_str(), nullptr, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "take the name '" + text + "'");
   core().on_renamed();
   return {};
@@ -157,18 +174,21 @@ Outcome<void> Node::give_name_back(Timeout timeout) const {
   return {};
 }
 
-Outcome<Watch> Node::watch(std::string_view pattern, const WatchOptions& options, Timeout timeout) const {
+Outcome<Watch> Node::watch(std::string_view pattern, const WatchOptions& options,
+                           Timeout timeout) const {
   auto begun = core().watches().watch(std::string(pattern), options, timeout);
   if (!begun) return begun.failure();
-  return Watch({begun->queue.get(),
-                [core = core_, begun = *begun](gimi::WatchQueue*) { core->watches().unwatch(begun.number); }});
+  return Watch({begun->queue.get(), [core = core_, begun = *begun](gimi::WatchQueue*) {
+                  core->watches().unwatch(begun.number);
+                }});
 }
 
 Outcome<Peer> Node::find(std::string_view name, Timeout timeout) const {
   if (const auto id = Peer::parse(name)) return *id;
   Peer peer;
   const std::string text(name);
-  const nif_status status = nif_resolve(core().node(), text.c_str(), &peer.id, nif_timeout(timeout));
+  const nif_status status =
+      nif_resolve(core().node(), text.c_str(), &peer.id, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "find the node '" + text + "'");
   return peer;
 }
@@ -184,10 +204,13 @@ Outcome<std::string> Node::name_of(Peer peer, Timeout timeout) const {
 Outcome<std::vector<NodeRecord>> Node::nodes(std::string_view pattern, Timeout timeout) const {
   return gimi::list_nodes(core().node(), std::string(pattern), timeout);
 }
-Outcome<std::vector<ServiceRecord>> Node::services(std::string_view pattern, Timeout timeout) const {
+Outcome<std::vector<ServiceRecord>> Node::services(std::string_view pattern,
+                                                   Timeout timeout) const {
   return gimi::list_services(core().node(), std::string(pattern), timeout);
 }
-Outcome<HubRecord> Node::hub(Timeout timeout) const { return gimi::ask_hub(core().node(), timeout); }
+Outcome<HubRecord> Node::hub(Timeout timeout) const {
+  return gimi::ask_hub(core().node(), timeout);
+}
 Outcome<std::vector<ShardCounts>> Node::hub_counters(Timeout timeout) const {
   return gimi::ask_counters(core().node(), timeout);
 }
@@ -205,7 +228,9 @@ Outcome<std::string> Node::kick(Peer node, std::string_view reason, Timeout time
 Outcome<void> Node::reassign(Peer node, Peer new_id, Timeout timeout) const {
   return gimi::reassign(core().node(), node, new_id, timeout);
 }
-Outcome<void> Node::drain_hub(Timeout timeout) const { return gimi::drain_hub(core().node(), timeout); }
+Outcome<void> Node::drain_hub(Timeout timeout) const {
+  return gimi::drain_hub(core().node(), timeout);
+}
 Outcome<std::vector<HubChange>> Node::reload_hub(Timeout timeout) const {
   return gimi::reload_hub(core().node(), timeout);
 }

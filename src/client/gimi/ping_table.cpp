@@ -14,7 +14,8 @@ void PingTable::forget(std::uint32_t number) {
   waiting_.erase(number);
 }
 
-Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadline, Timeout timeout) {
+Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadline,
+                                      Timeout timeout) {
   const MutexLock lock(mutex_);
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return Failure{Status::bad_argument, "no such ping"};
@@ -22,8 +23,9 @@ Outcome<std::int64_t> PingTable::wait(std::uint32_t number, std::int64_t deadlin
     if (end_) {
       place->second.answer = end_.failure("ping " + place->second.peer.text());
     } else if (is_over(deadline)) {
-      place->second.answer = Failure{Status::timeout, place->second.peer.text() + " did not answer within " +
-                                                          std::to_string(timeout.count()) + " ms"};
+      place->second.answer =
+          Failure{Status::timeout, place->second.peer.text() + " did not answer within " +
+                                       std::to_string(timeout.count()) + " ms"};
     } else {
       static_cast<void>(answered_.wait_until(mutex_, deadline));
     }
@@ -46,7 +48,8 @@ void PingTable::on_lost(std::uint32_t number, const std::string& why) {
   const MutexLock lock(mutex_);
   const auto place = waiting_.find(number);
   if (place == waiting_.end()) return;
-  place->second.answer = Failure{Status::not_delivered, "cannot ping " + place->second.peer.text() + ": " + why};
+  place->second.answer =
+      Failure{Status::not_delivered, "cannot ping " + place->second.peer.text() + ": " + why};
   answered_.notify_all();
 }
 

@@ -16,9 +16,10 @@ namespace gimnet::gimi {
 class PingTable {
  public:
   void expect(std::uint32_t number, Peer peer) GIMNET_EXCLUDES(mutex_);
-  /// The round trip in ns, or why there is none by `deadline`, which `timeout` led to. The number is forgotten.
-  [[nodiscard]] Outcome<std::int64_t> wait(std::uint32_t number, std::int64_t deadline, Timeout timeout)
-      GIMNET_EXCLUDES(mutex_);
+  /// The round trip in ns, or why there is none by `deadline`, which `timeout` led to. The number
+  /// is forgotten.
+  [[nodiscard]] Outcome<std::int64_t> wait(std::uint32_t number, std::int64_t deadline,
+                                           Timeout timeout) GIMNET_EXCLUDES(mutex_);
   /// The PING was not sent.
   void forget(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 

@@ -17,7 +17,8 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
     while (sending_ && !end_) {
       if (is_over(deadline)) {
         return Failure{Status::timeout,
-                       "not published by " + full_name_ + ": another thread published there for all of the time given"};
+                       "not published by " + full_name_ +
+                           ": another thread published there for all of the time given"};
       }
       static_cast<void>(changed_.wait_until(mutex_, deadline));
     }
@@ -33,8 +34,9 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
     envelope.to = group_;
     sending_ = true;
   }
-  const nif_status status = uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0},
-                                             options_.timestamp, data, nif_timeout_until(deadline));
+  const nif_status status =
+      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0}, options_.timestamp,
+                       data, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name());
   const MutexLock lock(mutex_);
   sending_ = false;
@@ -60,8 +62,8 @@ Outcome<void> PublishedService::wait_for_subscribers(std::size_t count, Timeout 
   while (subscribers_ < count) {
     if (end_) return end_.failure("wait for subscribers of " + full_name_);
     if (is_over(deadline)) {
-      return Failure{Status::timeout, full_name_ + " has " + std::to_string(subscribers_) + " subscribers, not " +
-                                          std::to_string(count)};
+      return Failure{Status::timeout, full_name_ + " has " + std::to_string(subscribers_) +
+                                          " subscribers, not " + std::to_string(count)};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }

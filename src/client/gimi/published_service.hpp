@@ -12,19 +12,25 @@
 
 namespace gimnet::gimi {
 
-/// An own service that provides data. Thread safety: any thread; nothing that is called from the library's thread waits
-/// for a thread that publishes.
+/// An own service that provides data. Thread safety: any thread; nothing that is called from the
+/// library's thread waits for a thread that publishes.
 class PublishedService {
  public:
-  PublishedService(Uplink& uplink, std::string name, std::string full_name, const PublishOptions& options)
-      : uplink_(uplink), name_(std::move(name)), options_(options), full_name_(std::move(full_name)) {}
+  PublishedService(Uplink& uplink, std::string name, std::string full_name,
+                   const PublishOptions& options)
+      : uplink_(uplink),
+        name_(std::move(name)),
+        options_(options),
+        full_name_(std::move(full_name)) {}
 
   [[nodiscard]] const std::string& name() const { return name_; }
   /// As it is now; without the node's name while the node has none.
   [[nodiscard]] std::string full_name() GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Outcome<void> publish(BytesView data, Timeout timeout, More more) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> publish(BytesView data, Timeout timeout, More more)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t subscribers() GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
 

@@ -17,7 +17,8 @@ struct Loss {
   [[nodiscard]] explicit operator bool() const { return !words.empty(); }
 };
 
-/// What a hub's report says to people: the reason's name, and what it means where the name does not tell.
+/// What a hub's report says to people: the reason's name, and what it means where the name does not
+/// tell.
 [[nodiscard]] inline std::string report_words(std::string_view reason) {
   using Meaning = std::pair<std::string_view, std::string_view>;
   constexpr std::array<Meaning, 9> kMeanings{

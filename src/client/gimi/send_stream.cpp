@@ -10,7 +10,9 @@ namespace {
 
 using proto::gimi::Operation;
 
-proto::gimi::MessageHeader header_of(Operation operation, std::uint32_t number) { return {number, operation, 0, 0}; }
+proto::gimi::MessageHeader header_of(Operation operation, std::uint32_t number) {
+  return {number, operation, 0, 0};
+}
 
 Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"}; }
 
@@ -28,7 +30,8 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
     sequence = window_.open(data.size(), steady_now_ns());
     to = destination_;
   }
-  const nif_status status = transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
+  const nif_status status =
+      transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   bool unwatched = false;
   {
@@ -46,7 +49,8 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
     if (destination_.id == 0) {
       return Failure{
           Status::not_found,
-          "not sent to " + service_ + ": nobody accepts it at the moment; it can be sent to again when it is back"};
+          "not sent to " + service_ +
+              ": nobody accepts it at the moment; it can be sent to again when it is back"};
     }
     const bool room = window_.has_room(data.size());
     if (!sending_ && room) {
@@ -56,7 +60,8 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
     }
     if (!room && options_.at_full == AtFullWindow::skip) {
       ++counts_.skipped;
-      return Failure{Status::window_full, "not sent to " + target() + ": " + std::to_string(window_.size()) +
+      return Failure{Status::window_full, "not sent to " + target() + ": " +
+                                              std::to_string(window_.size()) +
                                               " messages wait for their acknowledgement"};
     }
     if (!room && options_.at_full == AtFullWindow::hold_latest) {
@@ -67,7 +72,8 @@ Outcome<SendStream::Turn> SendStream::take_turn(BytesView data, std::int64_t dea
     if (std::exchange(unflushed_, false)) static_cast<void>(nif_flush(uplink_.node()));
     if (is_over(deadline)) {
       return Failure{Status::timeout,
-                     "not sent to " + target() + ": earlier messages were not acknowledged within the time given"};
+                     "not sent to " + target() +
+                         ": earlier messages were not acknowledged within the time given"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
@@ -84,16 +90,18 @@ void SendStream::hold_again(std::vector<std::byte> data) {
   if (held_) {
     ++counts_.skipped;  // a newer one came meanwhile
   } else if (end_ || destination_.id == 0) {
-    settle_freed({.acknowledged = 0, .lost = 1}, end_ ? Loss{LossReason::connection_lost, end_.why()} : withdrawn());
+    settle_freed({.acknowledged = 0, .lost = 1},
+                 end_ ? Loss{LossReason::connection_lost, end_.why()} : withdrawn());
   } else {
     held_ = std::move(data);
   }
 }
 
-nif_status SendStream::transmit(const Destination& to, const proto::gimi::MessageHeader& header, BytesView data,
-                                More more, std::int32_t timeout_ms) const {
+nif_status SendStream::transmit(const Destination& to, const proto::gimi::MessageHeader& header,
+                                BytesView data, More more, std::int32_t timeout_ms) const {
   const bool synchronized = options_.window != 0;
-  Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_max_ms, 0};
+  Envelope envelope{to.id, to.kind, NIF_POLICY_DEFAULT, options_.lane, to.key, options_.age_max_ms,
+                    0};
   if (synchronized) envelope.flags |= NIF_FLAG_REPORT;
   if (more == More::yes) envelope.flags |= NIF_FLAG_MORE;
   proto::gimi::MessageHeader asking = header;
@@ -108,13 +116,15 @@ nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number
   return transmit(to, header_of(Operation::ping, number), sent, More::no, 0);
 }
 
-/// True: somebody should watch over the stream. Another thread may have left a message to be held while this one was
-/// sending: it goes by tick() only, also where this one was not sent, or is acknowledged already.
+/// True: somebody should watch over the stream. Another thread may have left a message to be held
+/// while this one was sending: it goes by tick() only, also where this one was not sent, or is
+/// acknowledged already.
 bool SendStream::finish(std::uint32_t sequence, nif_status status, More more) {
   sending_ = false;
   changed_.notify_all();
   if (status != NIF_OK) {
-    // It may have been given up with all others meanwhile; then it counts as never sent all the same.
+    // It may have been given up with all others meanwhile; then it counts as never sent all the
+    // same.
     if (window_.synchronized() && !window_.cancel(sequence) && counts_.lost != 0) --counts_.lost;
     if (window_.empty()) forget_doubts();
   } else {
@@ -140,8 +150,8 @@ Outcome<void> SendStream::settle(Timeout timeout) {
   while (!window_.empty() || held_) {
     if (end_) return end_.failure("settle what was sent to " + target());
     if (is_over(deadline)) {
-      return Failure{Status::timeout,
-                     std::to_string(window_.size()) + " messages to " + target() + " are not acknowledged yet"};
+      return Failure{Status::timeout, std::to_string(window_.size()) + " messages to " + target() +
+                                          " are not acknowledged yet"};
     }
     static_cast<void>(changed_.wait_until(mutex_, deadline));
   }
@@ -150,8 +160,9 @@ Outcome<void> SendStream::settle(Timeout timeout) {
 }
 
 Failure SendStream::loss() const {
-  return {Status::not_delivered, std::to_string(counts_.lost) + " of " + std::to_string(counts_.sent) +
-                                     " messages to " + target() + " were not acknowledged: " + counts_.loss};
+  return {Status::not_delivered, std::to_string(counts_.lost) + " of " +
+                                     std::to_string(counts_.sent) + " messages to " + target() +
+                                     " were not acknowledged: " + counts_.loss};
 }
 
 SendCounts SendStream::counts() {
@@ -175,11 +186,12 @@ void SendStream::settle_freed(const SendWindow::Freed& freed, const Loss& why) {
 bool SendStream::on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) {
   const MutexLock lock(mutex_);
   const bool answers = ack.pong_sequence != 0 && ack.pong_sequence == window_.ping_number();
-  const SendWindow::Freed freed = window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
+  const SendWindow::Freed freed =
+      window_.acknowledge(sequence, ack.bitmap, ack.pong_sequence, steady_now_ns());
   const Loss& doubt = asked_ ? asked_ : doubt_;
-  settle_freed(
-      freed,
-      doubt ? doubt : Loss{LossReason::not_received, "the receiver answered a later question, but did not get them"});
+  settle_freed(freed, doubt ? doubt
+                            : Loss{LossReason::not_received,
+                                   "the receiver answered a later question, but did not get them"});
   if (answers) asked_ = {};
   if (freed.lost != 0 || window_.empty()) forget_doubts();
   return held_ && window_.has_room(held_->size());
@@ -218,9 +230,9 @@ void SendStream::on_broken(const Loss& why) {
 void SendStream::on_moved(const ServicePlace& place) {
   const MutexLock lock(mutex_);
   if (place.group == destination_.id) return;
-  lose_all(place.group == 0
-               ? withdrawn()
-               : Loss{LossReason::service_gone, "the service is somewhere else now, and cannot tell any more"});
+  lose_all(place.group == 0 ? withdrawn()
+                            : Loss{LossReason::service_gone,
+                                   "the service is somewhere else now, and cannot tell any more"});
   destination_.id = place.group;
   if (place.group != 0) destination_.key = place.key;
   changed_.notify_all();
@@ -241,7 +253,8 @@ bool SendStream::tick(std::int64_t now_ns) {
     const MutexLock lock(mutex_);
     to = destination_;
     if (end_ || (window_.empty() && !held_)) return watched_ = false;
-    if (sending_) return true;  // what that thread sends stands before a PING that could be put behind it now
+    if (sending_)
+      return true;  // what that thread sends stands before a PING that could be put behind it now
     if (held_ && window_.has_room(held_->size())) {
       data = std::exchange(held_, std::nullopt);
       sequence = window_.open(data->size(), now_ns);
@@ -255,7 +268,8 @@ bool SendStream::tick(std::int64_t now_ns) {
     sending_ = true;
   }
   if (data) {
-    const nif_status status = transmit(to, header_of(Operation::data, sequence), *data, More::no, 0);
+    const nif_status status =
+        transmit(to, header_of(Operation::data, sequence), *data, More::no, 0);
     const MutexLock lock(mutex_);
     static_cast<void>(finish(sequence, status, More::no));
     // Before the turn is anybody else's, whose message is newer.

@@ -34,8 +34,8 @@ struct ServicePlace {
   bool accepts = false;  ///< it takes data, and gives none
 };
 
-/// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any thread; nothing
-/// that is called from the library's thread waits for a thread that sends.
+/// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any
+/// thread; nothing that is called from the library's thread waits for a thread that sends.
 class SendStream {
  public:
   SendStream(Uplink& uplink, StreamKeeper& keeper, Peer to, const SendOptions& options)
@@ -55,7 +55,8 @@ class SendStream {
         destination_{NIF_SERVICE, place.group, place.key},
         window_(options.window) {}
 
-  [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> settle(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] SendCounts counts() GIMNET_EXCLUDES(mutex_);
   /// Nobody, of a stream to a service.
@@ -64,18 +65,21 @@ class SendStream {
   [[nodiscard]] const std::string& service() const { return service_; }
 
   /// True: a message that is held can go; tick() sends it.
-  [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack)
+      GIMNET_EXCLUDES(mutex_);
   /// One message is known to be lost.
   void on_lost(std::uint32_t sequence, const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// Messages may be lost, and that is why: ask.
   void on_doubt(const Loss& why) GIMNET_EXCLUDES(mutex_);
   /// What waits is lost, or nobody will ever tell.
   void on_broken(const Loss& why) GIMNET_EXCLUDES(mutex_);
-  /// The service is somewhere else now: what waits for an ACK from its former place gets none any more.
+  /// The service is somewhere else now: what waits for an ACK from its former place gets none any
+  /// more.
   void on_moved(const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
-  /// Puts a PING behind what waits for too long, sends what is held. False: nothing waits. Does not block.
+  /// Puts a PING behind what waits for too long, sends what is held. False: nothing waits. Does not
+  /// block.
   [[nodiscard]] bool tick(std::int64_t now_ns) GIMNET_EXCLUDES(mutex_);
 
  private:
@@ -85,12 +89,15 @@ class SendStream {
     std::uint32_t id = 0;  ///< 0: a service that nobody has
     MessageKey key;
   };
-  /// Waits for this thread's turn, and for room in the window. After Turn::send `sending_` is this thread's.
-  [[nodiscard]] Outcome<Turn> take_turn(BytesView data, std::int64_t deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header, BytesView data,
-                                    More more, std::int32_t timeout_ms) const;
+  /// Waits for this thread's turn, and for room in the window. After Turn::send `sending_` is this
+  /// thread's.
+  [[nodiscard]] Outcome<Turn> take_turn(BytesView data, std::int64_t deadline)
+      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status transmit(const Destination& to, const proto::gimi::MessageHeader& header,
+                                    BytesView data, More more, std::int32_t timeout_ms) const;
   [[nodiscard]] nif_status transmit_ping(const Destination& to, std::uint32_t number) const;
-  [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool finish(std::uint32_t sequence, nif_status status, More more)
+      GIMNET_REQUIRES(mutex_);
   void hold(BytesView data) GIMNET_REQUIRES(mutex_);
   void hold_again(std::vector<std::byte> data) GIMNET_REQUIRES(mutex_);
   void lose_all(const Loss& why) GIMNET_REQUIRES(mutex_);
@@ -113,11 +120,13 @@ class SendStream {
   SendWindow window_ GIMNET_GUARDED_BY(mutex_);
   SendCounts counts_ GIMNET_GUARDED_BY(mutex_);
   std::optional<std::vector<std::byte>> held_ GIMNET_GUARDED_BY(mutex_);
-  bool sending_ GIMNET_GUARDED_BY(mutex_) = false;    ///< one thread is between a sequence and NIF
-  bool unflushed_ GIMNET_GUARDED_BY(mutex_) = false;  ///< NIF holds messages back because of More::yes
+  bool sending_ GIMNET_GUARDED_BY(mutex_) = false;  ///< one thread is between a sequence and NIF
+  bool unflushed_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< NIF holds messages back because of More::yes
   bool watched_ GIMNET_GUARDED_BY(mutex_) = false;
-  /// Why messages may be lost, as the hub reported it since the last PING, if it did. A PONG that answers a PING
-  /// behind all of it settles it: `asked_` is what was in doubt when the open PING was sent.
+  /// Why messages may be lost, as the hub reported it since the last PING, if it did. A PONG that
+  /// answers a PING behind all of it settles it: `asked_` is what was in doubt when the open PING
+  /// was sent.
   Loss doubt_ GIMNET_GUARDED_BY(mutex_);
   Loss asked_ GIMNET_GUARDED_BY(mutex_);
   Ending end_ GIMNET_GUARDED_BY(mutex_);

@@ -9,7 +9,8 @@ namespace {
 
 constexpr std::int64_t kPatienceMinNs = 200'000'000;
 constexpr std::int64_t kPatienceRoundTrips = 4;
-/// A PING that is not answered is repeated, each time after twice as long, up to 16 times the patience.
+/// A PING that is not answered is repeated, each time after twice as long, up to 16 times the
+/// patience.
 constexpr std::uint32_t kDoublingsMax = 4;
 
 bool at_or_before(std::uint32_t sequence, std::uint32_t other) {
@@ -26,7 +27,8 @@ bool is_acknowledged(std::uint32_t sequence, std::uint32_t highest, std::uint64_
 
 bool SendWindow::has_room(std::size_t bytes) const {
   if (!synchronized()) return true;
-  // What the receiver's library holds for a program that stands still must not have to wait in a hub.
+  // What the receiver's library holds for a program that stands still must not have to wait in a
+  // hub.
   const bool fits = unacknowledged_ == 0 || unacknowledged_bytes_ + bytes <= kWindowBytesMax;
   // The span keeps the oldest within reach of the bitmap of any ACK.
   return fits && unacknowledged_ < messages_max_ &&
@@ -58,8 +60,8 @@ bool SendWindow::cancel(std::uint32_t sequence) {
   return true;
 }
 
-SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t pong,
-                                          std::int64_t now_ns) {
+SendWindow::Freed SendWindow::acknowledge(std::uint32_t highest, std::uint64_t bitmap,
+                                          std::uint32_t pong, std::int64_t now_ns) {
   Freed freed;
   const bool answers_ping = pong != 0 && pong == ping_number_;
   for (Waiting& waiting : waiting_) {
@@ -120,7 +122,9 @@ void SendWindow::ping_not_sent() {
   --pings_;
 }
 
-std::int64_t SendWindow::patience_ns() const { return std::max(kPatienceRoundTrips * round_trip_ns_, kPatienceMinNs); }
+std::int64_t SendWindow::patience_ns() const {
+  return std::max(kPatienceRoundTrips * round_trip_ns_, kPatienceMinNs);
+}
 
 void SendWindow::drop_front() {
   while (!waiting_.empty() && waiting_.front().acknowledged) waiting_.pop_front();

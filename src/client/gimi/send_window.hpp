@@ -8,9 +8,10 @@
 
 namespace gimnet::gimi {
 
-/// The DATA of one stream that wait for their ACK, and when to ask for it with a PING (docs/protocol.md, section 7).
-/// Knows no sockets and no clock: it is told the time, steady_now_ns(). Thread safety: one thread at a time.
-/// Time alone never frees: an ACK does, and the ACK that belongs to a PONG, and what the caller knows to be lost.
+/// The DATA of one stream that wait for their ACK, and when to ask for it with a PING
+/// (docs/protocol.md, section 7). Knows no sockets and no clock: it is told the time,
+/// steady_now_ns(). Thread safety: one thread at a time. Time alone never frees: an ACK does, and
+/// the ACK that belongs to a PONG, and what the caller knows to be lost.
 class SendWindow {
  public:
   /// What an event freed.
@@ -24,7 +25,8 @@ class SendWindow {
   explicit SendWindow(std::size_t messages_max) : messages_max_(messages_max) {}
 
   [[nodiscard]] bool synchronized() const { return messages_max_ != 0; }
-  /// For a message of so many bytes. A message always has room where no other waits, whatever its size.
+  /// For a message of so many bytes. A message always has room where no other waits, whatever its
+  /// size.
   [[nodiscard]] bool has_room(std::size_t bytes) const;
   [[nodiscard]] std::size_t size() const { return waiting_.size(); }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
@@ -35,7 +37,8 @@ class SendWindow {
   bool cancel(std::uint32_t sequence);
 
   /// `pong` is the PING that the ACK belongs to, or 0.
-  Freed acknowledge(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t pong, std::int64_t now_ns);
+  Freed acknowledge(std::uint32_t highest, std::uint64_t bitmap, std::uint32_t pong,
+                    std::int64_t now_ns);
   Freed lose(std::uint32_t sequence);
   Freed lose_all();
 

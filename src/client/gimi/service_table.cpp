@@ -44,9 +44,11 @@ class ServiceTable::Asking {
   ServiceTable& table_;
 };
 
-std::optional<Failure> ServiceTable::obstacle(const std::string& own_name, const std::string& name) {
+std::optional<Failure> ServiceTable::obstacle(const std::string& own_name,
+                                              const std::string& name) {
   if (own_name.empty()) {
-    return Failure{Status::denied, "a node without a name has no services: give it one to offer '" + name + "'"};
+    return Failure{Status::denied,
+                   "a node without a name has no services: give it one to offer '" + name + "'"};
   }
   if (own_names_.contains(name)) {
     return Failure{Status::taken, "this node offers " + own_name + "/" + name + " already"};
@@ -54,7 +56,8 @@ std::optional<Failure> ServiceTable::obstacle(const std::string& own_name, const
   return std::nullopt;
 }
 
-Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, const std::string& name,
+Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name,
+                                                   const std::string& name,
                                                    const PublishOptions& options, Timeout timeout) {
   const MutexLock turn(asking_);
   if (auto failure = obstacle(own_name, name)) return *failure;
@@ -66,9 +69,11 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
   service.retain = options.retain ? 1 : 0;
   std::uint32_t group = 0;
   std::uint32_t subscribers = 0;
-  const nif_status status = nif_advertise(uplink_.node(), &service, &group, &subscribers, nif_timeout(timeout));
+  const nif_status status =
+      nif_advertise(uplink_.node(), &service, &group, &subscribers, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "advertise " + own_name + "/" + name);
-  auto published = std::make_unique<PublishedService>(uplink_, name, own_name + "/" + name, options);
+  auto published =
+      std::make_unique<PublishedService>(uplink_, name, own_name + "/" + name, options);
   published->on_group(group);
   published->on_subscribers(subscribers);
   own_names_.insert(name);
@@ -79,14 +84,15 @@ Outcome<PublishedService*> ServiceTable::advertise(const std::string& own_name, 
   return published_.emplace_back(std::move(published)).get();
 }
 
-Outcome<void> ServiceTable::accept(const std::string& own_name, const std::string& name, const AcceptOptions& options,
-                                   Timeout timeout) {
+Outcome<void> ServiceTable::accept(const std::string& own_name, const std::string& name,
+                                   const AcceptOptions& options, Timeout timeout) {
   const MutexLock turn(asking_);
   if (auto failure = obstacle(own_name, name)) return *failure;
   nif_service service = description_of(name, options.key, options.metadata);
   service.direction = NIF_ACCEPTS;
   std::uint32_t group = 0;
-  const nif_status status = nif_advertise(uplink_.node(), &service, &group, nullptr, nif_timeout(timeout));
+  const nif_status status =
+      nif_advertise(uplink_.node(), &service, &group, nullptr, nif_timeout(timeout));
   if (status != NIF_OK) return failure_of(status, "accept " + own_name + "/" + name);
   own_names_.insert(name);
   return {};
@@ -99,13 +105,15 @@ void ServiceTable::withdraw(PublishedService& service) {
   {
     const MutexLock lock(mutex_);
     published_by_name_.erase(service.name());
-    std::erase_if(published_by_group_, [&service](const auto& entry) { return entry.second == &service; });
+    std::erase_if(published_by_group_,
+                  [&service](const auto& entry) { return entry.second == &service; });
   }
   // By name: NIF may know of a move that is not told here yet.
   static_cast<void>(nif_withdraw_service(uplink_.node(), service.name().c_str(), kLeaveTimeoutMs));
 }
 
-ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name, const QueueOptions& options) {
+ServiceTable::Subscribed ServiceTable::entry(const std::string& full_name,
+                                             const QueueOptions& options) {
   const auto place = subscribed_.find(full_name);
   if (place != subscribed_.end()) return place->second;
   auto service = std::make_shared<SubscribedService>(full_name, inbox_, options);
@@ -118,16 +126,18 @@ std::size_t ServiceTable::subscriptions() {
   return subscribed_.size();
 }
 
-/// A former group leads to the service until as many younger ones came: the event that a provider left may overtake
-/// what it published.
+/// A former group leads to the service until as many younger ones came: the event that a provider
+/// left may overtake what it published.
 void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& place) {
-  // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8), and the present one.
+  // The one that was known, those of which a hub tells at a return (docs/protocol.md, section 8),
+  // and the present one.
   constexpr std::size_t kGroups = proto::ns::kGroupsBetweenMax + 2;
   SubscribedService& service = *subscribed;
   service.place = place;
   service.on_place(place);
   if (place.group == 0) return;
-  subscribed_by_group_[place.group] = subscribed;  // also a former one again, which was another service's meanwhile
+  subscribed_by_group_[place.group] =
+      subscribed;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
   service.groups.push_back(place.group);
   if (service.groups.size() <= kGroups) return;
@@ -137,15 +147,19 @@ void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& p
 
 void ServiceTable::forget_group(SubscribedService& service, std::uint32_t group) {
   const auto place = subscribed_by_group_.find(group);
-  if (place != subscribed_by_group_.end() && place->second.get() == &service) subscribed_by_group_.erase(place);
+  if (place != subscribed_by_group_.end() && place->second.get() == &service)
+    subscribed_by_group_.erase(place);
 }
 
-nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace, std::int32_t timeout_ms) {
+nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
+                             std::int32_t timeout_ms) {
   nif_subscription found{};
   const nif_pace wanted{sizeof wanted, pace.window, pace.depth, pace.rate_hz};
-  const nif_status status = nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
+  const nif_status status =
+      nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
-  const ServicePlace place{found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS};
+  const ServicePlace place{
+      found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS};
   const bool was_refused = service->is_refused();
   {
     const MutexLock lock(mutex_);
@@ -156,8 +170,10 @@ nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
   return NIF_OK;
 }
 
-Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& full_name, const QueueOptions& options,
-                                                          const PaceOptions& pace, Timeout timeout) {
+Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& full_name,
+                                                          const QueueOptions& options,
+                                                          const PaceOptions& pace,
+                                                          Timeout timeout) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
   Subscribed service;
@@ -184,8 +200,8 @@ Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& ful
   // It may have been subscribed before, to know where it is or when it was another one.
   if (!service->accepts()) return service;
   leave(service);
-  return Failure{Status::not_found,
-                 "cannot subscribe to '" + full_name + "': it takes data and gives none; send to it"};
+  return Failure{Status::not_found, "cannot subscribe to '" + full_name +
+                                        "': it takes data and gives none; send to it"};
 }
 
 void ServiceTable::unsubscribe(const Subscribed& service) {
@@ -238,7 +254,8 @@ void ServiceTable::end_groups(SubscribedService& service) {
   while (ended_groups_.size() > kEndedGroupsMax) ended_groups_.pop_front();
 }
 
-Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout, const MakeStream& make) {
+Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout,
+                                          const MakeStream& make) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
   Subscribed service;
@@ -248,7 +265,8 @@ Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout 
   }
   const bool read = service->handles != 0;
   if ((!read && !service->followed) || service->is_refused()) {
-    const nif_status status = ask(service, read ? service->pace : PaceOptions{}, nif_timeout(timeout));
+    const nif_status status =
+        ask(service, read ? service->pace : PaceOptions{}, nif_timeout(timeout));
     if (status != NIF_OK) {
       auto failure = failure_of(status, "send to " + full_name);
       forget_unused(service);
@@ -295,7 +313,8 @@ std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
 
 ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
   const std::string full_name = moved.text;
-  const ServicePlace place{moved.group, {moved.message_type, moved.instance}, moved.direction == NIF_ACCEPTS};
+  const ServicePlace place{
+      moved.group, {moved.message_type, moved.instance}, moved.direction == NIF_ACCEPTS};
   {
     const MutexLock lock(mutex_);
     if (open_ != 0) return Place::not_yet;
@@ -313,14 +332,18 @@ void ServiceTable::on_renamed(const std::string& own_name) {
   for (auto& service : published_) service->on_renamed(own_name);
 }
 
-ServiceTable::Place ServiceTable::on_own_service_moved(const std::string& name, const OwnMove& move) {
+ServiceTable::Place ServiceTable::on_own_service_moved(const std::string& name,
+                                                       const OwnMove& move) {
   const MutexLock lock(mutex_);
   const auto known = published_by_name_.find(name);
-  if (known == published_by_name_.end()) return name == advertising_ ? Place::not_yet : Place::unknown;
+  if (known == published_by_name_.end())
+    return name == advertising_ ? Place::not_yet : Place::unknown;
   PublishedService* const service = known->second;
   if (service->group() != move.former) return Place::unknown;
-  // By service, not by id: a hub that lost its state may have given its former group to another one.
-  std::erase_if(published_by_group_, [service](const auto& entry) { return entry.second == service; });
+  // By service, not by id: a hub that lost its state may have given its former group to another
+  // one.
+  std::erase_if(published_by_group_,
+                [service](const auto& entry) { return entry.second == service; });
   if (move.group != 0) published_by_group_[move.group] = service;
   service->on_group(move.group);
   if (move.refusal) service->on_refused(*move.refusal);

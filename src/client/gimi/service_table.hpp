@@ -20,51 +20,57 @@
 
 namespace gimnet::gimi {
 
-/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread. What was advertised
-/// once stays in the table until the node is closed; a subscription goes with its last handle.
+/// What a node provides and what it subscribed, by name and by group id. Thread safety: any thread.
+/// What was advertised once stays in the table until the node is closed; a subscription goes with
+/// its last handle.
 class ServiceTable {
  public:
-  /// `on_moved` is called without a lock of this table but the asking one, for each service that is somewhere else now:
-  /// from the library's thread, or from a program's whose question the hub answered so.
+  /// `on_moved` is called without a lock of this table but the asking one, for each service that is
+  /// somewhere else now: from the library's thread, or from a program's whose question the hub
+  /// answered so.
   using OnMoved = std::function<void(const std::string& full_name, const ServicePlace& place)>;
   ServiceTable(Uplink& uplink, Inbox& inbox, OnMoved on_moved)
       : uplink_(uplink), inbox_(inbox), on_moved_(std::move(on_moved)) {}
 
   /// The calls of a program; they ask the hub, one after another.
-  [[nodiscard]] Outcome<PublishedService*> advertise(const std::string& own_name, const std::string& name,
+  [[nodiscard]] Outcome<PublishedService*> advertise(const std::string& own_name,
+                                                     const std::string& name,
                                                      const PublishOptions& options, Timeout timeout)
       GIMNET_EXCLUDES(asking_, mutex_);
-  [[nodiscard]] Outcome<void> accept(const std::string& own_name, const std::string& name, const AcceptOptions& options,
-                                     Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
+  [[nodiscard]] Outcome<void> accept(const std::string& own_name, const std::string& name,
+                                     const AcceptOptions& options, Timeout timeout)
+      GIMNET_EXCLUDES(asking_, mutex_);
   void withdraw(PublishedService& service) GIMNET_EXCLUDES(asking_, mutex_);
 
   using Subscribed = std::shared_ptr<SubscribedService>;
-  [[nodiscard]] Outcome<Subscribed> subscribe(const std::string& full_name, const QueueOptions& options,
-                                              const PaceOptions& pace, Timeout timeout)
-      GIMNET_EXCLUDES(asking_, mutex_);
+  [[nodiscard]] Outcome<Subscribed> subscribe(const std::string& full_name,
+                                              const QueueOptions& options, const PaceOptions& pace,
+                                              Timeout timeout) GIMNET_EXCLUDES(asking_, mutex_);
   /// A handle that subscribe() counted was dropped; with the last one the subscription ends.
   void unsubscribe(const Subscribed& service) GIMNET_EXCLUDES(asking_, mutex_);
   /// Services that are subscribed or sent to now.
   [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_);
 
-  /// Begins a stream to a service: `make` is called once with where it is; what changes then comes to on_moved(), for
-  /// as long as the node lives.
+  /// Begins a stream to a service: `make` is called once with where it is; what changes then comes
+  /// to on_moved(), for as long as the node lives.
   using MakeStream = std::function<Outcome<SendStream*>(const ServicePlace& place)>;
-  [[nodiscard]] Outcome<SendStream*> follow(const std::string& full_name, Timeout timeout, const MakeStream& make)
+  [[nodiscard]] Outcome<SendStream*> follow(const std::string& full_name, Timeout timeout,
+                                            const MakeStream& make)
       GIMNET_EXCLUDES(asking_, mutex_);
   /// The node has another name now: so have its services, in full.
   void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);
 
-  /// From the library's thread. `not_yet`: the program is just asking the hub about a service, and this may belong
-  /// behind the answer: nif_deliver() comes with it. `unwanted`: of a service that the program does not read (any
-  /// more).
+  /// From the library's thread. `not_yet`: the program is just asking the hub about a service, and
+  /// this may belong behind the answer: nif_deliver() comes with it. `unwanted`: of a service that
+  /// the program does not read (any more).
   enum class Place : std::uint8_t { found, unknown, not_yet, unwanted };
   struct Found {
     Place place = Place::unknown;
     Subscribed service;
   };
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count)
+      GIMNET_EXCLUDES(mutex_);
   /// What a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED says of a refusal.
   [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved);
   [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);
@@ -74,23 +80,30 @@ class ServiceTable {
     std::uint32_t group = 0;
     std::optional<Failure> refusal{};  ///< the hub did not take it again
   };
-  [[nodiscard]] Place on_own_service_moved(const std::string& name, const OwnMove& move) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place on_own_service_moved(const std::string& name, const OwnMove& move)
+      GIMNET_EXCLUDES(mutex_);
   void on_reconnected() GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
 
  private:
-  /// Of so many groups of subscriptions that ended it is known that messages on their way are not wanted.
+  /// Of so many groups of subscriptions that ended it is known that messages on their way are not
+  /// wanted.
   static constexpr std::size_t kEndedGroupsMax = 64;
 
   /// While one of these lives, groups that nobody knows are `not_yet`.
   class Asking;
   /// Why a service of that name cannot be declared; nothing if it can.
-  [[nodiscard]] std::optional<Failure> obstacle(const std::string& own_name, const std::string& name)
-      GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) { return open_ != 0 ? Place::not_yet : Place::unknown; }
-  [[nodiscard]] Subscribed entry(const std::string& full_name, const QueueOptions& options) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status ask(const Subscribed& service, const PaceOptions& pace, std::int32_t timeout_ms)
-      GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::optional<Failure> obstacle(const std::string& own_name,
+                                                const std::string& name) GIMNET_REQUIRES(asking_)
+      GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Place unknown() const GIMNET_REQUIRES(mutex_) {
+    return open_ != 0 ? Place::not_yet : Place::unknown;
+  }
+  [[nodiscard]] Subscribed entry(const std::string& full_name, const QueueOptions& options)
+      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status ask(const Subscribed& service, const PaceOptions& pace,
+                               std::int32_t timeout_ms) GIMNET_REQUIRES(asking_)
+      GIMNET_EXCLUDES(mutex_);
   void leave(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void give_up(const Subscribed& service) GIMNET_REQUIRES(asking_) GIMNET_EXCLUDES(mutex_);
   void stop_reading(SubscribedService& service) GIMNET_EXCLUDES(mutex_);
@@ -104,15 +117,19 @@ class ServiceTable {
   Inbox& inbox_;
   const OnMoved on_moved_;
 
-  Mutex asking_;  ///< held while the hub is asked: its answers must be applied in the order of the questions
-  std::set<std::string, std::less<>> own_names_ GIMNET_GUARDED_BY(asking_);  ///< of services that are declared now
+  Mutex asking_;  ///< held while the hub is asked: its answers must be applied in the order of the
+                  ///< questions
+  std::set<std::string, std::less<>> own_names_
+      GIMNET_GUARDED_BY(asking_);  ///< of services that are declared now
 
   Mutex mutex_;
   std::size_t open_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::string advertising_ GIMNET_GUARDED_BY(mutex_);  ///< the service that the hub is asked for; "": none
+  std::string advertising_
+      GIMNET_GUARDED_BY(mutex_);  ///< the service that the hub is asked for; "": none
   std::vector<std::unique_ptr<PublishedService>> published_ GIMNET_GUARDED_BY(mutex_);
   /// Those that were not withdrawn; also one that the hub did not take again, which has no group.
-  std::map<std::string, PublishedService*, std::less<>> published_by_name_ GIMNET_GUARDED_BY(mutex_);
+  std::map<std::string, PublishedService*, std::less<>> published_by_name_
+      GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, PublishedService*> published_by_group_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::string, Subscribed, std::less<>> subscribed_ GIMNET_GUARDED_BY(mutex_);
   std::map<std::uint32_t, Subscribed> subscribed_by_group_ GIMNET_GUARDED_BY(mutex_);

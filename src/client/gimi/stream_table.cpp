@@ -30,13 +30,14 @@ bool is_route_gone(std::uint32_t reason) {
 
 std::optional<Failure> StreamTable::obstacle(const SendOptions& options) const {
   if (options.window > kWindowMax) {
-    return Failure{Status::bad_argument, "a window of " + std::to_string(options.window) +
-                                             " messages is more than one ACK can speak of: at most " +
-                                             std::to_string(kWindowMax)};
+    return Failure{Status::bad_argument,
+                   "a window of " + std::to_string(options.window) +
+                       " messages is more than one ACK can speak of: at most " +
+                       std::to_string(kWindowMax)};
   }
   if (streams_.size() + services_.size() < kStreamsMax) return std::nullopt;
-  return Failure{Status::limit,
-                 "this node sends to " + std::to_string(kStreamsMax) + " (peer, key) and services already"};
+  return Failure{Status::limit, "this node sends to " + std::to_string(kStreamsMax) +
+                                    " (peer, key) and services already"};
 }
 
 Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
@@ -46,10 +47,12 @@ Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
   const auto place = streams_.find(name);
   if (place != streams_.end()) return place->second.get();
   if (auto failure = obstacle(options)) return *failure;
-  return streams_.emplace(name, std::make_unique<SendStream>(uplink_, *this, to, options)).first->second.get();
+  return streams_.emplace(name, std::make_unique<SendStream>(uplink_, *this, to, options))
+      .first->second.get();
 }
 
-Outcome<SendStream*> StreamTable::service_stream(const std::string& full_name, const ServicePlace& place,
+Outcome<SendStream*> StreamTable::service_stream(const std::string& full_name,
+                                                 const ServicePlace& place,
                                                  const SendOptions& options) {
   const MutexLock lock(mutex_);
   const auto known = services_.find(full_name);
@@ -92,7 +95,8 @@ std::vector<SendStream*> StreamTable::all() {
   return streams;
 }
 
-void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence, const proto::gimi::Ack& ack) {
+void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence,
+                         const proto::gimi::Ack& ack) {
   SendStream* stream = find(name);
   if (stream != nullptr && stream->on_ack(sequence, ack)) attend_(true);
 }
@@ -151,7 +155,8 @@ void StreamTable::watch(SendStream& stream) {
 bool StreamTable::tick(std::int64_t now_ns) {
   const std::int64_t interrupted_ns = interrupted_ns_.load();
   if (interrupted_ns != 0 && now_ns - interrupted_ns > kGraceNs) {
-    on_broken({LossReason::connection_lost, "the connection to the hub broke and did not come back in time"});
+    on_broken({LossReason::connection_lost,
+               "the connection to the hub broke and did not come back in time"});
   }
   std::vector<SendStream*> watched;
   {

@@ -39,9 +39,10 @@ Outcome<void> SubscribedService::standing() {
   const MutexLock lock(mutex_);
   if (end_) return end_.failure("subscribe " + *name_);
   if (!refusal_) return {};
-  return Failure{refusal_->status,
-                 "cannot subscribe " + *name_ +
-                     ": the hub did not take the subscription again, after a break: " + refusal_->sentence};
+  return Failure{
+      refusal_->status,
+      "cannot subscribe " + *name_ +
+          ": the hub did not take the subscription again, after a break: " + refusal_->sentence};
 }
 
 bool SubscribedService::is_refused() {

@@ -17,12 +17,13 @@
 
 namespace gimnet::gimi {
 
-/// A service of another node that this one subscribed, to read it or to know where it is, and the queue of its
-/// messages. Thread safety: any thread. Lifetime: the inbox outlives it.
+/// A service of another node that this one subscribed, to read it or to know where it is, and the
+/// queue of its messages. Thread safety: any thread. Lifetime: the inbox outlives it.
 class SubscribedService {
  public:
   SubscribedService(std::string full_name, Inbox& inbox, const QueueOptions& options)
-      : name_(std::make_shared<const std::string>(std::move(full_name))), queue_(inbox.add_queue(options)) {}
+      : name_(std::make_shared<const std::string>(std::move(full_name))),
+        queue_(inbox.add_queue(options)) {}
   ~SubscribedService() { queue_.inbox().remove(queue_); }
   SubscribedService(const SubscribedService&) = delete;
   SubscribedService& operator=(const SubscribedService&) = delete;
@@ -42,7 +43,8 @@ class SubscribedService {
   [[nodiscard]] bool is_refused() GIMNET_EXCLUDES(mutex_);
 
   /// The message that came last from that provider comes once more.
-  [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence)
+      GIMNET_EXCLUDES(mutex_);
   /// One of its messages is in the queue.
   void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);

@@ -71,12 +71,13 @@ Failure failure_of(nif_status status, std::string_view doing) {
   return {status_of(status), std::move(sentence)};
 }
 
-nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header, bool stamped, BytesView data,
-                            std::int32_t timeout_ms) const {
+nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
+                            bool stamped, BytesView data, std::int32_t timeout_ms) const {
   std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
   const auto stamp = stamped ? std::optional(wall_now_ns()) : std::nullopt;
   const std::size_t prefix_size = proto::gimi::write_message_prefix(header, stamp, prefix);
-  const std::array<nif_bytes, 2> parts{nif_bytes{prefix.data(), prefix_size}, nif_bytes{data.data(), data.size()}};
+  const std::array<nif_bytes, 2> parts{nif_bytes{prefix.data(), prefix_size},
+                                       nif_bytes{data.data(), data.size()}};
   nif_outgoing outgoing = NIF_OUTGOING_INIT;
   outgoing.kind = static_cast<std::uint8_t>(envelope.kind);
   outgoing.lane = static_cast<std::uint8_t>(envelope.lane);
@@ -93,7 +94,8 @@ nif_status Uplink::transmit(const Envelope& envelope, proto::gimi::MessageHeader
 std::string Uplink::trouble() const {
   std::string words(NIF_SENTENCE_BYTES_MAX, '\0');
   // It may be another, longer one by now.
-  for (std::size_t size = 0; (size = nif_last_error(node(), words.data(), words.size())) >= words.size();) {
+  for (std::size_t size = 0;
+       (size = nif_last_error(node(), words.data(), words.size())) >= words.size();) {
     words.assign(size + 1, '\0');
   }
   words.resize(words.find('\0'));

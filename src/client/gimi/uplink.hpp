@@ -28,8 +28,8 @@ struct Envelope {
   unsigned flags = 0;  ///< NIF_FLAG_*; KEYED is added
 };
 
-/// The way to NIF: GIMI messages in, frames out. Thread safety: any thread. The handle stays usable when it was closed;
-/// NIF then answers NIF_CLOSED.
+/// The way to NIF: GIMI messages in, frames out. Thread safety: any thread. The handle stays usable
+/// when it was closed; NIF then answers NIF_CLOSED.
 class Uplink {
  public:
   void open(nif_node* node) { node_.store(node); }
@@ -37,8 +37,8 @@ class Uplink {
   [[nodiscard]] nif_node* node() const { return node_.load(); }
 
   /// As nif_send(); `stamped`: with the time of this call.
-  [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header, bool stamped,
-                                    BytesView data, std::int32_t timeout_ms) const;
+  [[nodiscard]] nif_status transmit(const Envelope& envelope, proto::gimi::MessageHeader header,
+                                    bool stamped, BytesView data, std::int32_t timeout_ms) const;
 
   /// nif_last_error(), whole.
   [[nodiscard]] std::string trouble() const;

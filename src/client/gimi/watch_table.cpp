@@ -31,7 +31,8 @@ Outcome<WatchEvent> WatchQueue::receive(Timeout timeout) {
     const MutexLock lock(mutex_);
     while (entries_.empty()) {
       if (end_) return end_.failure("watch");
-      if (is_over(deadline)) return Failure{Status::timeout, "nothing changed within the time given"};
+      if (is_over(deadline))
+        return Failure{Status::timeout, "nothing changed within the time given"};
       static_cast<void>(changed_.wait_until(mutex_, deadline));
     }
     entry = std::move(entries_.front());
@@ -68,7 +69,8 @@ void WatchQueue::end(const Ending& ending) {
   changed_.notify_all();
 }
 
-Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern, const WatchOptions& options, Timeout timeout) {
+Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern,
+                                             const WatchOptions& options, Timeout timeout) {
   std::uint32_t subjects = NIF_WATCH_BY_HAND;
   if (options.nodes) subjects |= NIF_WATCH_NODES;
   if (options.services) subjects |= NIF_WATCH_SERVICES;
@@ -77,8 +79,8 @@ Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern, const W
     ++asking_;
   }
   Begun begun;
-  const nif_status status = nif_watch(uplink_.node(), pattern.empty() ? nullptr : pattern.c_str(), subjects,
-                                      &begun.number, nif_timeout(timeout));
+  const nif_status status = nif_watch(uplink_.node(), pattern.empty() ? nullptr : pattern.c_str(),
+                                      subjects, &begun.number, nif_timeout(timeout));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "watch '" + pattern + "'");
   {
     const MutexLock lock(mutex_);

@@ -14,8 +14,8 @@
 
 namespace gimnet::gimi {
 
-/// Events of one watch that the program has not taken. Bounded by what the hub sends unasked: a frame is acknowledged
-/// when its last event was taken. Thread safety: any thread.
+/// Events of one watch that the program has not taken. Bounded by what the hub sends unasked: a
+/// frame is acknowledged when its last event was taken. Thread safety: any thread.
 class WatchQueue {
  public:
   explicit WatchQueue(Uplink& uplink) : uplink_(uplink) {}
@@ -42,7 +42,8 @@ class WatchQueue {
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };
 
-/// The watches of a node, by NIF's numbers. Thread safety: any thread; on_watched() from the library's only.
+/// The watches of a node, by NIF's numbers. Thread safety: any thread; on_watched() from the
+/// library's only.
 class WatchTable {
  public:
   explicit WatchTable(Uplink& uplink) : uplink_(uplink) {}
@@ -51,8 +52,8 @@ class WatchTable {
     std::uint32_t number = 0;
     std::shared_ptr<WatchQueue> queue;
   };
-  [[nodiscard]] Outcome<Begun> watch(const std::string& pattern, const WatchOptions& options, Timeout timeout)
-      GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<Begun> watch(const std::string& pattern, const WatchOptions& options,
+                                     Timeout timeout) GIMNET_EXCLUDES(mutex_);
   void unwatch(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
   /// False: not yet, a watch() has not returned.

@@ -31,11 +31,13 @@ nif_status with_node(const nif_node* handle, Body body) noexcept {
   });
 }
 
-/// The same for calls that wait for an answer of the hub, which the library's own thread would have to read.
+/// The same for calls that wait for an answer of the hub, which the library's own thread would have
+/// to read.
 template <class Body>
 nif_status with_waiting_node(const nif_node* handle, Body body) noexcept {
   return with_node(handle, [&](Node& node) -> nif_status {
-    if (node.in_callback()) return fail(NIF_IN_CALLBACK, "a call that waits for the hub was made in the callback");
+    if (node.in_callback())
+      return fail(NIF_IN_CALLBACK, "a call that waits for the hub was made in the callback");
     return body(node);
   });
 }

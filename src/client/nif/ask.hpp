@@ -14,17 +14,21 @@
 
 namespace gimnet::nif {
 
-inline nif_status refused(const char* what, const std::string& about, const proto::Refusal& refusal) {
-  const std::string why = refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
-  return fail(status_of(refusal.status), std::string("cannot ") + what + " '" + about + "': " + why);
+inline nif_status refused(const char* what, const std::string& about,
+                          const proto::Refusal& refusal) {
+  const std::string why =
+      refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
+  return fail(status_of(refusal.status),
+              std::string("cannot ") + what + " '" + about + "': " + why);
 }
 
 /// Asks, and reads the answer. `what` and `about` are for the sentence.
 template <class Answer, class Request>
-nif_status ask(Node& node, const Request& request, Answer& answer, const char* what, const std::string& about,
-               Deadline deadline) {
+nif_status ask(Node& node, const Request& request, Answer& answer, const char* what,
+               const std::string& about, Deadline deadline) {
   proto::Payload payload;
-  const nif_status status = node.requests().ask(proto::Kind::ns, proto::encode(request), payload, deadline);
+  const nif_status status =
+      node.requests().ask(proto::Kind::ns, proto::encode(request), payload, deadline);
   if (status != NIF_OK) return status;
   auto decoded = proto::decode_answer<Answer>(payload);
   if (!decoded) return refused(what, about, decoded.error());
@@ -35,7 +39,8 @@ nif_status ask(Node& node, const Request& request, Answer& answer, const char* w
 /// `fault_of`: the rules, proto::name_fault or a stricter one.
 inline nif_status check_name(const char* name, const char* what,
                              const char* (*fault_of)(std::string_view) = proto::name_fault) {
-  if (name == nullptr) return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
+  if (name == nullptr)
+    return fail(NIF_BAD_ARGUMENT, std::string("cannot ") + what + ": name is NULL");
   const char* fault = fault_of(name);
   if (fault == nullptr) return NIF_OK;
   return fail(NIF_BAD_NAME, std::string("cannot ") + what + " '" + name + "': " + fault);
@@ -45,12 +50,14 @@ inline nif_status check_pattern(const char* pattern) {
   if (pattern == nullptr || *pattern == '\0' || proto::valid_pattern(pattern)) return NIF_OK;
   const std::string text = pattern;
   std::string fault =
-      "it is not a pattern: parts are separated by one /, and one is letters, digits, '.', '_', '-', or * for any one "
+      "it is not a pattern: parts are separated by one /, and one is letters, digits, '.', '_', "
+      "'-', or * for any one "
       "part, or ** for any number of them";
   if (std::ranges::count(text, '/') >= static_cast<std::ptrdiff_t>(proto::kNamePartsMax)) {
     fault = "it has more than " + std::to_string(proto::kNamePartsMax) + " parts";
   }
-  if (text.size() > proto::kNameBytesMax) fault = "it has more than " + std::to_string(proto::kNameBytesMax) + " bytes";
+  if (text.size() > proto::kNameBytesMax)
+    fault = "it has more than " + std::to_string(proto::kNameBytesMax) + " bytes";
   return fail(NIF_BAD_NAME, "cannot look for '" + text + "': " + fault);
 }
 

@@ -10,14 +10,15 @@ namespace gimnet::nif {
 
 /// A block of memory that frames are written into one after the other.
 struct Chunk {
-  explicit Chunk(std::size_t bytes) : memory(new(std::nothrow) std::byte[bytes]), capacity(memory ? bytes : 0) {}
+  explicit Chunk(std::size_t bytes)
+      : memory(new(std::nothrow) std::byte[bytes]), capacity(memory ? bytes : 0) {}
   std::unique_ptr<std::byte[]> memory;
   std::size_t capacity;
   std::size_t used = 0;
 };
 
-/// Hands out chunks and takes those back that nobody refers to any more, so that a steady stream allocates nothing.
-/// Thread safety: guarded by its owner, and so are all references to its chunks.
+/// Hands out chunks and takes those back that nobody refers to any more, so that a steady stream
+/// allocates nothing. Thread safety: guarded by its owner, and so are all references to its chunks.
 class ChunkPool {
  public:
   static constexpr std::size_t kChunkBytes = 128 * 1024;
@@ -48,7 +49,8 @@ class ChunkPool {
     return chunk;
   }
 
-  std::deque<std::shared_ptr<Chunk>> chunks_;  ///< the one handed out longest ago is first. Limit: kKept
+  std::deque<std::shared_ptr<Chunk>>
+      chunks_;  ///< the one handed out longest ago is first. Limit: kKept
 };
 
 }  // namespace gimnet::nif

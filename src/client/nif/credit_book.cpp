@@ -52,8 +52,10 @@ std::uint32_t CreditBook::epoch_for(std::uint32_t group) {
   const auto found = accounts_.find(group);
   if (found == accounts_.end()) {
     if (accounts_.size() >= kAccountsMax) {
-      // Of subscriptions that ended nobody tells. Plain ones that go on count early then, which nobody is told.
-      std::erase_if(accounts_, [](const auto& entry) { return entry.second.state != State::counted; });
+      // Of subscriptions that ended nobody tells. Plain ones that go on count early then, which
+      // nobody is told.
+      std::erase_if(accounts_,
+                    [](const auto& entry) { return entry.second.state != State::counted; });
       if (accounts_.size() >= kAccountsMax) return 0;
     }
     accounts_.emplace(group, Account{});
@@ -79,7 +81,8 @@ void CreditBook::take(std::uint32_t group, std::uint32_t epoch, std::uint32_t me
 
 void CreditBook::tell(std::uint32_t group, Account& account) {
   // Not connected: the next WELCOME brings it.
-  if (outbound_.post(proto::flow::Credit{GroupId{group}, account.taken})) account.told = account.taken;
+  if (outbound_.post(proto::flow::Credit{GroupId{group}, account.taken}))
+    account.told = account.taken;
 }
 
 }  // namespace gimnet::nif

@@ -35,7 +35,8 @@ void Declarations::enter_group(Service& service, GroupId group) {
   service.group = service.last_group = group;
 }
 
-void Declarations::add_service(const proto::ns::Advertise& service, GroupId group, std::vector<std::byte> proof) {
+void Declarations::add_service(const proto::ns::Advertise& service, GroupId group,
+                               std::vector<std::byte> proof) {
   const MutexLock lock(mutex_);
   Service& own = services_[service.service];
   if (!same_stream(own.request, service)) {
@@ -86,7 +87,8 @@ void Declarations::finish_service(const std::string& service, GroupId group) {
   const MutexLock lock(mutex_);
   const auto found = services_.find(service);
   if (found == services_.end() || !found->second.ended) return;
-  // Where it moved meanwhile, on_advertised() saw to it; what is still asked for will be seen to there.
+  // Where it moved meanwhile, on_advertised() saw to it; what is still asked for will be seen to
+  // there.
   if (found->second.group == group && !found->second.asked) services_.erase(found);
 }
 
@@ -95,11 +97,13 @@ void Declarations::add_subscription(const proto::ns::Subscribe& subscription, Gr
   subscriptions_.insert_or_assign(subscription.name, Subscription{subscription, group});
 }
 
-std::optional<Declarations::Former> Declarations::begin_subscription(const proto::ns::Subscribe& request) {
+std::optional<Declarations::Former> Declarations::begin_subscription(
+    const proto::ns::Subscribe& request) {
   const MutexLock lock(mutex_);
   const auto found = subscriptions_.find(request.name);
   if (found == subscriptions_.end()) return std::nullopt;
-  return Former{std::exchange(found->second.request, request), std::exchange(found->second.ended, false)};
+  return Former{std::exchange(found->second.request, request),
+                std::exchange(found->second.ended, false)};
 }
 
 void Declarations::give_up_subscription(const Former& former, bool heard) {
@@ -188,14 +192,16 @@ void Declarations::answered() {
 }
 
 bool Declarations::declare_service(const std::string& service) {
-  // The request leaves under the lock: what the program asks for once it has changed something here comes behind it.
+  // The request leaves under the lock: what the program asks for once it has changed something here
+  // comes behind it.
   const MutexLock lock(mutex_);
   const auto found = services_.find(service);
   if (found == services_.end()) return true;  // withdrawn meanwhile
   Service& own = found->second;
   if (own.ended && !own.asked) return withdraw_service(service, own.group);
   proto::ns::Advertise request = own.request;
-  // Also where the hub refused it meanwhile: it gave the group to nobody who could not prove that it was theirs.
+  // Also where the hub refused it meanwhile: it gave the group to nobody who could not prove that
+  // it was theirs.
   if (own.last_group != GroupId{}) {
     request.former_group = own.last_group;
     request.former_proof = own.proof;
@@ -213,12 +219,14 @@ bool Declarations::withdraw_service(const std::string& service, GroupId group) {
   const auto handler = [this, service, group, round = round_](const proto::Payload& payload) {
     if (round == round_) on_withdrawn(service, group, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Withdraw{group}), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Withdraw{group}), handler))
+    return false;
   ++under_way_;
   return true;
 }
 
-void Declarations::on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload) {
+void Declarations::on_withdrawn(const std::string& service, GroupId group,
+                                const proto::Payload& payload) {
   const auto answer = proto::decode_answer<proto::ns::WithdrawAnswer>(payload);
   if (answer || answer.error().status == proto::Status::not_found) finish_service(service, group);
   answered();
@@ -232,7 +240,8 @@ bool Declarations::declare_subscription(const std::string& full_name) {
   const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
     if (round == round_) on_subscribed(full_name, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(found->second.request), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(found->second.request), handler))
+    return false;
   ++under_way_;
   return true;
 }
@@ -241,7 +250,9 @@ bool Declarations::unsubscribe(const std::string& full_name) {
   const auto handler = [this, full_name, round = round_](const proto::Payload& payload) {
     if (round == round_) on_unsubscribed(full_name, payload);
   };
-  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Unsubscribe{full_name}), handler)) return false;
+  if (!requests_.ask_later(proto::Kind::ns, proto::encode(proto::ns::Unsubscribe{full_name}),
+                           handler))
+    return false;
   ++under_way_;
   return true;
 }
@@ -255,8 +266,9 @@ void Declarations::on_unsubscribed(const std::string& full_name, const proto::Pa
 /// What waits for the service goes where it is now.
 void Declarations::follow_group(Service& service) {
   const GroupId former = service.last_group;
-  const bool reused = std::ranges::any_of(
-      services_, [&](const auto& entry) { return &entry.second != &service && entry.second.group == former; });
+  const bool reused = std::ranges::any_of(services_, [&](const auto& entry) {
+    return &entry.second != &service && entry.second.group == former;
+  });
   outbound_.move_group({former.value(), service.group.value(), reused});
   if (service.group != GroupId{}) enter_group(service, service.group);
 }
@@ -279,7 +291,8 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
     const MutexLock lock(mutex_);
     const auto found = services_.find(service);
     if (found != services_.end()) {
-      provides = found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
+      provides =
+          found->second.request.direction == proto::ns::Direction::provides && !found->second.ended;
       former = std::exchange(found->second.group, group);
       if (answer) found->second.proof = answer->proof;
       found->second.asked = false;
@@ -312,7 +325,8 @@ void Declarations::on_advertised(const std::string& service, const proto::Payloa
 }
 
 bool Declarations::is_subscribed(GroupId group) const {
-  return std::ranges::any_of(subscriptions_, [&](const auto& entry) { return entry.second.group == group; });
+  return std::ranges::any_of(subscriptions_,
+                             [&](const auto& entry) { return entry.second.group == group; });
 }
 
 void Declarations::on_subscribed(const std::string& full_name, const proto::Payload& payload) {
@@ -327,11 +341,13 @@ void Declarations::on_subscribed(const std::string& full_name, const proto::Payl
       former = std::exchange(found->second.group, group);
       const bool ended = found->second.ended;
       const bool was_refused = std::exchange(found->second.refused, !answer);
-      // Also that the hub takes it again while nobody provides it: a program that was told of the refusal has to know.
+      // Also that the hub takes it again while nobody provides it: a program that was told of the
+      // refusal has to know.
       changed = (former != group || was_refused == answer.has_value()) && !ended;
       // What the program asked for in between may never have left.
       if (ended) subscriptions_due_.push_back(full_name);
-      // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to another one.
+      // Its SERVICE_MOVED was lost with the connection. A hub that began anew may have given it to
+      // another one.
       if (former != group && !is_subscribed(former)) credits_.forget(former);
     }
   }

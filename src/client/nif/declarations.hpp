@@ -29,25 +29,29 @@ class Declarations {
   void add_service(const proto::ns::Advertise& service, GroupId group, std::vector<std::byte> proof)
       GIMNET_EXCLUDES(mutex_);
   void remove_service(GroupId group) GIMNET_EXCLUDES(mutex_);
-  /// The program is about to advertise a service of that name: one that ended is not withdrawn any more. True: there is
-  /// such a one, which ends again where the hub does not take the new one.
+  /// The program is about to advertise a service of that name: one that ended is not withdrawn any
+  /// more. True: there is such a one, which ends again where the hub does not take the new one.
   [[nodiscard]] bool begin_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
-  /// The service of that name ends: it is declared no more, and withdrawn wherever the hub may have it. Returns the
-  /// group to withdraw now, 0: none, the rest is the library's thread's; nothing: there is no such service.
-  [[nodiscard]] std::optional<GroupId> end_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
+  /// The service of that name ends: it is declared no more, and withdrawn wherever the hub may have
+  /// it. Returns the group to withdraw now, 0: none, the rest is the library's thread's; nothing:
+  /// there is no such service.
+  [[nodiscard]] std::optional<GroupId> end_service(const std::string& service)
+      GIMNET_EXCLUDES(mutex_);
   /// The hub does not have the group (any more) that end_service() named.
   void finish_service(const std::string& service, GroupId group) GIMNET_EXCLUDES(mutex_);
-  void add_subscription(const proto::ns::Subscribe& subscription, GroupId group) GIMNET_EXCLUDES(mutex_);
+  void add_subscription(const proto::ns::Subscribe& subscription, GroupId group)
+      GIMNET_EXCLUDES(mutex_);
   /// What there was of a subscription that the program begins or changes.
   struct Former {
     proto::ns::Subscribe request;
     bool ended = false;
   };
-  /// The program is about to subscribe to a service. One that is subscribed already is declared by the new terms from
-  /// now on, and one that ended is not ended any more. Nothing: there was none.
-  [[nodiscard]] std::optional<Former> begin_subscription(const proto::ns::Subscribe& request) GIMNET_EXCLUDES(mutex_);
-  /// The hub did not take what was begun. `heard`: it said so, and what there was goes on; else it may have taken it,
-  /// and is asked with the next connection, unless the subscription had ended.
+  /// The program is about to subscribe to a service. One that is subscribed already is declared by
+  /// the new terms from now on, and one that ended is not ended any more. Nothing: there was none.
+  [[nodiscard]] std::optional<Former> begin_subscription(const proto::ns::Subscribe& request)
+      GIMNET_EXCLUDES(mutex_);
+  /// The hub did not take what was begun. `heard`: it said so, and what there was goes on; else it
+  /// may have taken it, and is asked with the next connection, unless the subscription had ended.
   void give_up_subscription(const Former& former, bool heard) GIMNET_EXCLUDES(mutex_);
   /// The subscription ends: it is declared no more, and the hub is told with the next connection if
   /// finish_subscription() does not come before. False: there is none, or it ended already.
@@ -55,9 +59,9 @@ class Declarations {
   /// The hub does not have it (any more).
   void finish_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
 
-  /// A new connection: declares everything again, a few requests at a time. GROUP messages wait until the services are
-  /// through. `forgotten`: what the hub kept of retained services may be gone; it gets their last messages again,
-  /// before newer ones.
+  /// A new connection: declares everything again, a few requests at a time. GROUP messages wait
+  /// until the services are through. `forgotten`: what the hub kept of retained services may be
+  /// gone; it gets their last messages again, before newer ones.
   void declare_again(bool forgotten) GIMNET_EXCLUDES(mutex_);
   /// Goes on declaring where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
@@ -74,11 +78,13 @@ class Declarations {
   struct Service {
     proto::ns::Advertise request;
     GroupId group;
-    GroupId last_group;  ///< while the hub refuses it: the one that it had before, unless another one has that
+    GroupId last_group;  ///< while the hub refuses it: the one that it had before, unless another
+                         ///< one has that
     std::vector<std::byte> proof{};  ///< of that
     bool last_due = false;           ///< retained, and the hub may not have the last message
-    bool asked = false;              ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
-    bool ended = false;              ///< for the program, and the hub may still have it
+    bool asked =
+        false;  ///< an ADVERTISE of the library has no answer yet, on this connection or for ever
+    bool ended = false;  ///< for the program, and the hub may still have it
   };
   struct Subscription {
     proto::ns::Subscribe request;
@@ -86,12 +92,17 @@ class Declarations {
     bool ended = false;    ///< for the program, and the hub may still have it
     bool refused = false;  ///< by the hub, when it was declared last
   };
-  void on_advertised(const std::string& service, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
-  void on_subscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
-  void on_unsubscribed(const std::string& full_name, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
-  void on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload) GIMNET_EXCLUDES(mutex_);
+  void on_advertised(const std::string& service, const proto::Payload& payload)
+      GIMNET_EXCLUDES(mutex_);
+  void on_subscribed(const std::string& full_name, const proto::Payload& payload)
+      GIMNET_EXCLUDES(mutex_);
+  void on_unsubscribed(const std::string& full_name, const proto::Payload& payload)
+      GIMNET_EXCLUDES(mutex_);
+  void on_withdrawn(const std::string& service, GroupId group, const proto::Payload& payload)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare_service(const std::string& service) GIMNET_EXCLUDES(mutex_);
-  [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool withdraw_service(const std::string& service, GroupId group)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool declare_subscription(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool unsubscribe(const std::string& full_name) GIMNET_REQUIRES(mutex_);
   void enter_group(Service& service, GroupId group) GIMNET_REQUIRES(mutex_);
@@ -106,7 +117,8 @@ class Declarations {
   CreditBook& credits_;
 
   Mutex mutex_;
-  std::map<std::string, Service> services_ GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node
+  std::map<std::string, Service> services_
+      GIMNET_GUARDED_BY(mutex_);  ///< by their name within this node
   std::map<std::string, Subscription> subscriptions_ GIMNET_GUARDED_BY(mutex_);
 
   // The library's thread.

@@ -11,12 +11,14 @@ namespace gimnet::nif {
 namespace {
 
 Failure closed_early(const Endpoint& endpoint) {
-  return {NIF_NO_HUB, "the peer at " + endpoint.url() + " closed the connection before it said WELCOME; is it a hub?"};
+  return {NIF_NO_HUB, "the peer at " + endpoint.url() +
+                          " closed the connection before it said WELCOME; is it a hub?"};
 }
 
 /// Nothing: all is written.
-std::optional<Failure> write_all(Socket& socket, std::span<const std::byte> bytes, const Endpoint& endpoint,
-                                 Deadline deadline, const WakeSignal& cancel) {
+std::optional<Failure> write_all(Socket& socket, std::span<const std::byte> bytes,
+                                 const Endpoint& endpoint, Deadline deadline,
+                                 const WakeSignal& cancel) {
   while (!bytes.empty()) {
     const IoResult result = socket.write(std::span(&bytes, 1));
     bytes = bytes.subspan(result.bytes);
@@ -38,8 +40,8 @@ Failure refused(const proto::Goodbye& goodbye, const Endpoint& endpoint) {
 }
 
 /// Reads until the handshake is over, one way or the other.
-std::optional<Failure> await_answer(Socket& socket, Handshake& handshake, const Endpoint& endpoint, Deadline deadline,
-                                    const WakeSignal& cancel) {
+std::optional<Failure> await_answer(Socket& socket, Handshake& handshake, const Endpoint& endpoint,
+                                    Deadline deadline, const WakeSignal& cancel) {
   std::array<std::byte, 4096> memory;
   for (;;) {
     const IoResult result = socket.read(memory);
@@ -50,7 +52,8 @@ std::optional<Failure> await_answer(Socket& socket, Handshake& handshake, const 
       const Ready ready = wait_for(socket, true, false, cancel, deadline);
       if (ready.woken) return Failure{NIF_CLOSED, "closed while connecting to " + endpoint.url()};
       if (!ready.readable && steady_now_ns() >= deadline) {
-        return Failure{NIF_TIMEOUT, "the peer at " + endpoint.url() + " does not answer HELLO; is it a hub?"};
+        return Failure{NIF_TIMEOUT,
+                       "the peer at " + endpoint.url() + " does not answer HELLO; is it a hub?"};
       }
       continue;
     }
@@ -62,31 +65,36 @@ std::optional<Failure> await_answer(Socket& socket, Handshake& handshake, const 
       case Handshake::State::goodbye:
         return refused(handshake.goodbye(), endpoint);
       case Handshake::State::failed:
-        return Failure{handshake.failure().status, endpoint.url() + ": " + handshake.failure().sentence};
+        return Failure{handshake.failure().status,
+                       endpoint.url() + ": " + handshake.failure().sentence};
     }
   }
 }
 
-Result<Admitted, Failure> admit_at(const Endpoint& endpoint, const SocketOptions& options, proto::Hello hello,
-                                   Deadline deadline, const WakeSignal& cancel, const TokenFor& token_for) {
+Result<Admitted, Failure> admit_at(const Endpoint& endpoint, const SocketOptions& options,
+                                   proto::Hello hello, Deadline deadline, const WakeSignal& cancel,
+                                   const TokenFor& token_for) {
   auto dialed = dial(endpoint, options, deadline, cancel);
   if (!dialed) return dialed.error();
   if (hello.token.empty() && token_for) hello.token = token_for(endpoint.url());
   const std::vector<std::byte> opening = encode_hello(hello);
-  // A hub that refuses may close before it has read everything: what it said is still there to read.
+  // A hub that refuses may close before it has read everything: what it said is still there to
+  // read.
   const auto unwritten = write_all(*dialed, opening, endpoint, deadline, cancel);
   if (unwritten && unwritten->status != NIF_NO_HUB) return *unwritten;
   Handshake handshake(hello.resume, hello.resume_epoch);
-  if (auto failure = await_answer(*dialed, handshake, endpoint, deadline, cancel)) return std::move(*failure);
+  if (auto failure = await_answer(*dialed, handshake, endpoint, deadline, cancel))
+    return std::move(*failure);
   const auto rest = handshake.rest();
-  return Admitted{std::move(*dialed), endpoint.url(), handshake.session(), {rest.begin(), rest.end()}};
+  return Admitted{
+      std::move(*dialed), endpoint.url(), handshake.session(), {rest.begin(), rest.end()}};
 }
 
 }  // namespace
 
 Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
-                                const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel,
-                                const TokenFor& token_for) {
+                                const proto::Hello& hello, Deadline deadline,
+                                const WakeSignal& cancel, const TokenFor& token_for) {
   Failure last{NIF_NO_HUB, "no address to connect to"};
   for (const Endpoint& endpoint : endpoints) {
     auto admitted = admit_at(endpoint, options, hello, deadline, cancel, token_for);

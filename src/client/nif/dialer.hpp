@@ -27,15 +27,18 @@ struct Admitted {
 /// The token to show at an address; empty: none.
 using TokenFor = std::function<std::vector<std::byte>(const std::string& address)>;
 
-/// What nif_connect() and the library's thread do to get one: dials each address in turn and shakes hands, until one
-/// hub admits the node, one refuses it, or the time is up. Where several fail, the last hub-less failure is told.
-/// `token_for` is asked where `hello` has no token; it may be empty.
+/// What nif_connect() and the library's thread do to get one: dials each address in turn and shakes
+/// hands, until one hub admits the node, one refuses it, or the time is up. Where several fail, the
+/// last hub-less failure is told. `token_for` is asked where `hello` has no token; it may be empty.
 /// Errors: those of dial() and of the hub's GOODBYE; NIF_CLOSED when `cancel` was raised.
-[[nodiscard]] Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints, const SocketOptions& options,
-                                              const proto::Hello& hello, Deadline deadline, const WakeSignal& cancel,
+[[nodiscard]] Result<Admitted, Failure> admit(std::span<const Endpoint> endpoints,
+                                              const SocketOptions& options,
+                                              const proto::Hello& hello, Deadline deadline,
+                                              const WakeSignal& cancel,
                                               const TokenFor& token_for = {});
 
-/// How long to wait before dialing again: full jitter, a random time below 50 ms, 100 ms, 200 ms ... 1 s.
+/// How long to wait before dialing again: full jitter, a random time below 50 ms, 100 ms, 200 ms
+/// ... 1 s.
 class Backoff {
  public:
   /// `random`: any 64 random bits.

@@ -12,7 +12,8 @@ constexpr std::string_view kTcp = "tcp://";
 constexpr std::string_view kUnix = "unix:";
 
 bool is_host(std::string_view text) {
-  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-";
+  constexpr std::string_view kLetters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-";
   return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
@@ -27,20 +28,22 @@ std::string advice_for(std::string_view url) {
   constexpr std::string_view kScheme = "tcp:/";
   if (url.starts_with(kScheme)) {
     meant =
-        std::string(kTcp) + std::string(url.substr(std::min(url.find_first_not_of('/', kScheme.size()), url.size())));
+        std::string(kTcp) +
+        std::string(url.substr(std::min(url.find_first_not_of('/', kScheme.size()), url.size())));
   }
   if (!meant.empty() && meant != url && parse_endpoint(meant)) return "did you mean " + meant + "?";
   std::string advice = "give tcp://host:port or unix:/path";
   const std::string_view host = url.starts_with(kTcp) ? url.substr(kTcp.size()) : url;
   if (is_host(host)) {
-    advice += ", such as " + std::string(kTcp) + std::string(host) + ":" + std::to_string(kDefaultPort);
+    advice +=
+        ", such as " + std::string(kTcp) + std::string(host) + ":" + std::to_string(kDefaultPort);
   }
   return advice;
 }
 
 Failure not_understood(std::string_view url, std::string_view why) {
-  return {NIF_BAD_ARGUMENT,
-          "cannot use the hub URL '" + std::string(url) + "': " + std::string(why) + "; " + advice_for(url)};
+  return {NIF_BAD_ARGUMENT, "cannot use the hub URL '" + std::string(url) +
+                                "': " + std::string(why) + "; " + advice_for(url)};
 }
 
 }  // namespace
@@ -57,7 +60,8 @@ Result<Endpoint, Failure> parse_endpoint(std::string_view url) {
     endpoint.transport = Endpoint::Transport::unix_socket;
     endpoint.path = url.substr(kUnix.size());
     if (endpoint.path.empty()) return not_understood(url, "the path is missing");
-    if (endpoint.path.size() > unix_path_max()) return not_understood(url, "the path is too long for a Unix socket");
+    if (endpoint.path.size() > unix_path_max())
+      return not_understood(url, "the path is too long for a Unix socket");
     return endpoint;
   }
   if (!url.starts_with(kTcp)) return not_understood(url, "the scheme is unknown");
@@ -65,7 +69,8 @@ Result<Endpoint, Failure> parse_endpoint(std::string_view url) {
   const std::size_t colon = rest.rfind(':');
   if (colon == std::string_view::npos) return not_understood(url, "the port is missing");
   std::string_view host = rest.substr(0, colon);
-  if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  if (host.size() >= 2 && host.front() == '[' && host.back() == ']')
+    host = host.substr(1, host.size() - 2);
   if (host.empty()) return not_understood(url, "the host is missing");
   if (host.find_first_of("[]") != std::string_view::npos) {
     return not_understood(url, "an IPv6 address stands between [ and ]");

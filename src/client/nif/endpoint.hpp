@@ -29,8 +29,9 @@ struct Endpoint {
 /// Errors: NIF_BAD_ARGUMENT with a sentence that names the URL and the forms that are understood.
 [[nodiscard]] Result<Endpoint, Failure> parse_endpoint(std::string_view url);
 
-/// What to try, in this order: `url` if not empty, else GIMNET_HUB of the environment, else the user's default Unix
-/// socket (left out where its folder is missing or another user's) and then tcp://127.0.0.1:7450.
+/// What to try, in this order: `url` if not empty, else GIMNET_HUB of the environment, else the
+/// user's default Unix socket (left out where its folder is missing or another user's) and then
+/// tcp://127.0.0.1:7450.
 [[nodiscard]] Result<std::vector<Endpoint>, Failure> endpoints_for(std::string_view url);
 
 }  // namespace gimnet::nif

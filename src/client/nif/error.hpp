@@ -21,7 +21,8 @@ struct Failure {
 nif_status fail(nif_status status, std::string_view sentence);
 nif_status fail(const Failure& failure);
 
-/// The sentence that fail() stored last in this thread. Valid until: the next fail() of this thread.
+/// The sentence that fail() stored last in this thread. Valid until: the next fail() of this
+/// thread.
 [[nodiscard]] const char* error_text();
 
 /// A time of steady_now_ns(); INT64_MAX: never.

@@ -8,7 +8,8 @@ void GroupMoves::begin() {
 
 void GroupMoves::add(const Move& move) {
   for (Waiting& waiting : waiting_) {
-    if (waiting.moved || move.former == 0 || waiting.message->parts().header.dst != move.former) continue;
+    if (waiting.moved || move.former == 0 || waiting.message->parts().header.dst != move.former)
+      continue;
     waiting.message->redirect(move.now);
     waiting.moved = true;
   }
@@ -24,7 +25,8 @@ void GroupMoves::forget(std::uint32_t group) {
 }
 
 GroupMoves::Turn::~Turn() {
-  std::erase_if(moves_.waiting_, [this](const Waiting& waiting) { return waiting.message == &message_; });
+  std::erase_if(moves_.waiting_,
+                [this](const Waiting& waiting) { return waiting.message == &message_; });
 }
 
 void GroupMoves::redirect_known(Outgoing& message) const {

@@ -8,10 +8,11 @@
 
 namespace gimnet::nif {
 
-/// Where the own services went that have another group than a program may know of yet. A message for a former group is
-/// for the service that had it when the message was sent: those that wait meanwhile are told of each move, others find
-/// the last one. A group of 0 is that of a service which the hub refuses, also for a message that waited then.
-/// Thread safety: guarded by its owner. Limits: threads that send, own services.
+/// Where the own services went that have another group than a program may know of yet. A message
+/// for a former group is for the service that had it when the message was sent: those that wait
+/// meanwhile are told of each move, others find the last one. A group of 0 is that of a service
+/// which the hub refuses, also for a message that waited then. Thread safety: guarded by its owner.
+/// Limits: threads that send, own services.
 class GroupMoves {
  public:
   struct Move {
@@ -55,7 +56,8 @@ class GroupMoves {
   void redirect_known(Outgoing& message) const;
 
   std::vector<Waiting> waiting_;
-  std::unordered_map<std::uint32_t, std::uint32_t> last_;  ///< former group and group of each service that moved
+  std::unordered_map<std::uint32_t, std::uint32_t>
+      last_;  ///< former group and group of each service that moved
 };
 
 }  // namespace gimnet::nif

@@ -9,34 +9,41 @@
 namespace gimnet::nif {
 namespace {
 
-// A slot's state: generation in the upper half; in the lower one a bit for "open" and the number of calls inside.
+// A slot's state: generation in the upper half; in the lower one a bit for "open" and the number of
+// calls inside.
 constexpr std::uint64_t kOpen = 0x8000'0000u;
 constexpr std::uint64_t kUsersMask = 0x7FFF'FFFFu;
 
 struct Slot {
   std::atomic<std::uint64_t> state{0};
-  std::atomic<Node*> node{nullptr};   ///< set by who claims the slot, before `open` is set; null: free
+  std::atomic<Node*> node{
+      nullptr};  ///< set by who claims the slot, before `open` is set; null: free
   std::uint32_t fork_generation = 0;  ///< written by the same, between the two
 };
 
 constinit std::array<Slot, kHandlesMax> g_slots{};
 constinit std::atomic<std::uint32_t> g_search_from{0};
 
-// A handle, as the pointer that it looks like: generation, slot (12 bits), and 8 in the lowest 4 bits, so that it is
-// never null and never a pointer that malloc gives.
+// A handle, as the pointer that it looks like: generation, slot (12 bits), and 8 in the lowest 4
+// bits, so that it is never null and never a pointer that malloc gives.
 constexpr std::uintptr_t kTag = 8;
 constexpr unsigned kSlotShift = 4;
 constexpr unsigned kGenerationShift = 16;
 constexpr std::uintptr_t kGenerationMask = UINTPTR_MAX >> kGenerationShift;
 
-std::uintptr_t generation_of(std::uint64_t state) { return static_cast<std::uintptr_t>(state >> 32) & kGenerationMask; }
-
-nif_node* handle_of(std::uint32_t slot, std::uint64_t state) {
-  const std::uintptr_t value = (generation_of(state) << kGenerationShift) | (std::uintptr_t{slot} << kSlotShift) | kTag;
-  return reinterpret_cast<nif_node*>(value);  // NOLINT(performance-no-int-to-ptr): a number in a pointer's clothes
+std::uintptr_t generation_of(std::uint64_t state) {
+  return static_cast<std::uintptr_t>(state >> 32) & kGenerationMask;
 }
 
-/// The slot that the handle names and, in the handle's own words, its generation. False: not a handle.
+nif_node* handle_of(std::uint32_t slot, std::uint64_t state) {
+  const std::uintptr_t value =
+      (generation_of(state) << kGenerationShift) | (std::uintptr_t{slot} << kSlotShift) | kTag;
+  return reinterpret_cast<nif_node*>(
+      value);  // NOLINT(performance-no-int-to-ptr): a number in a pointer's clothes
+}
+
+/// The slot that the handle names and, in the handle's own words, its generation. False: not a
+/// handle.
 bool take_apart(const nif_node* handle, std::uint32_t& slot, std::uintptr_t& generation) {
   const auto value = reinterpret_cast<std::uintptr_t>(handle);
   slot = static_cast<std::uint32_t>((value >> kSlotShift) & (kHandlesMax - 1));
@@ -44,13 +51,17 @@ bool take_apart(const nif_node* handle, std::uint32_t& slot, std::uintptr_t& gen
   return (value & ((1u << kSlotShift) - 1)) == kTag;
 }
 
-nif_status no_handle() { return fail(NIF_CLOSED, "no such handle: it was closed, or never came from nif_connect()"); }
+nif_status no_handle() {
+  return fail(NIF_CLOSED, "no such handle: it was closed, or never came from nif_connect()");
+}
 nif_status forked() {
-  return fail(NIF_FORKED, "the handle belongs to the parent process: after fork(), connect anew in the child");
+  return fail(NIF_FORKED,
+              "the handle belongs to the parent process: after fork(), connect anew in the child");
 }
 
 void leave(std::uint32_t slot) {
-  if (((g_slots[slot].state.fetch_sub(1) - 1) & (kOpen | kUsersMask)) == 0) g_slots[slot].state.notify_all();
+  if (((g_slots[slot].state.fetch_sub(1) - 1) & (kOpen | kUsersMask)) == 0)
+    g_slots[slot].state.notify_all();
 }
 
 }  // namespace
@@ -126,7 +137,8 @@ nif_status close_node(nif_node* handle) {
     return NIF_OK;
   }
   node->begin_close();
-  for (state = slot.state.load(); (state & kUsersMask) != 0; state = slot.state.load()) slot.state.wait(state);
+  for (state = slot.state.load(); (state & kUsersMask) != 0; state = slot.state.load())
+    slot.state.wait(state);
   node->close();
   delete node;
   slot.node = nullptr;

@@ -7,9 +7,9 @@
 #include "client/nif/node.hpp"
 #include "gimnet/nif.h"
 
-// From the handles of the C API to nodes. A handle is a number (slot and generation), so that one that was closed, or
-// never was, is found out instead of followed. A slot's numbers come round after 2^32 handles, after 2^16 where
-// pointers have 32 bits.
+// From the handles of the C API to nodes. A handle is a number (slot and generation), so that one
+// that was closed, or never was, is found out instead of followed. A slot's numbers come round
+// after 2^32 handles, after 2^16 where pointers have 32 bits.
 
 namespace gimnet::nif {
 
@@ -38,7 +38,8 @@ class NodeRef {
 
 [[nodiscard]] NodeRef find_node(const nif_node* handle);
 
-/// A new handle, which owns the node from then on, or null: kHandlesMax are open, and the node stays the caller's.
+/// A new handle, which owns the node from then on, or null: kHandlesMax are open, and the node
+/// stays the caller's.
 [[nodiscard]] nif_node* add_node(std::unique_ptr<Node>& node);
 
 /// Makes the handle invalid, has waiting calls leave, waits until they have, and closes the node.

@@ -40,7 +40,8 @@ std::string major_of(std::span<const std::byte> opening) {
 std::vector<std::byte> encode_hello(const proto::Hello& hello) {
   const std::vector<std::byte> frame = link_frame(proto::encode(hello));
   std::vector<std::byte> bytes(proto::kOpeningSize + frame.size());
-  std::copy(frame.begin(), frame.end(), std::copy(proto::kOpening.begin(), proto::kOpening.end(), bytes.begin()));
+  std::copy(frame.begin(), frame.end(),
+            std::copy(proto::kOpening.begin(), proto::kOpening.end(), bytes.begin()));
   return bytes;
 }
 
@@ -84,7 +85,8 @@ Handshake::State Handshake::take(std::span<const std::byte> bytes) {
   if (header.kind != proto::Kind::link || header.flags != 0) {
     return fail(NIF_PROTOCOL, "the peer answered HELLO with something else than WELCOME");
   }
-  if (header.length > kAnswerBytesMax) return fail(NIF_PROTOCOL, "the peer's answer to HELLO is too long");
+  if (header.length > kAnswerBytesMax)
+    return fail(NIF_PROTOCOL, "the peer's answer to HELLO is too long");
   if (rest.size() < header.frame_size()) return State::need_more;
   taken_ += header.frame_size();
   return take_frame(rest.subspan(proto::kHeaderSize, header.length));
@@ -99,7 +101,8 @@ Handshake::State Handshake::take_opening() {
       return fail(NIF_PROTOCOL, "the peer does not speak GIMnet; is it a hub?");
     case proto::Opening::bad_version:
       return fail(NIF_BAD_VERSION, "the hub speaks version " + major_of(bytes_) +
-                                       " of the protocol, this program version " + major_of(proto::kOpening) +
+                                       " of the protocol, this program version " +
+                                       major_of(proto::kOpening) +
                                        "; use a program of the hub's version");
     case proto::Opening::accepted:
       break;
@@ -113,19 +116,22 @@ Handshake::State Handshake::take_frame(std::span<const std::byte> payload) {
   if (!control) return fail(NIF_PROTOCOL, "the peer's answer to HELLO has no operation");
   if (control->header.operation == proto::Goodbye::kOperation) {
     auto goodbye = proto::decode<proto::Goodbye>(payload);
-    if (!goodbye) return fail(NIF_PROTOCOL, "cannot read the hub's GOODBYE: " + goodbye.error().sentence);
+    if (!goodbye)
+      return fail(NIF_PROTOCOL, "cannot read the hub's GOODBYE: " + goodbye.error().sentence);
     goodbye_ = std::move(*goodbye);
     return State::goodbye;
   }
   const auto welcome = proto::decode<proto::Welcome>(payload);
-  if (!welcome) return fail(NIF_PROTOCOL, "cannot read the hub's WELCOME: " + welcome.error().sentence);
+  if (!welcome)
+    return fail(NIF_PROTOCOL, "cannot read the hub's WELCOME: " + welcome.error().sentence);
   return take_welcome(*welcome);
 }
 
 Handshake::State Handshake::take_welcome(const proto::Welcome& welcome) {
   const std::uint32_t index = index_of(welcome.node);
   const HubId hub = hub_of(welcome.node);
-  if (index == kHubIndex || index == kEveryIndex || hub == kOwnHub || hub == kEveryHub || hub != welcome.hub) {
+  if (index == kHubIndex || index == kEveryIndex || hub == kOwnHub || hub == kEveryHub ||
+      hub != welcome.hub) {
     return fail(NIF_PROTOCOL, "the hub's WELCOME gives an impossible node id");
   }
   if (welcome.token.empty() || welcome.token.size() > proto::kTokenBytesMax) {
@@ -142,7 +148,8 @@ Handshake::State Handshake::take_welcome(const proto::Welcome& welcome) {
   session_.hub_epoch = welcome.epoch;
   session_.frame_bytes_max = std::min(welcome.frame_length_max, proto::kFrameLengthDefault);
   session_.keep_alive_ns = milliseconds(welcome.keep_alive_ms, kKeepAliveMsDefault);
-  session_.silent_after_ns = std::max(milliseconds(welcome.silent_ms, kSilentMsDefault), session_.keep_alive_ns * 2);
+  session_.silent_after_ns =
+      std::max(milliseconds(welcome.silent_ms, kSilentMsDefault), session_.keep_alive_ns * 2);
   session_.resume = resume_ && welcome.resume_buffer_bytes > 0;
   session_.resumed = session_.resume && welcome.resumed && former_hub_epoch_ != 0;
   if (session_.resumed && welcome.epoch != former_hub_epoch_) {

@@ -20,8 +20,9 @@ namespace gimnet::nif {
 /// What a GOODBYE means for nif_connect().
 [[nodiscard]] nif_status status_of(proto::GoodbyeCode code);
 
-/// The dialer's side of the handshake: takes the hub's bytes until WELCOME or GOODBYE is whole. The hub is not trusted.
-/// Thread safety: one thread; no sockets, no clocks. Memory: at most kAnswerBytesMax.
+/// The dialer's side of the handshake: takes the hub's bytes until WELCOME or GOODBYE is whole. The
+/// hub is not trusted. Thread safety: one thread; no sockets, no clocks. Memory: at most
+/// kAnswerBytesMax.
 class Handshake {
  public:
   /// Opening and WELCOME together; the longest legal one is far shorter.
@@ -29,9 +30,10 @@ class Handshake {
 
   enum class State : std::uint8_t { need_more, welcome, goodbye, failed };
 
-  /// `resume`: the HELLO asked for it; `former_hub_epoch`: what it named as the hub's earlier epoch, 0: none. Only
-  /// where it did both may WELCOME say `resumed`.
-  Handshake(bool resume, std::uint64_t former_hub_epoch) : resume_(resume), former_hub_epoch_(former_hub_epoch) {}
+  /// `resume`: the HELLO asked for it; `former_hub_epoch`: what it named as the hub's earlier
+  /// epoch, 0: none. Only where it did both may WELCOME say `resumed`.
+  Handshake(bool resume, std::uint64_t former_hub_epoch)
+      : resume_(resume), former_hub_epoch_(former_hub_epoch) {}
 
   /// Bytes as they came. REQUIRES: the last call answered need_more, or there was none.
   [[nodiscard]] State take(std::span<const std::byte> bytes);
@@ -39,7 +41,9 @@ class Handshake {
   /// After `welcome`.
   [[nodiscard]] const Session& session() const { return session_; }
   /// After `welcome`: what came behind it.
-  [[nodiscard]] std::span<const std::byte> rest() const { return std::span(bytes_).subspan(taken_); }
+  [[nodiscard]] std::span<const std::byte> rest() const {
+    return std::span(bytes_).subspan(taken_);
+  }
   /// After `goodbye`.
   [[nodiscard]] const proto::Goodbye& goodbye() const { return goodbye_; }
   /// After `failed`: what is wrong with the peer.

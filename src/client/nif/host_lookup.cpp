@@ -86,23 +86,29 @@ bool begin(std::shared_ptr<Search> search, const Endpoint& endpoint, const HostL
 
 }  // namespace
 
-Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
+Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
+                                                         Deadline deadline,
                                                          const WakeSignal& cancel) {
   // A number needs nobody to be asked.
   HostAddresses numeric = ask_system(endpoint.host, endpoint.port, AI_NUMERICHOST);
   if (numeric.fault.empty()) return std::move(numeric.found);
-  return find_addresses(endpoint, deadline, cancel,
-                        [](const std::string& host, std::uint16_t port) { return ask_system(host, port, 0); });
+  return find_addresses(
+      endpoint, deadline, cancel,
+      [](const std::string& host, std::uint16_t port) { return ask_system(host, port, 0); });
 }
 
-Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
-                                                         const WakeSignal& cancel, const HostLookup& lookup) {
+Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
+                                                         Deadline deadline,
+                                                         const WakeSignal& cancel,
+                                                         const HostLookup& lookup) {
   if (g_lookups.load(std::memory_order_relaxed) >= kHostLookupsMax) {  // a number by itself
-    return not_found(endpoint, "too many searches for hosts have no answer yet; does the name server answer?");
+    return not_found(
+        endpoint, "too many searches for hosts have no answer yet; does the name server answer?");
   }
   const auto search = std::make_shared<Search>();
   if (!search->ended().valid() || !begin(search, endpoint, lookup)) {
-    return Failure{NIF_NO_MEMORY, "cannot find the host of " + endpoint.url() + ": no descriptor or thread is left"};
+    return Failure{NIF_NO_MEMORY, "cannot find the host of " + endpoint.url() +
+                                      ": no descriptor or thread is left"};
   }
   for (;;) {
     const Raised raised = wait_for_either(search->ended(), cancel, deadline);

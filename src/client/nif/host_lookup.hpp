@@ -21,20 +21,24 @@ struct HostAddresses {
   std::vector<HostAddress> found;
 };
 
-/// Asks for all addresses of host and port; may take as long as it likes. Called on a thread of its own.
+/// Asks for all addresses of host and port; may take as long as it likes. Called on a thread of its
+/// own.
 using HostLookup = std::function<HostAddresses(const std::string& host, std::uint16_t port)>;
 
-/// Lookups of this process that may be under way. A name server that does not answer holds each for some seconds.
+/// Lookups of this process that may be under way. A name server that does not answer holds each for
+/// some seconds.
 inline constexpr int kHostLookupsMax = 16;
 
-/// All addresses of the endpoint's host. Gives up at the deadline or when `cancel` is raised: the system cannot be told
-/// to leave its search for a name, so that goes on without anybody, on a thread of its own, and is thrown away.
-/// Thread safety: any thread. Errors: NIF_NO_HOST, NIF_TIMEOUT, NIF_CLOSED (cancelled), NIF_NO_MEMORY.
-/// REQUIRES: a TCP endpoint.
-[[nodiscard]] Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
+/// All addresses of the endpoint's host. Gives up at the deadline or when `cancel` is raised: the
+/// system cannot be told to leave its search for a name, so that goes on without anybody, on a
+/// thread of its own, and is thrown away. Thread safety: any thread. Errors: NIF_NO_HOST,
+/// NIF_TIMEOUT, NIF_CLOSED (cancelled), NIF_NO_MEMORY. REQUIRES: a TCP endpoint.
+[[nodiscard]] Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
+                                                                       Deadline deadline,
                                                                        const WakeSignal& cancel);
 /// The same with another way to look.
-[[nodiscard]] Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint, Deadline deadline,
+[[nodiscard]] Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
+                                                                       Deadline deadline,
                                                                        const WakeSignal& cancel,
                                                                        const HostLookup& lookup);
 

@@ -49,9 +49,11 @@ std::optional<HubClock::Measurement> HubClock::wait_for(std::uint32_t sequence, 
 std::optional<HubClock::Measurement> HubClock::best() {
   const MutexLock lock(mutex_);
   if (measured_ == 0) return std::nullopt;
-  const auto end = kept_.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(measured_, kKept));
-  const auto shortest = std::min_element(
-      kept_.begin(), end, [](const auto& a, const auto& b) { return a.round_trip_ns < b.round_trip_ns; });
+  const auto end =
+      kept_.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(measured_, kKept));
+  const auto shortest = std::min_element(kept_.begin(), end, [](const auto& a, const auto& b) {
+    return a.round_trip_ns < b.round_trip_ns;
+  });
   return Measurement{kept_[(measured_ - 1) % kKept].round_trip_ns, shortest->offset_ns};
 }
 

@@ -22,14 +22,18 @@ class HubClock {
   };
 
   /// A PING that is about to be sent.
-  [[nodiscard]] proto::flow::Ping ping(std::int64_t steady_ns, std::int64_t wall_ns) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] proto::flow::Ping ping(std::int64_t steady_ns, std::int64_t wall_ns)
+      GIMNET_EXCLUDES(mutex_);
   /// A PONG. What was not asked, or was answered already, is ignored.
   void on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) GIMNET_EXCLUDES(mutex_);
-  /// The connection broke: what is under way will not be answered, and the next hub may have another clock.
+  /// The connection broke: what is under way will not be answered, and the next hub may have
+  /// another clock.
   void clear() GIMNET_EXCLUDES(mutex_);
   /// Waits for the answer to that PING. Nothing: time is up, or the connection broke.
-  [[nodiscard]] std::optional<Measurement> wait_for(std::uint32_t sequence, Deadline deadline) GIMNET_EXCLUDES(mutex_);
-  /// The last round trip, with the offset of the shortest of the last few: the one that waited least in queues.
+  [[nodiscard]] std::optional<Measurement> wait_for(std::uint32_t sequence, Deadline deadline)
+      GIMNET_EXCLUDES(mutex_);
+  /// The last round trip, with the offset of the shortest of the last few: the one that waited
+  /// least in queues.
   [[nodiscard]] std::optional<Measurement> best() GIMNET_EXCLUDES(mutex_);
 
  private:

@@ -24,7 +24,9 @@ Record* make_event(nif_incoming_type type, std::string text) {
   return record.release();
 }
 
-Item item_of(Record* record, std::size_t bytes) { return {record, nullptr, 0, bytes + sizeof(Record), 0}; }
+Item item_of(Record* record, std::size_t bytes) {
+  return {record, nullptr, 0, bytes + sizeof(Record), 0};
+}
 
 Inbound::~Inbound() {
   for (const Item& item : batch_) item.storage->release();
@@ -45,7 +47,8 @@ void Inbound::begin(const Session& session) {
     former_ids_.push_back(id_);
   }
   id_ = session.id;
-  confirm_bytes_ = session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
+  confirm_bytes_ =
+      session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
   unconfirmed_bytes_ = 0;
   if (session.resumed) return;
   taken_ = 0;
@@ -78,7 +81,8 @@ Inbound::Verdict Inbound::take(std::size_t bytes, const Arrival& arrival) {
   arrival_ = arrival;
   Verdict verdict = Verdict::going;
   while (verdict == Verdict::going) {
-    const auto next = proto::next_run(slab_->bytes() + parsed_, slab_->bytes() + filled_, proto::kFrameLengthDefault);
+    const auto next = proto::next_run(slab_->bytes() + parsed_, slab_->bytes() + filled_,
+                                      proto::kFrameLengthDefault);
     if (next.found == proto::Found::need_more) break;
     if (next.found == proto::Found::too_long) {
       verdict = malformed(proto::frame_error_text(proto::FrameError::too_long));
@@ -126,7 +130,8 @@ Inbound::Verdict Inbound::take_frame(const proto::FrameView& view, const std::by
 
 Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byte* frame) {
   ++counts_.frames;
-  if (view.header.kind == proto::Kind::report) return take_report(view);  // the hub's own, not counted for resume
+  if (view.header.kind == proto::Kind::report)
+    return take_report(view);  // the hub's own, not counted for resume
   ++taken_;
   unconfirmed_bytes_ += view.header.frame_size();
   switch (view.header.kind) {
@@ -177,7 +182,8 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     if (too_large) add_gap(view.header.src, 1, proto::DropReason::too_large);
   }
   if (reassembled.state != proto::Reassembled::State::whole) {
-    if (view.header.kind == proto::Kind::group && view.ends_message()) host_.on_message_lost(view.header.dst);
+    if (view.header.kind == proto::Kind::group && view.ends_message())
+      host_.on_message_lost(view.header.dst);
     return Verdict::going;
   }
   if (reassembled.storage.empty()) {
@@ -197,7 +203,8 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
 }
 
 void Inbound::add_frame(const proto::FrameView& view, const std::byte* frame) {
-  batch_.push_back({slab_, frame, arrival_.wall_ns, view.header.frame_size(), epoch_of(view.header)});
+  batch_.push_back(
+      {slab_, frame, arrival_.wall_ns, view.header.frame_size(), epoch_of(view.header)});
   slab_->add_reference();
   ++counts_.messages;
 }
@@ -212,7 +219,8 @@ void Inbound::add_record(Record* record, std::size_t bytes) {
 }
 
 void Inbound::add_events(std::span<const Item> events) {
-  for (const Item& event : events) static_cast<Record*>(event.storage)->incoming.arrival_ns = arrival_.wall_ns;
+  for (const Item& event : events)
+    static_cast<Record*>(event.storage)->incoming.arrival_ns = arrival_.wall_ns;
   batch_.insert(batch_.end(), events.begin(), events.end());
 }
 
@@ -230,12 +238,14 @@ Inbound::Verdict Inbound::take_flow(const proto::FrameView& view) {
   if (!message) return malformed("FLOW is too short or has an unknown operation");
   if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) {
     const bool unknown = skip->count == proto::flow::kSkipUnknown;
-    if (!unknown && skip->count > UINT64_MAX - 1 - taken_) return malformed("SKIP has an impossible count");
+    if (!unknown && skip->count > UINT64_MAX - 1 - taken_)
+      return malformed("SKIP has an impossible count");
     if (!unknown) taken_ += skip->count;
     add_gap(0, unknown ? NIF_COUNT_UNKNOWN : skip->count, skip->reason);
     return Verdict::going;
   }
-  return host_.on_flow(*message) ? Verdict::going : malformed("CONFIRM names more frames than were sent");
+  return host_.on_flow(*message) ? Verdict::going
+                                 : malformed("CONFIRM names more frames than were sent");
 }
 
 Inbound::Verdict Inbound::take_link(const proto::FrameView& view) {
@@ -276,14 +286,16 @@ void Inbound::add_subscriber(nif_incoming_type type, const proto::ns::Subscriber
   add_record(record, 0);
 }
 
-Inbound::Verdict Inbound::take_event(const proto::ControlView& event, std::span<const std::byte> payload) {
+Inbound::Verdict Inbound::take_event(const proto::ControlView& event,
+                                     std::span<const std::byte> payload) {
   switch (static_cast<proto::ns::Operation>(event.header.operation)) {
     case proto::ns::Operation::service_moved: {
       const auto moved = proto::decode<proto::ns::ServiceMoved>(payload);
       if (!moved) return malformed(moved.error().sentence);
       if (!host_.on_service_moved(*moved)) return Verdict::going;
       GroupId from = moved->old_group;
-      for (const GroupId between : moved->between) add_moved(*moved, std::exchange(from, between), between);
+      for (const GroupId between : moved->between)
+        add_moved(*moved, std::exchange(from, between), between);
       add_moved(*moved, from, moved->new_group);
       return Verdict::going;
     }
@@ -321,7 +333,8 @@ Inbound::Verdict Inbound::take_watch_events(std::span<const std::byte> payload) 
   return Verdict::going;
 }
 
-Inbound::Verdict Inbound::take_name_event(proto::ns::Operation operation, std::span<const std::byte> payload) {
+Inbound::Verdict Inbound::take_name_event(proto::ns::Operation operation,
+                                          std::span<const std::byte> payload) {
   const bool lost = operation == proto::ns::Operation::name_lost;
   proto::ns::NameLost event;
   if (lost) {
@@ -361,7 +374,8 @@ Inbound::Verdict Inbound::take_report(const proto::FrameView& view) {
   in.lane = report->header.lane & proto::kLaneMask;
   in.policy = static_cast<std::uint8_t>(report->header.policy());
   const bool plain = !report->header.has(proto::kFlagExt | proto::kFlagFragment);
-  if (plain && report->header.has(proto::kFlagKeyed) && report->following.size() >= sizeof(std::uint64_t)) {
+  if (plain && report->header.has(proto::kFlagKeyed) &&
+      report->following.size() >= sizeof(std::uint64_t)) {
     in.key = load_le<std::uint64_t>(report->following.data());
     in.flags = NIF_FLAG_KEYED;
   }

@@ -22,13 +22,16 @@
 
 namespace gimnet::nif {
 
-/// What the receiving half asks of the rest of the node. Called on the library's thread, with no lock held.
+/// What the receiving half asks of the rest of the node. Called on the library's thread, with no
+/// lock held.
 class InboundHost {
  public:
   /// PING, PONG, PAUSE, RESUME, CONFIRM. False: it contradicts what was sent, the hub is wrong.
   [[nodiscard]] virtual bool on_flow(const proto::flow::Message& message) = 0;
-  /// Returns the events that it leads to, which the program gets in its place; passes their references on.
-  [[nodiscard]] virtual std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) = 0;
+  /// Returns the events that it leads to, which the program gets in its place; passes their
+  /// references on.
+  [[nodiscard]] virtual std::vector<Item> on_answer(proto::Kind kind,
+                                                    const proto::ControlView& answer) = 0;
   /// False: it is nothing new to the program.
   [[nodiscard]] virtual bool on_service_moved(const proto::ns::ServiceMoved& event) = 0;
   /// True: the program is to have it.
@@ -39,7 +42,8 @@ class InboundHost {
   /// True: the program did not ask for this report.
   virtual bool on_report(const proto::Report& report) = 0;
   /// How the message with a fragment header began that the report is about, if that is known.
-  [[nodiscard]] virtual std::optional<ReportedMessages::Start> message_of(const proto::Report& report) = 0;
+  [[nodiscard]] virtual std::optional<ReportedMessages::Start> message_of(
+      const proto::Report& report) = 0;
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
   /// What a message of that group is tagged with; 0: it does not count in a window.
   [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;
@@ -52,9 +56,10 @@ class InboundHost {
   ~InboundHost() = default;
 };
 
-/// The receiving half of a node: bytes of the hub in, messages and events out. The hub is not trusted: whatever it
-/// sends either is taken or ends the connection with a sentence. Thread safety: the library's thread; no sockets, no
-/// clocks. Memory: the read buffer, and unfinished messages within the reassembly limits.
+/// The receiving half of a node: bytes of the hub in, messages and events out. The hub is not
+/// trusted: whatever it sends either is taken or ends the connection with a sentence. Thread
+/// safety: the library's thread; no sockets, no clocks. Memory: the read buffer, and unfinished
+/// messages within the reassembly limits.
 class Inbound {
  public:
   enum class Verdict : std::uint8_t {
@@ -63,7 +68,8 @@ class Inbound {
     malformed,  ///< fault() says what
   };
 
-  Inbound(const proto::ReassemblyLimits& limits, InboundHost& host) : host_(host), assembler_(limits) {}
+  Inbound(const proto::ReassemblyLimits& limits, InboundHost& host)
+      : host_(host), assembler_(limits) {}
   ~Inbound();
   Inbound(const Inbound&) = delete;
   Inbound& operator=(const Inbound&) = delete;
@@ -112,9 +118,11 @@ class Inbound {
   [[nodiscard]] Verdict take_flow(const proto::FrameView& view);
   [[nodiscard]] Verdict take_link(const proto::FrameView& view);
   [[nodiscard]] Verdict take_names(const proto::FrameView& view);
-  [[nodiscard]] Verdict take_event(const proto::ControlView& event, std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_event(const proto::ControlView& event,
+                                   std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_watch_events(std::span<const std::byte> payload);
-  [[nodiscard]] Verdict take_name_event(proto::ns::Operation operation, std::span<const std::byte> payload);
+  [[nodiscard]] Verdict take_name_event(proto::ns::Operation operation,
+                                        std::span<const std::byte> payload);
   [[nodiscard]] Verdict take_report(const proto::FrameView& view);
   void add_frame(const proto::FrameView& view, const std::byte* frame);
   void add_record(Record* record, std::size_t bytes);
@@ -126,7 +134,8 @@ class Inbound {
   void deliver();
 
   [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const {
-    return dst == id_ || std::find(former_ids_.begin(), former_ids_.end(), dst) != former_ids_.end();
+    return dst == id_ ||
+           std::find(former_ids_.begin(), former_ids_.end(), dst) != former_ids_.end();
   }
 
   InboundHost& host_;
@@ -135,7 +144,8 @@ class Inbound {
   std::size_t filled_ = 0;
   std::size_t parsed_ = 0;
   std::uint32_t id_ = 0;
-  /// The last ids before id_: frames which waited while the node was given another one are for them.
+  /// The last ids before id_: frames which waited while the node was given another one are for
+  /// them.
   std::vector<std::uint32_t> former_ids_;
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;

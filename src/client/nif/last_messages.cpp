@@ -60,7 +60,8 @@ bool LastMessages::keep(Entry& entry, Outgoing& message) {
   const std::size_t size = message.size();
   const std::size_t room = last.payload.capacity();
   if (size > room || (room > kRoomKept && size < room / 4)) clear(entry);
-  if (size > message_bytes_max_ || size > kBytesMax - bytes_ + last.payload.capacity()) return false;
+  if (size > message_bytes_max_ || size > kBytesMax - bytes_ + last.payload.capacity())
+    return false;
   try {
     last.extensions.assign(parts.extensions.begin(), parts.extensions.end());
     const std::size_t before = last.payload.capacity();
@@ -78,7 +79,8 @@ bool LastMessages::keep(Entry& entry, Outgoing& message) {
 
 const LastMessage* LastMessages::find(const std::string& service) const {
   const auto found = by_service_.find(service);
-  if (found == by_service_.end() || found->second.group == 0 || !found->second.there) return nullptr;
+  if (found == by_service_.end() || found->second.group == 0 || !found->second.there)
+    return nullptr;
   return &found->second.last;
 }
 

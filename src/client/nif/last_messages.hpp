@@ -25,9 +25,9 @@ struct LastMessage {
   [[nodiscard]] proto::FrameParts parts() const;
 };
 
-/// What hubs keep of the own retained services, kept here too: a hub that was started again has it no more.
-/// Thread safety: guarded by its owner. Limits: below; what is beyond is not kept but counted, nor is an older message
-/// in its place, which would not be the last.
+/// What hubs keep of the own retained services, kept here too: a hub that was started again has it
+/// no more. Thread safety: guarded by its owner. Limits: below; what is beyond is not kept but
+/// counted, nor is an older message in its place, which would not be the last.
 class LastMessages {
  public:
   /// As much as a hub keeps of one service unless it is told otherwise (its `retained_bytes`).
@@ -36,11 +36,13 @@ class LastMessages {
   static constexpr std::size_t kBytesMax = std::size_t{64} << 20;
 
   /// REQUIRES: message_bytes_max <= kBytesMax.
-  explicit LastMessages(std::size_t message_bytes_max = kMessageBytesDefault) : message_bytes_max_(message_bytes_max) {
+  explicit LastMessages(std::size_t message_bytes_max = kMessageBytesDefault)
+      : message_bytes_max_(message_bytes_max) {
     GIMNET_ASSERT(message_bytes_max <= kBytesMax);
   }
 
-  /// The own service of that name is retained and has this group; 0: none at the moment, what is kept stays.
+  /// The own service of that name is retained and has this group; 0: none at the moment, what is
+  /// kept stays.
   void follow(const std::string& service, std::uint32_t group);
   void forget(const std::string& service);
   /// A message to a group was sent. Allocates only where it is larger than those before it.

@@ -12,9 +12,9 @@
 
 namespace gimnet::nif {
 
-/// The folder `tokens` in runtime_folder_of_user(): both made if need be, and refused unless they are folders of mode
-/// 0700 of this user, not reached over a link.
-/// Thread safety: none. Ownership: of a descriptor.
+/// The folder `tokens` in runtime_folder_of_user(): both made if need be, and refused unless they
+/// are folders of mode 0700 of this user, not reached over a link. Thread safety: none. Ownership:
+/// of a descriptor.
 class PrivateFolder {
  public:
   /// fault() tells whether it can be used.
@@ -34,9 +34,9 @@ class PrivateFolder {
   Descriptor descriptor_ = -1;
 };
 
-/// A file of mode 0600 that one LockedFile in the whole system has open at a time: locked while it lives, in whichever
-/// way its process ends. A child after fork() does not keep it locked. Thread safety: none. Ownership: of a descriptor;
-/// move-only.
+/// A file of mode 0600 that one LockedFile in the whole system has open at a time: locked while it
+/// lives, in whichever way its process ends. A child after fork() does not keep it locked. Thread
+/// safety: none. Ownership: of a descriptor; move-only.
 class LockedFile {
  public:
   enum class State : std::uint8_t {
@@ -51,7 +51,8 @@ class LockedFile {
   LockedFile& operator=(LockedFile&& other) noexcept;
   ~LockedFile() { close(); }
 
-  /// Opens and locks `name` in the folder, `made` first if it is not there. REQUIRES: is_open() is false; `name` has no
+  /// Opens and locks `name` in the folder, `made` first if it is not there. REQUIRES: is_open() is
+  /// false; `name` has no
   /// '/' in it.
   [[nodiscard]] State open(const PrivateFolder& folder, const std::string& name, bool made);
   [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }

@@ -15,12 +15,13 @@ namespace {
 
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
-/// A file may be removed between its opening and its locking by the one who had it; each try meets another of those.
+/// A file may be removed between its opening and its locking by the one who had it; each try meets
+/// another of those.
 constexpr int kTries = 16;
 constexpr std::size_t kLocksMax = 4'096;
 
-/// Locked descriptors, so that a child can close them: a lock lives as long as any process has its descriptor. 0: free,
-/// else the descriptor plus 1.
+/// Locked descriptors, so that a child can close them: a lock lives as long as any process has its
+/// descriptor. 0: free, else the descriptor plus 1.
 constinit std::array<std::atomic<int>, kLocksMax> g_locked{};
 
 /// In a child after fork(), which has one thread: only what may be called in a signal handler.
@@ -57,8 +58,8 @@ bool is_private(const struct stat& info) {
 /// Does the folder still have this very file under that name?
 bool is_there(Descriptor folder, const char* name, const struct stat& opened) {
   struct stat named{};
-  return ::fstatat(folder, name, &named, AT_SYMLINK_NOFOLLOW) == 0 && named.st_ino == opened.st_ino &&
-         named.st_dev == opened.st_dev;
+  return ::fstatat(folder, name, &named, AT_SYMLINK_NOFOLLOW) == 0 &&
+         named.st_ino == opened.st_ino && named.st_dev == opened.st_dev;
 }
 
 }  // namespace
@@ -83,21 +84,24 @@ void PrivateFolder::enter(Descriptor above, const std::string& name, const std::
     fault_ = "cannot make the folder " + path + ": " + system_error_text(errno);
     return;
   }
-  const Descriptor inner = ::openat(above, name.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  const Descriptor inner =
+      ::openat(above, name.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (inner < 0) {
     fault_ = "cannot use " + path + ": " + system_error_text(errno) + "; it has to be a folder";
     return;
   }
   struct stat info{};
   if (::fstat(inner, &info) != 0 || !is_private(info)) {
-    fault_ = "cannot use the folder " + path + ": it is another user's, or others have rights in it; chmod 700 " + path;
+    fault_ = "cannot use the folder " + path +
+             ": it is another user's, or others have rights in it; chmod 700 " + path;
     ::close(inner);
     return;
   }
   ::close(std::exchange(descriptor_, inner));
 }
 
-LockedFile::LockedFile(LockedFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+LockedFile::LockedFile(LockedFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
 
 LockedFile& LockedFile::operator=(LockedFile&& other) noexcept {
   if (this != &other) {
@@ -107,8 +111,10 @@ LockedFile& LockedFile::operator=(LockedFile&& other) noexcept {
   return *this;
 }
 
-LockedFile::State LockedFile::open(const PrivateFolder& folder, const std::string& name, bool made) {
-  // A file that is no file of ours is not touched: no link is followed, and opening a pipe does not wait.
+LockedFile::State LockedFile::open(const PrivateFolder& folder, const std::string& name,
+                                   bool made) {
+  // A file that is no file of ours is not touched: no link is followed, and opening a pipe does not
+  // wait.
   const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | (made ? O_CREAT : 0);
   for (int i = 0; i < kTries; ++i) {
     const Descriptor file = ::openat(folder.descriptor(), name.c_str(), flags, kFileMode);
@@ -142,7 +148,8 @@ std::size_t LockedFile::read(std::span<std::byte> memory) const {
 }
 
 bool LockedFile::write(std::span<const std::byte> content) {
-  const bool written = ::pwrite(descriptor_, content.data(), content.size(), 0) == static_cast<ssize_t>(content.size());
+  const bool written = ::pwrite(descriptor_, content.data(), content.size(), 0) ==
+                       static_cast<ssize_t>(content.size());
   return written && ::ftruncate(descriptor_, static_cast<off_t>(content.size())) == 0;
 }
 

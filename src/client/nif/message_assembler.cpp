@@ -14,15 +14,19 @@ bool has_window(const proto::FrameView& view) {
 
 }  // namespace
 
-std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view, std::uint32_t taken,
-                                                       std::int64_t now_ns) {
+std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view,
+                                                       std::uint32_t taken, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
   const std::uint64_t key = window_key(view.header, fragment.message);
   auto found = windows_.find(key);
   if (found == windows_.end()) {
-    // Messages that ended without a word to this end leave their windows behind; those that go on get theirs again.
+    // Messages that ended without a word to this end leave their windows behind; those that go on
+    // get theirs again.
     if (windows_.size() >= limits_.streams_max) windows_.clear();
-    found = windows_.emplace(key, OpenMessage{.progress = {fragment.message, fragment.total}, .tuning = {}}).first;
+    found =
+        windows_
+            .emplace(key, OpenMessage{.progress = {fragment.message, fragment.total}, .tuning = {}})
+            .first;
   }
   OpenMessage& open = found->second;
   std::optional<proto::Taken> notice;
@@ -38,7 +42,8 @@ std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& v
 
 MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
-  Step step{reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload), std::nullopt};
+  Step step{reassembler_.take(proto::FragmentStream::of(view.header), fragment, view.payload),
+            std::nullopt};
   using State = proto::Reassembled::State;
   if (!has_window(view)) return step;
   if (step.reassembled.state == State::part || step.reassembled.state == State::whole) {
@@ -55,7 +60,8 @@ MessageAssembler::Lost MessageAssembler::clear() {
   Lost lost;
   for (const auto& [key, open] : windows_) {
     const auto message = static_cast<std::uint32_t>(key);
-    lost.notices.push_back({static_cast<std::uint32_t>(key >> 32), proto::ReceiveWindow::refusal(message)});
+    lost.notices.push_back(
+        {static_cast<std::uint32_t>(key >> 32), proto::ReceiveWindow::refusal(message)});
   }
   windows_.clear();
   lost.messages = reassembler_.clear();

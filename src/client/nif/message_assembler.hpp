@@ -14,11 +14,13 @@
 
 namespace gimnet::nif {
 
-/// Fragments in, whole messages and TAKENs out: proto's Reassembler with a receive window for each large UNICAST
-/// message. Thread safety: one thread. Memory: within the limits, whatever a peer claims.
+/// Fragments in, whole messages and TAKENs out: proto's Reassembler with a receive window for each
+/// large UNICAST message. Thread safety: one thread. Memory: within the limits, whatever a peer
+/// claims.
 class MessageAssembler {
  public:
-  explicit MessageAssembler(const proto::ReassemblyLimits& limits) : limits_(limits), reassembler_(limits) {}
+  explicit MessageAssembler(const proto::ReassemblyLimits& limits)
+      : limits_(limits), reassembler_(limits) {}
 
   /// What the sender of a message is to be told.
   struct Notice {
@@ -38,7 +40,8 @@ class MessageAssembler {
     return reassembler_.interrupt(proto::FragmentStream::of(header));
   }
 
-  /// Everything unfinished is lost: how many messages, and whom to tell that it is in vain to go on.
+  /// Everything unfinished is lost: how many messages, and whom to tell that it is in vain to go
+  /// on.
   struct Lost {
     std::uint32_t messages = 0;
     std::vector<Notice> notices;
@@ -50,8 +53,8 @@ class MessageAssembler {
     proto::ReceiveWindow progress;
     WindowTuning tuning;
   };
-  [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view, std::uint32_t taken,
-                                                     std::int64_t now_ns);
+  [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view,
+                                                     std::uint32_t taken, std::int64_t now_ns);
 
   const proto::ReassemblyLimits limits_;
   proto::Reassembler reassembler_;

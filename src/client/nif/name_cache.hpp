@@ -10,26 +10,31 @@
 
 namespace gimnet::nif {
 
-/// Which id a name had a moment ago, and which name an id. An entry holds for a second, or until it is known to be
-/// wrong. Thread safety: any thread; the time is the caller's. Limits: kEntriesMax, then everything is forgotten.
+/// Which id a name had a moment ago, and which name an id. An entry holds for a second, or until it
+/// is known to be wrong. Thread safety: any thread; the time is the caller's. Limits: kEntriesMax,
+/// then everything is forgotten.
 class NameCache {
  public:
   static constexpr std::size_t kEntriesMax = 4096;
   static constexpr std::int64_t kHoldsNs = 1'000'000'000;
 
-  void remember(std::string_view name, std::uint32_t id, std::int64_t now_ns) GIMNET_EXCLUDES(mutex_) {
+  void remember(std::string_view name, std::uint32_t id, std::int64_t now_ns)
+      GIMNET_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     if (by_name_.size() >= kEntriesMax || by_id_.size() >= kEntriesMax) clear_locked();
-    if (!name.empty()) by_name_.insert_or_assign(std::string(name), Entry<std::uint32_t>{id, now_ns});
+    if (!name.empty())
+      by_name_.insert_or_assign(std::string(name), Entry<std::uint32_t>{id, now_ns});
     by_id_.insert_or_assign(id, Entry<std::string>{std::string(name), now_ns});
   }
-  [[nodiscard]] std::optional<std::uint32_t> id_of(std::string_view name, std::int64_t now_ns) GIMNET_EXCLUDES(mutex_) {
+  [[nodiscard]] std::optional<std::uint32_t> id_of(std::string_view name, std::int64_t now_ns)
+      GIMNET_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     const auto found = by_name_.find(name);
     if (found == by_name_.end() || now_ns - found->second.since_ns > kHoldsNs) return std::nullopt;
     return found->second.value;
   }
-  [[nodiscard]] std::optional<std::string> name_of(std::uint32_t id, std::int64_t now_ns) GIMNET_EXCLUDES(mutex_) {
+  [[nodiscard]] std::optional<std::string> name_of(std::uint32_t id, std::int64_t now_ns)
+      GIMNET_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     const auto found = by_id_.find(id);
     if (found == by_id_.end() || now_ns - found->second.since_ns > kHoldsNs) return std::nullopt;

@@ -47,7 +47,8 @@ nif_status nif_close(nif_node* node) {
 
 nif_status nif_get_info(nif_node* node, nif_info* info) {
   return with_node(node, [&](Node& found) -> nif_status {
-    if (!has_size(info)) return fail(NIF_BAD_ARGUMENT, "cannot tell the state: info is NULL or has no struct_size");
+    if (!has_size(info))
+      return fail(NIF_BAD_ARGUMENT, "cannot tell the state: info is NULL or has no struct_size");
     write_struct(found.info(), *info);
     return NIF_OK;
   });
@@ -97,7 +98,8 @@ nif_status nif_flush(nif_node* node) {
 }
 
 nif_status nif_drain(nif_node* node, int32_t timeout_ms) {
-  return with_waiting_node(node, [&](Node& found) { return found.outbound().drain(deadline_after(timeout_ms)); });
+  return with_waiting_node(
+      node, [&](Node& found) { return found.outbound().drain(deadline_after(timeout_ms)); });
 }
 
 nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms) {
@@ -105,7 +107,8 @@ nif_status nif_receive(nif_node* node, nif_incoming* in, int32_t timeout_ms) {
   return nif_receive_many(node, in, 1, &count, timeout_ms);
 }
 
-nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, size_t* count, int32_t timeout_ms) {
+nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, size_t* count,
+                            int32_t timeout_ms) {
   return with_node(node, [&](Node& found) -> nif_status {
     if (in == nullptr || count == nullptr || capacity == 0) {
       return fail(NIF_BAD_ARGUMENT, "cannot receive: no place to receive into");
@@ -114,7 +117,8 @@ nif_status nif_receive_many(nif_node* node, nif_incoming* in, size_t capacity, s
     if (found.options().callback != nullptr) {
       return fail(NIF_BAD_ARGUMENT, "cannot receive: everything is given to the callback");
     }
-    const nif_status status = found.received().pop({in, capacity}, *count, deadline_after(timeout_ms));
+    const nif_status status =
+        found.received().pop({in, capacity}, *count, deadline_after(timeout_ms));
     if (found.options().credit_by_program) return status;
     for (std::size_t i = 0; i < *count; ++i) {
       if (in[i].epoch != 0) found.credits().take(in[i].to, in[i].epoch, 1, i + 1 != *count);
@@ -142,7 +146,8 @@ nif_status nif_deliver(nif_node* node) {
 nif_status nif_get_counters(nif_node* node, nif_counters* counters) {
   return with_node(node, [&](Node& found) -> nif_status {
     if (!has_size(counters)) {
-      return fail(NIF_BAD_ARGUMENT, "cannot tell the counters: counters is NULL or has no struct_size");
+      return fail(NIF_BAD_ARGUMENT,
+                  "cannot tell the counters: counters is NULL or has no struct_size");
     }
     write_struct(found.counters(), *counters);
     return NIF_OK;

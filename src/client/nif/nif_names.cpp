@@ -34,7 +34,9 @@ using gimnet::nif::with_waiting_node;
 
 namespace {
 
-nif_status impossible_answer() { return fail(NIF_PROTOCOL, "the hub's answer is not in ascending order"); }
+nif_status impossible_answer() {
+  return fail(NIF_PROTOCOL, "the hub's answer is not in ascending order");
+}
 
 /// All pages of a listing. `id_of` reads a record's id.
 template <class Request, class Answer, class Record, class IdOf>
@@ -57,8 +59,9 @@ nif_status list_pages(Node& node, Request request, std::vector<Record> Answer::*
   }
 }
 
-/// Asks and enters the outcome by `once`. The library declares again, at each connection anew, what had been entered by
-/// then; so what was answered before such a moment and entered behind it is asked once more.
+/// Asks and enters the outcome by `once`. The library declares again, at each connection anew, what
+/// had been entered by then; so what was answered before such a moment and entered behind it is
+/// asked once more.
 template <class Once>
 nif_status declare(Node& node, Once once) {
   bool done = false;
@@ -89,7 +92,8 @@ nif_status nif_resolve(nif_node* node, const char* name, uint32_t* id, int32_t t
       return NIF_OK;
     }
     ns::ResolveAnswer answer;
-    const nif_status status = ask(found, ns::Resolve{name}, answer, "resolve", name, deadline_after(timeout_ms));
+    const nif_status status =
+        ask(found, ns::Resolve{name}, answer, "resolve", name, deadline_after(timeout_ms));
     if (status != NIF_OK) return status;
     *id = answer.node.value();
     found.names().remember(name, *id, steady_now_ns());
@@ -106,7 +110,8 @@ nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_
       const nif_status status = ask(found, ns::Reverse{NodeId{id}}, answer, "look up the node",
                                     gimnet::to_string(NodeId{id}), deadline_after(timeout_ms));
       if (status != NIF_OK) return status;
-      if (answer.name.size() > NIF_NAME_BYTES_MAX) return fail(NIF_PROTOCOL, "the hub's answer has too long a name");
+      if (answer.name.size() > NIF_NAME_BYTES_MAX)
+        return fail(NIF_PROTOCOL, "the hub's answer has too long a name");
       found.names().remember(answer.name, id, steady_now_ns());
       known = std::move(answer.name);
     }
@@ -115,7 +120,8 @@ nif_status nif_reverse(nif_node* node, uint32_t id, char* name, int32_t timeout_
   });
 }
 
-nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list, int32_t timeout_ms) {
+nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** list,
+                          int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
     *list = nullptr;
@@ -124,14 +130,16 @@ nif_status nif_list_nodes(nif_node* node, const char* pattern, nif_node_list** l
     ns::List request;
     request.pattern = pattern != nullptr ? pattern : "";
     const nif_status status = list_pages(
-        found, request, &ns::ListAnswer::nodes, [](const ns::NodeRecord& record) { return record.node; }, records,
+        found, request, &ns::ListAnswer::nodes,
+        [](const ns::NodeRecord& record) { return record.node; }, records,
         deadline_after(timeout_ms));
     if (status == NIF_OK) *list = gimnet::nif::make_node_list(std::move(records));
     return status;
   });
 }
 
-nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list, int32_t timeout_ms) {
+nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_list** list,
+                             int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (list == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot list: list is NULL");
     *list = nullptr;
@@ -140,15 +148,16 @@ nif_status nif_list_services(nif_node* node, const char* pattern, nif_service_li
     ns::Services request;
     request.pattern = pattern != nullptr ? pattern : "";
     const nif_status status = list_pages(
-        found, request, &ns::ServicesAnswer::services, [](const ns::ServiceRecord& record) { return record.group; },
-        records, deadline_after(timeout_ms));
+        found, request, &ns::ServicesAnswer::services,
+        [](const ns::ServiceRecord& record) { return record.group; }, records,
+        deadline_after(timeout_ms));
     if (status == NIF_OK) *list = gimnet::nif::make_service_list(std::move(records));
     return status;
   });
 }
 
-nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group, uint32_t* subscribers,
-                         int32_t timeout_ms) {
+nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* group,
+                         uint32_t* subscribers, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (service == nullptr || group == nullptr)
       return fail(NIF_BAD_ARGUMENT, "cannot advertise: service or group is NULL");
@@ -156,9 +165,11 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     const nif_service* known = service;
     if (auto failure = read_struct(known, whole, "advertise", "nif_service")) return fail(*failure);
     if (known->direction > NIF_ACCEPTS || known->delivery > NIF_SYNC_DELIVERY) {
-      return fail(NIF_BAD_ARGUMENT, "cannot advertise: direction or delivery is not one of its enumeration");
+      return fail(NIF_BAD_ARGUMENT,
+                  "cannot advertise: direction or delivery is not one of its enumeration");
     }
-    if (const nif_status status = check_name(known->name, "advertise"); status != NIF_OK) return status;
+    if (const nif_status status = check_name(known->name, "advertise"); status != NIF_OK)
+      return status;
     ns::Advertise request;
     request.service = known->name;
     request.message_type = known->message_type;
@@ -169,14 +180,16 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
     request.window = known->window;
     request.retain = known->retain != 0;
     if (!proto::valid_service_name(request.service)) {
-      return fail(NIF_BAD_NAME, "cannot advertise '" + request.service + "': a service's name has one part");
+      return fail(NIF_BAD_NAME,
+                  "cannot advertise '" + request.service + "': a service's name has one part");
     }
     ns::AdvertiseAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
     const bool ended = found.declarations().begin_service(request.service);
     const nif_status status = declare(found, [&] {
       const nif_status asked = ask(found, request, answer, "advertise", request.service, deadline);
-      if (asked == NIF_OK) found.declarations().add_service(request, answer.group, std::move(answer.proof));
+      if (asked == NIF_OK)
+        found.declarations().add_service(request, answer.group, std::move(answer.proof));
       return asked;
     });
     if (status != NIF_OK) {
@@ -191,13 +204,17 @@ nif_status nif_advertise(nif_node* node, const nif_service* service, uint32_t* g
 
 nif_status nif_withdraw(nif_node* node, uint32_t group, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (group == 0) return fail(NIF_BAD_ARGUMENT, "cannot withdraw the service: group is 0, which no service has");
+    if (group == 0)
+      return fail(NIF_BAD_ARGUMENT,
+                  "cannot withdraw the service: group is 0, which no service has");
     ns::WithdrawAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
     return declare(found, [&] {
-      const nif_status status = ask(found, ns::Withdraw{GroupId{group}}, answer, "withdraw the service",
-                                    gimnet::to_string(GroupId{group}), deadline);
-      if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().remove_service(GroupId{group});
+      const nif_status status =
+          ask(found, ns::Withdraw{GroupId{group}}, answer, "withdraw the service",
+              gimnet::to_string(GroupId{group}), deadline);
+      if (status == NIF_OK || status == NIF_NOT_FOUND)
+        found.declarations().remove_service(GroupId{group});
       return status;
     });
   });
@@ -208,17 +225,20 @@ nif_status nif_withdraw_service(nif_node* node, const char* name, int32_t timeou
     if (const nif_status status = check_name(name, "withdraw"); status != NIF_OK) return status;
     const std::optional<GroupId> group = found.declarations().end_service(name);
     if (!group)
-      return fail(NIF_NOT_FOUND, "cannot withdraw '" + std::string(name) + "': this node has no such service");
+      return fail(NIF_NOT_FOUND,
+                  "cannot withdraw '" + std::string(name) + "': this node has no such service");
     if (*group == GroupId{}) return NIF_OK;
     ns::WithdrawAnswer answer;
-    const nif_status status = ask(found, ns::Withdraw{*group}, answer, "withdraw", name, deadline_after(timeout_ms));
+    const nif_status status =
+        ask(found, ns::Withdraw{*group}, answer, "withdraw", name, deadline_after(timeout_ms));
     if (status != NIF_OK && status != NIF_NOT_FOUND) return status;
     found.declarations().finish_service(name, *group);
     return NIF_OK;
   });
 }
 
-nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription, int32_t timeout_ms) {
+nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription,
+                         int32_t timeout_ms) {
   return nif_subscribe_paced(node, full_name, nullptr, subscription, timeout_ms);
 }
 
@@ -236,7 +256,8 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     if (pace != nullptr) {
       if (auto failure = read_struct(pace, whole, "subscribe", "nif_pace")) return fail(*failure);
     }
-    if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK) return status;
+    if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK)
+      return status;
     ns::Subscribe request{full_name};
     if (pace != nullptr) {
       request.window = pace->window;
@@ -271,34 +292,38 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
 
 nif_status nif_unsubscribe(nif_node* node, const char* full_name, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (const nif_status status = check_name(full_name, "unsubscribe"); status != NIF_OK) return status;
+    if (const nif_status status = check_name(full_name, "unsubscribe"); status != NIF_OK)
+      return status;
     ns::UnsubscribeAnswer answer;
     const Deadline deadline = deadline_after(timeout_ms);
     // A reconnect declares by what is entered, so that this needs to be asked once only.
     const bool ended = found.declarations().end_subscription(full_name);
-    const nif_status status = ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline);
-    if (status == NIF_OK || status == NIF_NOT_FOUND) found.declarations().finish_subscription(full_name);
+    const nif_status status =
+        ask(found, ns::Unsubscribe{full_name}, answer, "unsubscribe", full_name, deadline);
+    if (status == NIF_OK || status == NIF_NOT_FOUND)
+      found.declarations().finish_subscription(full_name);
     // The library may have told the hub before.
     return status == NIF_NOT_FOUND && ended ? NIF_OK : status;
   });
 }
 
-nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content, size_t size,
-                       nif_reply** reply, int32_t timeout_ms) {
+nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const void* content,
+                       size_t size, nif_reply** reply, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     if (reply == nullptr || (content == nullptr && size > 0)) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: reply or content is NULL");
     }
     *reply = nullptr;
-    if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit || size > NIF_REQUEST_BYTES_MAX) {
+    if ((kind != NIF_NS && kind != NIF_CTRL) || operation >= proto::kAnswerBit ||
+        size > NIF_REQUEST_BYTES_MAX) {
       return fail(NIF_BAD_ARGUMENT, "cannot ask: kind, operation or size is out of range");
     }
     proto::Payload request(proto::kControlHeaderSize + size);
     gimnet::store_le(request.data(), operation);
     if (size > 0) std::memcpy(request.data() + proto::kControlHeaderSize, content, size);
     auto owned = std::make_unique<OwnedReply>();
-    const nif_status status =
-        found.requests().ask(static_cast<proto::Kind>(kind), request, owned->payload, deadline_after(timeout_ms));
+    const nif_status status = found.requests().ask(static_cast<proto::Kind>(kind), request,
+                                                   owned->payload, deadline_after(timeout_ms));
     if (status != NIF_OK) return status;
     const auto body = std::span<const std::byte>(owned->payload).subspan(proto::kControlHeaderSize);
     const proto::Refusal refusal = proto::read_status(body);
@@ -314,7 +339,8 @@ nif_status nif_request(nif_node* node, uint8_t kind, uint16_t operation, const v
 
 void nif_free_reply(nif_reply* reply) { delete static_cast<OwnedReply*>(reply); }
 
-nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns, int32_t timeout_ms) {
+nif_status nif_ping_hub(nif_node* node, int64_t* round_trip_ns, int64_t* clock_offset_ns,
+                        int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     gimnet::nif::HubClock::Measurement measured;
     const nif_status status = found.ping_hub(measured, deadline_after(timeout_ms));

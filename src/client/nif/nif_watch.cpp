@@ -21,14 +21,16 @@ using gimnet::nif::with_waiting_node;
 
 extern "C" {
 
-nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional, int32_t timeout_ms) {
+nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional,
+                        int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
-    if (const nif_status status = check_name(name, "take the name", gimnet::proto::node_name_fault); status != NIF_OK)
+    if (const nif_status status = check_name(name, "take the name", gimnet::proto::node_name_fault);
+        status != NIF_OK)
       return status;
     ns::RegisterNameAnswer answer;
     found.begin_naming();
-    const nif_status status =
-        ask(found, ns::RegisterName{name}, answer, "take the name", name, deadline_after(timeout_ms));
+    const nif_status status = ask(found, ns::RegisterName{name}, answer, "take the name", name,
+                                  deadline_after(timeout_ms));
     if (status != NIF_OK) return status;
     if (provisional != nullptr) *provisional = answer.provisional ? 1 : 0;
     found.set_name(answer.name, std::move(answer.token));
@@ -39,25 +41,28 @@ nif_status nif_register(nif_node* node, const char* name, uint8_t* provisional, 
 nif_status nif_unregister(nif_node* node, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     ns::UnregisterNameAnswer answer;
-    const nif_status status =
-        ask(found, ns::UnregisterName{}, answer, "give back", "the name", deadline_after(timeout_ms));
+    const nif_status status = ask(found, ns::UnregisterName{}, answer, "give back", "the name",
+                                  deadline_after(timeout_ms));
     if (status == NIF_OK) found.set_name("", std::move(answer.token));
     return status;
   });
 }
 
-nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects, uint32_t* watch, int32_t timeout_ms) {
+nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects, uint32_t* watch,
+                     int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     const bool by_hand = (subjects & NIF_WATCH_BY_HAND) != 0;
     const std::uint32_t set = subjects & ~std::uint32_t{NIF_WATCH_BY_HAND};
     if (watch == nullptr || set < NIF_WATCH_NODES || set > NIF_WATCH_ALL) {
-      return fail(NIF_BAD_ARGUMENT, "cannot watch: watch is NULL, or subjects is not a set of nif_subjects");
+      return fail(NIF_BAD_ARGUMENT,
+                  "cannot watch: watch is NULL, or subjects is not a set of nif_subjects");
     }
     if (const nif_status status = check_pattern(pattern); status != NIF_OK) return status;
     const std::string text = pattern != nullptr ? pattern : "";
     const ns::Watch request = found.watches().add(text, static_cast<std::uint8_t>(set), by_hand);
     ns::WatchAnswer answer;
-    const nif_status status = ask(found, request, answer, "watch", text, deadline_after(timeout_ms));
+    const nif_status status =
+        ask(found, request, answer, "watch", text, deadline_after(timeout_ms));
     if (status != NIF_OK) {
       found.watches().remove(request.watch);
       return status;
@@ -70,7 +75,8 @@ nif_status nif_watch(nif_node* node, const char* pattern, uint32_t subjects, uin
 nif_status nif_watch_again(nif_node* node, uint32_t watch, int32_t timeout_ms) {
   return with_waiting_node(node, [&](Node& found) -> nif_status {
     const ns::Watch request = found.watches().again(watch);
-    if (request.watch == 0) return fail(NIF_NOT_FOUND, "this node has no watch " + std::to_string(watch));
+    if (request.watch == 0)
+      return fail(NIF_NOT_FOUND, "this node has no watch " + std::to_string(watch));
     ns::WatchAnswer answer;
     return ask(found, request, answer, "watch", request.pattern, deadline_after(timeout_ms));
   });
@@ -89,9 +95,10 @@ nif_status nif_unwatch(nif_node* node, uint32_t watch, int32_t timeout_ms) {
       return fail(NIF_NOT_FOUND, "this node has no watch " + std::to_string(watch));
     }
     ns::UnwatchAnswer answer;
-    const nif_status status =
-        ask(found, ns::Unwatch{watch}, answer, "end the watch", std::to_string(watch), deadline_after(timeout_ms));
-    return status == NIF_NOT_FOUND ? NIF_OK : status;  // it ended with a connection and had not begun again
+    const nif_status status = ask(found, ns::Unwatch{watch}, answer, "end the watch",
+                                  std::to_string(watch), deadline_after(timeout_ms));
+    return status == NIF_NOT_FOUND ? NIF_OK
+                                   : status;  // it ended with a connection and had not begun again
   });
 }
 

@@ -10,7 +10,8 @@
 #include "client/nif/handshake.hpp"
 #include "proto/frame/frame_builder.hpp"
 
-// A node as the program's threads see it, and what the receiving half asks of it; its thread is in node_thread.cpp.
+// A node as the program's threads see it, and what the receiving half asks of it; its thread is in
+// node_thread.cpp.
 
 namespace gimnet::nif {
 namespace {
@@ -28,7 +29,8 @@ void copy_text(char* to, std::size_t size, const std::string& text) {
 
 /// Worth another try while the hub may still be starting.
 bool may_come(nif_status status) {
-  return status == NIF_NO_HUB || status == NIF_NO_HOST || status == NIF_HUB_FULL || status == NIF_REFUSED;
+  return status == NIF_NO_HUB || status == NIF_NO_HOST || status == NIF_HUB_FULL ||
+         status == NIF_REFUSED;
 }
 
 }  // namespace
@@ -71,10 +73,12 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
   }
   const Deadline deadline = deadline_after(node->options_.connect_timeout_ms);
   Backoff backoff;
-  const auto token_for = [&node](const std::string& address) { return node->tokens_.find(address); };
+  const auto token_for = [&node](const std::string& address) {
+    return node->tokens_.find(address);
+  };
   for (;;) {
-    auto admitted =
-        admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline, node->stop_, token_for);
+    auto admitted = admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline,
+                          node->stop_, token_for);
     if (admitted) {
       if (!node->take_over(std::move(*admitted), true)) {
         return Failure{NIF_PROTOCOL, "the hub resumes a connection that never was"};
@@ -83,7 +87,8 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
     }
     const bool again = node->options_.wait_for_hub && may_come(admitted.error().status);
     if (!again || steady_now_ns() >= deadline) return admitted.error();
-    static_cast<void>(wait_for(Socket(), false, false, node->stop_, try_again_at(backoff, deadline)));
+    static_cast<void>(
+        wait_for(Socket(), false, false, node->stop_, try_again_at(backoff, deadline)));
   }
   try {
     const SignalsBlocked blocked;
@@ -122,8 +127,8 @@ bool Node::take_over(Admitted admitted, bool first) {
   if (!first) {
     Record* event = make_event(NIF_CONNECTED, session_.earlier_goodbye);
     event->incoming.from = session_.id;
-    event->incoming.flags = static_cast<std::uint8_t>((session_.resumed ? NIF_CONNECTED_RESUMED : 0) |
-                                                      (same_id ? NIF_CONNECTED_SAME_ID : 0));
+    event->incoming.flags = static_cast<std::uint8_t>(
+        (session_.resumed ? NIF_CONNECTED_RESUMED : 0) | (same_id ? NIF_CONNECTED_SAME_ID : 0));
     push_event(event);
   }
   if (*let_go > 0) {
@@ -177,8 +182,10 @@ bool Node::on_flow(const proto::flow::Message& message) {
 }
 
 std::vector<Item> Node::on_answer(proto::Kind kind, const proto::ControlView& answer) {
-  if (kind == proto::Kind::ns && answer.header.operation == proto::ns::SubscribeAnswer::kOperation) {
-    // Before the first message behind it, which the program may take before it has seen this answer.
+  if (kind == proto::Kind::ns &&
+      answer.header.operation == proto::ns::SubscribeAnswer::kOperation) {
+    // Before the first message behind it, which the program may take before it has seen this
+    // answer.
     proto::Payload payload(proto::kControlHeaderSize);
     store_le(payload.data(), answer.header.operation);
     payload.insert(payload.end(), answer.body.begin(), answer.body.end());
@@ -198,7 +205,9 @@ bool Node::on_service_moved(const proto::ns::ServiceMoved& event) {
   return true;
 }
 
-bool Node::on_watch_events(const proto::ns::WatchEvents& events) { return watches_.on_events(events); }
+bool Node::on_watch_events(const proto::ns::WatchEvents& events) {
+  return watches_.on_events(events);
+}
 
 void Node::on_name_decided(const std::string& name, bool lost) {
   if (!lost) return;
@@ -235,16 +244,20 @@ void Node::take_new_name() {
     session_.token = std::move(new_name_->token);
     new_name_.reset();
   }
-  // The token is for the new name: a program that is started again under the former one could not use it.
+  // The token is for the new name: a program that is started again under the former one could not
+  // use it.
   tokens_.rename(name_);
   keep_token();
   declarations_.declare_again(false);  // services have other groups then, which tells
 }
 
-void Node::on_taken(std::uint32_t from, const proto::Taken& taken) { outbound_.on_taken(from, taken); }
+void Node::on_taken(std::uint32_t from, const proto::Taken& taken) {
+  outbound_.on_taken(from, taken);
+}
 
 bool Node::on_report(const proto::Report& report) {
-  if (report.reason == proto::DropReason::no_such_node || report.reason == proto::DropReason::renumbered) {
+  if (report.reason == proto::DropReason::no_such_node ||
+      report.reason == proto::DropReason::renumbered) {
     names_.forget(report.header.dst);
   }
   return outbound_.on_report(report);
@@ -313,14 +326,16 @@ nif_status Node::ping_hub(HubClock::Measurement& measured, Deadline deadline) {
   const nif_status status = outbound_.wait_connected(deadline);
   if (status != NIF_OK) return status;
   const proto::flow::Ping ping = clock_.ping(steady_now_ns(), wall_now_ns());
-  if (!outbound_.post(ping)) return fail(NIF_NOT_CONNECTED, "the connection broke while the hub was pinged");
+  if (!outbound_.post(ping))
+    return fail(NIF_NOT_CONNECTED, "the connection broke while the hub was pinged");
   const auto answer = clock_.wait_for(ping.sequence, deadline);
   if (answer) {
     measured = *answer;
     return NIF_OK;
   }
   if (closing_.load()) return fail(NIF_CLOSED, "the handle was closed");
-  if (deadline != kNever && steady_now_ns() >= deadline) return fail(NIF_TIMEOUT, "the hub did not answer in time");
+  if (deadline != kNever && steady_now_ns() >= deadline)
+    return fail(NIF_TIMEOUT, "the hub did not answer in time");
   return fail(NIF_NOT_CONNECTED, "the connection broke while the hub was pinged");
 }
 

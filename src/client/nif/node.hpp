@@ -43,14 +43,17 @@ class Node final : private InboundHost {
   [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] NameCache& names() { return names_; }
   [[nodiscard]] CreditBook& credits() { return credits_; }
-  /// The hub registered this node under another name, "" for none. The library's thread declares the services anew.
-  /// Not if the hub has taken that name back since begin_naming(), of which the library's thread may hear first.
+  /// The hub registered this node under another name, "" for none. The library's thread declares
+  /// the services anew. Not if the hub has taken that name back since begin_naming(), of which the
+  /// library's thread may hear first.
   void set_name(const std::string& name, std::vector<std::byte> token) GIMNET_EXCLUDES(mutex_);
   /// Before the hub is asked for a name.
   void begin_naming() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] const Options& options() const { return options_; }
 
-  [[nodiscard]] std::uint32_t id() const { return id_.load(std::memory_order_relaxed); }  // a number by itself
+  [[nodiscard]] std::uint32_t id() const {
+    return id_.load(std::memory_order_relaxed);  // a number by itself
+  }
   [[nodiscard]] nif_info info() GIMNET_EXCLUDES(mutex_);
   /// How often it has connected anew. Grows before anything is declared on the new connection.
   [[nodiscard]] std::uint32_t reconnects() GIMNET_EXCLUDES(mutex_);
@@ -66,8 +69,8 @@ class Node final : private InboundHost {
   void begin_close();
   /// Writes what waits, says GOODBYE, ends the thread. REQUIRES: begin_close() was called.
   void close();
-  /// In a child after fork(), where the thread is not: closes the descriptor. The rest has to be left alone, since any
-  /// lock may be held by a thread that does not exist.
+  /// In a child after fork(), where the thread is not: closes the descriptor. The rest has to be
+  /// left alone, since any lock may be held by a thread that does not exist.
   void abandon();
 
  private:
@@ -75,16 +78,22 @@ class Node final : private InboundHost {
 
   // InboundHost, on the library's thread.
   [[nodiscard]] bool on_flow(const proto::flow::Message& message) override;
-  [[nodiscard]] std::vector<Item> on_answer(proto::Kind kind, const proto::ControlView& answer) override;
+  [[nodiscard]] std::vector<Item> on_answer(proto::Kind kind,
+                                            const proto::ControlView& answer) override;
   bool on_service_moved(const proto::ns::ServiceMoved& event) override;
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents& events) override;
   void on_name_decided(const std::string& name, bool lost) override;
   void on_taken(std::uint32_t from, const proto::Taken& taken) override;
   bool on_report(const proto::Report& report) override;
-  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) override;
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(
+      const proto::Report& report) override;
   void send_taken(std::uint32_t to, const proto::Taken& taken) override;
-  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return credits_.epoch_for(group); }
-  void on_message_lost(std::uint32_t group) override { credits_.take(group, epoch_for(group), 1, false); }
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override {
+    return credits_.epoch_for(group);
+  }
+  void on_message_lost(std::uint32_t group) override {
+    credits_.take(group, epoch_for(group), 1, false);
+  }
   void deliver(std::span<const Item> items) override;
 
   // The library's thread, node_thread.cpp.
@@ -100,9 +109,11 @@ class Node final : private InboundHost {
   void redial();
   void disconnect(std::string why, proto::GoodbyeCode code);
   void on_goodbye(const proto::Goodbye& goodbye);
-  [[nodiscard]] std::optional<Failure> ending_of(const std::string& why, proto::GoodbyeCode code) const;
+  [[nodiscard]] std::optional<Failure> ending_of(const std::string& why,
+                                                 proto::GoodbyeCode code) const;
   void set_disconnected(const std::string& why, bool for_good) GIMNET_EXCLUDES(mutex_);
-  void end(const Failure& failure, std::string why, proto::GoodbyeCode code) GIMNET_EXCLUDES(mutex_);
+  void end(const Failure& failure, std::string why, proto::GoodbyeCode code)
+      GIMNET_EXCLUDES(mutex_);
   void leave();
 
   [[nodiscard]] proto::Hello hello() const;
@@ -137,8 +148,9 @@ class Node final : private InboundHost {
     std::string name;
     std::vector<std::byte> token;
   };
-  std::optional<NewName> new_name_ GIMNET_GUARDED_BY(mutex_);  ///< given while connected, not seen to yet
-  std::string lost_name_ GIMNET_GUARDED_BY(mutex_);            ///< since begin_naming()
+  std::optional<NewName> new_name_
+      GIMNET_GUARDED_BY(mutex_);                     ///< given while connected, not seen to yet
+  std::string lost_name_ GIMNET_GUARDED_BY(mutex_);  ///< since begin_naming()
   Inbound::Counts inbound_counts_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t bytes_received_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t read_calls_ GIMNET_GUARDED_BY(mutex_) = 0;
@@ -148,9 +160,10 @@ class Node final : private InboundHost {
   TokenStore tokens_;
   Socket socket_;
   Session session_;
-  std::vector<std::byte> behind_welcome_;  ///< came in one read with it, and is the first that is taken
-  std::string address_;                    ///< of the hub that admitted it last, as a URL
-  std::string name_;                       ///< to ask for
+  std::vector<std::byte>
+      behind_welcome_;   ///< came in one read with it, and is the first that is taken
+  std::string address_;  ///< of the hub that admitted it last, as a URL
+  std::string name_;     ///< to ask for
   Backoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;
@@ -158,9 +171,10 @@ class Node final : private InboundHost {
   std::int64_t last_tick_ns_ = 0;
   bool was_reading_ = true;
   bool ended_ = false;
-  std::array<Item, 64> in_hand_;  ///< taken out of the receive queue under one lock, for the callback
-  bool held_ = false;             ///< the callback said NIF_NOT_NOW ...
-  std::uint32_t held_at_ = 0;     ///< ... after so many deliver_again()
+  std::array<Item, 64>
+      in_hand_;                ///< taken out of the receive queue under one lock, for the callback
+  bool held_ = false;          ///< the callback said NIF_NOT_NOW ...
+  std::uint32_t held_at_ = 0;  ///< ... after so many deliver_again()
 };
 
 }  // namespace gimnet::nif

@@ -7,7 +7,8 @@
 #include "client/nif/handshake.hpp"
 #include "client/nif/node.hpp"
 
-// The library's thread: reads, keeps alive, writes what senders left to it, calls back, dials again.
+// The library's thread: reads, keeps alive, writes what senders left to it, calls back, dials
+// again.
 
 namespace gimnet::nif {
 namespace {
@@ -157,9 +158,11 @@ void Node::on_timers(std::int64_t now, bool reading) {
   const bool due = now - wants.last_write_ns >= session_.keep_alive_ns;
   if (!due && now - last_tick_ns_ < session_.keep_alive_ns) return;
   last_tick_ns_ = now;
-  backoff_.reset();  // only now: a hub that admits and closes at once must not be dialed in a tight loop
+  backoff_.reset();  // only now: a hub that admits and closes at once must not be dialed in a tight
+                     // loop
   confirm();
-  // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not pile up.
+  // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not
+  // pile up.
   if (due && !wants.writable) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
   static_cast<void>(outbound_.flush());
 }
@@ -171,7 +174,8 @@ void Node::call_back() {
   held_ = false;
   std::size_t count = closing_.load() ? 0 : received_.take(in_hand_);
   if (count == 0) return;
-  const InCallbacks in_callbacks(outbound_);  // for all of them: between two batches nothing is written
+  const InCallbacks in_callbacks(
+      outbound_);  // for all of them: between two batches nothing is written
   while (count > 0) {
     const std::span<const Item> taken(in_hand_.data(), count);
     received_.give_back(taken.subspan(call_back_with(taken)));
@@ -180,7 +184,8 @@ void Node::call_back() {
   }
 }
 
-/// Returns how many the program took; fewer than there are if it has no room (`held_`), or the node closes.
+/// Returns how many the program took; fewer than there are if it has no room (`held_`), or the node
+/// closes.
 std::size_t Node::call_back_with(std::span<const Item> items) {
   std::size_t taken = 0;
   while (taken < items.size() && !closing_.load()) {
@@ -210,7 +215,8 @@ void Node::redial() {
   }
   if (closing_.load()) return;
   take_new_name();
-  auto admitted = admit(options_.endpoints, options_.socket, hello(), steady_now_ns() + kRedialNs, stop_);
+  auto admitted =
+      admit(options_.endpoints, options_.socket, hello(), steady_now_ns() + kRedialNs, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);
@@ -234,7 +240,8 @@ void Node::on_goodbye(const proto::Goodbye& goodbye) {
   disconnect(std::move(why), goodbye.code);
 }
 
-/// What calls answer where no connection follows one that ended so; nothing: the library dials again.
+/// What calls answer where no connection follows one that ended so; nothing: the library dials
+/// again.
 std::optional<Failure> Node::ending_of(const std::string& why, proto::GoodbyeCode code) const {
   switch (code) {
     case proto::GoodbyeCode::replaced:
@@ -293,8 +300,8 @@ void Node::end(const Failure& failure, std::string why, proto::GoodbyeCode code)
   received_.end(failure);
 }
 
-/// The last words: what waits, then GOODBYE, and then nothing is sent, but what the hub still says is read, so that
-/// closing does not throw away what is on its way to it.
+/// The last words: what waits, then GOODBYE, and then nothing is sent, but what the hub still says
+/// is read, so that closing does not throw away what is on its way to it.
 void Node::leave() {
   if (!socket_.open()) return;
   const Deadline deadline = steady_now_ns() + kLeaveNs;

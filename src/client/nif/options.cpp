@@ -23,8 +23,10 @@ std::optional<Failure> read_identity(const nif_options& given, Options& options)
     return Failure{NIF_BAD_NAME, "cannot connect as '" + options.name + "': " + std::string(fault)};
   }
   if (given.resume > NIF_RESUME_ON) return bad("resume is not a nif_resume");
-  options.resume = given.resume == NIF_RESUME_ON || (given.resume == NIF_RESUME_DEFAULT && !options.name.empty());
-  if (given.shard_plus_one > 0) options.shard = static_cast<std::uint16_t>(given.shard_plus_one - 1);
+  options.resume = given.resume == NIF_RESUME_ON ||
+                   (given.resume == NIF_RESUME_DEFAULT && !options.name.empty());
+  if (given.shard_plus_one > 0)
+    options.shard = static_cast<std::uint16_t>(given.shard_plus_one - 1);
   return std::nullopt;
 }
 
@@ -36,12 +38,13 @@ std::optional<Failure> read_limits(const nif_options& given, Options& options) {
   }
   if (given.last_message_bytes != 0) options.last_message_bytes = given.last_message_bytes;
   if (given.receive_queue_bytes != 0) options.receive_queue_bytes = given.receive_queue_bytes;
-  if (given.message_bytes_max > NIF_MESSAGE_BYTES_MAX) return bad("message_bytes_max is over 1 GiB");
+  if (given.message_bytes_max > NIF_MESSAGE_BYTES_MAX)
+    return bad("message_bytes_max is over 1 GiB");
   if (given.message_bytes_max != 0) {
     options.reassembly.message_bytes_max = static_cast<std::uint32_t>(given.message_bytes_max);
   }
-  options.reassembly.waiting_bytes_max =
-      std::max<std::uint64_t>(options.reassembly.waiting_bytes_max, options.reassembly.message_bytes_max);
+  options.reassembly.waiting_bytes_max = std::max<std::uint64_t>(
+      options.reassembly.waiting_bytes_max, options.reassembly.message_bytes_max);
   if (given.reassembly_bytes != 0) options.reassembly.waiting_bytes_max = given.reassembly_bytes;
   if (options.reassembly.waiting_bytes_max < options.reassembly.message_bytes_max) {
     return bad("reassembly_bytes is smaller than message_bytes_max");
@@ -60,7 +63,8 @@ Result<Options, Failure> read_options(const nif_options* options) {
   nif_options given{};
   if (options == nullptr) options = &given;
   if (options != &given) {
-    if (auto failure = read_struct(options, given, "connect", "nif_options")) return std::move(*failure);
+    if (auto failure = read_struct(options, given, "connect", "nif_options"))
+      return std::move(*failure);
     given = *options;
   }
   Options checked;

@@ -32,7 +32,8 @@ struct Options {
   SendQueue::Limits send;
   std::size_t last_message_bytes = LastMessages::kMessageBytesDefault;
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;
-  proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20};
+  proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20,
+                                     .waiting_bytes_max = 64u << 20};
   SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
   nif_callback callback = nullptr;
   void* user = nullptr;

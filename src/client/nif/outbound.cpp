@@ -10,7 +10,8 @@
 namespace gimnet::nif {
 namespace {
 
-/// After so many writes in a row a sender leaves the rest to the library's thread: its own message went long ago.
+/// After so many writes in a row a sender leaves the rest to the library's thread: its own message
+/// went long ago.
 constexpr int kWriteRoundsMax = 8;
 
 }  // namespace
@@ -64,7 +65,8 @@ bool Outbound::write_gathered() {
   return false;
 }
 
-/// Also where nothing was written: detach() waits for the writer, and drain() does where the queue is empty already.
+/// Also where nothing was written: detach() waits for the writer, and drain() does where the queue
+/// is empty already.
 void Outbound::end_writing() {
   writing_ = false;
   notify_waiting();
@@ -76,11 +78,13 @@ void Outbound::write_rounds(bool by_library) {
   const int rounds_max = by_library && gather_burst() ? 1 : kWriteRoundsMax;
   int rounds = 0;
   // While the library's thread is in a callback nobody else would write the rest.
-  while ((rounds < rounds_max || in_callbacks_) && state_ == State::connected && write_once()) ++rounds;
+  while ((rounds < rounds_max || in_callbacks_) && state_ == State::connected && write_once())
+    ++rounds;
   end_writing();
   last_write_ns_ = steady_now_ns();
   const bool more = rounds >= rounds_max && !queue_.all_written();
-  // The library's thread sees for itself that the kernel is full: waking it would only make it try again at once.
+  // The library's thread sees for itself that the kernel is full: waking it would only make it try
+  // again at once.
   if (more || (!by_library && (full_ || broken_))) wake_library();
 }
 
@@ -96,7 +100,8 @@ void Outbound::begin_callbacks() {
   const MutexLock lock(mutex_);
   in_callbacks_ = true;
   // Not gathered, since what is left behind one write would wait for the program.
-  if (wake_raised_ && state_ == State::connected && !writing_ && !full_ && !broken_) write_rounds(false);
+  if (wake_raised_ && state_ == State::connected && !writing_ && !full_ && !broken_)
+    write_rounds(false);
 }
 
 void Outbound::end_callbacks() {
@@ -127,7 +132,8 @@ bool Outbound::put_flow(const proto::flow::Message& message) {
 
 bool Outbound::post(std::span<const std::byte> frame) {
   const MutexLock lock(mutex_);
-  if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame)) return false;
+  if (state_ != State::connected || !put_frame(queue_.append_control(frame.size()), frame))
+    return false;
   count_appended(kBurstBytes);  // before all messages: what gathers does not wait for more
   write_or_leave(false);
   return true;
@@ -141,7 +147,8 @@ bool Outbound::post(const proto::flow::Message& message) {
 
 bool Outbound::post_data(std::span<const std::byte> frame, std::uint8_t lane) {
   const MutexLock lock(mutex_);
-  if (state_ != State::connected || !put_frame(queue_.append(lane, frame.size()), frame)) return false;
+  if (state_ != State::connected || !put_frame(queue_.append(lane, frame.size()), frame))
+    return false;
   count_appended(kBurstBytes);
   write_or_leave(false);
   return true;
@@ -157,12 +164,15 @@ void Outbound::forget_retained(const std::string& service) {
   last_.forget(service);
 }
 
-bool Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset) {
+bool Outbound::put_piece(const LastMessage& last, const proto::FrameParts& parts,
+                         std::uint32_t offset) {
   const proto::FrameHeader& header = parts.header;
   const std::size_t bytes = proto::prefix_size(parts) + parts.payload_size;
-  const bool replaceable = header.policy() == proto::Policy::latest && last.payload.size() <= proto::kUncutMessageMax;
-  const auto memory = replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, parts.key))
-                                  : queue_.append(header.lane, bytes);
+  const bool replaceable =
+      header.policy() == proto::Policy::latest && last.payload.size() <= proto::kUncutMessageMax;
+  const auto memory =
+      replaceable ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, parts.key))
+                  : queue_.append(header.lane, bytes);
   if (memory.empty()) return false;
   const std::size_t prefix = proto::write_prefix(parts, memory);
   std::copy_n(last.payload.data() + offset, parts.payload_size, memory.data() + prefix);
@@ -177,17 +187,21 @@ void Outbound::send_last_again(const std::string& service) {
   proto::FrameParts parts = last->parts();
   const proto::FrameHeader& header = parts.header;
   const auto newer = in_progress_.find(stream_code(header.kind, header.lane, header.dst));
-  if (newer != in_progress_.end() && newer->second->number != 0 && newer->second->epoch == epochs_) {
+  if (newer != in_progress_.end() && newer->second->number != 0 &&
+      newer->second->epoch == epochs_) {
     return;  // it goes on, and is about to be the last one
   }
   parts.header.src = id_;
-  parts.header.flags &= static_cast<std::uint8_t>(~proto::kFlagReport);  // it was asked for at its first sending
+  parts.header.flags &=
+      static_cast<std::uint8_t>(~proto::kFlagReport);  // it was asked for at its first sending
   const auto total = static_cast<std::uint32_t>(last->payload.size());
   std::uint32_t piece_max = proto::kUncutMessageMax;
-  if (proto::needs_fragment_header(total)) parts.fragment = proto::FragmentHeader{next_message_++, 0, total};
+  if (proto::needs_fragment_header(total))
+    parts.fragment = proto::FragmentHeader{next_message_++, 0, total};
   if (total > proto::kUncutMessageMax) {
     const std::size_t prefix = proto::prefix_size(parts) - proto::kHeaderSize;
-    piece_max = static_cast<std::uint32_t>(std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
+    piece_max = static_cast<std::uint32_t>(
+        std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
   }
   std::uint32_t offset = 0;
   do {
@@ -288,7 +302,8 @@ bool Outbound::on_report(const proto::Report& report) {
     InProgress& progress = *found->second;
     // Why the rest of a message goes is what became of its beginning.
     const bool rest = report.reason == proto::DropReason::cut_message;
-    if (!rest || progress.undelivered == proto::DropReason::none) progress.undelivered = report.reason;
+    if (!rest || progress.undelivered == proto::DropReason::none)
+      progress.undelivered = report.reason;
     notify_waiting();
   }
   return !reports_wanted_;

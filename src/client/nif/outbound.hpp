@@ -26,13 +26,16 @@
 
 namespace gimnet::nif {
 
-/// The sending half of a node: any thread puts messages in, whoever finds the socket idle writes what is there.
+/// The sending half of a node: any thread puts messages in, whoever finds the socket idle writes
+/// what is there.
 ///
-/// A message is copied into the send queue; then its thread becomes the writer, unless another one is (which takes the
-/// message along), the kernel is full, or messages come so fast one after another that writing is left to the library's
-/// thread, which gathers them. One small message on an idle connection is one system call in the caller's thread.
+/// A message is copied into the send queue; then its thread becomes the writer, unless another one
+/// is (which takes the message along), the kernel is full, or messages come so fast one after
+/// another that writing is left to the library's thread, which gathers them. One small message on
+/// an idle connection is one system call in the caller's thread.
 ///
-/// Thread safety: send, flush, drain, post and the counters from any thread; the rest from the library's thread.
+/// Thread safety: send, flush, drain, post and the counters from any thread; the rest from the
+/// library's thread.
 class Outbound {
  public:
   /// `wake` rouses the library's thread, which then calls write_pending().
@@ -44,14 +47,14 @@ class Outbound {
   [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status flush() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] nif_status drain(Deadline deadline) GIMNET_EXCLUDES(mutex_);
-  /// A frame of the connection itself (FLOW, LINK, NS, CTRL), before all messages. The source is filled in here, where
-  /// it cannot change on the way. False: not connected, or no memory.
+  /// A frame of the connection itself (FLOW, LINK, NS, CTRL), before all messages. The source is
+  /// filled in here, where it cannot change on the way. False: not connected, or no memory.
   bool post(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
   bool post(const proto::flow::Message& message) GIMNET_EXCLUDES(mutex_);
   /// A frame of a data kind that the library sends by itself; it does not wait for room.
   bool post_data(std::span<const std::byte> frame, std::uint8_t lane) GIMNET_EXCLUDES(mutex_);
-  /// The own service of that name is retained and has this group now (0: none): its last message is kept, see
-  /// LastMessages.
+  /// The own service of that name is retained and has this group now (0: none): its last message is
+  /// kept, see LastMessages.
   void follow_retained(const std::string& service, std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   void forget_retained(const std::string& service) GIMNET_EXCLUDES(mutex_);
   /// Waits until connected. NIF_OK, or why it will not be.
@@ -61,20 +64,24 @@ class Outbound {
   [[nodiscard]] std::uint32_t waiting() GIMNET_EXCLUDES(mutex_);
 
   // The library's thread.
-  /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is impossible, and it is not
-  /// attached. May throw std::bad_alloc, as may move_group(): then detach() must follow.
-  [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session) GIMNET_EXCLUDES(mutex_);
-  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket any more. After
-  /// Wants::no_memory nothing is kept for the next one.
+  /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is
+  /// impossible, and it is not attached. May throw std::bad_alloc, as may move_group(): then
+  /// detach() must follow.
+  [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session)
+      GIMNET_EXCLUDES(mutex_);
+  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket
+  /// any more. After Wants::no_memory nothing is kept for the next one.
   void detach(bool again) GIMNET_EXCLUDES(mutex_);
   /// No connection will come any more: what waits answers with this.
   void end(const Failure& failure) GIMNET_EXCLUDES(mutex_);
-  /// Writes what waits, as far as the kernel takes it. `writable`: it has room again after it was full.
+  /// Writes what waits, as far as the kernel takes it. `writable`: it has room again after it was
+  /// full.
   void write_pending(bool writable) GIMNET_EXCLUDES(mutex_);
-  /// The handle closes: what waits, a CONFIRM of the frames `taken` so far (0: none), and then this frame, are the last
-  /// that go out; write_last() sends them on. True: more is left. Without the CONFIRM the hub would count as lost what
-  /// was taken last.
-  void begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye) GIMNET_EXCLUDES(mutex_);
+  /// The handle closes: what waits, a CONFIRM of the frames `taken` so far (0: none), and then this
+  /// frame, are the last that go out; write_last() sends them on. True: more is left. Without the
+  /// CONFIRM the hub would count as lost what was taken last.
+  void begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool write_last() GIMNET_EXCLUDES(mutex_);
   /// What to wait for.
   struct Wants {
@@ -84,18 +91,18 @@ class Outbound {
     std::int64_t last_write_ns = 0;
   };
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
-  /// The program's callback is called from now on, until end_callbacks(): nothing is left to the library's thread
-  /// meanwhile, and what was left to it before is written now.
+  /// The program's callback is called from now on, until end_callbacks(): nothing is left to the
+  /// library's thread meanwhile, and what was left to it before is written now.
   void begin_callbacks() GIMNET_EXCLUDES(mutex_);
   void end_callbacks() GIMNET_EXCLUDES(mutex_);
-  /// Sends the last message of a retained service, of which the hub may know nothing, behind what waits in its lane,
-  /// unless a newer one goes on that had begun. Does not wait for room.
+  /// Sends the last message of a retained service, of which the hub may know nothing, behind what
+  /// waits in its lane, unless a newer one goes on that had begun. Does not wait for room.
   void send_last_again(const std::string& service) GIMNET_EXCLUDES(mutex_);
-  /// GROUP messages wait until the services are declared again. Returns how many frames that had been accepted before a
-  /// break have no service any more, and are lost.
+  /// GROUP messages wait until the services are declared again. Returns how many frames that had
+  /// been accepted before a break have no service any more, and are lost.
   std::uint64_t set_declaring(bool declaring) GIMNET_EXCLUDES(mutex_);
-  /// An own service has another group, or (`now` 0) none: what waits for it goes there, and so does what a program
-  /// still sends to the former one.
+  /// An own service has another group, or (`now` 0) none: what waits for it goes there, and so does
+  /// what a program still sends to the former one.
   void move_group(const GroupMoves::Move& move) GIMNET_EXCLUDES(mutex_);
   /// The own service that has the group ended.
   void forget_group(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
@@ -105,12 +112,13 @@ class Outbound {
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
   void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
-  /// True: the program never asked for reports, or this is about a question of the library alone. The library asks for
-  /// reports of every message of more than a window, and some come when it is sent. Once the program does, it gets all:
-  /// a hub merges them, whatever they are about.
+  /// True: the program never asked for reports, or this is about a question of the library alone.
+  /// The library asks for reports of every message of more than a window, and some come when it is
+  /// sent. Once the program does, it gets all: a hub merges them, whatever they are about.
   bool on_report(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
   /// How the message with a fragment header began that the report is about, if that is known.
-  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report& report)
+      GIMNET_EXCLUDES(mutex_);
 
  private:
   /// A send that follows the last write, or the send before, within this time is part of a burst.
@@ -131,19 +139,23 @@ class Outbound {
   };
 
   [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_pieces(Outgoing& message, InProgress& progress, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size, const InProgress* own,
-                                         Deadline deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own,
-                                                Deadline deadline) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
+                                         const InProgress* own, Deadline deadline)
+      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
+                                                const InProgress* own, Deadline deadline)
+      GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame)
+      GIMNET_REQUIRES(mutex_);
   /// Queues a FLOW frame; false: no memory.
   [[nodiscard]] bool put_flow(const proto::flow::Message& message) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts, std::uint32_t offset)
-      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts,
+                               std::uint32_t offset) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
@@ -152,8 +164,9 @@ class Outbound {
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
-                               std::uint32_t size, bool report) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
+                               std::uint32_t offset, std::uint32_t size, bool report)
+      GIMNET_REQUIRES(mutex_);
   void write_or_leave(bool more) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool in_burst() GIMNET_REQUIRES(mutex_);
   void count_appended(std::size_t bytes) GIMNET_REQUIRES(mutex_);
@@ -161,7 +174,8 @@ class Outbound {
   void write_rounds(bool by_library) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_once() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_gathered() GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::optional<std::uint64_t> take_up(const Session& session) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::optional<std::uint64_t> take_up(const Session& session)
+      GIMNET_REQUIRES(mutex_);
   void end_writing() GIMNET_REQUIRES(mutex_);
   void wake_library() GIMNET_REQUIRES(mutex_);
   void notify_waiting() GIMNET_REQUIRES(mutex_);
@@ -175,16 +189,21 @@ class Outbound {
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew
-  bool lost_ GIMNET_GUARDED_BY(mutex_) = false;   ///< frames were given up unconfirmed, and drain() has not said so yet
-  bool asked_ GIMNET_GUARDED_BY(mutex_) = false;  ///< drain() asked this hub for a CONFIRM, and none came since
+  bool lost_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< frames were given up unconfirmed, and drain() has not said so yet
+  bool asked_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< drain() asked this hub for a CONFIRM, and none came since
   Socket* socket_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
-  std::vector<std::byte> goodbye_ GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
+  std::vector<std::byte> goodbye_
+      GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
-  std::unordered_map<std::uint64_t, InProgress*> in_progress_ GIMNET_GUARDED_BY(mutex_);  ///< by stream
+  std::unordered_map<std::uint64_t, InProgress*> in_progress_
+      GIMNET_GUARDED_BY(mutex_);  ///< by stream
   std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
-  bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the program sent something with NIF_FLAG_REPORT
+  bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< the program sent something with NIF_FLAG_REPORT
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
@@ -193,7 +212,8 @@ class Outbound {
   bool writing_ GIMNET_GUARDED_BY(mutex_) = false;  ///< somebody is between gather() and commit()
   bool full_ GIMNET_GUARDED_BY(mutex_) = false;     ///< the kernel took less than was offered
   bool broken_ GIMNET_GUARDED_BY(mutex_) = false;
-  bool no_memory_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the queue is not in order: only drop_all() is right
+  bool no_memory_ GIMNET_GUARDED_BY(mutex_) =
+      false;  ///< the queue is not in order: only drop_all() is right
   bool wake_raised_ GIMNET_GUARDED_BY(mutex_) = false;
   bool in_callbacks_ GIMNET_GUARDED_BY(mutex_) = false;  ///< the library's thread cannot write
   std::int64_t last_write_ns_ GIMNET_GUARDED_BY(mutex_) = 0;

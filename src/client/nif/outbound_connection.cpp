@@ -14,7 +14,8 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
     if (!skipped) return std::nullopt;
     missing = *skipped;
     lost_ |= missing > 0;
-    // What was queued under an id that the node does not have any more, which the hub need not remember.
+    // What was queued under an id that the node does not have any more, which the hub need not
+    // remember.
     if (session.id != id_) queue_.set_source(session.id);
   } else {
     lost_ |= queue_.retained_bytes() > 0;
@@ -43,8 +44,10 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
   full_ = false;
   broken_ = false;
   last_write_ns_ = steady_now_ns();
-  if (*missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing})) return std::nullopt;
-  // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes in.
+  if (*missing > 0 && !put_flow(proto::flow::Skip{proto::DropReason::link_lost, *missing}))
+    return std::nullopt;
+  // A handle that is being closed stays closed: whoever waits in it leaves, and nobody else comes
+  // in.
   if (state_ != State::ended) state_ = State::connected;
   changed_.notify_all();
   return missing;
@@ -63,7 +66,8 @@ void Outbound::detach(bool again) {
     no_memory_ = true;
   }
   if (!again || !queue_.resume() || no_memory_) {
-    lost_ |= no_memory_ || !queue_.all_written() || queue_.parked_bytes() > 0 || queue_.retained_bytes() > 0;
+    lost_ |= no_memory_ || !queue_.all_written() || queue_.parked_bytes() > 0 ||
+             queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
     no_memory_ = false;
   }

@@ -21,14 +21,17 @@ constexpr std::int64_t kLookNs = 1'000;
 constexpr std::size_t kHeldBytesMax = 64 * 1024;
 /// After so many quick sends in a row gathering them pays for the wake-up of the library's thread.
 constexpr std::uint32_t kQuickSends = 4;
-/// Of a PING that asks for a CONFIRM; HubClock, which counts from 1, takes its PONG for nothing that it asked.
+/// Of a PING that asks for a CONFIRM; HubClock, which counts from 1, takes its PONG for nothing
+/// that it asked.
 constexpr std::uint32_t kAskSequence = 0;
-/// How long the receiver of a message may leave its window closed before it is asked whether it is still there.
+/// How long the receiver of a message may leave its window closed before it is asked whether it is
+/// still there.
 constexpr std::int64_t kProbeNs = 1'000'000'000;
 
 /// Room for a frame with this payload before its prefix is written.
 std::size_t frame_size(const Outgoing& message, bool fragment, std::uint32_t payload) {
-  return proto::prefix_size(message.parts()) + (fragment ? proto::kFragmentHeaderSize : 0) + payload;
+  return proto::prefix_size(message.parts()) + (fragment ? proto::kFragmentHeaderSize : 0) +
+         payload;
 }
 
 }  // namespace
@@ -41,22 +44,27 @@ bool Outbound::in_burst() {
 
 void Outbound::count_appended(std::size_t bytes) {
   // Partner: gather_burst(), to which any recent value is good enough.
-  appended_bytes_.store(appended_bytes_.load(std::memory_order_relaxed) + bytes, std::memory_order_relaxed);
+  appended_bytes_.store(appended_bytes_.load(std::memory_order_relaxed) + bytes,
+                        std::memory_order_relaxed);
 }
 
-/// The library's thread, woken because of a burst: lets messages gather as long as they come one right after the other,
-/// so that a write takes hundreds of them along. It gives its processor to whoever wants it and does not sleep: when
-/// they stop coming they are written at once. False: there is no burst, or enough of it.
+/// The library's thread, woken because of a burst: lets messages gather as long as they come one
+/// right after the other, so that a write takes hundreds of them along. It gives its processor to
+/// whoever wants it and does not sleep: when they stop coming they are written at once. False:
+/// there is no burst, or enough of it.
 bool Outbound::gather_burst() {
-  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= kBurstBytes || waiting_ > 0) return false;
-  const std::uint64_t enough =
-      appended_bytes_.load(std::memory_order_relaxed) + kBurstBytes - queue_.unsent_bytes();  // see count_appended()
+  if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= kBurstBytes || waiting_ > 0)
+    return false;
+  const std::uint64_t appended =
+      appended_bytes_.load(std::memory_order_relaxed);  // see count_appended()
+  const std::uint64_t enough = appended + kBurstBytes - queue_.unsent_bytes();
   mutex_.unlock();
   std::uint64_t appended = 0;
   const std::int64_t begin = steady_now_ns();
   for (std::int64_t now = begin, last = begin; now - last < kQuickNs && now - begin < kGatherNsMax;
        now = steady_now_ns()) {
-    const std::uint64_t before = std::exchange(appended, appended_bytes_.load(std::memory_order_relaxed));  // the same
+    const std::uint64_t before =
+        std::exchange(appended, appended_bytes_.load(std::memory_order_relaxed));  // the same
     if (appended >= enough) break;
     if (appended != before) last = now;
     std::this_thread::yield();
@@ -72,7 +80,7 @@ void Outbound::write_or_leave(bool more) {
   if (state_ != State::connected || writing_ || broken_) return;
   if (more && queue_.unsent_bytes() < kHeldBytesMax) return;
   if (!in_callbacks_) {
-    if (full_) return;                                        // the library's thread waits for the kernel
+    if (full_) return;  // the library's thread waits for the kernel
     if (wake_raised_ && quick_sends_ == kQuickSends) return;  // it comes, and takes this along
     if (in_burst()) {
       wake_library();
@@ -82,10 +90,11 @@ void Outbound::write_or_leave(bool more) {
   write_rounds(false);
 }
 
-/// Writes in this thread if there is something to write and nobody else does. True: it tried, without the lock, so that
-/// everything may be different now.
+/// Writes in this thread if there is something to write and nobody else does. True: it tried,
+/// without the lock, so that everything may be different now.
 bool Outbound::write_here() {
-  if (state_ != State::connected || writing_ || full_ || broken_ || queue_.all_written()) return false;
+  if (state_ != State::connected || writing_ || full_ || broken_ || queue_.all_written())
+    return false;
   const std::uint64_t before = write_calls_;
   write_rounds(false);
   return write_calls_ != before;
@@ -104,7 +113,8 @@ bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InP
     return false;
   }
   if (declaring_ && message.parts().header.kind == proto::Kind::group) return false;
-  if (message.replaceable() && queue_.would_replace(latest_stream_of(message.parts().header, message.parts().key))) {
+  if (message.replaceable() &&
+      queue_.would_replace(latest_stream_of(message.parts().header, message.parts().key))) {
     return true;
   }
   return queue_.has_room(frame_size);
@@ -113,21 +123,24 @@ bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InP
 /// Why a message that has begun cannot be finished; NIF_OK: it can.
 nif_status Outbound::check_progress(const InProgress& own) const {
   if (own.undelivered != proto::DropReason::none) {
-    return fail(NIF_NOT_DELIVERED, std::string("the hub reported ") + proto::drop_reason_name(own.undelivered) +
+    return fail(NIF_NOT_DELIVERED, std::string("the hub reported ") +
+                                       proto::drop_reason_name(own.undelivered) +
                                        " while the message was being sent");
   }
   if (own.refused && own.window.taken() == 0) {
     return fail(NIF_TOO_LARGE, "the receiver refused the message: it is larger than it takes");
   }
-  if (own.refused) return fail(NIF_NOT_DELIVERED, "the receiver lost a part of the message and gave it up");
+  if (own.refused)
+    return fail(NIF_NOT_DELIVERED, "the receiver lost a part of the message and gave it up");
   if (own.number != 0 && own.epoch != epochs_) {
-    return fail(NIF_NOT_CONNECTED, "the connection broke in the middle of the message; its receiver lost it");
+    return fail(NIF_NOT_CONNECTED,
+                "the connection broke in the middle of the message; its receiver lost it");
   }
   return NIF_OK;
 }
 
-/// A receiver that crashed says nothing more; a TAKEN of no message, which its hub reports if there is nobody to take
-/// it, tells that from one that is slow.
+/// A receiver that crashed says nothing more; a TAKEN of no message, which its hub reports if there
+/// is nobody to take it, tells that from one that is slow.
 void Outbound::probe(const InProgress& own) {
   proto::FrameHeader header;
   header.length = proto::kTakenSize;
@@ -149,33 +162,40 @@ nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size, co
   if (own != nullptr) return wait_until_it_may_go(message, frame_size, own, deadline);
   if (!message.is_group()) return wait_until_it_may_go(message, frame_size, own, deadline);
   moves_.redirect(message);
-  if (!moves_.refuses(message.parts().header.dst) && may_go(message, frame_size, own)) return NIF_OK;
+  if (!moves_.refuses(message.parts().header.dst) && may_go(message, frame_size, own))
+    return NIF_OK;
   const GroupMoves::Turn turn(moves_, message);
   return wait_until_it_may_go(message, frame_size, own, deadline);
 }
 
-nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own,
-                                          Deadline deadline) {
+nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
+                                          const InProgress* own, Deadline deadline) {
   std::int64_t probe_at = 0;
   for (;;) {
-    if (state_ == State::ended || (state_ == State::away && !queue_.resume())) return not_connected();
+    if (state_ == State::ended || (state_ == State::away && !queue_.resume()))
+      return not_connected();
     if (own != nullptr) {
       if (const nif_status status = check_progress(*own); status != NIF_OK) return status;
     }
     const bool settled = state_ == State::connected && !declaring_;
     if (settled && message.is_group() && moves_.refuses(message.parts().header.dst)) {
-      return fail(NIF_REFUSED, "the hub did not take the service again, after a break or another name");
+      return fail(NIF_REFUSED,
+                  "the hub did not take the service again, after a break or another name");
     }
     if (may_go(message, frame_size, own)) return NIF_OK;
-    // What NIF_FLAG_MORE held back, or was left to the library's thread, goes before anybody waits for room.
+    // What NIF_FLAG_MORE held back, or was left to the library's thread, goes before anybody waits
+    // for room.
     if (write_here()) continue;
     const std::int64_t now = steady_now_ns();
     if (now >= deadline) {
-      return fail(NIF_TIMEOUT, own != nullptr && own->number != 0
-                                   ? "no room within the time given; the message had begun, so its receiver lost it"
-                                   : "no room within the time given");
+      return fail(
+          NIF_TIMEOUT,
+          own != nullptr && own->number != 0
+              ? "no room within the time given; the message had begun, so its receiver lost it"
+              : "no room within the time given");
     }
-    const bool stalled = own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
+    const bool stalled =
+        own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;
     if (stalled && now >= probe_at) {
       probe(*own);
@@ -185,17 +205,19 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
   }
 }
 
-nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
-                         std::uint32_t size, bool report) {
+nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
+                         std::uint32_t offset, std::uint32_t size, bool report) {
   const std::size_t bytes = frame_size(message, fragment.has_value(), size);
   const proto::FrameHeader& header = message.parts().header;
-  const auto memory = message.replaceable()
-                          ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
-                          : queue_.append(header.lane, bytes);
+  const auto memory =
+      message.replaceable()
+          ? queue_.append_latest(header.lane, bytes, latest_stream_of(header, message.parts().key))
+          : queue_.append(header.lane, bytes);
   if (memory.empty()) return fail(NIF_NO_MEMORY, "no memory for the message");
   message.write_frame(memory, id_, fragment, offset, size, report);
   // What is urgent ends the gathering.
-  count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes : bytes);
+  count_appended(header.lane == static_cast<std::uint8_t>(proto::Lane::real_time) ? kBurstBytes
+                                                                                  : bytes);
   return NIF_OK;
 }
 
@@ -208,7 +230,8 @@ std::uint32_t Outbound::number_of(Outgoing& message, bool windowed) {
 
 nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   const bool with_header = proto::needs_fragment_header(message.size());
-  const nif_status turn = wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
+  const nif_status turn =
+      wait_for_turn(message, frame_size(message, with_header, message.size()), nullptr, deadline);
   if (turn != NIF_OK) return turn;
   std::optional<proto::FragmentHeader> fragment;
   if (with_header) fragment = proto::FragmentHeader{number_of(message, false), 0, message.size()};
@@ -217,20 +240,23 @@ nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
 
 nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadline deadline) {
   const std::size_t prefix = frame_size(message, true, 0) - proto::kHeaderSize;
-  const auto piece_max =
-      static_cast<std::uint32_t>(std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
+  const auto piece_max = static_cast<std::uint32_t>(
+      std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
   proto::Fragmenter fragmenter(message.size(), piece_max);
   while (!fragmenter.done()) {
-    const nif_status turn = wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
+    const nif_status turn =
+        wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
     if (turn != NIF_OK) return turn;
     if (progress.number == 0) {
       progress.number = number_of(message, progress.windowed);
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }
-    const proto::Piece piece = fragmenter.next(progress.windowed ? progress.window.room() : UINT32_MAX);
+    const proto::Piece piece =
+        fragmenter.next(progress.windowed ? progress.window.room() : UINT32_MAX);
     const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
-    const nif_status put_status = put(message, fragment, piece.offset, piece.size, progress.windowed);
+    const nif_status put_status =
+        put(message, fragment, piece.offset, piece.size, progress.windowed);
     if (put_status != NIF_OK) return put_status;
     if (progress.windowed) progress.window.on_sent(piece.size);
     write_or_leave(!fragmenter.done() || message.more());
@@ -239,19 +265,21 @@ nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadli
 }
 
 nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
-  const nif_status turn = wait_for_turn(message, frame_size(message, true, proto::kFragmentPayload), nullptr, deadline);
+  const nif_status turn =
+      wait_for_turn(message, frame_size(message, true, proto::kFragmentPayload), nullptr, deadline);
   if (turn != NIF_OK) return turn;
-  InProgress progress{
-      .number = 0,
-      .dst = message.parts().header.dst,
-      .windowed = message.parts().header.kind == proto::Kind::unicast && message.size() > proto::kWindowDefault,
-      .window = proto::SendWindow(0, message.size())};
+  InProgress progress{.number = 0,
+                      .dst = message.parts().header.dst,
+                      .windowed = message.parts().header.kind == proto::Kind::unicast &&
+                                  message.size() > proto::kWindowDefault,
+                      .window = proto::SendWindow(0, message.size())};
   in_progress_.emplace(message.stream(), &progress);
   nif_status status = NIF_NO_MEMORY;
   try {
     status = send_pieces(message, progress, deadline);
   } catch (const std::bad_alloc&) {
-    status = fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
+    status =
+        fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
   }
   in_progress_.erase(message.stream());
   notify_waiting();
@@ -262,7 +290,8 @@ nif_status Outbound::send(Outgoing& message, Deadline deadline) {
   const MutexLock lock(mutex_);
   const bool whole = message.size() <= proto::kUncutMessageMax;
   reports_wanted_ |= message.reported();
-  const nif_status status = whole ? send_whole(message, deadline) : send_fragments(message, deadline);
+  const nif_status status =
+      whole ? send_whole(message, deadline) : send_fragments(message, deadline);
   if (status != NIF_OK) return status;
   ++messages_sent_;
   if (message.parts().header.kind == proto::Kind::group && !last_.empty()) last_.keep(message);
@@ -277,10 +306,12 @@ nif_status Outbound::flush() {
   return NIF_OK;
 }
 
-/// The hub says by itself only now and then what it took, but always when it is asked by a PING. True: it was asked.
-/// One question at a time: the answer to an earlier one may be all that is wanted, and if not the next one follows it.
+/// The hub says by itself only now and then what it took, but always when it is asked by a PING.
+/// True: it was asked. One question at a time: the answer to an earlier one may be all that is
+/// wanted, and if not the next one follows it.
 bool Outbound::ask_for_confirm() {
-  if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written()) return false;
+  if (state_ != State::connected || asked_ || writing_ || broken_ || !queue_.all_written())
+    return false;
   asked_ = put_flow(proto::flow::Ping{kAskSequence, wall_now_ns()});
   if (asked_) write_or_leave(false);
   return asked_;
@@ -294,7 +325,8 @@ nif_status Outbound::drain(Deadline deadline) {
     // An empty queue proves nothing once something was thrown out of it.
     if (std::exchange(lost_, false)) {
       return fail(NIF_NOT_CONNECTED,
-                  "the connection was lost before everything was confirmed; some of it may not have arrived");
+                  "the connection was lost before everything was confirmed; some of it may not "
+                  "have arrived");
     }
     const bool nothing_waits = queue_.all_written() && queue_.parked_bytes() == 0 && !writing_;
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;

@@ -53,7 +53,8 @@ std::optional<Failure> Outgoing::read_address(const nif_outgoing& message) {
       return bad("a LIST has 1 to 1,024 recipients");
     }
     if (message.recipients == nullptr) return bad("recipients is NULL");
-    for (std::size_t i = 0; i < message.recipient_count; ++i) recipients_.emplace_back(message.recipients[i]);
+    for (std::size_t i = 0; i < message.recipient_count; ++i)
+      recipients_.emplace_back(message.recipients[i]);
     std::sort(recipients_.begin(), recipients_.end());
     recipients_.erase(std::unique(recipients_.begin(), recipients_.end()), recipients_.end());
     parts_.recipients = recipients_;
@@ -80,7 +81,8 @@ std::optional<Failure> Outgoing::read_payload(const nif_outgoing& message) {
 void Outgoing::read_extensions(const nif_outgoing& message) {
   proto::ExtensionWriter writer(extensions_);
   // 8 TRACE slots and an AGE take 212 bytes: there is room.
-  if (message.age_ms_max != 0) static_cast<void>(writer.add_age({wall_now_ns(), message.age_ms_max}));
+  if (message.age_ms_max != 0)
+    static_cast<void>(writer.add_age({wall_now_ns(), message.age_ms_max}));
   if (message.trace_slots != 0) static_cast<void>(writer.add_trace(message.trace_slots));
   parts_.extensions = writer.written();
 }
@@ -109,8 +111,8 @@ void Outgoing::redirect(std::uint32_t dst) {
 }
 
 bool Outgoing::replaceable() const {
-  return parts_.header.policy() == proto::Policy::latest && parts_.header.kind != proto::Kind::list &&
-         size_ <= proto::kUncutMessageMax;
+  return parts_.header.policy() == proto::Policy::latest &&
+         parts_.header.kind != proto::Kind::list && size_ <= proto::kUncutMessageMax;
 }
 
 /// Pieces are asked for in order, so the search goes on where the last one ended.
@@ -135,8 +137,9 @@ void Outgoing::copy_payload(std::byte* to, std::uint32_t offset, std::uint32_t b
   }
 }
 
-void Outgoing::write_frame(std::span<std::byte> frame, std::uint32_t src, std::optional<proto::FragmentHeader> fragment,
-                           std::uint32_t offset, std::uint32_t piece_size, bool report) {
+void Outgoing::write_frame(std::span<std::byte> frame, std::uint32_t src,
+                           std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
+                           std::uint32_t piece_size, bool report) {
   proto::FrameParts parts = parts_;
   parts.header.src = src;
   parts.fragment = fragment;

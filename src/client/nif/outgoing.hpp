@@ -15,8 +15,8 @@
 
 namespace gimnet::nif {
 
-/// A nif_outgoing that was checked, in the form in which frames are made of it. Refers to the caller's payload.
-/// Thread safety: one thread.
+/// A nif_outgoing that was checked, in the form in which frames are made of it. Refers to the
+/// caller's payload. Thread safety: one thread.
 class Outgoing {
  public:
   /// Errors: NIF_BAD_ARGUMENT, NIF_TOO_LARGE. REQUIRES: `given` and what it points to outlive this.
@@ -36,12 +36,16 @@ class Outgoing {
   [[nodiscard]] bool reported() const { return parts_.header.has(proto::kFlagReport); }
 
   /// Writes one frame with the payload bytes from `offset` on; `frame` has exactly its size.
-  void write_frame(std::span<std::byte> frame, std::uint32_t src, std::optional<proto::FragmentHeader> fragment,
-                   std::uint32_t offset, std::uint32_t piece_size, bool report);
-  /// Writes the key, if there is one, and the first bytes of the payload behind it. REQUIRES: it has as many.
+  void write_frame(std::span<std::byte> frame, std::uint32_t src,
+                   std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
+                   std::uint32_t piece_size, bool report);
+  /// Writes the key, if there is one, and the first bytes of the payload behind it. REQUIRES: it
+  /// has as many.
   void write_start(std::span<std::byte> start);
   /// The whole payload. REQUIRES: `to` has its size.
-  void copy_to(std::span<std::byte> to) { copy_payload(to.data(), 0, static_cast<std::uint32_t>(to.size())); }
+  void copy_to(std::span<std::byte> to) {
+    copy_payload(to.data(), 0, static_cast<std::uint32_t>(to.size()));
+  }
 
  private:
   [[nodiscard]] std::optional<Failure> read_address(const nif_outgoing& message);

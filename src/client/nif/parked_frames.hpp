@@ -10,10 +10,10 @@
 
 namespace gimnet::nif {
 
-/// GROUP frames that wait, after a break without resume, until their services are declared again: before that the hub
-/// knows none of their groups, and afterwards a service may have another one.
-/// Thread safety: guarded by its owner. Limit: what waited in the lanes at the break, and again at each one that
-/// follows before the services are through.
+/// GROUP frames that wait, after a break without resume, until their services are declared again:
+/// before that the hub knows none of their groups, and afterwards a service may have another one.
+/// Thread safety: guarded by its owner. Limit: what waited in the lanes at the break, and again at
+/// each one that follows before the services are through.
 class ParkedFrames {
  public:
   using Runs = std::deque<FrameRun>;  ///< Limit: what waited in the lanes, see above
@@ -21,7 +21,8 @@ class ParkedFrames {
 
   /// Takes the GROUP frames out of the lanes.
   void take_from(Lanes& lanes);
-  /// Those for the group `former` are for `now`, and go back to the front of their lanes. Returns their bytes.
+  /// Those for the group `former` are for `now`, and go back to the front of their lanes. Returns
+  /// their bytes.
   std::size_t give_back(std::uint32_t former, std::uint32_t now, Lanes& lanes);
   void set_source(std::uint32_t src);
   /// Returns how many frames there were.

@@ -10,12 +10,13 @@
 namespace gimnet::nif {
 
 /// Kind, lane and destination: what PAUSE is about, and what keeps its order.
-[[nodiscard]] constexpr std::uint64_t stream_code(proto::Kind kind, std::uint8_t lane, std::uint32_t dst) {
+[[nodiscard]] constexpr std::uint64_t stream_code(proto::Kind kind, std::uint8_t lane,
+                                                  std::uint32_t dst) {
   return (static_cast<std::uint64_t>(kind) << 40) | (static_cast<std::uint64_t>(lane) << 32) | dst;
 }
 
-/// The destinations that the hub has paused. In order, which no choice of destinations can make slow. Thread safety:
-/// guarded by its owner.
+/// The destinations that the hub has paused. In order, which no choice of destinations can make
+/// slow. Thread safety: guarded by its owner.
 class PauseTable {
  public:
   /// A hub that pauses more than this is not obeyed further.
@@ -25,7 +26,9 @@ class PauseTable {
     if (paused_.size() < kPausesMax) paused_.insert(code(target));
   }
   void resume(const proto::flow::Target& target) { paused_.erase(code(target)); }
-  [[nodiscard]] bool is_paused(std::uint64_t stream) const { return !paused_.empty() && paused_.contains(stream); }
+  [[nodiscard]] bool is_paused(std::uint64_t stream) const {
+    return !paused_.empty() && paused_.contains(stream);
+  }
   [[nodiscard]] std::size_t size() const { return paused_.size(); }
   /// A new connection: the hub says again what it wants paused.
   void clear() { paused_.clear(); }

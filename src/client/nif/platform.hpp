@@ -10,8 +10,8 @@
 #include "base/result.hpp"
 #include "client/nif/error.hpp"
 
-// Everything that NIF asks of the operating system, sockets first. platform_linux.cpp implements it; another system
-// needs another such file and nothing else.
+// Everything that NIF asks of the operating system, sockets first. platform_linux.cpp implements
+// it; another system needs another such file and nothing else.
 
 namespace gimnet::nif {
 
@@ -49,7 +49,8 @@ class WakeSignal {
 };
 
 /// A connected stream socket that never blocks. Move-only; closes at destruction.
-/// Thread safety: read, write and shutdown at once from different threads; moving and closing by one owner alone.
+/// Thread safety: read, write and shutdown at once from different threads; moving and closing by
+/// one owner alone.
 class Socket {
  public:
   Socket() = default;
@@ -77,8 +78,8 @@ inline constexpr std::size_t kWritePiecesMax = 64;
 
 /// Connects, trying each address of the host. Gives up at the deadline or when `cancel` is raised.
 /// Errors: NIF_NO_HUB, NIF_NO_HOST, NIF_TIMEOUT, NIF_CLOSED (cancelled), NIF_NO_MEMORY, NIF_SYSTEM.
-[[nodiscard]] Result<Socket, Failure> dial(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
-                                           const WakeSignal& cancel);
+[[nodiscard]] Result<Socket, Failure> dial(const Endpoint& endpoint, const SocketOptions& options,
+                                           Deadline deadline, const WakeSignal& cancel);
 
 struct Ready {
   bool readable = false;  ///< or ended, or failed: read() tells
@@ -86,21 +87,24 @@ struct Ready {
   bool woken = false;
 };
 
-/// Waits until the socket is ready for what is asked, the signal is raised, or the deadline. The socket may be closed
-/// (then only the signal counts).
-[[nodiscard]] Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wake, Deadline deadline);
+/// Waits until the socket is ready for what is asked, the signal is raised, or the deadline. The
+/// socket may be closed (then only the signal counts).
+[[nodiscard]] Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wake,
+                             Deadline deadline);
 
 struct Raised {
   bool one = false;
   bool other = false;
 };
 /// Waits until one of them is raised, or the deadline; maybe less.
-[[nodiscard]] Raised wait_for_either(const WakeSignal& one, const WakeSignal& other, Deadline deadline);
+[[nodiscard]] Raised wait_for_either(const WakeSignal& one, const WakeSignal& other,
+                                     Deadline deadline);
 
 /// "" where it is not set.
 [[nodiscard]] std::string environment(const char* name);
-/// Where this user's hub has its socket: runtime_folder_of_user(). One in the temporary folder, where anybody can make
-/// folders, counts only if it is there, belongs to this user and is closed to others; else "".
+/// Where this user's hub has its socket: runtime_folder_of_user(). One in the temporary folder,
+/// where anybody can make folders, counts only if it is there, belongs to this user and is closed
+/// to others; else "".
 [[nodiscard]] std::string runtime_folder();
 [[nodiscard]] std::size_t unix_path_max();
 

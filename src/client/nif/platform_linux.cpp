@@ -44,12 +44,14 @@ void set_option(Descriptor descriptor, int level, int name, int value) {
 void set_options(Descriptor descriptor, const SocketOptions& options) {
   if (options.receive_bytes != 0)
     set_option(descriptor, SOL_SOCKET, SO_RCVBUF, static_cast<int>(options.receive_bytes));
-  if (options.send_bytes != 0) set_option(descriptor, SOL_SOCKET, SO_SNDBUF, static_cast<int>(options.send_bytes));
+  if (options.send_bytes != 0)
+    set_option(descriptor, SOL_SOCKET, SO_SNDBUF, static_cast<int>(options.send_bytes));
 }
 
 Failure cannot_connect(const Endpoint& endpoint, int error) {
   nif_status status = NIF_NO_HUB;
-  if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS) status = NIF_NO_MEMORY;
+  if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS)
+    status = NIF_NO_MEMORY;
   if (error == EACCES || error == EPERM) status = NIF_SYSTEM;
   std::string remedy = status == NIF_NO_HUB ? "; is the hub running there?" : "";
   if (error == EACCES && endpoint.transport == Endpoint::Transport::unix_socket) {
@@ -76,33 +78,38 @@ Result<Socket, Failure> finish_dial(Socket socket, const Endpoint& endpoint, Dea
   return socket;
 }
 
-Result<Socket, Failure> dial_address(const sockaddr* address, socklen_t address_size, const Endpoint& endpoint,
-                                     const SocketOptions& options, Deadline deadline, const WakeSignal& cancel) {
+Result<Socket, Failure> dial_address(const sockaddr* address, socklen_t address_size,
+                                     const Endpoint& endpoint, const SocketOptions& options,
+                                     Deadline deadline, const WakeSignal& cancel) {
   Socket socket(::socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!socket.open()) return cannot_connect(endpoint, errno);
   set_options(socket.descriptor(), options);
-  if (endpoint.transport == Endpoint::Transport::tcp) set_option(socket.descriptor(), IPPROTO_TCP, TCP_NODELAY, 1);
+  if (endpoint.transport == Endpoint::Transport::tcp)
+    set_option(socket.descriptor(), IPPROTO_TCP, TCP_NODELAY, 1);
   if (::connect(socket.descriptor(), address, address_size) == 0) return socket;
   if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(endpoint, errno);
   return finish_dial(std::move(socket), endpoint, deadline, cancel);
 }
 
-Result<Socket, Failure> dial_unix(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
-                                  const WakeSignal& cancel) {
+Result<Socket, Failure> dial_unix(const Endpoint& endpoint, const SocketOptions& options,
+                                  Deadline deadline, const WakeSignal& cancel) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, endpoint.path.data(), std::min(endpoint.path.size(), unix_path_max()));
-  return dial_address(reinterpret_cast<const sockaddr*>(&address), sizeof address, endpoint, options, deadline, cancel);
+  std::memcpy(address.sun_path, endpoint.path.data(),
+              std::min(endpoint.path.size(), unix_path_max()));
+  return dial_address(reinterpret_cast<const sockaddr*>(&address), sizeof address, endpoint,
+                      options, deadline, cancel);
 }
 
-Result<Socket, Failure> dial_tcp(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
-                                 const WakeSignal& cancel) {
+Result<Socket, Failure> dial_tcp(const Endpoint& endpoint, const SocketOptions& options,
+                                 Deadline deadline, const WakeSignal& cancel) {
   const auto addresses = find_addresses(endpoint, deadline, cancel);
   if (!addresses) return addresses.error();
   Failure last;
   for (const HostAddress& address : *addresses) {
-    auto dialed = dial_address(reinterpret_cast<const sockaddr*>(address.data()),
-                               static_cast<socklen_t>(address.size()), endpoint, options, deadline, cancel);
+    auto dialed =
+        dial_address(reinterpret_cast<const sockaddr*>(address.data()),
+                     static_cast<socklen_t>(address.size()), endpoint, options, deadline, cancel);
     if (dialed || dialed.error().status == NIF_CLOSED) return dialed;
     last = dialed.error();
   }
@@ -149,11 +156,13 @@ IoResult Socket::write(std::span<const std::span<const std::byte>> pieces) {
   constexpr int kFlags = MSG_NOSIGNAL | MSG_DONTWAIT;
   for (;;) {
     // One piece, as of most messages that go by themselves, costs 75 ns less without a vector.
-    const ssize_t written = count == 1 ? ::send(descriptor_, pieces[0].data(), pieces[0].size(), kFlags)
-                                       : ::sendmsg(descriptor_, &message, kFlags);
+    const ssize_t written = count == 1
+                                ? ::send(descriptor_, pieces[0].data(), pieces[0].size(), kFlags)
+                                : ::sendmsg(descriptor_, &message, kFlags);
     if (written >= 0) return {IoResult::State::done, static_cast<std::size_t>(written), 0};
     if (errno == EINTR) continue;
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS) return {IoResult::State::would_block, 0, 0};
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS)
+      return {IoResult::State::would_block, 0, 0};
     return {IoResult::State::failed, 0, errno};
   }
 }
@@ -175,16 +184,20 @@ void Socket::close() {
   if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
 }
 
-Result<Socket, Failure> dial(const Endpoint& endpoint, const SocketOptions& options, Deadline deadline,
-                             const WakeSignal& cancel) {
-  return endpoint.transport == Endpoint::Transport::unix_socket ? dial_unix(endpoint, options, deadline, cancel)
-                                                                : dial_tcp(endpoint, options, deadline, cancel);
+Result<Socket, Failure> dial(const Endpoint& endpoint, const SocketOptions& options,
+                             Deadline deadline, const WakeSignal& cancel) {
+  return endpoint.transport == Endpoint::Transport::unix_socket
+             ? dial_unix(endpoint, options, deadline, cancel)
+             : dial_tcp(endpoint, options, deadline, cancel);
 }
 
-Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wake, Deadline deadline) {
+Ready wait_for(const Socket& socket, bool read, bool write, const WakeSignal& wake,
+               Deadline deadline) {
   const auto events = static_cast<short>((read ? POLLIN : 0) | (write ? POLLOUT : 0));
-  // A negative descriptor is skipped: with nothing asked of the socket even its errors must not end the wait at once.
-  std::array<pollfd, 2> waits{{{wake.descriptor(), POLLIN, 0}, {events != 0 ? socket.descriptor() : -1, events, 0}}};
+  // A negative descriptor is skipped: with nothing asked of the socket even its errors must not end
+  // the wait at once.
+  std::array<pollfd, 2> waits{
+      {{wake.descriptor(), POLLIN, 0}, {events != 0 ? socket.descriptor() : -1, events, 0}}};
   const int count = ::poll(waits.data(), waits.size(), poll_timeout_ms(deadline));
   if (count <= 0) return {};
   Ready ready;
@@ -208,8 +221,8 @@ std::string environment(const char* name) {
 
 std::string runtime_folder() {
   const RuntimeFolder folder = runtime_folder_of_user();
-  // XDG_RUNTIME_DIR is nobody else's already. Its owner may have given the folder in it to a container, in which the
-  // same user has another id.
+  // XDG_RUNTIME_DIR is nobody else's already. Its owner may have given the folder in it to a
+  // container, in which the same user has another id.
   return folder.in_private || is_own_folder(folder.path()) ? folder.path() : "";
 }
 
@@ -229,9 +242,11 @@ SignalsBlocked::~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &saved_->set,
 
 std::uint32_t fork_generation() {
   static std::once_flag once;
-  std::call_once(once,
-                 [] { static_cast<void>(::pthread_atfork(nullptr, nullptr, [] { g_fork_generation.fetch_add(1); })); });
-  return g_fork_generation.load(std::memory_order_relaxed);  // partner: fetch_add in the child, which has one thread
+  std::call_once(once, [] {
+    static_cast<void>(::pthread_atfork(nullptr, nullptr, [] { g_fork_generation.fetch_add(1); }));
+  });
+  return g_fork_generation.load(
+      std::memory_order_relaxed);  // partner: fetch_add in the child, which has one thread
 }
 
 std::string system_error_text(int error) { return std::generic_category().message(error); }

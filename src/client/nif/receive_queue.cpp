@@ -66,7 +66,8 @@ nif_status ReceiveQueue::pop(std::span<nif_incoming> in, std::size_t& count, Dea
       if (deadline != kNever && steady_now_ns() >= deadline) return NIF_TIMEOUT;
       static_cast<void>(filled_.wait_until(mutex_, deadline));
     }
-    while (size < std::min(in.size(), taken.size()) && !items_.empty()) taken[size++] = take_first();
+    while (size < std::min(in.size(), taken.size()) && !items_.empty())
+      taken[size++] = take_first();
     after_removal();
   }
   for (; count < size; ++count) in[count] = incoming_of(taken[count]);

@@ -13,9 +13,9 @@
 
 namespace gimnet::nif {
 
-/// What was received and waits for the program, in order, bounded in bytes. It overwrites nothing: who fills it asks
-/// has_room() before reading more, so it exceeds its limit by at most what one read brings. Thread safety: push() and
-/// has_room() from the library's thread, the rest from any.
+/// What was received and waits for the program, in order, bounded in bytes. It overwrites nothing:
+/// who fills it asks has_room() before reading more, so it exceeds its limit by at most what one
+/// read brings. Thread safety: push() and has_room() from the library's thread, the rest from any.
 class ReceiveQueue {
  public:
   /// `room` is raised when there is room again after has_room() said no.
@@ -24,17 +24,18 @@ class ReceiveQueue {
 
   /// Takes over the items' references.
   void push(std::span<const Item> items) GIMNET_EXCLUDES(mutex_);
-  /// Once it was full there is room only when half of it is free, so that reading does not stop and go with each
-  /// message.
+  /// Once it was full there is room only when half of it is free, so that reading does not stop and
+  /// go with each message.
   [[nodiscard]] bool has_room() GIMNET_EXCLUDES(mutex_);
 
-  /// Waits for the first; NIF_OK and at least one, or NIF_TIMEOUT, NIF_CLOSED, or what end() was given.
+  /// Waits for the first; NIF_OK and at least one, or NIF_TIMEOUT, NIF_CLOSED, or what end() was
+  /// given.
   [[nodiscard]] nif_status pop(std::span<nif_incoming> in, std::size_t& count, Deadline deadline)
       GIMNET_EXCLUDES(mutex_);
 
-  /// For a consumer that may find that it has no room itself: takes out what waits, as far as it fits into `items`;
-  /// returns how many. Then it gives back those that it could not see to, maybe none, which are first again.
-  /// REQUIRES: one consumer, and it does not pop().
+  /// For a consumer that may find that it has no room itself: takes out what waits, as far as it
+  /// fits into `items`; returns how many. Then it gives back those that it could not see to, maybe
+  /// none, which are first again. REQUIRES: one consumer, and it does not pop().
   [[nodiscard]] std::size_t take(std::span<Item> items) GIMNET_EXCLUDES(mutex_);
   void give_back(std::span<const Item> items) GIMNET_EXCLUDES(mutex_);
 
@@ -57,7 +58,8 @@ class ReceiveQueue {
 
   Mutex mutex_;
   Condition filled_;
-  std::deque<Item> items_ GIMNET_GUARDED_BY(mutex_);  ///< Limit: bytes_max_, and what one read brings
+  std::deque<Item> items_
+      GIMNET_GUARDED_BY(mutex_);  ///< Limit: bytes_max_, and what one read brings
   std::size_t bytes_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool stopped_ GIMNET_GUARDED_BY(mutex_) = false;
   bool closed_ GIMNET_GUARDED_BY(mutex_) = false;

@@ -69,5 +69,9 @@ nif_service_list* make_service_list(std::vector<proto::ns::ServiceRecord> record
 
 }  // namespace gimnet::nif
 
-extern "C" void nif_free_nodes(nif_node_list* list) { delete static_cast<gimnet::nif::OwnedNodes*>(list); }
-extern "C" void nif_free_services(nif_service_list* list) { delete static_cast<gimnet::nif::OwnedServices*>(list); }
+extern "C" void nif_free_nodes(nif_node_list* list) {
+  delete static_cast<gimnet::nif::OwnedNodes*>(list);
+}
+extern "C" void nif_free_services(nif_service_list* list) {
+  delete static_cast<gimnet::nif::OwnedServices*>(list);
+}

@@ -11,10 +11,10 @@
 
 namespace gimnet::nif {
 
-/// How the last messages with a fragment header began whose frames ask for reports. A REPORT repeats 16 bytes of a
-/// frame, and of a fragment those are hardly more than its header: they tell the number of the message, and nothing of
-/// what it is. Thread safety: one thread at a time. Memory: 48 KiB,
-/// from the first message on.
+/// How the last messages with a fragment header began whose frames ask for reports. A REPORT
+/// repeats 16 bytes of a frame, and of a fragment those are hardly more than its header: they tell
+/// the number of the message, and nothing of what it is. Thread safety: one thread at a time.
+/// Memory: 48 KiB, from the first message on.
 class ReportedMessages {
  public:
   /// REPORTs come a round trip and a report_interval_ms of the hub after their messages.
@@ -25,8 +25,8 @@ class ReportedMessages {
   /// REQUIRES: the message has over 4 KiB.
   void remember(std::uint32_t number, Outgoing& message);
 
-  /// What stood behind the header of the message that the report is about. Nothing: it has no fragment header, that is
-  /// behind other bytes (EXT, LIST ids), or the message is too old.
+  /// What stood behind the header of the message that the report is about. Nothing: it has no
+  /// fragment header, that is behind other bytes (EXT, LIST ids), or the message is too old.
   [[nodiscard]] std::optional<Start> find(const proto::Report& report) const;
 
   /// The number of the message that the report is about; nothing: it has none, or does not tell.

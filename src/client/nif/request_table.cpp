@@ -13,9 +13,12 @@ namespace gimnet::nif {
 static_assert(NIF_REQUESTS_MAX == proto::kOpenRequestsMax);
 namespace {
 
-std::uint16_t operation_of(const proto::Payload& payload) { return load_le<std::uint16_t>(payload.data()); }
+std::uint16_t operation_of(const proto::Payload& payload) {
+  return load_le<std::uint16_t>(payload.data());
+}
 
-std::vector<std::byte> request_frame(proto::Kind kind, const proto::Payload& payload, std::uint16_t number) {
+std::vector<std::byte> request_frame(proto::Kind kind, const proto::Payload& payload,
+                                     std::uint16_t number) {
   proto::FrameParts parts;
   parts.header.kind = kind;
   std::vector<std::byte> frame(proto::kHeaderSize + payload.size());
@@ -29,14 +32,16 @@ nif_status closed() { return fail(NIF_CLOSED, "the handle was closed"); }
 
 }  // namespace
 
-/// As the hub counts them: what was answered or broke is none to it, though its caller has not seen that yet.
+/// As the hub counts them: what was answered or broke is none to it, though its caller has not seen
+/// that yet.
 std::size_t RequestTable::unanswered() const {
   return static_cast<std::size_t>(std::ranges::count_if(open_, [](const auto& entry) {
     return entry.second.state == State::waiting || entry.second.state == State::abandoned;
   }));
 }
 
-std::optional<std::uint16_t> RequestTable::reserve(proto::Kind kind, std::uint16_t operation, Handler handler) {
+std::optional<std::uint16_t> RequestTable::reserve(proto::Kind kind, std::uint16_t operation,
+                                                   Handler handler) {
   if (unanswered() >= proto::kOpenRequestsMax) return std::nullopt;
   do {
     ++last_number_;
@@ -45,8 +50,8 @@ std::optional<std::uint16_t> RequestTable::reserve(proto::Kind kind, std::uint16
   return last_number_;
 }
 
-nif_status RequestTable::wait_for_number(proto::Kind kind, std::uint16_t operation, Deadline deadline,
-                                         std::uint16_t& number) {
+nif_status RequestTable::wait_for_number(proto::Kind kind, std::uint16_t operation,
+                                         Deadline deadline, std::uint16_t& number) {
   for (;;) {
     if (closed_) return closed();
     if (const auto reserved = reserve(kind, operation, {})) {
@@ -58,7 +63,8 @@ nif_status RequestTable::wait_for_number(proto::Kind kind, std::uint16_t operati
   }
 }
 
-nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& answer, Deadline deadline, bool& again) {
+nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& answer,
+                                         Deadline deadline, bool& again) {
   for (;;) {
     // Only this call removes the entry, so it is there.
     Open& open = open_.find(number)->second;
@@ -79,11 +85,11 @@ nif_status RequestTable::wait_for_answer(std::uint16_t number, proto::Payload& a
 }
 
 /// `again`: the connection broke before the answer came.
-nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payload, proto::Payload& answer,
-                                  Deadline deadline, bool& again) {
+nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payload,
+                                  proto::Payload& answer, Deadline deadline, bool& again) {
   std::uint16_t number = 0;
-  // Until it is posted, so that a break comes before both or behind both: what went out behind it would be counted by
-  // the next hub, and not here.
+  // Until it is posted, so that a break comes before both or behind both: what went out behind it
+  // would be counted by the next hub, and not here.
   const MutexLock lock(mutex_);
   const nif_status status = wait_for_number(kind, operation_of(payload), deadline, number);
   if (status != NIF_OK) return status;
@@ -95,8 +101,8 @@ nif_status RequestTable::ask_once(proto::Kind kind, const proto::Payload& payloa
   return NIF_OK;
 }
 
-nif_status RequestTable::ask(proto::Kind kind, const proto::Payload& payload, proto::Payload& answer,
-                             Deadline deadline) {
+nif_status RequestTable::ask(proto::Kind kind, const proto::Payload& payload,
+                             proto::Payload& answer, Deadline deadline) {
   for (;;) {
     nif_status status = outbound_.wait_connected(deadline);
     if (status != NIF_OK) return status;
@@ -109,7 +115,8 @@ nif_status RequestTable::ask(proto::Kind kind, const proto::Payload& payload, pr
 
 bool RequestTable::ask_later(proto::Kind kind, const proto::Payload& payload, Handler handler) {
   const MutexLock lock(mutex_);  // until it is posted, as in ask_once()
-  const std::optional<std::uint16_t> number = reserve(kind, operation_of(payload), std::move(handler));
+  const std::optional<std::uint16_t> number =
+      reserve(kind, operation_of(payload), std::move(handler));
   if (!number) return false;
   if (outbound_.post(request_frame(kind, payload, *number))) return true;
   open_.erase(*number);
@@ -127,7 +134,8 @@ bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer)
     const auto found = open_.find(answer.header.request);
     if (found == open_.end()) return false;
     Open& open = found->second;
-    const bool matches = open.kind == kind && (open.operation | proto::kAnswerBit) == answer.header.operation;
+    const bool matches =
+        open.kind == kind && (open.operation | proto::kAnswerBit) == answer.header.operation;
     // A broken one is the call's that asked, which asks once more under another number.
     if (!matches || open.state == State::answered || open.state == State::broken) return false;
     if (open.state == State::waiting && !open.handler) {
@@ -146,8 +154,9 @@ bool RequestTable::on_answer(proto::Kind kind, const proto::ControlView& answer)
 
 void RequestTable::fail_all() {
   const MutexLock lock(mutex_);
-  std::erase_if(open_,
-                [](const auto& entry) { return entry.second.handler || entry.second.state == State::abandoned; });
+  std::erase_if(open_, [](const auto& entry) {
+    return entry.second.handler || entry.second.state == State::abandoned;
+  });
   for (auto& [number, open] : open_) {
     if (open.state == State::waiting) open.state = State::broken;
   }

@@ -14,8 +14,8 @@ void RetainedFrames::written(FrameRun run, bool keep) {
     return;
   }
   // Not across lanes: without a resume each run goes back into its own.
-  const bool extends = !runs_.empty() && runs_.back().lane == run.lane && runs_.back().chunk == run.chunk &&
-                       runs_.back().end == run.begin;
+  const bool extends = !runs_.empty() && runs_.back().lane == run.lane &&
+                       runs_.back().chunk == run.chunk && runs_.back().end == run.begin;
   if (extends) {
     runs_.back().end = run.end;
     runs_.back().frames += run.frames;
@@ -53,20 +53,23 @@ void RetainedFrames::drop_front(std::uint64_t count) {
 }
 
 bool RetainedFrames::make_room(std::size_t more) {
-  while (bytes_ + more > bytes_max_ && !runs_.empty() && !proto::is_block(runs_.front().first_header())) {
+  while (bytes_ + more > bytes_max_ && !runs_.empty() &&
+         !proto::is_block(runs_.front().first_header())) {
     drop_front(1);
     ++let_go_;
   }
   return bytes_ + more <= bytes_max_;
 }
 
-std::optional<std::uint64_t> RetainedFrames::take_after(std::uint64_t peer_taken, std::deque<FrameRun>& again) {
+std::optional<std::uint64_t> RetainedFrames::take_after(std::uint64_t peer_taken,
+                                                        std::deque<FrameRun>& again) {
   if (peer_taken > next_) return std::nullopt;
   const std::uint64_t missing = first() > peer_taken ? first() - peer_taken : 0;
   if (peer_taken > first()) drop_front(peer_taken - first());
   next_ = first();
   for (FrameRun& run : runs_) run.sort = FrameRun::Sort::resent;
-  again.insert(again.begin(), std::make_move_iterator(runs_.begin()), std::make_move_iterator(runs_.end()));
+  again.insert(again.begin(), std::make_move_iterator(runs_.begin()),
+               std::make_move_iterator(runs_.end()));
   runs_.clear();
   frames_ = 0;
   bytes_ = 0;

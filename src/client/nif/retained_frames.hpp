@@ -9,23 +9,27 @@
 
 namespace gimnet::nif {
 
-/// Frames that were written and not confirmed, by their count in this epoch (docs/protocol.md, section 3, Resume).
-/// Thread safety: guarded by its owner.
+/// Frames that were written and not confirmed, by their count in this epoch (docs/protocol.md,
+/// section 3, Resume). Thread safety: guarded by its owner.
 class RetainedFrames {
  public:
   explicit RetainedFrames(std::size_t bytes_max) : bytes_max_(bytes_max) {}
 
   /// Frames that were written just now; `keep` false only counts them.
   void written(FrameRun run, bool keep);
-  /// `upcoming`: frames handed to the kernel by a write whose written() comes later; a confirmation may overtake it.
+  /// `upcoming`: frames handed to the kernel by a write whose written() comes later; a confirmation
+  /// may overtake it.
   [[nodiscard]] bool confirm(std::uint64_t count, std::uint64_t upcoming);
 
-  /// Whether `more` bytes may be kept in addition; lets frames at the front go that were not sent with BLOCK.
+  /// Whether `more` bytes may be kept in addition; lets frames at the front go that were not sent
+  /// with BLOCK.
   [[nodiscard]] bool make_room(std::size_t more);
 
-  /// The peer took `peer_taken` frames: takes out what came after, to be sent again, and sets the count back to the
-  /// first of these. Returns how many frames before it are missing; nothing: more than were written.
-  [[nodiscard]] std::optional<std::uint64_t> take_after(std::uint64_t peer_taken, std::deque<FrameRun>& again);
+  /// The peer took `peer_taken` frames: takes out what came after, to be sent again, and sets the
+  /// count back to the first of these. Returns how many frames before it are missing; nothing: more
+  /// than were written.
+  [[nodiscard]] std::optional<std::uint64_t> take_after(std::uint64_t peer_taken,
+                                                        std::deque<FrameRun>& again);
   /// Counts begin at 0.
   void restart();
 

@@ -28,18 +28,20 @@ bool push(ParkedFrames::Runs& runs, FrameRun run) noexcept {
 }  // namespace
 
 LatestStream latest_stream_of(const proto::FrameHeader& header, std::optional<std::uint64_t> key) {
-  const std::uint64_t rest =
-      (std::uint64_t{key.has_value()} << 16) | (static_cast<std::uint64_t>(header.kind) << 8) | header.lane;
+  const std::uint64_t rest = (std::uint64_t{key.has_value()} << 16) |
+                             (static_cast<std::uint64_t>(header.kind) << 8) | header.lane;
   return {(rest << 32) | header.dst, key.value_or(0)};
 }
 
 void SendQueue::set_resume(bool on) { resume_ = on; }
 
 bool SendQueue::has_room(std::size_t frame_size) {
-  const bool queue_has_room = unsent_bytes_ == 0 || unsent_bytes_ + frame_size <= limits_.queue_bytes;
+  const bool queue_has_room =
+      unsent_bytes_ == 0 || unsent_bytes_ + frame_size <= limits_.queue_bytes;
   if (!queue_has_room || !resume_) return queue_has_room;
   // What waits will be kept, too, once it is written.
-  return retained_.make_room(unsent_bytes_ + frame_size) || (retained_.bytes() == 0 && unsent_bytes_ == 0);
+  return retained_.make_room(unsent_bytes_ + frame_size) ||
+         (retained_.bytes() == 0 && unsent_bytes_ == 0);
 }
 
 SendQueue::Place SendQueue::allocate(std::size_t size) noexcept {
@@ -59,12 +61,13 @@ std::span<std::byte> SendQueue::append(std::uint8_t lane, std::size_t size) noex
   if (!place.chunk) return {};
   Runs& runs = lanes_[lane];
   std::byte* memory = place.chunk->memory.get() + place.begin;
-  const bool extends = !runs.empty() && runs.back().chunk == place.chunk && runs.back().end == place.begin &&
-                       runs.back().sort == FrameRun::Sort::data;
+  const bool extends = !runs.empty() && runs.back().chunk == place.chunk &&
+                       runs.back().end == place.begin && runs.back().sort == FrameRun::Sort::data;
   if (extends) {
     runs.back().end += size;
     ++runs.back().frames;
-  } else if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::data})) {
+  } else if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane,
+                          FrameRun::Sort::data})) {
     return {};
   }
   unsent_bytes_ += size;
@@ -87,7 +90,8 @@ std::span<std::byte> SendQueue::append_latest(std::uint8_t lane, std::size_t siz
     return memory;
   }
   Runs& runs = lanes_[lane];
-  if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane, FrameRun::Sort::latest}))
+  if (!push(runs, {std::move(place.chunk), place.begin, place.begin + size, 1, lane,
+                   FrameRun::Sort::latest}))
     return {};
   try {
     latest_.emplace(stream, &runs.back());
@@ -103,7 +107,8 @@ std::span<std::byte> SendQueue::append_control(std::size_t size) noexcept {
   Place place = allocate(size);
   if (!place.chunk) return {};
   std::byte* memory = place.chunk->memory.get() + place.begin;
-  FrameRun run{std::move(place.chunk), place.begin, place.begin + size, 1, 0, FrameRun::Sort::control};
+  FrameRun run{std::move(place.chunk), place.begin, place.begin + size, 1, 0,
+               FrameRun::Sort::control};
   if (!push(control_, std::move(run))) return {};
   unsent_bytes_ += size;
   return {memory, size};
@@ -136,8 +141,9 @@ void SendQueue::stage_lanes() {
   while (staged_.size() < kGatherPiecesMax && staged_bytes_ < kGatherBytesMax) {
     const auto lane = pick_lane();
     if (!lane) return;
-    const bool others = std::any_of(lanes_.begin(), lanes_.end(),
-                                    [&](const Runs& runs) { return &runs != &lanes_[*lane] && !runs.empty(); });
+    const bool others = std::any_of(lanes_.begin(), lanes_.end(), [&](const Runs& runs) {
+      return &runs != &lanes_[*lane] && !runs.empty();
+    });
     const std::size_t before = staged_bytes_;
     stage(lanes_[*lane], others ? kTurnBytes : kGatherBytesMax - staged_bytes_);
     passed_over_[*lane] = 0;
@@ -196,7 +202,8 @@ void SendQueue::commit(std::size_t bytes) {
   return_staged();
 }
 
-/// What was not begun goes back where it came from, so that more urgent frames can still overtake it.
+/// What was not begun goes back where it came from, so that more urgent frames can still overtake
+/// it.
 void SendQueue::return_staged() {
   std::optional<FrameRun> begun;
   if (first_written_ > 0) {

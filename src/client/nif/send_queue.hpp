@@ -22,14 +22,16 @@ struct LatestStream {
   std::uint64_t key = 0;
   friend bool operator==(const LatestStream&, const LatestStream&) = default;
 };
-[[nodiscard]] LatestStream latest_stream_of(const proto::FrameHeader& header, std::optional<std::uint64_t> key);
+[[nodiscard]] LatestStream latest_stream_of(const proto::FrameHeader& header,
+                                            std::optional<std::uint64_t> key);
 
-/// Frames on their way out: four lanes of frames that wait, the frames of one write under way, and, where resume is on,
-/// the frames that were written and not confirmed. A write is gather(), the system call on what it gave out, commit().
-/// Between the two frames may be appended and confirmed; nothing else may be called.
-/// Errors: appending answers with no memory, and nothing changed. What else throws std::bad_alloc leaves a queue of
-/// which only drop_all() may be called. Thread safety: guarded by its owner. Limits: the owner asks has_room() before
-/// it appends, but for what it brings again after a reconnect.
+/// Frames on their way out: four lanes of frames that wait, the frames of one write under way, and,
+/// where resume is on, the frames that were written and not confirmed. A write is gather(), the
+/// system call on what it gave out, commit(). Between the two frames may be appended and confirmed;
+/// nothing else may be called. Errors: appending answers with no memory, and nothing changed. What
+/// else throws std::bad_alloc leaves a queue of which only drop_all() may be called. Thread safety:
+/// guarded by its owner. Limits: the owner asks has_room() before it appends, but for what it
+/// brings again after a reconnect.
 class SendQueue {
  public:
   struct Limits {
@@ -45,23 +47,27 @@ class SendQueue {
   void set_resume(bool on);
   [[nodiscard]] bool resume() const { return resume_; }
 
-  /// Whether a frame of that size may wait. Lets unconfirmed frames go to make room, where that is allowed. A frame of
-  /// any size has room in an empty queue.
+  /// Whether a frame of that size may wait. Lets unconfirmed frames go to make room, where that is
+  /// allowed. A frame of any size has room in an empty queue.
   [[nodiscard]] bool has_room(std::size_t frame_size);
   /// An older frame of the stream waits and would be replaced: that needs no room.
-  [[nodiscard]] bool would_replace(const LatestStream& stream) const { return latest_.contains(stream); }
+  [[nodiscard]] bool would_replace(const LatestStream& stream) const {
+    return latest_.contains(stream);
+  }
 
-  /// Memory for one data frame at the end of the lane; the caller writes the whole frame before it lets go of its lock.
-  /// Empty: no memory. REQUIRES: 16 <= size, lane < 4.
+  /// Memory for one data frame at the end of the lane; the caller writes the whole frame before it
+  /// lets go of its lock. Empty: no memory. REQUIRES: 16 <= size, lane < 4.
   [[nodiscard]] std::span<std::byte> append(std::uint8_t lane, std::size_t size) noexcept;
   /// The same for LATEST: in the place of the older frame of the stream, or at the end of the lane.
   [[nodiscard]] std::span<std::byte> append_latest(std::uint8_t lane, std::size_t size,
                                                    const LatestStream& stream) noexcept;
-  /// Memory for a frame that goes before all lanes and is neither counted nor kept. Empty: no memory.
+  /// Memory for a frame that goes before all lanes and is neither counted nor kept. Empty: no
+  /// memory.
   [[nodiscard]] std::span<std::byte> append_control(std::size_t size) noexcept;
 
-  /// Chooses what to write next, at most kGatherBytesMax, lower lanes first, but at least 1/16 for each lane that
-  /// waits. Returns the pieces in order; empty: nothing waits. Valid until: commit().
+  /// Chooses what to write next, at most kGatherBytesMax, lower lanes first, but at least 1/16 for
+  /// each lane that waits. Returns the pieces in order; empty: nothing waits. Valid until:
+  /// commit().
   [[nodiscard]] std::span<const std::span<const std::byte>> gather();
   /// `bytes` of the gathered pieces were written.
   void commit(std::size_t bytes);
@@ -80,20 +86,23 @@ class SendQueue {
   /// CONFIRM. False: more than were ever written, so the peer is wrong.
   [[nodiscard]] bool confirm(std::uint64_t count);
 
-  /// The connection broke: a frame partly written will be written again from its start, control frames go.
+  /// The connection broke: a frame partly written will be written again from its start, control
+  /// frames go.
   void disconnect();
-  /// The peer took `peer_taken` frames of this epoch: what came after goes out again, first. Returns how many frames
-  /// were let go and are to be announced by SKIP; nothing: the count is impossible.
+  /// The peer took `peer_taken` frames of this epoch: what came after goes out again, first.
+  /// Returns how many frames were let go and are to be announced by SKIP; nothing: the count is
+  /// impossible.
   [[nodiscard]] std::optional<std::uint64_t> resume_from(std::uint64_t peer_taken);
-  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait stay; GROUP frames are
-  /// parked until their services are declared again.
+  /// A new epoch under this node id: counts begin at 0, unconfirmed frames go, those that wait
+  /// stay; GROUP frames are parked until their services are declared again.
   void restart(std::uint32_t src);
-  /// The service that had the group `former` has `now`: what is parked for it goes, before what waits in its lane.
-  /// False: there is nothing.
+  /// The service that had the group `former` has `now`: what is parked for it goes, before what
+  /// waits in its lane. False: there is nothing.
   bool release_group(std::uint32_t former, std::uint32_t now);
   /// What is parked has no service any more. Returns how many frames.
   std::uint64_t drop_parked() { return parked_.drop(); }
-  /// All that goes out from now on, again or for the first time, is from this node id. After resume_from().
+  /// All that goes out from now on, again or for the first time, is from this node id. After
+  /// resume_from().
   void set_source(std::uint32_t src);
   /// Everything that waits and everything unconfirmed goes. Returns frames that waited.
   std::uint64_t drop_all() noexcept;
@@ -101,14 +110,16 @@ class SendQueue {
  private:
   struct StreamHash {
     std::size_t operator()(const LatestStream& stream) const noexcept {
-      return static_cast<std::size_t>((stream.address ^ (stream.key * 0x9E3779B97F4A7C15ull)) * 0xC2B2AE3D27D4EB4Full);
+      return static_cast<std::size_t>((stream.address ^ (stream.key * 0x9E3779B97F4A7C15ull)) *
+                                      0xC2B2AE3D27D4EB4Full);
     }
   };
   struct Place {
     std::shared_ptr<Chunk> chunk;
     std::size_t begin = 0;
   };
-  using Runs = ParkedFrames::Runs;  ///< Limit: has_room(), what LastMessages keeps, and what was parked
+  using Runs =
+      ParkedFrames::Runs;  ///< Limit: has_room(), what LastMessages keeps, and what was parked
 
   [[nodiscard]] Place allocate(std::size_t size) noexcept;
   [[nodiscard]] std::optional<std::uint8_t> pick_lane() const;
@@ -124,9 +135,11 @@ class SendQueue {
   ChunkPool pool_;
   std::shared_ptr<Chunk> open_chunk_;
   Runs control_;
-  Runs resend_;  ///< written on an earlier connection, or cut by a break: in the order of their counts
+  Runs resend_;  ///< written on an earlier connection, or cut by a break: in the order of their
+                 ///< counts
   ParkedFrames::Lanes lanes_;
-  std::array<std::size_t, proto::kLaneCount> passed_over_{};  ///< bytes that went while the lane waited
+  std::array<std::size_t, proto::kLaneCount>
+      passed_over_{};  ///< bytes that went while the lane waited
   std::unordered_map<LatestStream, FrameRun*, StreamHash> latest_;
 
   ParkedFrames parked_;

@@ -15,12 +15,13 @@ namespace gimnet::nif {
 /// No structure of any version is larger.
 inline constexpr std::size_t kStructSizeMax = 4096;
 
-/// What a program gave, as this version of the library has it. One compiled with an older header gives a shorter
-/// structure: what that does not have is zero, the default. One of a newer header may give a longer one, as long as it
-/// asks for nothing there. `given` leads to `whole` then. `doing` and `name` are for the sentence.
+/// What a program gave, as this version of the library has it. One compiled with an older header
+/// gives a shorter structure: what that does not have is zero, the default. One of a newer header
+/// may give a longer one, as long as it asks for nothing there. `given` leads to `whole` then.
+/// `doing` and `name` are for the sentence.
 template <class Struct>
-[[nodiscard]] std::optional<Failure> read_struct(const Struct*& given, Struct& whole, const char* doing,
-                                                 const char* name) {
+[[nodiscard]] std::optional<Failure> read_struct(const Struct*& given, Struct& whole,
+                                                 const char* doing, const char* name) {
   const std::size_t size = given->struct_size;
   if (size == sizeof(Struct)) return std::nullopt;
   const auto bad = [&](const std::string& why) {

@@ -5,9 +5,11 @@
 namespace gimnet::nif {
 namespace {
 
-/// Nothing stands between header and payload, as in most frames: they need not be taken apart again.
+/// Nothing stands between header and payload, as in most frames: they need not be taken apart
+/// again.
 bool is_plain(const proto::FrameHeader& header) {
-  return header.kind != proto::Kind::list && !header.has(proto::kFlagExt | proto::kFlagFragment | proto::kFlagKeyed);
+  return header.kind != proto::Kind::list &&
+         !header.has(proto::kFlagExt | proto::kFlagFragment | proto::kFlagKeyed);
 }
 
 }  // namespace

@@ -13,8 +13,9 @@
 
 namespace gimnet::nif {
 
-/// Memory that received things lie in; freed with its last reference, by whichever thread gives that back.
-/// Thread safety: references from any thread; the contents are written before the first other thread gets one.
+/// Memory that received things lie in; freed with its last reference, by whichever thread gives
+/// that back. Thread safety: references from any thread; the contents are written before the first
+/// other thread gets one.
 class Storage {
  public:
   Storage(const Storage&) = delete;
@@ -24,12 +25,14 @@ class Storage {
     references_.fetch_add(1, std::memory_order_relaxed);
   }
   void release() {
-    // Partner: the other releases; whoever is last sees everything that the others did with the contents.
+    // Partner: the other releases; whoever is last sees everything that the others did with the
+    // contents.
     if (references_.fetch_sub(1, std::memory_order_acq_rel) == 1) delete this;
   }
   /// Nobody but the caller has a reference.
   [[nodiscard]] bool is_only_reference() const {
-    return references_.load(std::memory_order_acquire) == 1;  // partner: the fetch_sub of the others' release()
+    return references_.load(std::memory_order_acquire) ==
+           1;  // partner: the fetch_sub of the others' release()
   }
 
  protected:
@@ -94,7 +97,8 @@ class Record final : public Storage {
   }
 };
 
-/// A place in the receive queue: a frame in a slab, or (frame null) a record. Holds one reference to its storage.
+/// A place in the receive queue: a frame in a slab, or (frame null) a record. Holds one reference
+/// to its storage.
 struct Item {
   Storage* storage = nullptr;
   const std::byte* frame = nullptr;

@@ -18,9 +18,12 @@ constexpr std::size_t kHeadSize = 16;
 /// How much of a name is in its file's: the whole has to stay below 255 bytes.
 constexpr std::size_t kReadableMax = 60;
 
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span{text}); }
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span{text});
+}
 
-/// FNV-1a. Chance only: who is fooled by a collision finds another node's record there, which says so.
+/// FNV-1a. Chance only: who is fooled by a collision finds another node's record there, which says
+/// so.
 std::uint64_t hash_of(std::string_view text, std::uint64_t hash) {
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100'0000'01b3u;
   return hash;
@@ -33,8 +36,10 @@ std::string text_at(std::span<const std::byte> bytes) {
 }  // namespace
 
 std::optional<std::vector<std::byte>> write_token_record(const TokenRecord& record) {
-  const std::size_t size = kHeadSize + record.token.size() + record.name.size() + record.address.size();
-  if (record.token.empty() || record.token.size() > proto::kTokenBytesMax || size > kTokenRecordBytesMax) {
+  const std::size_t size =
+      kHeadSize + record.token.size() + record.name.size() + record.address.size();
+  if (record.token.empty() || record.token.size() > proto::kTokenBytesMax ||
+      size > kTokenRecordBytesMax) {
     return std::nullopt;
   }
   std::vector<std::byte> bytes(kHeadSize);
@@ -44,7 +49,8 @@ std::optional<std::vector<std::byte>> write_token_record(const TokenRecord& reco
   store_le(bytes.data() + kSizesAt, static_cast<std::uint16_t>(record.token.size()));
   store_le(bytes.data() + kSizesAt + 2, static_cast<std::uint16_t>(record.name.size()));
   store_le(bytes.data() + kSizesAt + 4, static_cast<std::uint16_t>(record.address.size()));
-  for (const auto part : {std::span<const std::byte>{record.token}, bytes_of(record.name), bytes_of(record.address)}) {
+  for (const auto part : {std::span<const std::byte>{record.token}, bytes_of(record.name),
+                          bytes_of(record.address)}) {
     bytes.insert(bytes.end(), part.begin(), part.end());
   }
   return bytes;
@@ -78,7 +84,8 @@ std::string token_file_name(std::string_view address, std::string_view name) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string text;
   for (const char c : name.substr(0, kReadableMax)) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
+    const bool plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
     text += plain ? c : '_';
   }
   text += '.';

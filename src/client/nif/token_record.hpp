@@ -27,8 +27,9 @@ inline constexpr std::size_t kTokenRecordBytesMax = 1'024;
 /// The file is not trusted. Nothing: it holds something else, or is cut or longer than it says.
 [[nodiscard]] std::optional<TokenRecord> read_token_record(std::span<const std::byte> bytes);
 
-/// The file's name for that node at that hub: readable, without anything that means something to a file system, and
-/// another one for another address or name but for chance; the record says for which it is.
+/// The file's name for that node at that hub: readable, without anything that means something to a
+/// file system, and another one for another address or name but for chance; the record says for
+/// which it is.
 [[nodiscard]] std::string token_file_name(std::string_view address, std::string_view name);
 
 }  // namespace gimnet::nif

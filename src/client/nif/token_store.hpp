@@ -9,26 +9,27 @@
 
 namespace gimnet::nif {
 
-/// Keeps one node's session token where the node's next life finds it, and where a second program of the same name sees
-/// that this one lives. What fails here costs the node nothing but its id after a crash.
-/// Thread safety: none; one thread at a time. Ownership: of a locked file.
+/// Keeps one node's session token where the node's next life finds it, and where a second program
+/// of the same name sees that this one lives. What fails here costs the node nothing but its id
+/// after a crash. Thread safety: none; one thread at a time. Ownership: of a locked file.
 class TokenStore {
  public:
-  /// `name` "": a node without one, which keeps nothing. `enabled` false: the program does not want it.
+  /// `name` "": a node without one, which keeps nothing. `enabled` false: the program does not want
+  /// it.
   TokenStore(std::string name, bool enabled);
   ~TokenStore();
   TokenStore(const TokenStore&) = delete;
   TokenStore& operator=(const TokenStore&) = delete;
 
-  /// The token that an earlier life left for the hub at `address`; empty if there is none, or if the node that has it
-  /// still lives. The file stays locked.
+  /// The token that an earlier life left for the hub at `address`; empty if there is none, or if
+  /// the node that has it still lives. The file stays locked.
   [[nodiscard]] std::vector<std::byte> find(const std::string& address);
   /// The hub at `address` gave this one. A file for another address goes.
   void keep(const std::string& address, const std::vector<std::byte>& token);
   /// The session is over: nobody is to find the token.
   void forget();
-  /// The node has another name now, "" for none: the file of the former one goes, and what keep() is given next stands
-  /// in that of the new one.
+  /// The node has another name now, "" for none: the file of the former one goes, and what keep()
+  /// is given next stands in that of the new one.
   void rename(std::string name);
   /// Others may have the token from now on.
   void release();

@@ -86,8 +86,8 @@ bool WatchTable::on_events(const ns::WatchEvents& events) {
 }
 
 bool WatchTable::tell_taken(std::uint32_t number, std::uint32_t frames) {
-  // It is a request like all others to the hub, so it has a number that is counted until the answer, which says
-  // nothing.
+  // It is a request like all others to the hub, so it has a number that is counted until the
+  // answer, which says nothing.
   return requests_.ask_later(proto::Kind::ns, proto::encode(ns::WatchTaken{number, frames}),
                              [](const proto::Payload&) {});
 }
@@ -95,7 +95,8 @@ bool WatchTable::tell_taken(std::uint32_t number, std::uint32_t frames) {
 void WatchTable::taken(std::uint32_t number) {
   const MutexLock lock(mutex_);
   const auto found = watches_.find(number);
-  // Of a watch that ended here and not yet at the hub: where no number is free, the hub may go without.
+  // Of a watch that ended here and not yet at the hub: where no number is free, the hub may go
+  // without.
   if (found == watches_.end()) return static_cast<void>(tell_taken(number, 1));
   Watch& watch = found->second;
   ++watch.untold;
@@ -118,9 +119,10 @@ bool WatchTable::follows(const ns::WatchEvents& events, bool& by_hand) {
     if (found == watches_.end()) return false;
     Watch& watch = found->second;
     by_hand = watch.by_hand;
-    const bool begins = !events.changes.empty() && events.changes.front().kind == ns::ChangeKind::begin;
-    const bool continues =
-        watch.has_begun && events.epoch == watch.request.epoch && events.after == watch.request.version;
+    const bool begins =
+        !events.changes.empty() && events.changes.front().kind == ns::ChangeKind::begin;
+    const bool continues = watch.has_begun && events.epoch == watch.request.epoch &&
+                           events.after == watch.request.version;
     if (begins || continues) {
       watch.has_begun = true;
       watch.request.epoch = events.epoch;
@@ -161,8 +163,9 @@ bool WatchTable::declare(std::uint32_t number) {
     if (found == watches_.end()) return true;  // ended meanwhile
     request = found->second.request;
   }
-  return requests_.ask_later(proto::Kind::ns, proto::encode(request),
-                             [this, number](const proto::Payload& payload) { on_answer(number, payload); });
+  return requests_.ask_later(
+      proto::Kind::ns, proto::encode(request),
+      [this, number](const proto::Payload& payload) { on_answer(number, payload); });
 }
 
 void WatchTable::on_answer(std::uint32_t number, const proto::Payload& payload) {

@@ -13,33 +13,35 @@
 
 namespace gimnet::nif {
 
-/// The own watches: acknowledges what the hub tells, sees gaps, and begins the watches again after a reconnect, where
-/// they were if the hub can. Thread safety: add and remove from any thread; the rest from the library's.
+/// The own watches: acknowledges what the hub tells, sees gaps, and begins the watches again after
+/// a reconnect, where they were if the hub can. Thread safety: add and remove from any thread; the
+/// rest from the library's.
 class WatchTable {
  public:
   explicit WatchTable(RequestTable& requests) : requests_(requests) {}
   ~WatchTable();
 
   /// The request to begin a watch with, under a number of its own.
-  [[nodiscard]] proto::ns::Watch add(std::string pattern, std::uint8_t subjects, bool by_hand) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] proto::ns::Watch add(std::string pattern, std::uint8_t subjects, bool by_hand)
+      GIMNET_EXCLUDES(mutex_);
   /// The request to begin a watch anew; number 0: there is no such watch.
   [[nodiscard]] proto::ns::Watch again(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
   /// False: there is none.
   bool remove(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
-  /// One more frame of that watch was taken: the hub may send another. It is told later where numbers for requests are
-  /// short. Any thread.
+  /// One more frame of that watch was taken: the hub may send another. It is told later where
+  /// numbers for requests are short. Any thread.
   void taken(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
 
-  /// What the hub told. True: the program is to have it; false: it is of no watch, or behind a gap, after which the
-  /// watch begins anew.
+  /// What the hub told. True: the program is to have it; false: it is of no watch, or behind a gap,
+  /// after which the watch begins anew.
   [[nodiscard]] bool on_events(const proto::ns::WatchEvents& events) GIMNET_EXCLUDES(mutex_);
   /// A new connection.
   void declare_again() GIMNET_EXCLUDES(mutex_);
   /// Goes on where numbers for requests were short.
   void go_on() GIMNET_EXCLUDES(mutex_);
-  /// What the program should know of a watch that the hub did not take again, after its answer. Takes the references
-  /// along.
+  /// What the program should know of a watch that the hub did not take again, after its answer.
+  /// Takes the references along.
   [[nodiscard]] std::vector<Item> take_events();
 
  private:
@@ -49,7 +51,8 @@ class WatchTable {
     bool has_begun = false;    ///< false: what comes is of an earlier life of it, or behind a gap
     std::uint32_t untold = 0;  ///< frames taken of which the hub is still to be told
   };
-  [[nodiscard]] bool follows(const proto::ns::WatchEvents& events, bool& by_hand) GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool follows(const proto::ns::WatchEvents& events, bool& by_hand)
+      GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool tell_taken(std::uint32_t number, std::uint32_t frames);
   void tell_all_taken() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool declare(std::uint32_t number) GIMNET_EXCLUDES(mutex_);
@@ -65,8 +68,9 @@ class WatchTable {
   std::vector<Item> events_;
 };
 
-/// What the program is given for one change: a record with all that it points to. REQUIRES: `change` is one of
-/// `events`.
-[[nodiscard]] Record* make_watched(const proto::ns::WatchEvents& events, const proto::ns::Change& change);
+/// What the program is given for one change: a record with all that it points to. REQUIRES:
+/// `change` is one of `events`.
+[[nodiscard]] Record* make_watched(const proto::ns::WatchEvents& events,
+                                   const proto::ns::Change& change);
 
 }  // namespace gimnet::nif

@@ -9,17 +9,19 @@ namespace {
 constexpr double kPathNsMax = 10e9;
 
 std::uint32_t within(double bytes, std::uint32_t least, std::uint32_t most) {
-  return static_cast<std::uint32_t>(std::clamp(bytes, static_cast<double>(least), static_cast<double>(most)));
+  return static_cast<std::uint32_t>(
+      std::clamp(bytes, static_cast<double>(least), static_cast<double>(most)));
 }
 
 }  // namespace
 
-/// In this time the bytes of a window should have come. A long path is given a quarter more than it needs, to find out
-/// whether it carries more.
+/// In this time the bytes of a window should have come. A long path is given a quarter more than it
+/// needs, to find out whether it carries more.
 std::int64_t WindowTuning::limit_ns() const { return std::max(kLoopNs, path_ns_ + path_ns_ / 4); }
 
 void WindowTuning::on_taken(std::uint32_t taken, std::int64_t now_ns) {
-  // A sender that uses a number twice at once tells of two messages in turns: there is nothing to learn from it.
+  // A sender that uses a number twice at once tells of two messages in turns: there is nothing to
+  // learn from it.
   if (taken < begin_ || received_ < begin_ || received_ns_ < begin_ns_) phase_ = Phase::first;
   // On a path that has become slow the round of a large window would take long to end.
   const bool overdue = phase_ == Phase::steady && now_ns - begin_ns_ >= 2 * limit_ns();
@@ -38,11 +40,12 @@ void WindowTuning::on_taken(std::uint32_t taken, std::int64_t now_ns) {
 
 void WindowTuning::end_round() {
   const double bytes = received_ - begin_;
-  const double bytes_per_ns = bytes / static_cast<double>(std::max<std::int64_t>(received_ns_ - begin_ns_, 1));
+  const double bytes_per_ns =
+      bytes / static_cast<double>(std::max<std::int64_t>(received_ns_ - begin_ns_, 1));
   switch (phase_) {
     case Phase::draining:
-      // The path may have become slower, or this end may have slept and then read in one go. What is left of the former
-      // window takes a whole loop on a long path, too.
+      // The path may have become slower, or this end may have slept and then read in one go. What
+      // is left of the former window takes a whole loop on a long path, too.
       former_rate_ = std::min(former_rate_, bytes_per_ns * former_ / std::max(bytes, 1.0));
       phase_ = Phase::proving;
       return;
@@ -54,7 +57,8 @@ void WindowTuning::end_round() {
         phase_ = Phase::doubting;
         return;
       }
-      path_ns_ = static_cast<std::int64_t>(std::min({window_ / bytes_per_ns, former_ / former_rate_, kPathNsMax}));
+      path_ns_ = static_cast<std::int64_t>(
+          std::min({window_ / bytes_per_ns, former_ / former_rate_, kPathNsMax}));
       trust_left_ = kTrustedRounds;
       window_ = former_;
       phase_ = Phase::steady;

@@ -6,13 +6,14 @@
 
 namespace gimnet::nif {
 
-/// How far ahead of what came the sender of one large message may be: what its path carries in kLoopNs, so that a slow
-/// path is kept busy and nothing piles up in the queues on it.
+/// How far ahead of what came the sender of one large message may be: what its path carries in
+/// kLoopNs, so that a slow path is kept busy and nothing piles up in the queues on it.
 ///
-/// A path whose round trip alone is longer than kLoopNs needs more, and looks the same from here as one with a queue:
-/// a window's bytes take long to come. So a smaller window is only a trial. If fewer bytes a second come through it,
-/// the path is long, its loop is remembered, and the former window is back; after kTrustedRounds it is tried again. If
-/// as many come, there was a queue, and now it is shorter.
+/// A path whose round trip alone is longer than kLoopNs needs more, and looks the same from here as
+/// one with a queue: a window's bytes take long to come. So a smaller window is only a trial. If
+/// fewer bytes a second come through it, the path is long, its loop is remembered, and the former
+/// window is back; after kTrustedRounds it is tried again. If as many come, there was a queue, and
+/// now it is shorter.
 ///
 /// Knows no sockets and no clock. Thread safety: one thread.
 class WindowTuning {
@@ -53,8 +54,9 @@ class WindowTuning {
   std::uint32_t allowed_ = proto::kWindowDefault;
   Phase phase_ = Phase::first;
 
-  // A round begins with a TAKEN and lasts until the last byte came that was allowed by then: at least a whole loop. On
-  // a path that is not full they come in bursts, and the next TAKEN may be due in the next one only.
+  // A round begins with a TAKEN and lasts until the last byte came that was allowed by then: at
+  // least a whole loop. On a path that is not full they come in bursts, and the next TAKEN may be
+  // due in the next one only.
   std::int64_t begin_ns_ = 0;
   std::int64_t received_ns_ = 0;  ///< when received_ was reached
   std::uint32_t begin_ = 0;

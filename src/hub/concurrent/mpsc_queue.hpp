@@ -16,8 +16,9 @@
 
 namespace gimnet::hub {
 
-/// Many producers, one consumer, each producer's order kept; unbounded by itself (its users bound it).
-/// Thread safety: push(p, ...) only from producer p's thread; drain() only from the consumer's; empty() from anywhere.
+/// Many producers, one consumer, each producer's order kept; unbounded by itself (its users bound
+/// it). Thread safety: push(p, ...) only from producer p's thread; drain() only from the
+/// consumer's; empty() from anywhere.
 template <class T>
 class MpscQueue {
  public:
@@ -40,7 +41,8 @@ class MpscQueue {
     const std::lock_guard lock(mutex_);
     items_.push_back(std::move(item));
 #else
-    // It fails where there is no memory for another block; an item that vanishes would be a loss that nobody counts.
+    // It fails where there is no memory for another block; an item that vanishes would be a loss
+    // that nobody counts.
     GIMNET_CHECK(queue_.enqueue(tokens_[producer], std::move(item)));
 #endif
   }
@@ -50,8 +52,8 @@ class MpscQueue {
   std::size_t drain(std::size_t most, Take&& take) {
     return drain(most, [] {}, take);
   }
-  /// The same, with on_taken() called after some items were taken out and before they are looked at: what their
-  /// producers did before they pushed them can be seen then.
+  /// The same, with on_taken() called after some items were taken out and before they are looked
+  /// at: what their producers did before they pushed them can be seen then.
   template <class Taken, class Take>
   std::size_t drain(std::size_t most, Taken&& on_taken, Take&& take) {
     std::size_t taken = 0;
@@ -90,8 +92,8 @@ class MpscQueue {
     }
     return count;
 #else
-    // From all producers in turns: the queue by itself would empty one before it looks at the next, and a busy one
-    // would keep the others waiting for ever.
+    // From all producers in turns: the queue by itself would empty one before it looks at the next,
+    // and a busy one would keep the others waiting for ever.
     std::size_t count = 0;
     for (std::size_t tried = 0; tried < tokens_.size() && count < most; ++tried) {
       count += queue_.try_dequeue_bulk_from_producer(tokens_[turn_], into + count, most - count);
@@ -102,7 +104,8 @@ class MpscQueue {
   }
 
 #ifdef GIMNET_TSAN_QUEUE
-  // ThreadSanitizer does not model the fences inside concurrentqueue and would report races that are none.
+  // ThreadSanitizer does not model the fences inside concurrentqueue and would report races that
+  // are none.
   mutable std::mutex mutex_;
   std::deque<T> items_;  // Limit: its users', as of the queue in whose place it stands
 #else

@@ -5,10 +5,11 @@
 
 namespace gimnet::hub {
 
-/// Wakes one thread that waits for a descriptor, and only if it sleeps: a running thread costs its senders one load.
+/// Wakes one thread that waits for a descriptor, and only if it sleeps: a running thread costs its
+/// senders one load.
 ///
-/// The sleeper says prepare_to_sleep(), looks at its queues once more, and only then waits for descriptor(); after it
-/// woke it says awake(). A sender publishes its item, then says wake().
+/// The sleeper says prepare_to_sleep(), looks at its queues once more, and only then waits for
+/// descriptor(); after it woke it says awake(). A sender publishes its item, then says wake().
 /// Thread safety: wake() from any thread; the rest from the sleeper's.
 class Waker {
  public:

@@ -19,14 +19,16 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr const char* kGivePath = "give the path of a TOML file with --config, or, in conf.d, take it away";
+constexpr const char* kGivePath =
+    "give the path of a TOML file with --config, or, in conf.d, take it away";
 
 ConfigText no_text(int code) {
   const std::error_code error{code, std::generic_category()};
   const bool denied = error == std::errc::permission_denied;
-  return {
-      {},
-      error.message() + remedy_of(error, denied ? "give the user that runs tcphub the right to read it" : kGivePath)};
+  return {{},
+          error.message() +
+              remedy_of(error, denied ? "give the user that runs tcphub the right to read it"
+                                      : kGivePath)};
 }
 
 /// What stands there instead of a file, or "".
@@ -36,7 +38,8 @@ std::string instead_of_file(const struct stat& info, bool pipes) {
   if (S_ISDIR(info.st_mode)) return "it is a folder" + remedy;
   if (S_ISSOCK(info.st_mode)) return "it is a socket" + remedy;
   if (S_ISFIFO(info.st_mode)) {
-    return "it is a pipe, which only a hub that starts can read, as the file of --config; put a regular file in its "
+    return "it is a pipe, which only a hub that starts can read, as the file of --config; put a "
+           "regular file in its "
            "place";
   }
   // The usual word for "no file".
@@ -44,8 +47,8 @@ std::string instead_of_file(const struct stat& info, bool pipes) {
   return "it is a device" + remedy;
 }
 
-/// Reads what is there, at most one byte more than a configuration may have. 0: the end, EAGAIN: the rest is not
-/// there yet, or another error.
+/// Reads what is there, at most one byte more than a configuration may have. 0: the end, EAGAIN:
+/// the rest is not there yet, or another error.
 int read_more(int descriptor, std::string& text) {
   while (text.size() <= kConfigBytesMax) {
     const std::size_t before = text.size();
@@ -76,28 +79,34 @@ ConfigText read_pipe(int descriptor, milliseconds patience) {
     }
     pollfd wait{descriptor, POLLIN, 0};
     const int events = ::poll(&wait, 1, static_cast<int>(left_ns / 1'000'000 + 1));
-    if (events > 0 && (wait.revents & POLLIN) == 0 && file.text.empty()) return {{}, "this pipe is empty" + remedy};
+    if (events > 0 && (wait.revents & POLLIN) == 0 && file.text.empty())
+      return {{}, "this pipe is empty" + remedy};
   }
 }
 
 }  // namespace
 
 std::string remedy_of(const std::error_code& error, const std::string& otherwise) {
-  const bool shortage = error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system;
+  const bool shortage =
+      error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system;
   if (!shortage) return "; " + otherwise;
-  return "; there is no descriptor left to read it with: raise the limit (ulimit -n) or let a node go, then try again";
+  return "; there is no descriptor left to read it with: raise the limit (ulimit -n) or let a node "
+         "go, then try again";
 }
 
 ConfigText read_config_text(const std::string& path, milliseconds pipe_patience) {
   const bool pipes = pipe_patience > milliseconds{0};
   struct stat info{};
-  // Before it is opened: that may already do something to a device, or to who waits to write into a pipe.
+  // Before it is opened: that may already do something to a device, or to who waits to write into a
+  // pipe.
   if (::stat(path.c_str(), &info) != 0) return no_text(errno);
-  if (std::string error = instead_of_file(info, pipes); !error.empty()) return {{}, std::move(error)};
+  if (std::string error = instead_of_file(info, pipes); !error.empty())
+    return {{}, std::move(error)};
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   if (file.get() < 0 || ::fstat(file.get(), &info) != 0) return no_text(errno);
   // Something else may have taken its place.
-  if (std::string error = instead_of_file(info, pipes); !error.empty()) return {{}, std::move(error)};
+  if (std::string error = instead_of_file(info, pipes); !error.empty())
+    return {{}, std::move(error)};
   if (S_ISFIFO(info.st_mode)) return read_pipe(file.get(), pipe_patience);
   ConfigText whole;
   const int error = read_more(file.get(), whole.text);

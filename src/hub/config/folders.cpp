@@ -18,35 +18,44 @@ constexpr mode_t kPrivate = 0700;
 constexpr const char* kElsewhere = "name another place";
 constexpr const char* kStateElsewhere = "name another place with --state-dir";
 
-/// What can be done about a folder that cannot be made or looked at; `elsewhere` can always be done.
+/// What can be done about a folder that cannot be made or looked at; `elsewhere` can always be
+/// done.
 std::string remedy_of(int error, const std::string& path, const std::string& elsewhere) {
   const std::size_t slash = path.rfind('/');
-  const std::string above = slash == std::string::npos ? "." : slash == 0 ? "/" : path.substr(0, slash);
+  const std::string above = slash == std::string::npos ? "."
+                            : slash == 0               ? "/"
+                                                       : path.substr(0, slash);
   // There are folders in which nothing can be made: /proc.
-  if (error == ENOENT && ::access(above.c_str(), F_OK) != 0) return "; make " + above + " first, or " + elsewhere;
+  if (error == ENOENT && ::access(above.c_str(), F_OK) != 0)
+    return "; make " + above + " first, or " + elsewhere;
   if (error == ENOTDIR) return "; a part of " + above + " is no folder: " + elsewhere;
   if (error == ENAMETOOLONG) return "; " + elsewhere + ", with a shorter path";
-  if (error == EACCES) return "; run tcphub as a user that may write to " + above + ", or " + elsewhere;
+  if (error == EACCES)
+    return "; run tcphub as a user that may write to " + above + ", or " + elsewhere;
   return "; " + elsewhere;
 }
 
 /// "" when there is something at `path` then; `info` describes it.
-std::string make_folder(const std::string& path, struct stat& info, const char* elsewhere = kElsewhere) {
+std::string make_folder(const std::string& path, struct stat& info,
+                        const char* elsewhere = kElsewhere) {
   if (::mkdir(path.c_str(), kPrivate) != 0 && errno != EEXIST) {
     const int error = errno;
-    return "cannot create the folder " + path + ": " + system_text(error) + remedy_of(error, path, elsewhere);
+    return "cannot create the folder " + path + ": " + system_text(error) +
+           remedy_of(error, path, elsewhere);
   }
   if (::lstat(path.c_str(), &info) != 0) {
     const int error = errno;
-    return "cannot use the folder " + path + ": " + system_text(error) + remedy_of(error, path, elsewhere);
+    return "cannot use the folder " + path + ": " + system_text(error) +
+           remedy_of(error, path, elsewhere);
   }
   return {};
 }
 
 /// What a link at `path` leads to cannot be looked at.
 std::string broken_link(const std::string& path, int error) {
-  const std::string what = error == ENOENT ? "it is a link to something that does not exist; make that folder"
-                                           : "it is a link, and " + system_text(error) + "; remove it";
+  const std::string what = error == ENOENT
+                               ? "it is a link to something that does not exist; make that folder"
+                               : "it is a link, and " + system_text(error) + "; remove it";
   return "cannot use the folder " + path + ": " + what + ", or " + kStateElsewhere;
 }
 
@@ -57,15 +66,18 @@ std::string prepare_private_folder(const std::string& path) {
   if (std::string error = make_folder(path, info); !error.empty()) return error;
   if (!S_ISDIR(info.st_mode)) return "cannot use " + path + ": it is not a folder; remove it";
   if (info.st_uid != ::geteuid()) {
-    return "cannot use the folder " + path + ": it belongs to another user, who could put his own socket in its place";
+    return "cannot use the folder " + path +
+           ": it belongs to another user, who could put his own socket in its place";
   }
   if ((info.st_mode & 0077) != 0) {
     return "cannot use the folder " + path + ": other users have rights in it; chmod 700 " + path;
   }
-  // As whoever the process acts for, like the bind() that follows. Root may anything, but where all is read-only.
+  // As whoever the process acts for, like the bind() that follows. Root may anything, but where all
+  // is read-only.
   if (::faccessat(AT_FDCWD, path.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
     const std::string remedy = errno == EACCES ? "; chmod 700 " + path : "";
-    return "cannot use the folder " + path + ": nothing can be put into it: " + system_text(errno) + remedy;
+    return "cannot use the folder " + path + ": nothing can be put into it: " + system_text(errno) +
+           remedy;
   }
   return {};
 }
@@ -85,15 +97,18 @@ std::string prepare_state_folder(const std::string& path) {
   if (std::string error = make_folder(path, info, kStateElsewhere); !error.empty()) return error;
   if (S_ISLNK(info.st_mode) && ::stat(path.c_str(), &info) != 0) return broken_link(path, errno);
   if (!S_ISDIR(info.st_mode)) {
-    return "cannot use " + path + " for state: it is not a folder; remove it, or " + kStateElsewhere;
+    return "cannot use " + path + " for state: it is not a folder; remove it, or " +
+           kStateElsewhere;
   }
   if (info.st_uid != ::geteuid() && info.st_uid != 0) {
     return "cannot use the folder " + path +
-           " for state: it belongs to another user, who could put other files into it; run tcphub as that user, or " +
+           " for state: it belongs to another user, who could put other files into it; run tcphub "
+           "as that user, or " +
            kStateElsewhere;
   }
   if ((info.st_mode & 0022) != 0) {
-    return "cannot use the folder " + path + " for state: other users may write to it; chmod go-w " + path;
+    return "cannot use the folder " + path +
+           " for state: other users may write to it; chmod go-w " + path;
   }
   if (::access(path.c_str(), R_OK | W_OK | X_OK) != 0) {
     return "cannot use the folder " + path + " for state: " + system_text(errno) +

@@ -28,8 +28,8 @@ struct HubOptions {
 
 inline constexpr std::size_t kShardCountMax = 16;
 
-/// Shards if nobody says: half of this machine's processors, since the nodes that a hub serves often run beside it, at
-/// least 1 and at most 8.
+/// Shards if nobody says: half of this machine's processors, since the nodes that a hub serves
+/// often run beside it, at least 1 and at most 8.
 [[nodiscard]] std::size_t default_shards();
 
 }  // namespace gimnet::hub

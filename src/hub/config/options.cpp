@@ -46,41 +46,56 @@ void declare(CLI::App& app, Raw& raw) {
   app.allow_extras();
   app.set_help_flag();  // it knows no --help=false
   app.add_flag("-h,--help", raw.help, "Says this and ends");
-  app.add_option("--listen", raw.listen,
-                 "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free port),\n"
-                 "unix:/path. Default: tcp://127.0.0.1:7450 and a Unix socket in the user's runtime folder")
+  app.add_option(
+         "--listen", raw.listen,
+         "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free "
+         "port),\n"
+         "unix:/path. Default: tcp://127.0.0.1:7450 and a Unix socket in the user's runtime folder")
       ->type_name("URL")
       ->expected(1)
       ->take_all();
-  app.add_option("--shards", raw.shards, "Threads that carry data, 1 to 16. Default: half of the processors, at most 8")
+  app.add_option("--shards", raw.shards,
+                 "Threads that carry data, 1 to 16. Default: half of the processors, at most 8")
       ->type_name("N");
-  app.add_option("--hub-id", raw.hub_id, "This hub's number in its network, 1 to 4094. Default: 1")->type_name("N");
-  app.add_option("--hub-name", raw.hub_name, "Its name for people. Default: hub-ID")->type_name("NAME");
-  app.add_option("--state-dir", raw.state_dir, "Folder for what the hub keeps, created if needed")->type_name("DIR");
+  app.add_option("--hub-id", raw.hub_id, "This hub's number in its network, 1 to 4094. Default: 1")
+      ->type_name("N");
+  app.add_option("--hub-name", raw.hub_name, "Its name for people. Default: hub-ID")
+      ->type_name("NAME");
+  app.add_option("--state-dir", raw.state_dir, "Folder for what the hub keeps, created if needed")
+      ->type_name("DIR");
   app.add_option("--limit", raw.limits, "Sets a limit, may be repeated; --help-limits lists them")
       ->type_name("NAME=VALUE")
       ->expected(1)
       ->take_all();
   app.add_flag("--help-limits", raw.help_limits, "Lists all limits and ends");
-  app.add_option("--placement", raw.placement,
-                 "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)")
-      ->type_name("HOW");
-  app.add_flag("--spin", raw.spin, "Shards never sleep: shorter round trips, for a whole processor each");
-  app.add_flag("--insecure", raw.insecure, "Allows to listen on addresses that other machines reach");
-  app.add_option("--log-level", raw.log_level, "error, warning, info (default), debug or off")->type_name("LEVEL");
   app.add_option(
-         "--config", raw.config,
-         "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the first that is there of\n"
-         "gimnet/tcphub.toml in the user's configuration folder, /etc/gimnet/tcphub.toml. No file is needed")
+         "--placement", raw.placement,
+         "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)")
+      ->type_name("HOW");
+  app.add_flag("--spin", raw.spin,
+               "Shards never sleep: shorter round trips, for a whole processor each");
+  app.add_flag("--insecure", raw.insecure,
+               "Allows to listen on addresses that other machines reach");
+  app.add_option("--log-level", raw.log_level, "error, warning, info (default), debug or off")
+      ->type_name("LEVEL");
+  app.add_option("--config", raw.config,
+                 "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the "
+                 "first that is there of\n"
+                 "gimnet/tcphub.toml in the user's configuration folder, /etc/gimnet/tcphub.toml. "
+                 "No file is needed")
       ->type_name("FILE");
-  app.add_flag("--check-config", raw.check_config, "Says everything that is wrong with the configuration, and ends");
-  app.add_flag("--print-config", raw.print_config, "Shows every value and where it came from, and ends");
+  app.add_flag("--check-config", raw.check_config,
+               "Says everything that is wrong with the configuration, and ends");
+  app.add_flag("--print-config", raw.print_config,
+               "Shows every value and where it came from, and ends");
   app.add_flag("--version", raw.version, "Says the version and ends");
 }
 
 std::string help_limits() {
   const Limits defaults;
-  std::string text = "Limits, set with --limit NAME=VALUE (k, M and G are powers of 1,024; times take no suffix):\n\n";
+  std::string text =
+      "Limits, set with --limit NAME=VALUE (k, M and G are powers of 1,024; times take no "
+      "suffix):\n\n";
   for (const LimitInfo& limit : limit_table()) {
     std::string line = "  " + std::string{limit.name};
     line.resize(std::max<std::size_t>(line.size(), 25), ' ');
@@ -139,9 +154,11 @@ std::string leftover_fault(std::vector<std::string> words) {
   const bool behind_end = end == words.begin();
   if (end != words.end()) words.erase(end);
   if (words.empty()) return {};
-  const std::string word = behind_end ? words.front() : words.front().substr(0, words.front().find('='));
+  const std::string word =
+      behind_end ? words.front() : words.front().substr(0, words.front().find('='));
   return "there is no argument '" + escaped(word, kQuotedMax) + "'" +
-         (behind_end ? " behind --" : did_you_mean(word, kOptionNames)) + " (tcphub --help shows all)";
+         (behind_end ? " behind --" : did_you_mean(word, kOptionNames)) +
+         " (tcphub --help shows all)";
 }
 
 Given flag(const std::string& key, const std::string& label, std::string text) {
@@ -153,26 +170,30 @@ Given flag(const std::string& key, const std::string& label, std::string text) {
   return given;
 }
 
-/// The flags that were given, as values of their keys. Returns what is wrong with their form, or "".
+/// The flags that were given, as values of their keys. Returns what is wrong with their form, or
+/// "".
 std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sources) {
   if (!raw.listen.empty()) {
     Given& listen = sources.flags.emplace_back(flag("listen", "--listen", {}));
     listen.value.kind = Value::Kind::list;
-    for (const std::string& url : raw.listen) listen.value.items.push_back({Value::Kind::words, url, {}, {}});
+    for (const std::string& url : raw.listen)
+      listen.value.items.push_back({Value::Kind::words, url, {}, {}});
   }
-  const std::array<std::pair<const char*, const std::string*>, 6> texts{{{"--shards", &raw.shards},
-                                                                         {"--hub-id", &raw.hub_id},
-                                                                         {"--hub-name", &raw.hub_name},
-                                                                         {"--state-dir", &raw.state_dir},
-                                                                         {"--placement", &raw.placement},
-                                                                         {"--log-level", &raw.log_level}}};
+  const std::array<std::pair<const char*, const std::string*>, 6> texts{
+      {{"--shards", &raw.shards},
+       {"--hub-id", &raw.hub_id},
+       {"--hub-name", &raw.hub_name},
+       {"--state-dir", &raw.state_dir},
+       {"--placement", &raw.placement},
+       {"--log-level", &raw.log_level}}};
   for (const auto& [name, text] : texts) {
     if (app.count(name) == 0) continue;
     std::string key = std::string{name}.substr(2);
     std::ranges::replace(key, '-', '_');
     sources.flags.push_back(flag(key, name, *text));
   }
-  for (const auto& [key, value] : {std::pair{"spin", raw.spin}, std::pair{"insecure", raw.insecure}}) {
+  for (const auto& [key, value] :
+       {std::pair{"spin", raw.spin}, std::pair{"insecure", raw.insecure}}) {
     const std::string name = "--" + std::string{key};
     // Also --spin=false, which is stronger than what a file says.
     if (app.count(name) != 0) sources.flags.push_back(flag(key, name, value ? "true" : "false"));
@@ -180,7 +201,8 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
   for (const std::string& assignment : raw.limits) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos) {
-      return "--limit " + escaped(assignment, kQuotedMax) + " has no value: write NAME=VALUE, for example nodes=1000";
+      return "--limit " + escaped(assignment, kQuotedMax) +
+             " has no value: write NAME=VALUE, for example nodes=1000";
     }
     const std::string name = assignment.substr(0, equals);
     const std::string key = "limits." + name;
@@ -209,10 +231,12 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
     for (const Fault& fault : read.faults) ending.text += fault.line() + "\n";
-    if (read.more_faults) ending.text += "tcphub: there are more faults; mend these, then look again\n";
+    if (read.more_faults)
+      ending.text += "tcphub: there are more faults; mend these, then look again\n";
     return ending;
   }
-  // Read again it is the same file, or an error: a hub does not lose its configuration because a file went.
+  // Read again it is the same file, or an error: a hub does not lose its configuration because a
+  // file went.
   line.sources.file = read.place.file;
   line.sources.parts_alone = read.place.parts_alone;
   for (const Fault& warning : read.warnings) line.warnings.push_back(warning.text());
@@ -231,18 +255,21 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
   Raw raw;
   declare(app, raw);
   const std::span words(argv, static_cast<std::size_t>(argc));
-  if (const std::string word = wrong_word(app, words.subspan(words.empty() ? 0 : 1)); !word.empty()) return wrong(word);
+  if (const std::string word = wrong_word(app, words.subspan(words.empty() ? 0 : 1)); !word.empty())
+    return wrong(word);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return wrong(syntax_error(app, error));
   }
   if (raw.help) return CommandLineEnding{0, app.help()};
-  if (const std::string fault = leftover_fault(app.remaining()); !fault.empty()) return wrong(fault);
+  if (const std::string fault = leftover_fault(app.remaining()); !fault.empty())
+    return wrong(fault);
   if (raw.version) return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};
   if (raw.help_limits) return CommandLineEnding{0, help_limits()};
   CommandLine line;
-  if (const std::string error = read_flags(app, raw, line.sources); !error.empty()) return wrong(error);
+  if (const std::string error = read_flags(app, raw, line.sources); !error.empty())
+    return wrong(error);
   line.warnings = read_environment(line.sources, environment);
   return read_all(raw, std::move(line));
 }

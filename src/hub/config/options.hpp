@@ -24,9 +24,9 @@ struct CommandLine {
   std::vector<std::string> warnings;
 };
 
-/// Reads tcphub's command line, its environment and its configuration files. Errors: exit code 2 and a line for each
-/// thing that is wrong, which names it and says what to write.
-[[nodiscard]] std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const char* const* argv,
-                                                                              const char* const* environment);
+/// Reads tcphub's command line, its environment and its configuration files. Errors: exit code 2
+/// and a line for each thing that is wrong, which names it and says what to write.
+[[nodiscard]] std::variant<CommandLine, CommandLineEnding> parse_command_line(
+    int argc, const char* const* argv, const char* const* environment);
 
 }  // namespace gimnet::hub

@@ -15,8 +15,9 @@ Reloading Reloader::read_again() {
   try {
     found = reader_.read(sources_, {.faults_max = kReloadFaultsMax});
   } catch (const std::system_error& error) {
-    reloading.faults.push_back("cannot begin to read the configuration: " + error.code().message() +
-                               "; raise the limit on threads (ulimit -u), or let other programs go");
+    reloading.faults.push_back(
+        "cannot begin to read the configuration: " + error.code().message() +
+        "; raise the limit on threads (ulimit -u), or let other programs go");
     return reloading;
   }
   if (!found) {
@@ -31,7 +32,8 @@ Reloading Reloader::read_again() {
   reloading.more_faults = read.more_faults;
   if (!reloading.faults.empty()) return reloading;
   for (const Fault& warning : read.warnings) log_warning(warning.text());
-  // A file that appeared in a default place is the hub's from now on, and must not go unnoticed when it goes.
+  // A file that appeared in a default place is the hub's from now on, and must not go unnoticed
+  // when it goes.
   sources_.file = read.place.file;
   sources_.parts_alone = read.place.parts_alone;
   const HubOptions& wanted = read.configuration.options;
@@ -39,14 +41,15 @@ Reloading Reloader::read_again() {
     std::string from = setting.show(in_force_);
     std::string to = setting.show(wanted);
     if (from == to) continue;
-    reloading.changes.push_back({std::string{setting.key}, std::move(from), std::move(to), !setting.reloads});
+    reloading.changes.push_back(
+        {std::string{setting.key}, std::move(from), std::move(to), !setting.reloads});
   }
   for (const LimitInfo& limit : limit_table()) {
     const std::uint64_t from = in_force_.limits.*limit.field;
     const std::uint64_t to = wanted.limits.*limit.field;
     if (from == to) continue;
-    reloading.changes.push_back(
-        {"limits." + std::string{limit.name}, std::to_string(from), std::to_string(to), !limit.reloads});
+    reloading.changes.push_back({"limits." + std::string{limit.name}, std::to_string(from),
+                                 std::to_string(to), !limit.reloads});
     if (limit.reloads) in_force_.limits.*limit.field = to;
   }
   in_force_.log_level = wanted.log_level;

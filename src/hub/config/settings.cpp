@@ -25,24 +25,29 @@ constexpr std::string_view kLimits = "limits.";
 constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
 
 std::string_view kind_name(Kind kind) {
-  constexpr std::array<std::string_view, 8> kNames{"words",      "a text",         "a whole number", "true or false",
-                                                   "a fraction", "a date or time", "a list",         "a table"};
+  constexpr std::array<std::string_view, 8> kNames{"words",         "a text",     "a whole number",
+                                                   "true or false", "a fraction", "a date or time",
+                                                   "a list",        "a table"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-Fault fault(const Given& given, std::string sentence) { return {given.value.place, std::move(sentence)}; }
+Fault fault(const Given& given, std::string sentence) {
+  return {given.value.place, std::move(sentence)};
+}
 
 /// Is the value of that kind? If not, what to write instead is a fault.
 bool has_kind(const Given& given, Kind wanted, const std::string& example, Faults& faults) {
   if (given.value.kind == wanted || given.value.kind == Kind::words) return true;
   faults.push_back(fault(given, given.label + " is " + std::string{kind_name(wanted)} + ", not " +
-                                    std::string{kind_name(given.value.kind)} + ": write " + example));
+                                    std::string{kind_name(given.value.kind)} + ": write " +
+                                    example));
   return false;
 }
 
-/// What may be written instead of a value that is no whole number: the nearest one to what can be read as a number, or
-/// the usual one.
-std::uint64_t nearest_number(const Value& value, std::uint64_t least, std::uint64_t most, std::uint64_t usual) {
+/// What may be written instead of a value that is no whole number: the nearest one to what can be
+/// read as a number, or the usual one.
+std::uint64_t nearest_number(const Value& value, std::uint64_t least, std::uint64_t most,
+                             std::uint64_t usual) {
   if (value.kind != Kind::text && value.kind != Kind::fraction) return usual;
   double number = 0.0;
   const char* const last = value.text.data() + value.text.size();
@@ -53,46 +58,58 @@ std::uint64_t nearest_number(const Value& value, std::uint64_t least, std::uint6
   return static_cast<std::uint64_t>(std::llround(number));
 }
 
-std::optional<std::size_t> number_in(const Given& given, std::size_t least, std::size_t most, Faults& faults) {
+std::optional<std::size_t> number_in(const Given& given, std::size_t least, std::size_t most,
+                                     Faults& faults) {
   const std::uint64_t instead = nearest_number(given.value, least, most, least);
-  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(instead), faults)) return std::nullopt;
+  if (!has_kind(given, Kind::integer, given.label + " = " + std::to_string(instead), faults))
+    return std::nullopt;
   const std::string& text = given.value.text;
   std::size_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc{} && end == text.data() + text.size() && value >= least && value <= most) return value;
+  if (error == std::errc{} && end == text.data() + text.size() && value >= least && value <= most)
+    return value;
   faults.push_back(fault(given, given.label + " cannot be '" + escaped(text, kQuotedMax) +
-                                    "': give a whole number from " + std::to_string(least) + " to " +
-                                    std::to_string(most)));
+                                    "': give a whole number from " + std::to_string(least) +
+                                    " to " + std::to_string(most)));
   return std::nullopt;
 }
 
 /// One of a few words.
-bool one_of(const Given& given, std::span<const std::string_view> words, const std::string& list, Faults& faults) {
-  if (!has_kind(given, Kind::text, given.label + " = \"" + std::string{words.front()} + "\"", faults)) return false;
+bool one_of(const Given& given, std::span<const std::string_view> words, const std::string& list,
+            Faults& faults) {
+  if (!has_kind(given, Kind::text, given.label + " = \"" + std::string{words.front()} + "\"",
+                faults))
+    return false;
   if (std::ranges::find(words, given.value.text) != words.end()) return true;
-  faults.push_back(fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': " + list +
+  faults.push_back(fault(given, given.label + " cannot be '" +
+                                    escaped(given.value.text, kQuotedMax) + "': " + list +
                                     did_you_mean(given.value.text, words)));
   return false;
 }
 
 /// Each of them is another one.
-bool any_free_port(const ListenUrl& url) { return url.scheme == ListenUrl::Scheme::tcp && url.port == 0; }
+bool any_free_port(const ListenUrl& url) {
+  return url.scheme == ListenUrl::Scheme::tcp && url.port == 0;
+}
 
 void set_listen(Configuration& configuration, const Given& given, Faults& faults) {
   std::vector<Value> urls = given.value.items;
   if (given.value.kind == Kind::text) urls = {given.value};
-  if (given.value.kind != Kind::text && !has_kind(given, Kind::list, "listen = [\"tcp://127.0.0.1:7450\"]", faults)) {
+  if (given.value.kind != Kind::text &&
+      !has_kind(given, Kind::list, "listen = [\"tcp://127.0.0.1:7450\"]", faults)) {
     return;
   }
   configuration.options.listen.clear();
   configuration.listen_places.clear();
   if (urls.empty()) {
-    faults.push_back(fault(given, given.label + " names no address; leave it out for the default ones"));
+    faults.push_back(
+        fault(given, given.label + " names no address; leave it out for the default ones"));
   }
   std::set<std::string> known;
   for (const Value& url : urls) {
     if (url.kind != Kind::text && url.kind != Kind::words) {
-      faults.push_back({url.place, "an address of listen is a text, not " + std::string{kind_name(url.kind)} +
+      faults.push_back({url.place, "an address of listen is a text, not " +
+                                       std::string{kind_name(url.kind)} +
                                        ": write \"tcp://127.0.0.1:7450\""});
       continue;
     }
@@ -100,7 +117,8 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
     if (!parsed) {
       faults.push_back({url.place, parsed.error().sentence});
     } else if (!known.insert(parsed->text()).second && !any_free_port(*parsed)) {
-      faults.push_back({url.place, given.label + " " + escaped(url.text, kQuotedMax) + " is given twice"});
+      faults.push_back(
+          {url.place, given.label + " " + escaped(url.text, kQuotedMax) + " is given twice"});
     } else {
       configuration.options.listen.push_back(*parsed);
       configuration.listen_places.push_back({url.place, given.label});
@@ -109,7 +127,8 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
 }
 
 void set_shards(Configuration& configuration, const Given& given, Faults& faults) {
-  if (const auto shards = number_in(given, 1, kShardCountMax, faults)) configuration.options.shards = *shards;
+  if (const auto shards = number_in(given, 1, kShardCountMax, faults))
+    configuration.options.shards = *shards;
 }
 
 void set_hub_id(Configuration& configuration, const Given& given, Faults& faults) {
@@ -120,8 +139,8 @@ void set_hub_id(Configuration& configuration, const Given& given, Faults& faults
 void set_hub_name(Configuration& configuration, const Given& given, Faults& faults) {
   if (!has_kind(given, Kind::text, "hub_name = \"hall\"", faults)) return;
   if (const char* wrong = proto::name_fault(given.value.text)) {
-    faults.push_back(
-        fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': " + wrong));
+    faults.push_back(fault(given, given.label + " cannot be '" +
+                                      escaped(given.value.text, kQuotedMax) + "': " + wrong));
     return;
   }
   configuration.options.name = given.value.text;
@@ -130,7 +149,8 @@ void set_hub_name(Configuration& configuration, const Given& given, Faults& faul
 void set_state_dir(Configuration& configuration, const Given& given, Faults& faults) {
   if (!has_kind(given, Kind::text, "state_dir = \"/var/lib/tcphub\"", faults)) return;
   if (given.value.kind == Kind::words && given.value.text.empty()) {
-    // Mostly a shell variable that is not set; a hub that kept its state elsewhere would begin anew.
+    // Mostly a shell variable that is not set; a hub that kept its state elsewhere would begin
+    // anew.
     faults.push_back(fault(given, given.label + " is empty: give it a folder, or leave it out"));
     return;
   }
@@ -143,15 +163,17 @@ void set_state_dir(Configuration& configuration, const Given& given, Faults& fau
 
 void set_placement(Configuration& configuration, const Given& given, Faults& faults) {
   if (!one_of(given, kPlacements, "spread or hint", faults)) return;
-  configuration.options.placement = given.value.text == "hint" ? Placement::hint : Placement::spread;
+  configuration.options.placement =
+      given.value.text == "hint" ? Placement::hint : Placement::spread;
 }
 
 template <bool HubOptions::* option>
 void set_flag(Configuration& configuration, const Given& given, Faults& faults) {
   if (!has_kind(given, Kind::boolean, given.label + " = true", faults)) return;
   if (given.value.text != "true" && given.value.text != "false") {
-    faults.push_back(
-        fault(given, given.label + " cannot be '" + escaped(given.value.text, kQuotedMax) + "': write true or false"));
+    faults.push_back(fault(given, given.label + " cannot be '" +
+                                      escaped(given.value.text, kQuotedMax) +
+                                      "': write true or false"));
     return;
   }
   configuration.options.*option = given.value.text == "true";
@@ -177,25 +199,30 @@ std::string show_listen(const HubOptions& options) {
   return "[" + list + "]";
 }
 
-std::string show_log_level(const HubOptions& options) { return toml_quoted(log_level_name(options.log_level)); }
+std::string show_log_level(const HubOptions& options) {
+  return toml_quoted(log_level_name(options.log_level));
+}
 
 constexpr std::array kSettings{
-    Setting{"listen", "addresses to listen on: tcp://HOST:PORT or unix:/PATH", false, set_listen, show_listen},
+    Setting{"listen", "addresses to listen on: tcp://HOST:PORT or unix:/PATH", false, set_listen,
+            show_listen},
     Setting{"shards", "threads that carry data, 1 to 16", false, set_shards,
             [](const HubOptions& options) { return std::to_string(options.shards); }},
     Setting{"hub_id", "the hub's number, 1 to 4094", false, set_hub_id,
             [](const HubOptions& options) { return std::to_string(options.id.value()); }},
     Setting{"hub_name", "its name for people", false, set_hub_name,
             [](const HubOptions& options) { return toml_quoted(options.name); }},
-    Setting{"state_dir", "folder of what the hub keeps over its restarts; \"\" is the default one", false,
-            set_state_dir, [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
+    Setting{"state_dir", "folder of what the hub keeps over its restarts; \"\" is the default one",
+            false, set_state_dir,
+            [](const HubOptions& options) { return toml_quoted(options.state_dir); }},
     Setting{"placement", "where new nodes live: spread or hint", false, set_placement,
             [](const HubOptions& options) {
               return toml_quoted(kPlacements[options.placement == Placement::hint ? 1 : 0]);
             }},
-    Setting{"spin", "shards never sleep", false, set_flag<&HubOptions::spin>, show_flag<&HubOptions::spin>},
-    Setting{"insecure", "allows addresses that other machines reach", false, set_flag<&HubOptions::insecure>,
-            show_flag<&HubOptions::insecure>},
+    Setting{"spin", "shards never sleep", false, set_flag<&HubOptions::spin>,
+            show_flag<&HubOptions::spin>},
+    Setting{"insecure", "allows addresses that other machines reach", false,
+            set_flag<&HubOptions::insecure>, show_flag<&HubOptions::insecure>},
     Setting{"log_level", "error, warning, info, debug or off", true, set_log_level, show_log_level},
 };
 
@@ -206,7 +233,8 @@ const std::vector<std::string>& all_keys() {
     keys.reserve(std::size(kSettings) + 1 + limit_table().size());
     for (const Setting& setting : kSettings) keys.emplace_back(setting.key);
     keys.emplace_back("limits");
-    for (const LimitInfo& limit : limit_table()) keys.push_back(std::string{kLimits} + std::string{limit.name});
+    for (const LimitInfo& limit : limit_table())
+      keys.push_back(std::string{kLimits} + std::string{limit.name});
     return keys;
   }();
   return all;
@@ -218,17 +246,21 @@ std::string nearest_key(std::string_view key) {
   return did_you_mean(key, keys) + " (tcphub --print-config shows all)";
 }
 
-void apply_limit(Configuration& configuration, const Given& given, std::string_view name, Faults& faults) {
+void apply_limit(Configuration& configuration, const Given& given, std::string_view name,
+                 Faults& faults) {
   const LimitInfo* limit = find_limit(name);
   if (limit == nullptr) {
-    faults.push_back({given.place, "there is no limit '" + escaped(name, kQuotedMax) + "'" + nearest_limit(name) +
-                                       " (tcphub --help-limits shows all)"});
+    faults.push_back({given.place, "there is no limit '" + escaped(name, kQuotedMax) + "'" +
+                                       nearest_limit(name) + " (tcphub --help-limits shows all)"});
     return;
   }
   // A text may have a suffix: "64k".
   const bool number = given.value.kind == Kind::text || given.value.kind == Kind::words;
-  const std::uint64_t instead = nearest_number(given.value, limit->least, limit->most, Limits{}.*(limit->field));
-  if (!number && !has_kind(given, Kind::integer, std::string{name} + " = " + std::to_string(instead), faults)) return;
+  const std::uint64_t instead =
+      nearest_number(given.value, limit->least, limit->most, Limits{}.*(limit->field));
+  if (!number &&
+      !has_kind(given, Kind::integer, std::string{name} + " = " + std::to_string(instead), faults))
+    return;
   std::string error = set_limit(configuration.options.limits, *limit, given.value.text);
   if (error.empty()) return;
   // Of a file the place says where that stands; of the environment only the variable's name can.
@@ -236,12 +268,14 @@ void apply_limit(Configuration& configuration, const Given& given, std::string_v
   faults.push_back(fault(given, std::move(error)));
 }
 
-/// WATCH_EVENTS that may wait for one node: of each watch a window, of all a window per node, but one of each watch in
-/// any case (Watches::is_idle).
+/// WATCH_EVENTS that may wait for one node: of each watch a window, of all a window per node, but
+/// one of each watch in any case (Watches::is_idle).
 std::uint64_t watch_frames_most(const Limits& limits) {
   const std::uint64_t watches = std::min(limits.watches_per_node, limits.watches);
-  if (watches * limits.watch_window <= limits.watch_window_per_node) return watches * limits.watch_window;
-  const std::uint64_t full = (limits.watch_window_per_node + limits.watch_window - 1) / limits.watch_window;
+  if (watches * limits.watch_window <= limits.watch_window_per_node)
+    return watches * limits.watch_window;
+  const std::uint64_t full =
+      (limits.watch_window_per_node + limits.watch_window - 1) / limits.watch_window;
   return limits.watch_window_per_node + watches - std::min(full, watches);
 }
 
@@ -270,16 +304,19 @@ void apply(Configuration& configuration, const Given& given, Faults& faults) {
   const std::size_t before = faults.size();
   if (given.key.starts_with(kLimits)) {
     apply_limit(configuration, given, std::string_view{given.key}.substr(kLimits.size()), faults);
-  } else if (const auto* setting = std::ranges::find(kSettings, given.key, &Setting::key); setting != kSettings.end()) {
+  } else if (const auto* setting = std::ranges::find(kSettings, given.key, &Setting::key);
+             setting != kSettings.end()) {
     setting->set(configuration, given, faults);
   } else if (given.key == "limits") {
     if (given.value.kind != Kind::table) {
-      faults.push_back({given.place, "limits is a table: write [limits], and below it a line NAME = NUMBER for each"});
+      faults.push_back(
+          {given.place,
+           "limits is a table: write [limits], and below it a line NAME = NUMBER for each"});
     }
     return;
   } else {
-    faults.push_back(
-        {given.place, "there is no key '" + escaped(given.key, kQuotedMax) + "'" + nearest_key(given.key)});
+    faults.push_back({given.place, "there is no key '" + escaped(given.key, kQuotedMax) + "'" +
+                                       nearest_key(given.key)});
   }
   if (faults.size() == before) keep_origin(configuration, given);
 }
@@ -292,17 +329,21 @@ void complete(Configuration& configuration, Faults& faults) {
     const Fault& where = configuration.listen_places[i];
     const std::string word = where.place.empty() ? "--insecure" : "insecure = true";
     faults.push_back(
-        {where.place, "cannot listen on " + options.listen[i].text() +
-                          ": other machines could reach it, and nothing that is sent is encrypted; where " +
-                          "all of them are trusted give " + word + ", otherwise listen on 127.0.0.1"});
+        {where.place,
+         "cannot listen on " + options.listen[i].text() +
+             ": other machines could reach it, and nothing that is sent is encrypted; where " +
+             "all of them are trusted give " + word + ", otherwise listen on 127.0.0.1"});
   }
   const Limits& limits = options.limits;
   if (limits.silent_ms <= limits.keep_alive_ms) {
     auto where = configuration.places.find("limits.silent_ms");
-    if (where == configuration.places.end()) where = configuration.places.find("limits.keep_alive_ms");
+    if (where == configuration.places.end())
+      where = configuration.places.find("limits.keep_alive_ms");
     faults.push_back({where == configuration.places.end() ? "" : where->second.place,
-                      "limit silent_ms (" + std::to_string(limits.silent_ms) + ") must be larger than keep_alive_ms (" +
-                          std::to_string(limits.keep_alive_ms) + "), or healthy nodes are closed as silent"});
+                      "limit silent_ms (" + std::to_string(limits.silent_ms) +
+                          ") must be larger than keep_alive_ms (" +
+                          std::to_string(limits.keep_alive_ms) +
+                          "), or healthy nodes are closed as silent"});
   }
 }
 
@@ -312,24 +353,29 @@ Faults warnings_about(const Configuration& configuration) {
   const std::uint64_t bytes = frames * (proto::kHeaderSize + limits.watch_event_bytes);
   if (bytes <= limits.control_bytes) return {};
   std::string place;
-  for (const char* key :
-       {"control_bytes", "watch_event_bytes", "watch_window_per_node", "watch_window", "watches_per_node", "watches"}) {
+  for (const char* key : {"control_bytes", "watch_event_bytes", "watch_window_per_node",
+                          "watch_window", "watches_per_node", "watches"}) {
     const auto where = configuration.places.find(std::string{kLimits} + key);
     if (where != configuration.places.end() && place.empty()) place = where->second.place;
   }
-  return {{place, "the watches of one node may have " + std::to_string(frames) + " WATCH_EVENTS of " +
-                      std::to_string(limits.watch_event_bytes) + " bytes waiting for it, " + std::to_string(bytes) +
-                      " bytes with their headers, and limit control_bytes (" + std::to_string(limits.control_bytes) +
-                      ") has a node sent away for more than that: make control_bytes " + std::to_string(bytes) +
-                      " or more, or watch_event_bytes, watch_window_per_node or watches_per_node smaller"}};
+  return {
+      {place,
+       "the watches of one node may have " + std::to_string(frames) + " WATCH_EVENTS of " +
+           std::to_string(limits.watch_event_bytes) + " bytes waiting for it, " +
+           std::to_string(bytes) + " bytes with their headers, and limit control_bytes (" +
+           std::to_string(limits.control_bytes) +
+           ") has a node sent away for more than that: make control_bytes " +
+           std::to_string(bytes) +
+           " or more, or watch_event_bytes, watch_window_per_node or watches_per_node smaller"}};
 }
 
 std::string print(const Configuration& configuration) {
-  std::string text =
-      "# tcphub " + std::string{kVersion} + ": the configuration in force, and where each value came from\n\n";
+  std::string text = "# tcphub " + std::string{kVersion} +
+                     ": the configuration in force, and where each value came from\n\n";
   for (const Setting& setting : kSettings) {
     const std::string key{setting.key};
-    text += key + " = " + setting.show(configuration.options) + "  # " + origin_of(configuration, key) + "\n";
+    text += key + " = " + setting.show(configuration.options) + "  # " +
+            origin_of(configuration, key) + "\n";
   }
   text += "\n[limits]\n";
   for (const LimitInfo& limit : limit_table()) {

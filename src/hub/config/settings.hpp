@@ -9,8 +9,8 @@
 #include "hub/config/hub_options.hpp"
 #include "hub/config/value.hpp"
 
-// The keys that a hub can be configured by: the flags' names with `_`. The limits, which are keys too, have a table of
-// their own (hub/limits.hpp).
+// The keys that a hub can be configured by: the flags' names with `_`. The limits, which are keys
+// too, have a table of their own (hub/limits.hpp).
 
 namespace gimnet::hub {
 
@@ -37,15 +37,15 @@ struct Setting {
 
 [[nodiscard]] std::span<const Setting> settings();
 
-/// Sets a key to a value; a later one replaces an earlier one. Faults: an unknown key, with the nearest one; a value of
-/// the wrong type, unit or range. Thread safety: any thread.
+/// Sets a key to a value; a later one replaces an earlier one. Faults: an unknown key, with the
+/// nearest one; a value of the wrong type, unit or range. Thread safety: any thread.
 void apply(Configuration& configuration, const Given& given, Faults& faults);
 
 /// Fills in what follows from other values, and looks at what must agree. To be called last.
 void complete(Configuration& configuration, Faults& faults);
 
-/// What a hub of that configuration runs with, but may not do what it is told to: with numbers, and what to do.
-/// REQUIRES: complete() was called.
+/// What a hub of that configuration runs with, but may not do what it is told to: with numbers, and
+/// what to do. REQUIRES: complete() was called.
 [[nodiscard]] Faults warnings_about(const Configuration& configuration);
 
 /// The whole configuration as TOML, each value with where it came from.

@@ -27,7 +27,8 @@ constexpr std::string_view kFileVariable = "TCPHUB_CONFIG";
 
 std::string upper(std::string_view text) {
   std::string result{text};
-  std::ranges::transform(result, result.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   return result;
 }
 
@@ -37,15 +38,18 @@ std::string key_of(std::string_view variable) {
     if (variable == std::string{kPrefix} + upper(setting.key)) return std::string{setting.key};
   }
   for (const LimitInfo& limit : limit_table()) {
-    if (variable == std::string{kLimitsPrefix} + upper(limit.name)) return "limits." + std::string{limit.name};
+    if (variable == std::string{kLimitsPrefix} + upper(limit.name))
+      return "limits." + std::string{limit.name};
   }
   return {};
 }
 
 std::string nearest_variable(std::string_view variable) {
   std::vector<std::string> all{std::string{kFileVariable}};
-  for (const Setting& setting : settings()) all.push_back(std::string{kPrefix} + upper(setting.key));
-  for (const LimitInfo& limit : limit_table()) all.push_back(std::string{kLimitsPrefix} + upper(limit.name));
+  for (const Setting& setting : settings())
+    all.push_back(std::string{kPrefix} + upper(setting.key));
+  for (const LimitInfo& limit : limit_table())
+    all.push_back(std::string{kLimitsPrefix} + upper(limit.name));
   const std::vector<std::string_view> views(all.begin(), all.end());
   return did_you_mean(variable, views);
 }
@@ -80,7 +84,8 @@ std::pair<std::size_t, std::size_t> position_in(const std::string& place) {
   const std::size_t column = place.rfind(':');
   const std::size_t line = column == std::string::npos ? column : place.rfind(':', column - 1);
   if (line == std::string::npos) return {};
-  return {std::strtoul(place.c_str() + line + 1, nullptr, 10), std::strtoul(place.c_str() + column + 1, nullptr, 10)};
+  return {std::strtoul(place.c_str() + line + 1, nullptr, 10),
+          std::strtoul(place.c_str() + column + 1, nullptr, 10)};
 }
 
 /// By line and column.
@@ -114,7 +119,8 @@ void read_one(const std::string& path, const ReadOptions& how, ReadConfiguration
   sort(faults);
   read.more_faults = faults.size() > most;
   if (read.more_faults) faults.resize(most);
-  read.faults.insert(read.faults.end(), std::move_iterator(faults.begin()), std::move_iterator(faults.end()));
+  read.faults.insert(read.faults.end(), std::move_iterator(faults.begin()),
+                     std::move_iterator(faults.end()));
 }
 
 /// The *.toml of the folder, by name.
@@ -125,22 +131,25 @@ std::vector<std::string> files_in(const fs::path& folder, Faults& faults) {
   if (status.type() == fs::file_type::not_found) return files;
   if (!error && !fs::is_directory(status)) {
     faults.push_back({folder.string(),
-                      "this is not a folder, of which the *.toml would be read; make it one, or give it another name"});
+                      "this is not a folder, of which the *.toml would be read; make it one, or "
+                      "give it another name"});
     return files;
   }
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
     // Hidden ones are no members: editors put their locks and copies beside a file.
     const bool hidden = entry->path().filename().native().starts_with('.');
     if (entry->path().extension() == ".toml" && !hidden) files.push_back(entry->path().string());
   }
   if (error) {
-    faults.push_back(
-        {folder.string(), "cannot read this folder: " + error.message() + remedy_of(error, "give it rights")});
+    faults.push_back({folder.string(), "cannot read this folder: " + error.message() +
+                                           remedy_of(error, "give it rights")});
   }
   std::ranges::sort(files);
   if (files.size() > kConfigFilesMax) {
-    faults.push_back({folder.string(), "there are " + std::to_string(files.size()) + " files; at most " +
-                                           std::to_string(kConfigFilesMax) + " are read"});
+    faults.push_back({folder.string(), "there are " + std::to_string(files.size()) +
+                                           " files; at most " + std::to_string(kConfigFilesMax) +
+                                           " are read"});
     files.clear();
   }
   return files;
@@ -190,12 +199,13 @@ std::vector<std::string> read_environment(ConfigSources& sources, const char* co
       if (!sources.file.empty()) continue;
       sources.file = value;
       if (value.empty())
-        sources.faults.push_back({{}, variable + " is empty: give it a TOML file's path, or unset it"});
+        sources.faults.push_back(
+            {{}, variable + " is empty: give it a TOML file's path, or unset it"});
     } else if (const std::string key = key_of(variable); !key.empty()) {
       sources.environment.push_back(from_environment(variable, key, value));
     } else {
-      warnings.push_back("the environment's " + escaped(variable, kQuotedMax) + " is no key of the configuration" +
-                         nearest_variable(variable));
+      warnings.push_back("the environment's " + escaped(variable, kQuotedMax) +
+                         " is no key of the configuration" + nearest_variable(variable));
     }
   }
   std::ranges::sort(sources.environment, {}, &Given::label);
@@ -206,14 +216,17 @@ ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOpt
   ReadConfiguration read;
   read.faults = sources.faults;
   read.configuration.options.shards = default_shards();
-  read.place = sources.file.empty() ? default_place() : ConfigPlace{sources.file, sources.parts_alone};
+  read.place =
+      sources.file.empty() ? default_place() : ConfigPlace{sources.file, sources.parts_alone};
   if (!read.place.file.empty()) {
     Faults of_folder;
     const std::vector<std::string> parts = parts_beside(read.place, of_folder);
     std::error_code ignored;
-    // Where parts were enough they are so as long as there are any: a hub does not lose its configuration unnoticed.
+    // Where parts were enough they are so as long as there are any: a hub does not lose its
+    // configuration unnoticed.
     const bool any_parts = !parts.empty() || !of_folder.empty();
-    read.place.parts_alone = read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);
+    read.place.parts_alone =
+        read.place.parts_alone && any_parts && !fs::exists(read.place.file, ignored);
     if (!read.place.parts_alone) read_one(read.place.file, how, read);
     read.faults.insert(read.faults.end(), of_folder.begin(), of_folder.end());
     ReadOptions only_files = how;

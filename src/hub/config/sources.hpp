@@ -15,10 +15,11 @@ namespace gimnet::hub {
 /// Most files in a conf.d.
 inline constexpr std::size_t kConfigFilesMax = 256;
 
-/// Where a hub's configuration comes from, the weakest first: defaults, a file, the files in conf.d beside it, the
-/// environment, the flags. Kept so that all of it can be read again. A value type.
+/// Where a hub's configuration comes from, the weakest first: defaults, a file, the files in conf.d
+/// beside it, the environment, the flags. Kept so that all of it can be read again. A value type.
 struct ConfigSources {
-  std::string file;                ///< of --config or TCPHUB_CONFIG; "": the first of the default places that is there
+  std::string
+      file;  ///< of --config or TCPHUB_CONFIG; "": the first of the default places that is there
   std::vector<Given> environment;  ///< TCPHUB_...
   std::vector<Given> flags;
   Faults faults{};           ///< of how the file is named
@@ -34,7 +35,8 @@ struct ConfigPlace {
 /// How to read.
 struct ReadOptions {
   std::size_t faults_max = kConfigFaultsMax;  ///< told of the files
-  /// How long to wait for the end of a pipe in place of the file; 0: a pipe is a fault. It can be read once.
+  /// How long to wait for the end of a pipe in place of the file; 0: a pipe is a fault. It can be
+  /// read once.
   std::chrono::milliseconds pipe_patience{};
 };
 
@@ -51,13 +53,15 @@ struct ReadConfiguration {
 /// The places of the file if nobody says: the user's and the system's.
 [[nodiscard]] std::vector<std::string> default_config_files();
 
-/// The variables of this process that configure a hub; TCPHUB_CONFIG sets `sources.file` unless it is set. Warnings:
-/// variables that are no key.
-[[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources, const char* const* environment);
+/// The variables of this process that configure a hub; TCPHUB_CONFIG sets `sources.file` unless it
+/// is set. Warnings: variables that are no key.
+[[nodiscard]] std::vector<std::string> read_environment(ConfigSources& sources,
+                                                        const char* const* environment);
 
-/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, or is no regular file,
-/// is one. Thread safety: any thread. Limits: kConfigFilesMax files of kConfigBytesMax each. Blocks no longer than the
-/// disk does, and `pipe_patience`.
-[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources, const ReadOptions& how = {});
+/// Reads everything. Errors are faults: a file that is named and not there, or cannot be read, or
+/// is no regular file, is one. Thread safety: any thread. Limits: kConfigFilesMax files of
+/// kConfigBytesMax each. Blocks no longer than the disk does, and `pipe_patience`.
+[[nodiscard]] ReadConfiguration read_configuration(const ConfigSources& sources,
+                                                   const ReadOptions& how = {});
 
 }  // namespace gimnet::hub

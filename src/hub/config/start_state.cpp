@@ -40,14 +40,16 @@ StartState in_memory(bool known_first) {
   return result;
 }
 
-Result<StartState> go_on_from(std::unique_ptr<StateFolder> folder, const std::optional<HubState>& found,
+Result<StartState> go_on_from(std::unique_ptr<StateFolder> folder,
+                              const std::optional<HubState>& found,
                               std::chrono::milliseconds wall) {
   if (!found && folder->was_used()) {
     log_warning("there is no state in " + folder->path() +
                 " any more: the hub begins anew, and nodes that come back get new ids");
   }
   Result<HubStart> start = next_start(found ? *found : new_state(!folder->was_used()), wall);
-  if (!start) return Error{"cannot go on from " + folder->path() + "/state: " + start.error().sentence};
+  if (!start)
+    return Error{"cannot go on from " + folder->path() + "/state: " + start.error().sentence};
   if (const std::string error = folder->write(start->state); !error.empty()) return Error{error};
   return StartState{std::move(*start), std::move(folder)};
 }
@@ -69,8 +71,10 @@ std::string state_folder_name(HubId hub, const ListenUrl& address) {
   const bool tcp = address.scheme == ListenUrl::Scheme::tcp;
   if (tcp && address.port == 0) return {};
   std::string name = "hub-" + std::to_string(hub.value()) + "-";
-  for (const char c : tcp ? "tcp-" + address.host + "-" + std::to_string(address.port) : "unix" + address.path) {
-    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '_';
+  for (const char c :
+       tcp ? "tcp-" + address.host + "-" + std::to_string(address.port) : "unix" + address.path) {
+    const bool plain =
+        std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '_';
     name += plain ? c : (c == '/' ? '-' : '_');
   }
   return name;

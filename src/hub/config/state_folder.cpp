@@ -25,11 +25,14 @@ constexpr const char* kLock = "lock";
 constexpr const char* kMakeWritable = "; make the folder one that tcphub may write to";
 constexpr const char* kBeginAnew =
     "; put a copy of it back, or move it away: the hub then begins anew, and nodes get new ids";
-constexpr const char* kOtherFolder = "; run tcphub as the user whose it is, or give it another folder with --state-dir";
+constexpr const char* kOtherFolder =
+    "; run tcphub as the user whose it is, or give it another folder with --state-dir";
 
-/// Why a file of the folder cannot be opened, and what to do; `otherwise` where the error tells nothing special.
+/// Why a file of the folder cannot be opened, and what to do; `otherwise` where the error tells
+/// nothing special.
 std::string open_fault(int error, const std::string& otherwise) {
-  if (error == ELOOP) return "it is a link, and links are not followed; put a file in its place, or remove it";
+  if (error == ELOOP)
+    return "it is a link, and links are not followed; put a file in its place, or remove it";
   if (error == EISDIR) return "it is a folder; remove it";
   if (error == ENXIO) return "it is not a file; remove it";
   return system_text(error) + (error == EACCES ? kOtherFolder : otherwise);
@@ -40,7 +43,8 @@ std::string private_file_fault(int descriptor, const std::string& path) {
   struct stat info{};
   if (::fstat(descriptor, &info) != 0) return system_text(errno);
   if (!S_ISREG(info.st_mode)) return "it is not a file; remove it";
-  if (info.st_uid != ::geteuid()) return "it belongs to another user; run tcphub as that user, or give it --state-dir";
+  if (info.st_uid != ::geteuid())
+    return "it belongs to another user; run tcphub as that user, or give it --state-dir";
   if ((info.st_mode & 0077) != 0) return "other users have rights in it; chmod 600 " + path;
   return {};
 }
@@ -93,24 +97,29 @@ std::string write_fault(const std::string& path, const char* what, int error) {
   if (error == ENOSPC || error == EDQUOT) remedy = "; free space there";
   if (error == EFBIG) remedy = "; allow tcphub larger files (ulimit -f, LimitFSIZE=)";
   if (error == EISDIR) remedy = "; it is a folder: remove it";
-  return "cannot write the hub's state to " + path + "/" + kState + " (" + what + "): " + system_text(error) + remedy;
+  return "cannot write the hub's state to " + path + "/" + kState + " (" + what +
+         "): " + system_text(error) + remedy;
 }
 
 Error in_use(const std::string& path, int lock) {
   const pid_t holder = holder_of(lock);
-  return Error{"the state folder " + path + " is in use by " + (holder > 0 ? process_text(holder) : "another hub") +
+  return Error{"the state folder " + path + " is in use by " +
+               (holder > 0 ? process_text(holder) : "another hub") +
                "; end that, or give this hub a folder of its own with --state-dir"};
 }
 
 }  // namespace
 
 Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) {
-  if (std::string error = prepare_state_folder(path); !error.empty()) return Error{std::move(error)};
+  if (std::string error = prepare_state_folder(path); !error.empty())
+    return Error{std::move(error)};
   Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!folder.is_open())
-    return Error{"cannot use the folder " + path + " for state: " + open_fault(errno, kOtherFolder)};
+    return Error{"cannot use the folder " + path +
+                 " for state: " + open_fault(errno, kOtherFolder)};
   const std::string name = path + "/" + kLock;
-  Descriptor lock(::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  Descriptor lock(
+      ::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!lock.is_open()) return Error{"cannot use " + name + ": " + open_fault(errno, kOtherFolder)};
   if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
@@ -120,14 +129,17 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
     return Error{"cannot lock " + name + ": " + system_text(errno) +
                  "; give tcphub a folder on a disk of this machine with --state-dir"};
   }
-  // A hub that kept nothing takes the file away: what was opened before then is no file of the folder any more.
+  // A hub that kept nothing takes the file away: what was opened before then is no file of the
+  // folder any more.
   struct stat info{};
   if (::fstat(lock.get(), &info) == 0 && info.st_nlink == 0) return open(path);
-  // Not before it is locked: the file may be of a hub that just takes it away, or that could not lock it. Who had it
-  // wrote its number.
-  const bool was_used = info.st_size > 0 || ::faccessat(folder.get(), kState, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
+  // Not before it is locked: the file may be of a hub that just takes it away, or that could not
+  // lock it. Who had it wrote its number.
+  const bool was_used =
+      info.st_size > 0 || ::faccessat(folder.get(), kState, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   write_holder(lock.get());
-  return std::unique_ptr<StateFolder>(new StateFolder(path, folder.release(), lock.release(), was_used));
+  return std::unique_ptr<StateFolder>(
+      new StateFolder(path, folder.release(), lock.release(), was_used));
 }
 
 StateFolder::~StateFolder() {
@@ -166,10 +178,12 @@ std::string StateFolder::write(const HubState& state) {
   };
   // A file left over by a crash, or a link that somebody put there: never written through.
   if (::unlinkat(folder_, kFresh, 0) != 0 && errno != ENOENT) {
-    const std::string why = errno == EISDIR ? "it is a folder; remove it" : system_text(errno) + kMakeWritable;
+    const std::string why =
+        errno == EISDIR ? "it is a folder; remove it" : system_text(errno) + kMakeWritable;
     return "cannot write the hub's state: " + path_ + "/" + kFresh + " is in the way: " + why;
   }
-  const Descriptor file(::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  const Descriptor file(
+      ::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!file.is_open()) return failed("create");
   created = true;
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");

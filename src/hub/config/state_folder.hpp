@@ -10,11 +10,12 @@
 
 namespace gimnet::hub {
 
-/// The folder in which one hub keeps its state: a file `state`, and a file `lock` that keeps a second hub out while
-/// this one lives. What stands there is not trusted: it is read within bounds, links are not followed.
-/// A folder that no hub used before, that was opened and into which nothing was kept is left empty. Where the lock
-/// cannot be had its file stays: to remove it without holding it could take it from another hub.
-/// Thread safety: none. Ownership: of two descriptors. Errors: sentences that name the file and say what to do.
+/// The folder in which one hub keeps its state: a file `state`, and a file `lock` that keeps a
+/// second hub out while this one lives. What stands there is not trusted: it is read within bounds,
+/// links are not followed. A folder that no hub used before, that was opened and into which nothing
+/// was kept is left empty. Where the lock cannot be had its file stays: to remove it without
+/// holding it could take it from another hub. Thread safety: none. Ownership: of two descriptors.
+/// Errors: sentences that name the file and say what to do.
 class StateFolder {
  public:
   /// Creates the folder (mode 0700) where there is none, but not the one above it, and locks it.
@@ -25,8 +26,8 @@ class StateFolder {
 
   /// What a hub kept here; nothing: no hub has.
   [[nodiscard]] Result<std::optional<HubState>> read() const;
-  /// Keeps it: when this returns "", neither a crash nor a loss of power takes it away. Otherwise why it was not
-  /// written; what stood there before is still there then.
+  /// Keeps it: when this returns "", neither a crash nor a loss of power takes it away. Otherwise
+  /// why it was not written; what stood there before is still there then.
   [[nodiscard]] std::string write(const HubState& state);
 
   [[nodiscard]] const std::string& path() const { return path_; }

@@ -1,10 +1,10 @@
 #include "hub/config/toml_file.hpp"
 
 #define TOML_EXCEPTIONS 0
-// The library has two errors that a file can bring about, each undefined behaviour, and an abort where assertions are
-// on: it takes for granted that the name of a table begins like one ("[?"), and that a letter like the umlauts outside
-// of a text is a blank. Here the first is not taken for granted, and goes on to the error that the library has for such
-// a name; the second is no blank.
+// The library has two errors that a file can bring about, each undefined behaviour, and an abort
+// where assertions are on: it takes for granted that the name of a table begins like one ("[?"),
+// and that a letter like the umlauts outside of a text is a blank. Here the first is not taken for
+// granted, and goes on to the error that the library has for such a name; the second is no blank.
 #include <toml++/impl/forward_declarations.h>
 #undef TOML_ASSERT_ASSUME
 #define TOML_ASSERT_ASSUME(expr) static_assert(true)
@@ -32,10 +32,11 @@ namespace {
 
 constexpr std::size_t kQuotedLineMax = 120;
 constexpr std::string_view kOnlyTable = "limits";
-/// Bytes that may be parsed in vain to find where something begins of which the end was left out; a file that needs
-/// more is left alone from there.
+/// Bytes that may be parsed in vain to find where something begins of which the end was left out; a
+/// file that needs more is left alone from there.
 constexpr std::size_t kVainBytesMax = std::size_t{16} << 20;
-/// Dots in a key: the library makes a table within a table of each, and frees them one within the other.
+/// Dots in a key: the library makes a table within a table of each, and frees them one within the
+/// other.
 constexpr std::size_t kKeyDotsMax = 64;
 
 /// Where something stands in a file of which a part was parsed.
@@ -43,7 +44,9 @@ struct Places {
   const std::string& name;
   std::size_t first = 1;  ///< the part's first line
 
-  [[nodiscard]] std::size_t line(const toml::source_region& source) const { return first - 1 + source.begin.line; }
+  [[nodiscard]] std::size_t line(const toml::source_region& source) const {
+    return first - 1 + source.begin.line;
+  }
   [[nodiscard]] std::string of(std::size_t line, std::size_t column) const {
     return name + ":" + std::to_string(line) + ":" + std::to_string(column);
   }
@@ -63,9 +66,11 @@ std::string given_twice(std::string_view key) {
   return "'" + escaped(key, kQuotedLineMax) + "' is given twice; leave one of them out";
 }
 
-Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines& lines, const Places& places) {
+Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines& lines,
+               const Places& places) {
   std::string_view what = error.description();
-  if (const std::size_t colon = what.find(": "); what.starts_with("Error while") && colon != std::string_view::npos) {
+  if (const std::size_t colon = what.find(": ");
+      what.starts_with("Error while") && colon != std::string_view::npos) {
     what.remove_prefix(colon + 2);
   }
   const std::size_t column = error.source().begin.column;
@@ -75,11 +80,12 @@ Fault fault_of(const toml::parse_error& error, std::size_t line, const TomlLines
   if (what.ends_with("is not representable in 64 bits")) {
     // It is told behind the number.
     const auto [number, begin] = lines.number_before(line, column);
-    return {places.of(line, begin), "no key can be '" + escaped(number, kQuotedLineMax) +
-                                        "': it does not fit in 64 bits; give a number that is nearer to 0"};
+    return {places.of(line, begin),
+            "no key can be '" + escaped(number, kQuotedLineMax) +
+                "': it does not fit in 64 bits; give a number that is nearer to 0"};
   }
-  return {places.of(line, column),
-          "this is not TOML: " + escaped(what, kQuotedLineMax) + "; write KEY = VALUE, texts in quotes"};
+  return {places.of(line, column), "this is not TOML: " + escaped(what, kQuotedLineMax) +
+                                       "; write KEY = VALUE, texts in quotes"};
 }
 
 bool is_at_end(const toml::parse_error& error) {
@@ -132,8 +138,8 @@ Value value_of(const toml::node& node, const Places& places) {
   return value;
 }
 
-/// Reads a file part by part: what stands before something that is no TOML is taken for itself, so that each byte is
-/// parsed a few times only, however much is wrong.
+/// Reads a file part by part: what stands before something that is no TOML is taken for itself, so
+/// that each byte is parsed a few times only, however much is wrong.
 class Reading {
  public:
   Reading(std::string_view text, const std::string& name, std::size_t faults_max)
@@ -149,14 +155,15 @@ class Reading {
       }
       leave_out(parsed.error());
       if (!take_what_is_before() && vain_bytes_ > kVainBytesMax) {
-        file_.faults.push_back(
-            {places_.of(left_out_from_, lines_.first_column(left_out_from_)),
-             "what follows here cannot be made sense of; mend what stands above it, then look again"});
+        file_.faults.push_back({places_.of(left_out_from_, lines_.first_column(left_out_from_)),
+                                "what follows here cannot be made sense of; mend what stands above "
+                                "it, then look again"});
         break;
       }
     }
     // The table itself is worth telling only where nothing is in it.
-    if (any_limit_) std::erase_if(found_, [](const Found& each) { return each.given.key == kOnlyTable; });
+    if (any_limit_)
+      std::erase_if(found_, [](const Found& each) { return each.given.key == kOnlyTable; });
     std::ranges::stable_sort(found_, {}, &Found::at);
     for (Found& each : found_) file_.keys.push_back(std::move(each.given));
     return std::move(file_);
@@ -173,16 +180,20 @@ class Reading {
     bool is_table = false;
   };
 
-  /// What the parser is not to see. Of what is no UTF-8 it would say so at the character before, and get no further.
+  /// What the parser is not to see. Of what is no UTF-8 it would say so at the character before,
+  /// and get no further.
   void look_at_lines() {
-    for (std::size_t number = 1; number <= lines_.size() && file_.faults.size() < faults_max_; ++number) {
+    for (std::size_t number = 1; number <= lines_.size() && file_.faults.size() < faults_max_;
+         ++number) {
       if (const std::size_t column = lines_.mend_text(number); column != 0) {
         mended_.insert(number);
-        file_.faults.push_back({places_.of(number, column), "this is not UTF-8 text; save the file in that encoding"});
+        file_.faults.push_back(
+            {places_.of(number, column), "this is not UTF-8 text; save the file in that encoding"});
       }
       if (lines_.key_dots(number) > kKeyDotsMax) {
-        file_.faults.push_back({places_.of(number, lines_.first_column(number)),
-                                "no key has so many parts; write KEY = VALUE, or LIMIT = VALUE below [limits]"});
+        file_.faults.push_back(
+            {places_.of(number, lines_.first_column(number)),
+             "no key has so many parts; write KEY = VALUE, or LIMIT = VALUE below [limits]"});
         lines_.blank(number, number);
       }
     }
@@ -190,19 +201,22 @@ class Reading {
 
   /// Tells what is wrong and blanks it.
   void leave_out(const toml::parse_error& error) {
-    const std::size_t line = std::clamp<std::size_t>(places_.line(error.source()), places_.first, lines_.size());
+    const std::size_t line =
+        std::clamp<std::size_t>(places_.line(error.source()), places_.first, lines_.size());
     const bool at_end = is_at_end(error);
     const bool nothing_left_out = left_out_from_ == 0;
-    if (const auto text = at_end && nothing_left_out ? lines_.open_text(places_.first) : std::nullopt) {
+    if (const auto text =
+            at_end && nothing_left_out ? lines_.open_text(places_.first) : std::nullopt) {
       left_out_from_ = lines_.beginning(text->first, places_.first);
       left_out_to_ = last_of_open_text(text->first);
-      file_.faults.push_back(
-          {places_.of(text->first, text->second),
-           "this is not TOML: the text that begins here is not closed; end it with its three quotes"});
+      file_.faults.push_back({places_.of(text->first, text->second),
+                              "this is not TOML: the text that begins here is not closed; end it "
+                              "with its three quotes"});
     } else if (const auto list = open_list_before(line, at_end)) {
       std::tie(left_out_from_, left_out_to_) = *list;
-      file_.faults.push_back({places_.of(left_out_from_, lines_.first_column(left_out_from_)),
-                              "this is not TOML: the list that begins here is not closed; end it with ]"});
+      file_.faults.push_back(
+          {places_.of(left_out_from_, lines_.first_column(left_out_from_)),
+           "this is not TOML: the list that begins here is not closed; end it with ]"});
     } else if (left_out_from_ != 0 && (at_end || line <= left_out_to_)) {
       // What was left out was the end of something that began further up.
       left_out_from_ = lines_.beginning(left_out_from_ - 1, places_.first);
@@ -213,24 +227,26 @@ class Reading {
     header_left_out_ = lines_.is_header(left_out_from_);
     lines_.blank(left_out_from_, left_out_to_);
   }
-  /// A text that is not closed takes all that follows. Its last line, as far as can be guessed: before the next one
-  /// that is a key or a header for itself.
+  /// A text that is not closed takes all that follows. Its last line, as far as can be guessed:
+  /// before the next one that is a key or a header for itself.
   [[nodiscard]] std::size_t last_of_open_text(std::size_t first) const {
     std::size_t last = first;
-    while (last < lines_.size() && !(lines_.begins(last + 1) && toml::parse(lines_.line(last + 1)))) ++last;
+    while (last < lines_.size() && !(lines_.begins(last + 1) && toml::parse(lines_.line(last + 1))))
+      ++last;
     return last;
   }
-  /// A list that is not closed takes what follows for its values, so the parser complains of the next key, or of the
-  /// end. The lines of such a list before the error; none: that is not what is wrong.
-  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_list_before(std::size_t line,
-                                                                                    bool at_end) const {
+  /// A list that is not closed takes what follows for its values, so the parser complains of the
+  /// next key, or of the end. The lines of such a list before the error; none: that is not what is
+  /// wrong.
+  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_list_before(
+      std::size_t line, bool at_end) const {
     const std::size_t last = at_end ? lines_.size() : line - 1;
     if (last < places_.first) return std::nullopt;
     if (!at_end && !toml::parse(lines_.text(line, line))) return std::nullopt;
     const std::size_t first = lines_.beginning(last, places_.first);
     const toml::parse_result part = toml::parse(lines_.text(first, last));
-    const bool is_open =
-        !part && is_at_end(part.error()) && part.error().description().find("array") != std::string_view::npos;
+    const bool is_open = !part && is_at_end(part.error()) &&
+                         part.error().description().find("array") != std::string_view::npos;
     return is_open ? std::optional(std::pair(first, last)) : std::nullopt;
   }
   /// False: something that begins before what was left out does not end there.
@@ -266,8 +282,10 @@ class Reading {
     const auto [known, is_new] = known_.try_emplace(outer, Known{inner != nullptr});
     const bool is_header = lines_.is_header(places_.line(key.source()));
     if (!is_new) {
-      // A table may go on by dotted keys and with tables in it, and a list of tables with one table more.
-      const bool begins_again = is_header && inner != nullptr && begins_alone(places_.line(key.source()));
+      // A table may go on by dotted keys and with tables in it, and a list of tables with one table
+      // more.
+      const bool begins_again =
+          is_header && inner != nullptr && begins_alone(places_.line(key.source()));
       const bool goes_on = inner != nullptr ? known->second.is_table && !begins_again : is_header;
       if (!goes_on) return tell_twice(key);
     }
@@ -299,13 +317,15 @@ class Reading {
     if (node.is_table() && lines_.is_header(line)) last_header_ = std::max(last_header_, line);
     if (const toml::table* table = node.as_table()) {
       for (auto&& [key, inner] : *table) note_headers(inner);
-    } else if (const toml::array* list = node.as_array(); list != nullptr && list->is_array_of_tables()) {
+    } else if (const toml::array* list = node.as_array();
+               list != nullptr && list->is_array_of_tables()) {
       for (const toml::node& inner : *list) note_headers(inner);
     }
   }
   [[nodiscard]] Inside what_begins_at(std::size_t header) const {
     const toml::parse_result alone = toml::parse(lines_.line(header));
-    const bool limits = alone && alone.table().size() == 1 && alone.table().begin()->first.str() == kOnlyTable;
+    const bool limits =
+        alone && alone.table().size() == 1 && alone.table().begin()->first.str() == kOnlyTable;
     return limits && begins_alone(header) ? Inside::limits : Inside::unknown;
   }
   /// Is it the header of a table that is in no other, and no list of them?
@@ -321,8 +341,9 @@ class Reading {
   const std::size_t faults_max_;
   TomlFile file_;
   std::vector<Found> found_;
-  std::map<std::string, Known, std::less<>> known_;  ///< keys, limits by their full names, and tables
-  std::set<std::size_t> mended_;                     ///< lines
+  std::map<std::string, Known, std::less<>>
+      known_;                     ///< keys, limits by their full names, and tables
+  std::set<std::size_t> mended_;  ///< lines
   Inside inside_ = Inside::nothing;
   std::size_t last_header_ = 0;
   std::size_t vain_bytes_ = 0;     ///< parsed so far
@@ -337,7 +358,8 @@ class Reading {
 TomlFile read_toml(std::string_view text, const std::string& name, std::size_t faults_max) {
   if (text.size() > kConfigBytesMax) {
     TomlFile file;
-    file.faults.push_back({Places{name}.of(1, 1), "the file is over " + std::to_string(kConfigBytesMax) +
+    file.faults.push_back({Places{name}.of(1, 1), "the file is over " +
+                                                      std::to_string(kConfigBytesMax) +
                                                       " bytes; is it a configuration of tcphub?"});
     return file;
   }
@@ -354,7 +376,8 @@ std::string toml_quoted(std::string_view text) {
 #endif
       quoted += c;
     } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      std::snprintf(code.data(), code.size(), "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
+      std::snprintf(code.data(), code.size(), "\\u%04x",
+                    static_cast<unsigned>(static_cast<unsigned char>(c)));
       quoted += code.data();
     } else {
       quoted += c;

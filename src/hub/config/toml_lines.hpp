@@ -17,7 +17,8 @@ namespace gimnet::hub {
 class TomlLines {
  public:
   explicit TomlLines(std::string_view text) : text_(text) {
-    if (text_.starts_with("\xEF\xBB\xBF")) text_.erase(0, 3);  // a mark of the encoding is no part of the first line
+    if (text_.starts_with("\xEF\xBB\xBF"))
+      text_.erase(0, 3);  // a mark of the encoding is no part of the first line
     for (std::size_t at = 0; at <= text_.size();) {
       begins_.push_back(at);
       at = std::min(text_.find('\n', at), text_.size()) + 1;
@@ -45,17 +46,22 @@ class TomlLines {
     return number;
   }
   /// Does the header of a table begin there?
-  [[nodiscard]] bool is_header(std::size_t number) const { return trimmed(line(number)).starts_with('['); }
+  [[nodiscard]] bool is_header(std::size_t number) const {
+    return trimmed(line(number)).starts_with('[');
+  }
   /// Dots that may separate the parts of a key: none of those in a value behind it.
   [[nodiscard]] std::size_t key_dots(std::size_t number) const {
     const std::string_view all = line(number);
     const std::size_t end = is_header(number) ? all.size() : all.rfind('=');
     if (end == std::string_view::npos || trimmed(all).starts_with('#')) return 0;
-    return static_cast<std::size_t>(std::count(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(end), '.'));
+    return static_cast<std::size_t>(
+        std::count(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(end), '.'));
   }
-  /// Where the text over several lines begins in which the lines from `first` on end, as its end is missing: line, and
-  /// column (from 1, in characters). REQUIRES: `first` begins outside of any text.
-  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_text(std::size_t first) const {
+  /// Where the text over several lines begins in which the lines from `first` on end, as its end is
+  /// missing: line, and column (from 1, in characters). REQUIRES: `first` begins outside of any
+  /// text.
+  [[nodiscard]] std::optional<std::pair<std::size_t, std::size_t>> open_text(
+      std::size_t first) const {
     const std::string_view all = text(first, size());
     for (std::size_t at = 0; at < all.size();) {
       const std::string_view rest = all.substr(at);
@@ -82,8 +88,10 @@ class TomlLines {
     }
   }
   /// The number that ends right before the column (from 1, in characters), and where it begins.
-  [[nodiscard]] std::pair<std::string_view, std::size_t> number_before(std::size_t number, std::size_t column) const {
-    constexpr std::string_view kNumberCharacters = "0123456789abcdefABCDEFox_+-";  // of a whole number of TOML
+  [[nodiscard]] std::pair<std::string_view, std::size_t> number_before(std::size_t number,
+                                                                       std::size_t column) const {
+    constexpr std::string_view kNumberCharacters =
+        "0123456789abcdefABCDEFox_+-";  // of a whole number of TOML
     const std::string_view all = line(number);
     std::size_t end = 0;
     for (std::size_t at = 1; at < column && end < all.size(); ++at) {
@@ -97,7 +105,8 @@ class TomlLines {
   [[nodiscard]] std::size_t first_column(std::size_t number) const {
     return line(number).size() - trimmed(line(number)).size() + 1;
   }
-  /// Puts a `?` in place of each byte that is no UTF-8. Column (from 1, in characters) of the first; 0: there was none.
+  /// Puts a `?` in place of each byte that is no UTF-8. Column (from 1, in characters) of the
+  /// first; 0: there was none.
   [[nodiscard]] std::size_t mend_text(std::size_t number) {
     const std::size_t begin = begins_[number - 1];
     const std::size_t bytes = line(number).size();
@@ -127,7 +136,8 @@ class TomlLines {
     }
     return std::string_view::npos;
   }
-  /// Of a text on one line with its quotes, or of what is left of the line where its end is missing.
+  /// Of a text on one line with its quotes, or of what is left of the line where its end is
+  /// missing.
   static std::size_t one_line_text_bytes(std::string_view text) {
     const char quote = text.front();
     std::size_t at = 1;
@@ -141,8 +151,9 @@ class TomlLines {
   static std::pair<std::size_t, std::size_t> place_in(std::size_t first, std::string_view text) {
     const auto line = first + static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
     const std::size_t begin = text.rfind('\n') + 1;  // 0 where there is none
-    const auto characters = std::count_if(text.begin() + static_cast<std::ptrdiff_t>(begin), text.end(),
-                                          [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
+    const auto characters =
+        std::count_if(text.begin() + static_cast<std::ptrdiff_t>(begin), text.end(),
+                      [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
     return {line, static_cast<std::size_t>(characters) + 1};
   }
   /// Bytes of the first character; 0: it is none.
@@ -159,7 +170,8 @@ class TomlLines {
   }
   static bool begins(std::string_view line) {
     line = trimmed(line);
-    return line.starts_with('[') || (line.find('=') != std::string_view::npos && !line.starts_with('#'));
+    return line.starts_with('[') ||
+           (line.find('=') != std::string_view::npos && !line.starts_with('#'));
   }
 
   std::string text_;                 ///< each line with its end

@@ -8,7 +8,8 @@ namespace gimnet::hub {
 
 /// What somebody set a key to, before it is understood. A value type.
 struct Value {
-  /// `words` come from the environment and the command line, where nothing tells a number from a text.
+  /// `words` come from the environment and the command line, where nothing tells a number from a
+  /// text.
   enum class Kind : std::uint8_t { words, text, integer, boolean, fraction, time, list, table };
 
   Kind kind = Kind::words;

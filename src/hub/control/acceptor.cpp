@@ -18,13 +18,16 @@ namespace {
 
 constexpr int kBatch = 64;
 
-int accept_one(int listener) { return ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK); }
+int accept_one(int listener) {
+  return ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+}
 
 std::string tcp_peer(int descriptor) {
   sockaddr_storage storage{};
   socklen_t size = sizeof storage;
   std::array<char, INET6_ADDRSTRLEN> text{};
-  if (::getpeername(descriptor, reinterpret_cast<sockaddr*>(&storage), &size) != 0) return "unknown";
+  if (::getpeername(descriptor, reinterpret_cast<sockaddr*>(&storage), &size) != 0)
+    return "unknown";
   if (storage.ss_family == AF_INET6) {
     const auto* v6 = reinterpret_cast<const sockaddr_in6*>(&storage);
     ::inet_ntop(AF_INET6, &v6->sin6_addr, text.data(), text.size());
@@ -35,12 +38,14 @@ std::string tcp_peer(int descriptor) {
   return std::string{text.data()} + ":" + std::to_string(ntohs(v4->sin_port));
 }
 
-bool is_shortage(int error) { return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM; }
+bool is_shortage(int error) {
+  return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
+}
 
 }  // namespace
 
-Acceptor::Acceptor(std::unique_ptr<Listener> listener, const Limits& limits, RefusalCounters& refusals,
-                   DescriptorReserve& reserve, MakeRoom make_room)
+Acceptor::Acceptor(std::unique_ptr<Listener> listener, const Limits& limits,
+                   RefusalCounters& refusals, DescriptorReserve& reserve, MakeRoom make_room)
     : listener_(std::move(listener)),
       limits_(limits),
       refusals_(refusals),
@@ -63,9 +68,11 @@ Acceptor::After Acceptor::accept_some(const std::function<void(Stranger)>& take)
     } else if (is_shortage(errno)) {
       // The kernel says so before it looks whether anybody waits.
       const Shortage outcome = accept_with_spare(take);
-      if (outcome != Shortage::served_one) return outcome == Shortage::nobody_waits ? After::wait : After::pause;
+      if (outcome != Shortage::served_one)
+        return outcome == Shortage::nobody_waits ? After::wait : After::pause;
     }
-    // Anything else is one peer's trouble (it reset before it was accepted): the next one may be well.
+    // Anything else is one peer's trouble (it reset before it was accepted): the next one may be
+    // well.
   }
   return After::wait;
 }
@@ -75,7 +82,8 @@ Stranger Acceptor::stranger(int descriptor) const {
   if (listener_->url().scheme == ListenUrl::Scheme::tcp) {
     result.peer = PeerInfo{"tcp", tcp_peer(descriptor)};
     result.identity = "open";
-    result.transport = std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::tcp, limits_);
+    result.transport =
+        std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::tcp, limits_);
     return result;
   }
   ucred credentials{};
@@ -83,11 +91,13 @@ Stranger Acceptor::stranger(int descriptor) const {
   result.peer = PeerInfo{"unix", "unknown"};
   result.identity = "unknown";
   if (::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
-    result.peer.address = "pid " + std::to_string(credentials.pid) + " uid " + std::to_string(credentials.uid);
+    result.peer.address =
+        "pid " + std::to_string(credentials.pid) + " uid " + std::to_string(credentials.uid);
     result.identity = "uid " + std::to_string(credentials.uid);
     result.may_administer = credentials.uid == 0 || credentials.uid == ::geteuid();
   }
-  result.transport = std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::unix_socket, limits_);
+  result.transport =
+      std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::unix_socket, limits_);
   return result;
 }
 
@@ -99,7 +109,8 @@ Acceptor::Shortage Acceptor::accept_with_spare(const std::function<void(Stranger
   const int error = errno;
   if (descriptor < 0) {
     spare_ = open_spare_descriptor();
-    return error == EAGAIN || error == EWOULDBLOCK ? Shortage::nobody_waits : Shortage::nothing_helps;
+    return error == EAGAIN || error == EWOULDBLOCK ? Shortage::nobody_waits
+                                                   : Shortage::nothing_helps;
   }
   Stranger peer = stranger(descriptor);
   if (find_room(peer)) {
@@ -125,8 +136,8 @@ void Acceptor::turn_away(const Stranger& peer) {
   log_line(LogLevel::error, {"no_descriptor", log_peer(peer.peer.transport, peer.peer.address)},
            "out of descriptors: turned " + peer.peer.transport + " " + peer.peer.address +
                " away; raise the limit (ulimit -n) or lower --limit nodes");
-  static_cast<void>(
-      send_goodbye(*peer.transport, proto::GoodbyeCode::no_memory, "the hub is out of descriptors; try again later"));
+  static_cast<void>(send_goodbye(*peer.transport, proto::GoodbyeCode::no_memory,
+                                 "the hub is out of descriptors; try again later"));
 }
 
 }  // namespace gimnet::hub

@@ -17,14 +17,16 @@ namespace gimnet::hub {
 struct Stranger {
   std::unique_ptr<Transport> transport;
   PeerInfo peer;
-  std::string identity;  ///< who it is, as far as the system tells: "uid 1000" over a Unix socket, "open" over TCP
+  std::string identity;  ///< who it is, as far as the system tells: "uid 1000" over a Unix socket,
+                         ///< "open" over TCP
   bool may_administer = false;  ///< root or the hub's own user, over a Unix socket
-  bool on_reserve = false;      ///< has a descriptor that is kept for administrators: nobody else may stay
+  bool on_reserve =
+      false;  ///< has a descriptor that is kept for administrators: nobody else may stay
 };
 
-/// Takes connections from a listener. Out of descriptors it has a spare one to accept with. The peer stays if others
-/// make room, or if it may administer the hub and there is a descriptor in reserve for it; else it is told `no_memory`
-/// and closed, so that it learns at once what is wrong.
+/// Takes connections from a listener. Out of descriptors it has a spare one to accept with. The
+/// peer stays if others make room, or if it may administer the hub and there is a descriptor in
+/// reserve for it; else it is told `no_memory` and closed, so that it learns at once what is wrong.
 /// Thread safety: none. Ownership: of the listener and one spare descriptor.
 class Acceptor {
  public:
@@ -44,7 +46,8 @@ class Acceptor {
   Acceptor& operator=(const Acceptor&) = delete;
 
   enum class After : std::uint8_t { wait, pause };
-  /// Hands over what is waiting, at most a batch. `pause`: descriptors are short, come back after kPauseMs.
+  /// Hands over what is waiting, at most a batch. `pause`: descriptors are short, come back after
+  /// kPauseMs.
   After accept_some(const std::function<void(Stranger)>& take);
   static constexpr int kPauseMs = 100;
 

@@ -49,24 +49,29 @@ void say(const char* what, const std::string& about, const std::string& more = {
 
 void log_change(const NodeNoted& noted, const Membership& membership, HubId hub) {
   if (!log_enabled(LogLevel::debug)) return;
-  const Session* session = noted.kind == ChangeKind::left ? nullptr : membership.sessions().find(noted.index);
+  const Session* session =
+      noted.kind == ChangeKind::left ? nullptr : membership.sessions().find(noted.index);
   const std::string name = session != nullptr ? session->name.str() : noted.name;
-  const std::string before = noted.kind == ChangeKind::renamed ? ", before '" + noted.former_name + "'" : "";
+  const std::string before =
+      noted.kind == ChangeKind::renamed ? ", before '" + noted.former_name + "'" : "";
   say(happening(noted.kind), node_text(hub, noted.index, name), before);
 }
 
 void log_change(const ServiceNoted& noted, const Membership& membership, HubId hub) {
   if (!log_enabled(LogLevel::debug)) return;
-  const Topic* topic = noted.kind == ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
+  const Topic* topic =
+      noted.kind == ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
   const std::string name = topic != nullptr ? std::string{topic->full_name} : noted.full_name;
-  say(happening(noted.kind), "service " + to_string(make_id<GroupId>(hub, noted.group)) + " '" + name + "'",
+  say(happening(noted.kind),
+      "service " + to_string(make_id<GroupId>(hub, noted.group)) + " '" + name + "'",
       ", of " + node_text(hub, noted.provider, {}));
 }
 
 void log_change(const RenumberDue& due, const Membership& membership, HubId hub) {
   if (!log_enabled(LogLevel::debug)) return;
   const Session* session = membership.sessions().find(due.index);
-  say("has another id", node_text(hub, due.former, session != nullptr ? session->name.str() : std::string{}),
+  say("has another id",
+      node_text(hub, due.former, session != nullptr ? session->name.str() : std::string{}),
       ", " + to_string(make_id<NodeId>(hub, due.index)));
 }
 

@@ -4,8 +4,9 @@
 #include "hub/control/state/effects.hpp"
 #include "hub/control/state/membership.hpp"
 
-// The changes of nodes and services as lines of level debug: what somebody who watches everything is told, and who has
-// another id. Costs nothing at other levels. Thread safety: the conductor's thread only.
+// The changes of nodes and services as lines of level debug: what somebody who watches everything
+// is told, and who has another id. Costs nothing at other levels. Thread safety: the conductor's
+// thread only.
 
 namespace gimnet::hub {
 

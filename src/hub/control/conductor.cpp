@@ -26,7 +26,8 @@ bool is_odd(proto::Status status) {
   return status == proto::Status::bad_request || status == proto::Status::not_supported;
 }
 
-/// The log's subject: nobody who comes and goes again and again fills the log, nor keeps others out of it.
+/// The log's subject: nobody who comes and goes again and again fills the log, nor keeps others out
+/// of it.
 LogSubject subject(std::string_view reason, const Session& session) {
   if (!session.name.empty()) return {reason, session.name};
   return {reason, log_peer(session.origin.transport, session.origin.address)};
@@ -49,7 +50,8 @@ Sessions::Options sessions_options(const HubFacts& facts, Placement placement, c
 
 /// Never 0, and another one at each start, also of a hub that keeps nothing.
 std::uint64_t epoch_of(const HubStart& start) {
-  const std::uint64_t epoch = load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
+  const std::uint64_t epoch =
+      load_le<std::uint64_t>(start.state.unique_id.data()) + start.state.boot;
   return epoch != 0 ? epoch : 1;
 }
 
@@ -77,9 +79,11 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
   if (returns_published_) expect_all(wiring_.start.nodes.used, wiring_.tables.nodes);
 }
 
-std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello, Moment moment) {
+std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello,
+                                        Moment moment) {
 #ifndef GIMNET_BUG_DRAINING_LETS_IN
-  if (draining_) return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
+  if (draining_)
+    return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
 #endif
   JoinRequest request;
   request.role = hello.role;
@@ -99,7 +103,8 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   return std::nullopt;
 }
 
-void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment) {
+void Conductor::attach(Stranger& stranger, const proto::Hello& hello,
+                       const Membership::Joined& joined, Moment moment) {
   Session& session = *joined.session;
   watches_.connection_ended(session.index);  // of one that this one replaces
   AttachCommand command;
@@ -117,17 +122,20 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello, const Memb
   command.peer_frame_bytes = hello.frame_length_max;
   command.tell_heard = session.renumbered;
   runner_.tell_again(session, command);
-  // Before the command, which lets WELCOME out: who has seen that can be reached. The id is nobody's before.
+  // Before the command, which lets WELCOME out: who has seen that can be reached. The id is
+  // nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
   session.closing.reset();
   log_line(LogLevel::info, subject("joined", session),
-           title(node_id(session), session) + (session.came_back ? " came back over " : " joined over ") +
-               session.origin.transport.str() + " from " + session.origin.address.str() + ", shard " +
-               std::to_string(session.place.shard.value()));
+           title(node_id(session), session) +
+               (session.came_back ? " came back over " : " joined over ") +
+               session.origin.transport.str() + " from " + session.origin.address.str() +
+               ", shard " + std::to_string(session.place.shard.value()));
 }
 
-proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& hello, Moment moment) const {
+proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& hello,
+                                  Moment moment) const {
   proto::Welcome welcome;
   welcome.node = node_id(session);
   welcome.token = membership_.sessions().token_of(session);
@@ -166,19 +174,26 @@ void Conductor::on_event(ShardEvent event, milliseconds now) {
 
 void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Session* session = find(event.session, event.node);
-  // What a replaced connection had asked would count as declared on the new one, by which the node never asks for it.
-  if (session == nullptr || event.attachment != session->attachment || event.frame.size() < proto::kHeaderSize) return;
+  // What a replaced connection had asked would count as declared on the new one, by which the node
+  // never asks for it.
+  if (session == nullptr || event.attachment != session->attachment ||
+      event.frame.size() < proto::kHeaderSize)
+    return;
   const proto::FrameHeader header = proto::load_header(event.frame.data());
   const proto::Kind kind = header.kind;
   std::span<const std::byte> payload = std::span{event.frame}.subspan(proto::kHeaderSize);
   if (header.has(proto::kFlagExt)) {
     const auto frame = proto::parse_frame(event.frame, proto::Origin::node);
-    if (!frame) return close(*session, GoodbyeCode::malformed, proto::frame_error_text(frame.error()));
+    if (!frame)
+      return close(*session, GoodbyeCode::malformed, proto::frame_error_text(frame.error()));
     payload = frame->payload;
   }
   const auto view = proto::split_control(payload);
-  if (!view) return close(*session, GoodbyeCode::malformed, "a control frame without operation and request number");
-  // The shards let no ROUTE through (check_header_from_node()): a hole there is not to reach a handler.
+  if (!view)
+    return close(*session, GoodbyeCode::malformed,
+                 "a control frame without operation and request number");
+  // The shards let no ROUTE through (check_header_from_node()): a hole there is not to reach a
+  // handler.
   if (kind != proto::Kind::ns && kind != proto::Kind::ctrl) {
     return close(*session, GoodbyeCode::not_allowed, "frames of that kind are between hubs only");
   }
@@ -189,7 +204,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const Request request{*session, view->header, payload};
   const NodeId dst{header.dst};
   const bool is_ours = dst == NodeId{} || dst == make_id<NodeId>(facts_.id, kHubIndex);
-  const Handler handle = is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
+  const Handler handle =
+      is_ours ? handler_for(session->role, kind, view->header.operation) : handle_for_another;
   const ShardIndex shard = session->place.shard;
   const proto::Payload answer = handle(context, request);
   const proto::Status status = proto::peek_status(answer);
@@ -204,7 +220,8 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
 #endif
   command.frame = control_frame(kind, event.node, facts_.id, answer);
 #ifdef GIMNET_BUG_ANSWER_NAMES_THE_SLOT
-  command.frame = control_frame(kind, make_id<NodeId>(facts_.id, event.session.slot.value() + 1), facts_.id, answer);
+  command.frame = control_frame(kind, make_id<NodeId>(facts_.id, event.session.slot.value() + 1),
+                                facts_.id, answer);
 #endif
   command.answers = 1;
   wiring_.shards.send(shard, std::move(command));
@@ -216,10 +233,13 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
 
 void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
   Session* session = find(event.session, event.node);
-  if (session == nullptr || session->oddities.take({limits_.oddities_per_s, limits_.oddities_burst}, now)) return;
+  if (session == nullptr ||
+      session->oddities.take({limits_.oddities_per_s, limits_.oddities_burst}, now))
+    return;
   close(*session, GoodbyeCode::oddities,
         "more than " + std::to_string(limits_.oddities_burst) +
-            " requests were answered bad_request, not_supported or denied in a short time; look at the answers");
+            " requests were answered bad_request, not_supported or denied in a short time; look at "
+            "the answers");
 }
 
 void Conductor::on_heard(const HeardEvent& event) {
@@ -242,20 +262,22 @@ void Conductor::on_detached(const DetachedEvent& event, milliseconds now) {
   if (event.said_by_peer && event.code == GoodbyeCode::done) {
     line += " left";
   } else if (said) {
-    line += std::string{event.said_by_peer ? " said goodbye: " : " was closed: "} + proto::goodbye_name(event.code) +
-            (event.sentence.empty() ? "" : ": ") + event.sentence;
+    line += std::string{event.said_by_peer ? " said goodbye: " : " was closed: "} +
+            proto::goodbye_name(event.code) + (event.sentence.empty() ? "" : ": ") + event.sentence;
   } else {
     line += " lost its connection";
   }
   log_line(LogLevel::info, subject("left", *session), line);
   Effects effects;
   watches_.connection_ended(session->index);
-  membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now, effects);
+  membership_.connection_ended(*session, {event.said_by_peer, event.code, event.sentence}, now,
+                               effects);
   runner_.carry_out(effects, now);
 }
 
 void Conductor::close(const Session& session, GoodbyeCode code, std::string sentence) {
-  wiring_.shards.send(session.place.shard, CloseCommand{ref_of(session.place), code, std::move(sentence)});
+  wiring_.shards.send(session.place.shard,
+                      CloseCommand{ref_of(session.place), code, std::move(sentence)});
 }
 
 void Conductor::tick(milliseconds now) {
@@ -274,7 +296,8 @@ void Conductor::tick(milliseconds now) {
 
 std::optional<milliseconds> Conductor::next_deadline() const {
   std::optional<milliseconds> deadline = membership_.next_deadline();
-  const auto returns_until = returns_published_ ? membership_.sessions().returns_until() : std::nullopt;
+  const auto returns_until =
+      returns_published_ ? membership_.sessions().returns_until() : std::nullopt;
   for (const std::optional<milliseconds>& other : {keeper_.again_at(), returns_until}) {
     if (other && (!deadline || *other < *deadline)) deadline = other;
   }
@@ -296,9 +319,11 @@ void Conductor::drain() {
 Reloading Conductor::reload() {
   Reloading reloading;
   if (wiring_.read_again) reloading = wiring_.read_again();
-  if (!wiring_.read_again) reloading.faults.emplace_back("this hub has no configuration that could be read again");
+  if (!wiring_.read_again)
+    reloading.faults.emplace_back("this hub has no configuration that could be read again");
   for (const std::string& fault : reloading.faults) log_error(fault);
-  if (reloading.more_faults) log_error("there are more faults; tcphub --check-config tells all of them");
+  if (reloading.more_faults)
+    log_error("there are more faults; tcphub --check-config tells all of them");
 #ifdef GIMNET_BUG_BAD_CONFIGURATION_TAKEN
   if (!reloading.faults.empty()) limits_ = reloading.limits;
 #endif
@@ -322,19 +347,23 @@ void Conductor::log_level_set(LogLevel level) {
 
 Session* Conductor::find(const SessionRef& ref, NodeId node) {
   // The shard may have said it before it heard of a new id.
-  Session* session = membership_.sessions().find(membership_.sessions().present_index(index_of(node)));
+  Session* session =
+      membership_.sessions().find(membership_.sessions().present_index(index_of(node)));
   if (session == nullptr || session->place.generation != ref.generation) return nullptr;
   return session;
 }
 
-NodeId Conductor::node_id(const Session& session) const { return membership_.sessions().node_id(session); }
+NodeId Conductor::node_id(const Session& session) const {
+  return membership_.sessions().node_id(session);
+}
 
 bool Conductor::serve_watches(milliseconds now) {
   const std::uint64_t resyncs = watches_.resyncs();
-  const bool more = watches_.serve(membership_, now, [this](std::uint32_t node, const proto::Payload& events) {
-    const Session* session = membership_.sessions().find(node);
-    if (session != nullptr) runner_.send_event(*session, events);
-  });
+  const bool more =
+      watches_.serve(membership_, now, [this](std::uint32_t node, const proto::Payload& events) {
+        const Session* session = membership_.sessions().find(node);
+        if (session != nullptr) runner_.send_event(*session, events);
+      });
   request_counters_.resyncs.add(watches_.resyncs() - resyncs);
   return more;
 }

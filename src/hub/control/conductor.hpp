@@ -26,9 +26,10 @@
 
 namespace gimnet::hub {
 
-/// The control plane of a hub: admits peers, answers control requests, publishes tables, commands the shards. The event
-/// loop around it is conductor_loop.hpp; here are neither sockets to wait for nor clocks.
-/// Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters outlive it.
+/// The control plane of a hub: admits peers, answers control requests, publishes tables, commands
+/// the shards. The event loop around it is conductor_loop.hpp; here are neither sockets to wait for
+/// nor clocks. Thread safety: one thread, the conductor's. Lifetime: shards, tables and counters
+/// outlive it.
 class Conductor final : private Administration {
  public:
   struct Wiring {
@@ -39,8 +40,9 @@ class Conductor final : private Administration {
     StateKeeper::Keep keep_state{};                    ///< or none: in memory only
     std::span<const SessionGauges* const> sessions{};  ///< one per shard, or none
     const RefusalCounters* refusals = nullptr;         ///< or none
-    ReadAgain read_again{};                            ///< or none: the configuration stays as it is
-    std::function<void(LogLevel)> note_log_level{};    ///< told of levels that were set by request; or none
+    ReadAgain read_again{};  ///< or none: the configuration stays as it is
+    std::function<void(LogLevel)>
+        note_log_level{};  ///< told of levels that were set by request; or none
   };
   /// `limits` is what the conductor's thread goes by; reload() changes it.
   Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring wiring);
@@ -51,15 +53,17 @@ class Conductor final : private Administration {
     std::int64_t wall_ns = 0;         ///< since 1970
   };
   /// Judges a HELLO: takes the stranger's transport and hands it to a shard, or says why not.
-  [[nodiscard]] std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello, Moment moment);
+  [[nodiscard]] std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello,
+                                                    Moment moment);
 
   void on_event(ShardEvent event, std::chrono::milliseconds now);
 
-  /// As long as something runs out, tick() is to be called so often: from a call that comes later than that one sees
-  /// that the hub stood still (stopped, or without a processor), and for how long.
+  /// As long as something runs out, tick() is to be called so often: from a call that comes later
+  /// than that one sees that the hub stood still (stopped, or without a processor), and for how
+  /// long.
   static constexpr std::chrono::milliseconds kLookEvery{100};
-  /// It did for so long until now: times in which nodes come back run no further by it. To be said before events are
-  /// taken.
+  /// It did for so long until now: times in which nodes come back run no further by it. To be said
+  /// before events are taken.
   void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now) {
     membership_.stood_still(time, now);
   }
@@ -70,12 +74,12 @@ class Conductor final : private Administration {
   /// Do lists wait to be freed? Then tick() wants to be called from time to time.
   [[nodiscard]] bool has_garbage() const { return publisher_.garbage() > 0; }
 
-  /// Tells those who watch names and services what they have not heard yet, a bounded piece of it. True: there is more.
-  /// To be called after events were taken, and again as long as there is more.
+  /// Tells those who watch names and services what they have not heard yet, a bounded piece of it.
+  /// True: there is more. To be called after events were taken, and again as long as there is more.
   [[nodiscard]] bool serve_watches(std::chrono::milliseconds now);
 
-  /// Reads the configuration again. With faults nothing changes; else all that may change does, here at once and on
-  /// each shard before its next turn. Says in the log what came of it.
+  /// Reads the configuration again. With faults nothing changes; else all that may change does,
+  /// here at once and on each shard before its next turn. Says in the log what came of it.
   Reloading reload() override;
 
   /// Somebody who may asked for the end of the hub.
@@ -88,8 +92,10 @@ class Conductor final : private Administration {
   [[nodiscard]] const Watches& watches() const { return watches_; }
 
  private:
-  void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined, Moment moment);
-  [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello, Moment moment) const;
+  void attach(Stranger& stranger, const proto::Hello& hello, const Membership::Joined& joined,
+              Moment moment);
+  [[nodiscard]] proto::Welcome welcome(const Session& session, const proto::Hello& hello,
+                                       Moment moment) const;
   void on_frame(const ControlFrameEvent& event, std::chrono::milliseconds now);
   /// Closes a connection that asks too often for what it cannot have.
   void on_oddity(const ControlFrameEvent& event, std::chrono::milliseconds now);
@@ -104,7 +110,9 @@ class Conductor final : private Administration {
 
   void want_drain() override { drain_wanted_ = true; }
   void log_level_set(LogLevel level) override;
-  std::string keep_state(std::chrono::milliseconds now) override { return keeper_.keep_at_once(membership_, now); }
+  std::string keep_state(std::chrono::milliseconds now) override {
+    return keeper_.keep_at_once(membership_, now);
+  }
 
   // Immutable after construction
   const HubFacts facts_;
@@ -116,8 +124,9 @@ class Conductor final : private Administration {
   TablePublisher publisher_;
   RequestCounters request_counters_;
   StateKeeper keeper_;
-  EffectRunner runner_;             ///< on all of these
-  bool returns_published_ = false;  ///< after a restart: to the shards nodes that are not back yet count as away
+  EffectRunner runner_;  ///< on all of these
+  bool returns_published_ =
+      false;  ///< after a restart: to the shards nodes that are not back yet count as away
   bool drain_wanted_ = false;
   bool draining_ = false;
   std::size_t shards_to_drain_ = 0;

@@ -52,7 +52,8 @@ struct ConductorLoop::Impl {
   struct Door {
     Door(asio::io_context& context, std::unique_ptr<Listener> listener, const Wiring& wiring,
          DescriptorReserve& reserve, Acceptor::MakeRoom make_room)
-        : acceptor(std::move(listener), wiring.limits, wiring.refusals, reserve, std::move(make_room)),
+        : acceptor(std::move(listener), wiring.limits, wiring.refusals, reserve,
+                   std::move(make_room)),
           watch(context, acceptor.listener().descriptor()),
           pause(context) {}
     Acceptor acceptor;
@@ -64,7 +65,10 @@ struct ConductorLoop::Impl {
       : wiring(parts),
         reserve(parts.limits),
         strangers(
-            parts.limits, [this](Stranger& stranger, const proto::Hello& hello) { return admit(stranger, hello); },
+            parts.limits,
+            [this](Stranger& stranger, const proto::Hello& hello) {
+              return admit(stranger, hello);
+            },
             parts.refusals),
         strangers_watch(context, strangers.descriptor()),
         inbox_watch(context, parts.inbox.waker().descriptor()),
@@ -72,8 +76,9 @@ struct ConductorLoop::Impl {
         signals(context, SIGTERM, SIGINT),
         reloads(context, SIGHUP) {
     for (auto& listener : listeners) {
-      doors.push_back(std::make_unique<Door>(context, std::move(listener), parts, reserve,
-                                             [this](const Stranger& newcomer) { return make_room(newcomer); }));
+      doors.push_back(
+          std::make_unique<Door>(context, std::move(listener), parts, reserve,
+                                 [this](const Stranger& newcomer) { return make_room(newcomer); }));
     }
   }
 
@@ -85,8 +90,8 @@ struct ConductorLoop::Impl {
     if (stopping) return;
     look_whether_it_stood();
     const milliseconds moment = now();
-    const auto after =
-        door.acceptor.accept_some([this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
+    const auto after = door.acceptor.accept_some(
+        [this, moment](Stranger stranger) { strangers.enter(std::move(stranger), moment); });
     see_off_leaving();
     serve_watches();  // a newcomer that finds no room has those served who said HELLO
     arm_timer();
@@ -97,17 +102,20 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// What the shards told before this HELLO was sent holds already, however much that is: a name that was given back
-  /// is free.
+  /// What the shards told before this HELLO was sent holds already, however much that is: a name
+  /// that was given back is free.
   std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello) {
     // Draining ends in take_events().
-    if (!stopping) wiring.inbox.drain_present([this](ShardEvent&& event) { take_event_in_admit(std::move(event)); });
+    if (!stopping)
+      wiring.inbox.drain_present(
+          [this](ShardEvent&& event) { take_event_in_admit(std::move(event)); });
     return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
   }
 
   void take_event_in_admit(ShardEvent event) {
     if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
-      leaving.push_back(std::move(farewell->transport));  // the waiting room is busy with this stranger
+      leaving.push_back(
+          std::move(farewell->transport));  // the waiting room is busy with this stranger
     } else {
       wiring.conductor.on_event(std::move(event), now());
     }
@@ -126,7 +134,8 @@ struct ConductorLoop::Impl {
   }
 
   void see_off_leaving() {
-    for (auto& transport : std::exchange(leaving, {})) strangers.see_off(std::move(transport), now());
+    for (auto& transport : std::exchange(leaving, {}))
+      strangers.see_off(std::move(transport), now());
   }
 
   void watch_strangers() {
@@ -143,7 +152,8 @@ struct ConductorLoop::Impl {
   void take_events() {
     look_whether_it_stood();
     wiring.inbox.waker().awake();
-    wiring.inbox.drain(ControlInbox::kEventsABatch, [this](ShardEvent event) { take_event(std::move(event)); });
+    wiring.inbox.drain(ControlInbox::kEventsABatch,
+                       [this](ShardEvent event) { take_event(std::move(event)); });
     serve_watches();
     arm_timer();
     if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
@@ -204,7 +214,8 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// Before anything is judged by the clock: what peers sent while the hub stood still lies there unread.
+  /// Before anything is judged by the clock: what peers sent while the hub stood still lies there
+  /// unread.
   void look_whether_it_stood() {
     const milliseconds moment = now();
     if (!armed || moment - *armed <= Conductor::kLookEvery) return;
@@ -238,7 +249,8 @@ struct ConductorLoop::Impl {
   void begin_drain() {
     stopping = true;
     doors.clear();
-    strangers.dismiss_all({proto::GoodbyeCode::draining, "the hub is shutting down; connect to another one"}, now());
+    strangers.dismiss_all(
+        {proto::GoodbyeCode::draining, "the hub is shutting down; connect to another one"}, now());
     wiring.conductor.drain();
     drain_deadline.emplace(context, milliseconds{wiring.limits.drain_ms} + kDrainMargin);
     drain_deadline->async_wait([this](const error_code& error) {
@@ -251,8 +263,9 @@ struct ConductorLoop::Impl {
     arm_timer();
   }
 
-  /// The shards write nothing any more, and whoever was told GOODBYE has left or had its time: closed before that, a
-  /// connection on which it had sent something would be reset, and the GOODBYE lost.
+  /// The shards write nothing any more, and whoever was told GOODBYE has left or had its time:
+  /// closed before that, a connection on which it had sent something would be reset, and the
+  /// GOODBYE lost.
   void end_if_all_left() {
     const bool all_told = wiring.conductor.drained() || gave_up;
     if (all_told && strangers.leaving() == 0 && leaving.empty()) context.stop();

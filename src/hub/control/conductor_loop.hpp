@@ -11,9 +11,10 @@
 
 namespace gimnet::hub {
 
-/// The conductor's thread: waits for strangers, for what shards hand over, for deadlines and for signals, and drives a
-/// Conductor with them. SIGHUP has the configuration read again; SIGTERM or SIGINT drains the hub; a second one ends it
-/// at once. Thread safety: constructed, run and destroyed by one thread. Lifetime: what it is wired to outlives it.
+/// The conductor's thread: waits for strangers, for what shards hand over, for deadlines and for
+/// signals, and drives a Conductor with them. SIGHUP has the configuration read again; SIGTERM or
+/// SIGINT drains the hub; a second one ends it at once. Thread safety: constructed, run and
+/// destroyed by one thread. Lifetime: what it is wired to outlives it.
 class ConductorLoop {
  public:
   struct Wiring {
@@ -27,7 +28,8 @@ class ConductorLoop {
   ConductorLoop(const ConductorLoop&) = delete;
   ConductorLoop& operator=(const ConductorLoop&) = delete;
 
-  /// Returns when the hub has drained and all who were told GOODBYE have left or had their time, or at a second signal.
+  /// Returns when the hub has drained and all who were told GOODBYE have left or had their time, or
+  /// at a second signal.
   void run();
 
  private:

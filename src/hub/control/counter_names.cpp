@@ -55,8 +55,8 @@ constexpr std::array kCounters{
 };
 #undef GIMNET_COUNTER
 
-// Every field of ShardCounters is a Counter, but for the padding at its end: one that is added there and forgotten here
-// shows.
+// Every field of ShardCounters is a Counter, but for the padding at its end: one that is added
+// there and forgotten here shows.
 constexpr std::size_t kListed = kCounters.size() + proto::kDropReasonCount;
 static_assert(sizeof(ShardCounters) >= kListed * sizeof(Counter) &&
               sizeof(ShardCounters) - kListed * sizeof(Counter) < alignof(ShardCounters));
@@ -64,8 +64,8 @@ static_assert(sizeof(ShardCounters) >= kListed * sizeof(Counter) &&
 using Take = std::function<void(const std::string& name, std::uint64_t value)>;
 
 template <class Protocol>
-void take_requests(const std::string& prefix, const Protocol& counters, const char* (*name_of)(std::uint16_t),
-                   const Take& take) {
+void take_requests(const std::string& prefix, const Protocol& counters,
+                   const char* (*name_of)(std::uint16_t), const Take& take) {
   for (std::size_t operation = 0; operation < counters.by_operation.size(); ++operation) {
     const char* name = name_of(static_cast<std::uint16_t>(operation));
     if (name != nullptr) take(prefix + name, counters.by_operation[operation].value());
@@ -80,7 +80,8 @@ void take_requests(const std::string& prefix, const Protocol& counters, const ch
 }  // namespace
 
 void for_each_counter(const ShardCounters& counters, const Take& take) {
-  for (const Named& named : kCounters) take(std::string{named.name}, (counters.*named.field).value());
+  for (const Named& named : kCounters)
+    take(std::string{named.name}, (counters.*named.field).value());
   for (std::size_t reason = 1; reason < proto::kDropReasonCount; ++reason) {
     const auto* name = proto::drop_reason_name(static_cast<proto::DropReason>(reason));
     take(std::string{"dropped."} + name, counters.dropped[reason].value());

@@ -7,9 +7,9 @@
 
 namespace gimnet::hub {
 
-/// Descriptors that are kept open for nothing: given up one by one when there are no others and an administrator has to
-/// get in, and taken back, before anybody else gets them, when some are free again.
-/// Thread safety: none. Ownership: of what it keeps. Limits: limits.administrators.
+/// Descriptors that are kept open for nothing: given up one by one when there are no others and an
+/// administrator has to get in, and taken back, before anybody else gets them, when some are free
+/// again. Thread safety: none. Ownership: of what it keeps. Limits: limits.administrators.
 class DescriptorReserve {
  public:
   /// REQUIRES: limits outlives it.

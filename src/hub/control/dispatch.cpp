@@ -57,8 +57,8 @@ Roles mask_of(Role role) { return role == Role::admin ? admins : nodes; }
 
 proto::Payload handle_unknown(HandlerContext&, const Request& request) {
   return proto::encode_refusal(
-      request.header,
-      {proto::Status::not_supported, "this hub has no operation " + std::to_string(request.header.operation)});
+      request.header, {proto::Status::not_supported,
+                       "this hub has no operation " + std::to_string(request.header.operation)});
 }
 
 }  // namespace
@@ -75,7 +75,8 @@ proto::Payload handle_for_another(HandlerContext& context, const Request& reques
   return proto::encode_refusal(
       request.header,
       {proto::Status::not_found, "no hub answers at that address: there is no route from hub " +
-                                     std::to_string(context.facts.id.value()) + " to it; ask the own hub with dst 0"});
+                                     std::to_string(context.facts.id.value()) +
+                                     " to it; ask the own hub with dst 0"});
 }
 
 }  // namespace gimnet::hub

@@ -5,8 +5,8 @@
 
 namespace gimnet::hub {
 
-/// The handler for an operation of that kind by somebody of that role. Never null: what is not in the table is answered
-/// `not_supported`, what is for others `denied`. Thread safety: any thread.
+/// The handler for an operation of that kind by somebody of that role. Never null: what is not in
+/// the table is answered `not_supported`, what is for others `denied`. Thread safety: any thread.
 [[nodiscard]] Handler handler_for(proto::Role role, proto::Kind kind, std::uint16_t operation);
 
 /// The answer to a request whose frame is not for this hub: `not_found`.

@@ -43,10 +43,13 @@ void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
 void EffectRunner::run(const StateDue&) {}  // carry_out() has seen to it
 
 void EffectRunner::run(const CloseDue& effect) {
-  parts_.shards.send(effect.place.shard, CloseCommand{ref_of(effect.place), effect.code, effect.sentence});
+  parts_.shards.send(effect.place.shard,
+                     CloseCommand{ref_of(effect.place), effect.code, effect.sentence});
 }
 
-void EffectRunner::run(const NodeChanged& effect) { parts_.publisher.publish_node(effect.index, parts_.membership); }
+void EffectRunner::run(const NodeChanged& effect) {
+  parts_.publisher.publish_node(effect.index, parts_.membership);
+}
 
 void EffectRunner::run(const GroupChanged& effect) {
   if (parts_.membership.services().find_group(effect.index) != nullptr) {
@@ -82,11 +85,13 @@ void EffectRunner::run(const RenumberDue& effect) {
   parts_.watches.connection_ended(effect.former);
   parts_.shards.send(
       effect.place.shard,
-      RenumberCommand{ref_of(effect.place), make_id<NodeId>(parts_.facts.id, effect.index), effect.sentence});
+      RenumberCommand{ref_of(effect.place), make_id<NodeId>(parts_.facts.id, effect.index),
+                      effect.sentence});
 }
 
 void EffectRunner::run(const ServiceMovedDue& effect) {
-  if (const Session* session = find(effect.subscriber)) send_event(*session, payload_of(effect), effect.move);
+  if (const Session* session = find(effect.subscriber))
+    send_event(*session, payload_of(effect), effect.move);
 }
 
 void EffectRunner::tell_again(const Session& session, AttachCommand& command) const {
@@ -94,7 +99,8 @@ void EffectRunner::tell_again(const Session& session, AttachCommand& command) co
 #ifdef GIMNET_BUG_MOVES_NOT_TOLD_AGAIN
     continue;
 #endif
-    const auto frame = control_frame(proto::Kind::ns, command.node, parts_.facts.id, payload_of(untold));
+    const auto frame =
+        control_frame(proto::Kind::ns, command.node, parts_.facts.id, payload_of(untold));
     command.told.insert(command.told.end(), frame.begin(), frame.end());
     command.told_move = std::max(command.told_move, untold.move);
   }
@@ -124,8 +130,9 @@ void EffectRunner::run(const PaceDue& effect) {
 #else
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
 #endif
-  parts_.shards.send(session->place.shard, PaceCommand{ref_of(session->place), group_id(effect.group), terms,
-                                                       effect.retained, effect.was_plain});
+  parts_.shards.send(session->place.shard,
+                     PaceCommand{ref_of(session->place), group_id(effect.group), terms,
+                                 effect.retained, effect.was_plain});
 }
 
 void EffectRunner::run(const PaceEnded& effect) {
@@ -163,16 +170,19 @@ void EffectRunner::run(const NameDecided& effect) {
   const Session* session = find(effect.node);
   if (session == nullptr) return;
   send_event(*session, effect.confirmed ? proto::encode(ns::NameConfirmed{effect.name})
-                                        : proto::encode(ns::NameLost{effect.name, effect.holder, effect.sentence}));
+                                        : proto::encode(ns::NameLost{effect.name, effect.holder,
+                                                                     effect.sentence}));
 }
 
-void EffectRunner::send_event(const Session& session, const proto::Payload& payload, std::uint64_t move) {
-  // When it is back it is told how services moved, and learns the rest from the answers to what it declares again.
+void EffectRunner::send_event(const Session& session, const proto::Payload& payload,
+                              std::uint64_t move) {
+  // When it is back it is told how services moved, and learns the rest from the answers to what it
+  // declares again.
   if (!session.connected) return;
   SendControlCommand command;
   command.session = ref_of(session.place);
-  command.frame =
-      control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session), parts_.facts.id, payload);
+  command.frame = control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session),
+                                parts_.facts.id, payload);
   command.move = move;
   parts_.shards.send(session.place.shard, std::move(command));
 }

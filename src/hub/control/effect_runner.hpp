@@ -14,9 +14,10 @@
 
 namespace gimnet::hub {
 
-/// Carries out what the state machines want done: publishes tables, commands shards, tells nodes, and keeps what has to
-/// outlive the hub. In the order in which they wanted it, which is part of its meaning (state/effects.hpp).
-/// Thread safety: the conductor's thread only. Lifetime: all its parts outlive it.
+/// Carries out what the state machines want done: publishes tables, commands shards, tells nodes,
+/// and keeps what has to outlive the hub. In the order in which they wanted it, which is part of
+/// its meaning (state/effects.hpp). Thread safety: the conductor's thread only. Lifetime: all its
+/// parts outlive it.
 class EffectRunner {
  public:
   struct Parts {
@@ -32,10 +33,12 @@ class EffectRunner {
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
   /// A shard has taken what another one had handed over to it.
   void fence_passed(const FencePassedEvent& event);
-  /// Sends an event of kind NS; nothing to a node that is away. `move`, if not 0: the conductor wants to hear when the
-  /// node has read what it was told of the services' moves up to that one (Services::moves_read()).
+  /// Sends an event of kind NS; nothing to a node that is away. `move`, if not 0: the conductor
+  /// wants to hear when the node has read what it was told of the services' moves up to that one
+  /// (Services::moves_read()).
   void send_event(const Session& session, const proto::Payload& payload, std::uint64_t move = 0);
-  /// Adds what the node has to be told ahead of all else, since it came back: how services moved meanwhile.
+  /// Adds what the node has to be told ahead of all else, since it came back: how services moved
+  /// meanwhile.
   void tell_again(const Session& session, AttachCommand& command) const;
 
  private:
@@ -52,7 +55,9 @@ class EffectRunner {
   void run(const CloseDue& effect);
   void run(const StateDue& effect);
   void run(const NameDecided& effect);
-  [[nodiscard]] const Session* find(std::uint32_t node) const { return parts_.membership.sessions().find(node); }
+  [[nodiscard]] const Session* find(std::uint32_t node) const {
+    return parts_.membership.sessions().find(node);
+  }
   [[nodiscard]] GroupId group_id(std::uint32_t group) const;
   [[nodiscard]] proto::Payload payload_of(const ServiceMovedDue& effect) const;
 

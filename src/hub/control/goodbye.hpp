@@ -7,8 +7,8 @@
 
 namespace gimnet::hub {
 
-/// Writes the opening and GOODBYE to somebody who was not admitted. False: the peer takes nothing, which nobody needs
-/// to be told. Never waits.
+/// Writes the opening and GOODBYE to somebody who was not admitted. False: the peer takes nothing,
+/// which nobody needs to be told. Never waits.
 bool send_goodbye(Transport& transport, proto::GoodbyeCode code, std::string_view sentence);
 
 }  // namespace gimnet::hub

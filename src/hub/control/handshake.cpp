@@ -13,11 +13,13 @@ using proto::GoodbyeCode;
 
 constexpr std::size_t kLengthBytes = 4;
 
-/// What a HELLO frame's header has after its length: dst, src, kind, flags, hops. The lane is the dialer's to choose.
-constexpr std::array<std::byte, 11> kAfterLength{std::byte{},   std::byte{}, std::byte{}, std::byte{},
-                                                 std::byte{},   std::byte{}, std::byte{}, std::byte{},
-                                                 std::byte{16}, std::byte{}, std::byte{}};
-static_assert(static_cast<std::uint8_t>(kAfterLength[8]) == static_cast<std::uint8_t>(proto::Kind::link));
+/// What a HELLO frame's header has after its length: dst, src, kind, flags, hops. The lane is the
+/// dialer's to choose.
+constexpr std::array<std::byte, 11> kAfterLength{
+    std::byte{}, std::byte{}, std::byte{},   std::byte{}, std::byte{}, std::byte{},
+    std::byte{}, std::byte{}, std::byte{16}, std::byte{}, std::byte{}};
+static_assert(static_cast<std::uint8_t>(kAfterLength[8]) ==
+              static_cast<std::uint8_t>(proto::Kind::link));
 
 }  // namespace
 
@@ -37,8 +39,10 @@ Handshake::Verdict Handshake::took(std::size_t bytes) {
       return Verdict::garbage;
     case proto::Opening::bad_version:
       return refuse(GoodbyeCode::bad_version,
-                    "this hub speaks version " + std::to_string(proto::kVersionMajor) + " of the protocol and you " +
-                        std::to_string(static_cast<int>(all[proto::kOpeningSize - 2])) + "; use a matching library");
+                    "this hub speaks version " + std::to_string(proto::kVersionMajor) +
+                        " of the protocol and you " +
+                        std::to_string(static_cast<int>(all[proto::kOpeningSize - 2])) +
+                        "; use a matching library");
     case proto::Opening::accepted:
       break;
   }
@@ -48,7 +52,8 @@ Handshake::Verdict Handshake::took(std::size_t bytes) {
   const std::span<const std::byte> rest = frame.subspan(proto::kHeaderSize);
   if (rest.size() < length) return Verdict::more;
   if (rest.size() > length) {
-    return refuse(GoodbyeCode::malformed, "there are bytes after HELLO; send nothing more before WELCOME");
+    return refuse(GoodbyeCode::malformed,
+                  "there are bytes after HELLO; send nothing more before WELCOME");
   }
   return read_hello(rest);
 }
@@ -60,13 +65,16 @@ Handshake::Verdict Handshake::check_header(std::span<const std::byte> frame) {
     std::copy_n(frame.data(), kLengthBytes, reinterpret_cast<std::byte*>(&length));
     const std::size_t most = capacity_ - proto::kOpeningSize - proto::kHeaderSize;
     if (length > most) {
-      return refuse(GoodbyeCode::malformed, "a HELLO of " + std::to_string(length) + " bytes after its header; " +
-                                                std::to_string(most) + " are allowed");
+      return refuse(GoodbyeCode::malformed, "a HELLO of " + std::to_string(length) +
+                                                " bytes after its header; " + std::to_string(most) +
+                                                " are allowed");
     }
     const std::span<const std::byte> after = frame.subspan(kLengthBytes, size - kLengthBytes);
     const std::size_t known = std::min(after.size(), kAfterLength.size());
-    if (!std::equal(after.begin(), after.begin() + static_cast<std::ptrdiff_t>(known), kAfterLength.begin())) {
-      return refuse(GoodbyeCode::malformed, "the first frame is not a HELLO: kind 16, dst, src, flags and hops 0");
+    if (!std::equal(after.begin(), after.begin() + static_cast<std::ptrdiff_t>(known),
+                    kAfterLength.begin())) {
+      return refuse(GoodbyeCode::malformed,
+                    "the first frame is not a HELLO: kind 16, dst, src, flags and hops 0");
     }
   }
   if (size < proto::kHeaderSize) return Verdict::more;

@@ -10,8 +10,9 @@
 
 namespace gimnet::hub {
 
-/// What a peer said before it was admitted: the opening and HELLO, looked at byte by byte, so that the first impossible
-/// byte ends it. Thread safety: none. Ownership: of one buffer of limits.handshake_bytes, all that a stranger costs.
+/// What a peer said before it was admitted: the opening and HELLO, looked at byte by byte, so that
+/// the first impossible byte ends it. Thread safety: none. Ownership: of one buffer of
+/// limits.handshake_bytes, all that a stranger costs.
 class Handshake {
  public:
   explicit Handshake(const Limits& limits);

@@ -17,7 +17,8 @@ Error refuse(std::string_view text, std::string_view why) {
   return Error{"cannot listen on " + escaped(text, kQuotedLineMax) + ": " + std::string{why}};
 }
 
-constexpr std::string_view kForms = "write tcp://127.0.0.1:7450, tcp://[::1]:7450 or unix:/path/to/socket";
+constexpr std::string_view kForms =
+    "write tcp://127.0.0.1:7450, tcp://[::1]:7450 or unix:/path/to/socket";
 
 /// The system's functions would read only what stands before it.
 bool has_zero(const std::string& host) { return host.find('\0') != std::string::npos; }
@@ -46,7 +47,8 @@ Result<ListenUrl> parse_tcp(std::string_view text, std::string_view rest) {
   url.host = std::string{bracketed ? rest.substr(1, colon - 2) : rest.substr(0, colon)};
   if (url.host == "localhost") url.host = "127.0.0.1";
   if (bracketed ? !is_v6(url.host) : !is_v4(url.host)) {
-    return refuse(text, "'" + escaped(url.host, kQuotedLineMax) + "' is not a numeric address; " + std::string{kForms});
+    return refuse(text, "'" + escaped(url.host, kQuotedLineMax) + "' is not a numeric address; " +
+                            std::string{kForms});
   }
   return url;
 }
@@ -56,8 +58,9 @@ Result<ListenUrl> parse_unix(std::string_view text, std::string_view rest) {
   if (rest.empty() || rest.front() != '/')
     return refuse(text, "the path must be absolute, as in unix:/run/tcphub.sock");
   if (rest.size() > kSocketPathMax) {
-    return refuse(text, "the path has " + std::to_string(rest.size()) + " bytes, and a socket's may have " +
-                            std::to_string(kSocketPathMax) + "; choose a shorter one");
+    return refuse(text, "the path has " + std::to_string(rest.size()) +
+                            " bytes, and a socket's may have " + std::to_string(kSocketPathMax) +
+                            "; choose a shorter one");
   }
   // Addresses are printed side by side, and in lines of the log.
   if (std::ranges::any_of(rest, [](unsigned char c) { return c <= ' ' || c == 0x7f; })) {
@@ -78,7 +81,8 @@ std::string ListenUrl::text() const {
 }
 
 bool ListenUrl::is_local() const {
-  return scheme == Scheme::unix_socket || host == "::1" || (host.starts_with("127.") && is_v4(host));
+  return scheme == Scheme::unix_socket || host == "::1" ||
+         (host.starts_with("127.") && is_v4(host));
 }
 
 Result<ListenUrl> parse_listen_url(std::string_view text) {

@@ -8,7 +8,8 @@
 
 namespace gimnet::hub {
 
-/// An address to listen on: `tcp://127.0.0.1:7450`, `tcp://[::1]:0` (any free port), `unix:/run/tcphub.sock`.
+/// An address to listen on: `tcp://127.0.0.1:7450`, `tcp://[::1]:0` (any free port),
+/// `unix:/run/tcphub.sock`.
 struct ListenUrl {
   enum class Scheme : std::uint8_t { tcp, unix_socket };
 
@@ -27,7 +28,8 @@ struct ListenUrl {
 /// A Unix socket's path is at most this long (sockaddr_un).
 inline constexpr std::size_t kSocketPathMax = 107;
 
-/// Errors: a sentence that names the address and says how to write it. Host names but `localhost` are not looked up.
+/// Errors: a sentence that names the address and says how to write it. Host names but `localhost`
+/// are not looked up.
 [[nodiscard]] Result<ListenUrl> parse_listen_url(std::string_view text);
 
 }  // namespace gimnet::hub

@@ -46,7 +46,8 @@ TcpAddress tcp_address(const ListenUrl& url) {
   return address;
 }
 
-/// One is the other, or every address of its family; the families never get in each other's way (IPV6_V6ONLY).
+/// One is the other, or every address of its family; the families never get in each other's way
+/// (IPV6_V6ONLY).
 bool share_a_host(const sockaddr_storage& a, const sockaddr_storage& b) {
   if (a.ss_family != b.ss_family) return false;
   if (a.ss_family == AF_INET) {
@@ -56,7 +57,9 @@ bool share_a_host(const sockaddr_storage& a, const sockaddr_storage& b) {
   }
   const in6_addr& one = reinterpret_cast<const sockaddr_in6&>(a).sin6_addr;
   const in6_addr& two = reinterpret_cast<const sockaddr_in6&>(b).sin6_addr;
-  const auto is = [](const in6_addr& x, const in6_addr& y) { return std::memcmp(&x, &y, sizeof x) == 0; };
+  const auto is = [](const in6_addr& x, const in6_addr& y) {
+    return std::memcmp(&x, &y, sizeof x) == 0;
+  };
   return is(one, two) || is(one, in6addr_any) || is(two, in6addr_any);
 }
 
@@ -70,7 +73,8 @@ std::uint16_t bound_port(int descriptor) {
 
 std::string other_reason(int error, const char* remedy) {
   const bool open_files = error == EMFILE || error == ENFILE;
-  return system_text(error) + "; " + (open_files ? "allow more of them (ulimit -n, LimitNOFILE=)" : remedy);
+  return system_text(error) + "; " +
+         (open_files ? "allow more of them (ulimit -n, LimitNOFILE=)" : remedy);
 }
 
 std::string tcp_reason(const ListenUrl& url, int error) {
@@ -79,9 +83,12 @@ std::string tcp_reason(const ListenUrl& url, int error) {
     return "the port is in use by " + (owner.empty() ? "another process" : owner) +
            "; end that, or choose another port (0: any free one)";
   }
-  if (error == EACCES) return "ports below 1024 need rights that this user does not have; choose a higher one";
-  if (error == EADDRNOTAVAIL) return "this machine has no such address; `ip address` shows those it has";
-  if (error == EAFNOSUPPORT) return "this machine has no such kind of address; choose one of the other kind";
+  if (error == EACCES)
+    return "ports below 1024 need rights that this user does not have; choose a higher one";
+  if (error == EADDRNOTAVAIL)
+    return "this machine has no such address; `ip address` shows those it has";
+  if (error == EAFNOSUPPORT)
+    return "this machine has no such kind of address; choose one of the other kind";
   return other_reason(error, "choose another address");
 }
 
@@ -95,18 +102,22 @@ sockaddr_un unix_address(const std::string& path) {
 /// Why the socket file has to stay: somebody answers on it, or may; "" for nobody.
 std::string unix_obstacle(const sockaddr_un& address) {
   const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  const int failed = ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
-  // Also of a file that a killed process left behind, and nothing else tells it from that of a live one: /proc/net/unix
-  // lacks those of other network namespaces (containers) and has others under the path that was theirs.
+  const int failed =
+      ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  // Also of a file that a killed process left behind, and nothing else tells it from that of a live
+  // one: /proc/net/unix lacks those of other network namespaces (containers) and has others under
+  // the path that was theirs.
   if (failed != 0 && errno == EACCES) {
-    return "there is a socket to which this user may not connect, as that of another user; end the process that "
+    return "there is a socket to which this user may not connect, as that of another user; end the "
+           "process that "
            "listens "
            "on it, remove it if none does, or choose another path";
   }
   if (failed != 0 && errno != EAGAIN) return {};  // EAGAIN: it listens, and its queue is full
   ucred peer{};
   socklen_t size = sizeof peer;
-  const bool known = failed == 0 && ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  const bool known =
+      failed == 0 && ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
   return "the socket is in use by " + (known ? process_text(peer.pid) : "another process") +
          "; end that, or choose another path";
 }
@@ -115,7 +126,8 @@ std::string unix_obstacle(const sockaddr_un& address) {
 std::string clear_path(const std::string& path, const sockaddr_un& address) {
   struct stat info{};
   if (::lstat(path.c_str(), &info) != 0) return {};
-  if (!S_ISSOCK(info.st_mode)) return "there is a file of that name that is no socket; choose another path";
+  if (!S_ISSOCK(info.st_mode))
+    return "there is a file of that name that is no socket; choose another path";
   if (std::string obstacle = unix_obstacle(address); !obstacle.empty()) return obstacle;
   if (::unlink(path.c_str()) != 0) {
     return "a socket is left over there and cannot be removed: " + system_text(errno) +
@@ -131,26 +143,29 @@ std::string unix_reason(const ListenUrl& url, int error) {
     return "the folder " + folder + " does not exist; create it, or choose another path";
   }
   if (error == EACCES) {
-    return system_text(error) + "; run tcphub as a user that may write to " + folder + ", or choose another path";
+    return system_text(error) + "; run tcphub as a user that may write to " + folder +
+           ", or choose another path";
   }
   return other_reason(error, "choose another path");
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Listener>> Listener::open(const ListenUrl& url,
-                                                 std::span<const std::unique_ptr<Listener>> others) {
-  const auto found = std::ranges::find_if(others, [&url](const auto& other) { return other->overlaps(url); });
+Result<std::unique_ptr<Listener>> Listener::open(
+    const ListenUrl& url, std::span<const std::unique_ptr<Listener>> others) {
+  const auto found =
+      std::ranges::find_if(others, [&url](const auto& other) { return other->overlaps(url); });
   if (found != others.end()) {
-    return refuse(url, "the address is given twice: this hub listens there already, as " + (*found)->url().text() +
-                           "; leave one of the two out");
+    return refuse(url, "the address is given twice: this hub listens there already, as " +
+                           (*found)->url().text() + "; leave one of the two out");
   }
   return url.scheme == ListenUrl::Scheme::tcp ? open_tcp(url) : open_unix(url);
 }
 
 Result<std::unique_ptr<Listener>> Listener::open_tcp(const ListenUrl& url) {
   const TcpAddress address = tcp_address(url);
-  Descriptor socket(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  Descriptor socket(
+      ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (socket.get() < 0) return refuse(url, tcp_reason(url, errno));
   const int on = 1;
   // Connections of a killed process may linger on the port; with this it can be bound all the same.
@@ -158,7 +173,8 @@ Result<std::unique_ptr<Listener>> Listener::open_tcp(const ListenUrl& url) {
   if (address.storage.ss_family == AF_INET6) {
     static_cast<void>(::setsockopt(socket.get(), IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on));
   }
-  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address.storage), address.size) != 0 ||
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address.storage), address.size) !=
+          0 ||
       ::listen(socket.get(), kBacklog) != 0) {
     return refuse(url, tcp_reason(url, errno));
   }
@@ -188,7 +204,8 @@ Result<std::unique_ptr<Listener>> Listener::open_unix(const ListenUrl& url) {
 bool Listener::overlaps(const ListenUrl& url) const {
   if (url.scheme != url_.scheme) return false;
   if (url.scheme == ListenUrl::Scheme::tcp) {
-    return url.port == url_.port && share_a_host(tcp_address(url).storage, tcp_address(url_).storage);
+    return url.port == url_.port &&
+           share_a_host(tcp_address(url).storage, tcp_address(url_).storage);
   }
   struct stat info{};
   return ::lstat(url.path.c_str(), &info) == 0 && info.st_dev == device_ && info.st_ino == file_;
@@ -197,8 +214,9 @@ bool Listener::overlaps(const ListenUrl& url) const {
 Listener::~Listener() {
   ::close(descriptor_);
   struct stat info{};
-  const bool still_ours = url_.scheme == ListenUrl::Scheme::unix_socket && ::lstat(url_.path.c_str(), &info) == 0 &&
-                          info.st_dev == device_ && info.st_ino == file_;
+  const bool still_ours = url_.scheme == ListenUrl::Scheme::unix_socket &&
+                          ::lstat(url_.path.c_str(), &info) == 0 && info.st_dev == device_ &&
+                          info.st_ino == file_;
   if (still_ours) ::unlink(url_.path.c_str());
 }
 

@@ -11,16 +11,16 @@
 
 namespace gimnet::hub {
 
-/// A socket that listens. Thread safety: none. Ownership: of its descriptor and of its Unix socket's file, which it
-/// removes unless somebody put another one there.
+/// A socket that listens. Thread safety: none. Ownership: of its descriptor and of its Unix
+/// socket's file, which it removes unless somebody put another one there.
 class Listener {
  public:
-  /// Binds and listens. A port that a killed process left behind is taken over at once; so is a Unix socket's file that
-  /// nobody answers on, if this user may connect to it: else there may be somebody. Errors: a sentence that names the
-  /// address, what stands in the way (where it can be found out, the process, or which of this hub's `others`), and
-  /// what to do.
-  [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const ListenUrl& url,
-                                                              std::span<const std::unique_ptr<Listener>> others = {});
+  /// Binds and listens. A port that a killed process left behind is taken over at once; so is a
+  /// Unix socket's file that nobody answers on, if this user may connect to it: else there may be
+  /// somebody. Errors: a sentence that names the address, what stands in the way (where it can be
+  /// found out, the process, or which of this hub's `others`), and what to do.
+  [[nodiscard]] static Result<std::unique_ptr<Listener>> open(
+      const ListenUrl& url, std::span<const std::unique_ptr<Listener>> others = {});
 
   ~Listener();
   Listener(const Listener&) = delete;
@@ -29,7 +29,8 @@ class Listener {
   [[nodiscard]] int descriptor() const { return descriptor_; }
   /// With the port that the system chose, if it was to choose one.
   [[nodiscard]] const ListenUrl& url() const { return url_; }
-  /// Both cannot be had: `url` is this address in other words, or one of them is a part of the other.
+  /// Both cannot be had: `url` is this address in other words, or one of them is a part of the
+  /// other.
   [[nodiscard]] bool overlaps(const ListenUrl& url) const;
 
  private:

@@ -26,7 +26,8 @@ std::string listening_inode(const char* table, std::uint16_t port) {
     std::string skipped;
     std::string inode;
     fields >> number >> local >> remote >> state;
-    for (int i = 0; i < 5; ++i) fields >> skipped;  // queues, timer, retransmissions, user, time-out
+    for (int i = 0; i < 5; ++i)
+      fields >> skipped;  // queues, timer, retransmissions, user, time-out
     fields >> inode;
     const std::size_t colon = local.rfind(':');
     if (state != kListenState || colon == std::string::npos) continue;
@@ -37,8 +38,8 @@ std::string listening_inode(const char* table, std::uint16_t port) {
 
 bool holds(const fs::path& descriptors, const std::string& target) {
   std::error_code error;
-  for (fs::directory_iterator entry(descriptors, error); !error && entry != fs::directory_iterator{};
-       entry.increment(error)) {
+  for (fs::directory_iterator entry(descriptors, error);
+       !error && entry != fs::directory_iterator{}; entry.increment(error)) {
     std::error_code unreadable;
     if (fs::read_symlink(entry->path(), unreadable).string() == target) return true;
   }
@@ -57,7 +58,8 @@ std::string port_owner(std::uint16_t port) {
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    if (holds(entry->path() / "fd", target)) return process_text(static_cast<pid_t>(std::stol(name)));
+    if (holds(entry->path() / "fd", target))
+      return process_text(static_cast<pid_t>(std::stol(name)));
   }
   return {};
 }

@@ -7,8 +7,8 @@
 
 namespace gimnet::hub {
 
-/// "tcphub (process 77)" for whoever listens on that TCP port of this machine, or "" if that is not to be found out:
-/// another user's processes keep their descriptors to themselves. Reads /proc.
+/// "tcphub (process 77)" for whoever listens on that TCP port of this machine, or "" if that is not
+/// to be found out: another user's processes keep their descriptors to themselves. Reads /proc.
 [[nodiscard]] std::string port_owner(std::uint16_t port);
 
 /// "tcphub (process 77)", or "process 77" if its name is not to be had.

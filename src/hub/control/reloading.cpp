@@ -13,9 +13,11 @@ std::string rest_of(const Reloading& reloading, std::size_t told) {
   if (untold == 0) return {};
   std::string line = told != 0 ? "\nand " : "\n";
   if (reloading.more_faults) line += "at least ";
-  line += std::to_string(untold) + (told != 0 ? " more" : "") + (untold == 1 ? " fault" : " faults");
-  return line + (reloading.more_faults ? ": tcphub --check-config tells all of them"
-                                       : ": the hub's log tells all of them, and so does tcphub --check-config");
+  line +=
+      std::to_string(untold) + (told != 0 ? " more" : "") + (untold == 1 ? " fault" : " faults");
+  return line + (reloading.more_faults
+                     ? ": tcphub --check-config tells all of them"
+                     : ": the hub's log tells all of them, and so does tcphub --check-config");
 }
 
 }  // namespace

@@ -33,8 +33,9 @@ using ReadAgain = std::function<Reloading()>;
 /// One line for the log: the keys that changed, and those that need a restart.
 [[nodiscard]] std::string reload_summary(const Reloading& reloading);
 
-/// What an administrator is told of a configuration that was not taken: as many whole faults as `bytes_max` have room
-/// for, a line each, and how many more there are and where. REQUIRES: there are faults; bytes_max >= 256.
+/// What an administrator is told of a configuration that was not taken: as many whole faults as
+/// `bytes_max` have room for, a line each, and how many more there are and where. REQUIRES: there
+/// are faults; bytes_max >= 256.
 [[nodiscard]] std::string reload_refusal(const Reloading& reloading, std::size_t bytes_max);
 
 }  // namespace gimnet::hub

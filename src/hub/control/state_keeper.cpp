@@ -29,10 +29,10 @@ std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) 
   state.groups_outlasting = durable.groups.outlasting;
   state.kicked = durable.kicked;
   if (std::string error = keep_(state); !error.empty()) {
-    log_error(
-        error +
-        "; the hub goes on, but soon gives no ids to newcomers, none by REASSIGN, and forgets at a restart whom it "
-        "kicked");
+    log_error(error +
+              "; the hub goes on, but soon gives no ids to newcomers, none by REASSIGN, and "
+              "forgets at a restart whom it "
+              "kicked");
     again_at_ = now + kAgainAfter;
     membership.state_not_kept();
     return error;

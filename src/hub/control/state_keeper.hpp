@@ -10,8 +10,9 @@
 
 namespace gimnet::hub {
 
-/// Sees to it that what has to outlive the hub is kept where it does, and tries again where that did not work.
-/// Thread safety: the conductor's thread only. Errors: go to the log; the hub goes on within the ids that it has.
+/// Sees to it that what has to outlive the hub is kept where it does, and tries again where that
+/// did not work. Thread safety: the conductor's thread only. Errors: go to the log; the hub goes on
+/// within the ids that it has.
 class StateKeeper {
  public:
   /// "" when the state is safe, or why it is not.
@@ -21,7 +22,8 @@ class StateKeeper {
 
   /// Keeps what `membership` says now, and tells it so; nothing while it waits to try again.
   void keep(Membership& membership, std::chrono::milliseconds now);
-  /// The same, also while it waits: for somebody who is told what came of it. Why it could not be kept, or "".
+  /// The same, also while it waits: for somebody who is told what came of it. Why it could not be
+  /// kept, or "".
   [[nodiscard]] std::string keep_at_once(Membership& membership, std::chrono::milliseconds now);
 
   /// When to try again; nothing if all is kept.

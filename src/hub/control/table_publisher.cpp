@@ -16,7 +16,8 @@ TablePublisher::TablePublisher(HubId hub, std::size_t shards, const Tables& tabl
     : hub_(hub), shards_(shards), tables_(tables) {}
 
 TablePublisher::~TablePublisher() {
-  for (const auto& [index, members] : published_) static_cast<void>(tables_.groups.exchange(index, nullptr));
+  for (const auto& [index, members] : published_)
+    static_cast<void>(tables_.groups.exchange(index, nullptr));
 }
 
 void TablePublisher::publish_node(std::uint32_t index, const Membership& membership) {
@@ -52,18 +53,21 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
   replace(index, std::move(members));
 }
 
-bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscriber, const Membership& membership) {
+bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscriber,
+                                    const Membership& membership) {
   const auto found = published_.find(index);
   const Topic* topic = membership.services().find_group(index);
   const NodePlace place = place_of(subscriber, membership);
-  if (found == published_.end() || found->second->ends() || topic == nullptr || !place.exists()) return false;
+  if (found == published_.end() || found->second->ends() || topic == nullptr || !place.exists())
+    return false;
   auto members = std::make_unique<GroupMembers>(*found->second);
   members->by_shard[place.shard.value()].erase(place.slot);
   auto& paced = members->paced_by_shard;
   if (!paced.empty() && paced[place.shard.value()].erase(place.slot)) {
     if (std::ranges::all_of(paced, [](const auto& list) { return list.empty(); })) paced.clear();
   }
-  if (std::ranges::binary_search(topic->subscribers, subscriber)) put(*members, *topic, subscriber, place);
+  if (std::ranges::binary_search(topic->subscribers, subscriber))
+    put(*members, *topic, subscriber, place);
   replace(index, std::move(members));
   return true;
 }
@@ -122,9 +126,11 @@ void TablePublisher::replace(std::uint32_t index, std::unique_ptr<const GroupMem
 
 void TablePublisher::collect() {
 #ifdef GIMNET_BUG_LAST_LIST_IS_KEPT
-  while (garbage_.size() > 1 && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
+  while (garbage_.size() > 1 && tables_.quiescence.passed(garbage_.front().ticket))
+    garbage_.pop_front();
 #else
-  while (!garbage_.empty() && tables_.quiescence.passed(garbage_.front().ticket)) garbage_.pop_front();
+  while (!garbage_.empty() && tables_.quiescence.passed(garbage_.front().ticket))
+    garbage_.pop_front();
 #endif
 }
 

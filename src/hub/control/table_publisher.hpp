@@ -14,9 +14,9 @@
 
 namespace gimnet::hub {
 
-/// Writes the tables that shards read. Lists of members that were replaced are freed when no shard can still look at
-/// them. Thread safety: the conductor's thread only. Ownership: of all published lists; shards must have ended, or left
-/// their turns for good, before it is destroyed.
+/// Writes the tables that shards read. Lists of members that were replaced are freed when no shard
+/// can still look at them. Thread safety: the conductor's thread only. Ownership: of all published
+/// lists; shards must have ended, or left their turns for good, before it is destroyed.
 class TablePublisher {
  public:
   struct Tables {
@@ -33,14 +33,16 @@ class TablePublisher {
   void publish_node(std::uint32_t index, const Membership& membership);
   /// Publishes what `membership` says of the group now: as much work as the group has members.
   void publish_group(std::uint32_t index, const Membership& membership);
-  /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little work, whatever the
-  /// group's size. False: nothing was done, since the group, or where the node lives, is not published; publish_group()
-  /// is due. REQUIRES: the node lives where the table of nodes says, if its session is over.
-  [[nodiscard]] bool publish_member(std::uint32_t index, std::uint32_t subscriber, const Membership& membership);
+  /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little
+  /// work, whatever the group's size. False: nothing was done, since the group, or where the node
+  /// lives, is not published; publish_group() is due. REQUIRES: the node lives where the table of
+  /// nodes says, if its session is over.
+  [[nodiscard]] bool publish_member(std::uint32_t index, std::uint32_t subscriber,
+                                    const Membership& membership);
 
-  /// The group has no provider any more. Where it has members on other shards than its provider's, the table says so
-  /// and keeps them for what is on its way there, until clear_group(): returns the provider's shard. Otherwise it is
-  /// cleared.
+  /// The group has no provider any more. Where it has members on other shards than its provider's,
+  /// the table says so and keeps them for what is on its way there, until clear_group(): returns
+  /// the provider's shard. Otherwise it is cleared.
   [[nodiscard]] std::optional<ShardIndex> end_group(std::uint32_t index);
   void clear_group(std::uint32_t index);
 
@@ -55,7 +57,8 @@ class TablePublisher {
   };
   /// Where the node lives, or lived until now.
   [[nodiscard]] NodePlace place_of(std::uint32_t node, const Membership& membership) const;
-  void put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber, const NodePlace& place) const;
+  void put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber,
+           const NodePlace& place) const;
   void replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members);
 
   const HubId hub_;

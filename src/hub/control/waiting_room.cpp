@@ -23,12 +23,14 @@ using proto::GoodbyeCode;
 using std::chrono::milliseconds;
 
 constexpr int kBatch = 64;
-/// Closing at once would reset the connection where the peer sent more than was read, and the reset could overtake
-/// GOODBYE. So the peer has limits.farewell_ms to read it and close, and may send this much that nobody looks at.
+/// Closing at once would reset the connection where the peer sent more than was read, and the reset
+/// could overtake GOODBYE. So the peer has limits.farewell_ms to read it and close, and may send
+/// this much that nobody looks at.
 constexpr std::size_t kDiscardedMax = 64 * 1'024;
 
 void log_refusal(const PeerInfo& who, const Goodbye& goodbye) {
-  log_line(LogLevel::info, {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
+  log_line(LogLevel::info,
+           {proto::goodbye_name(goodbye.code), log_peer(who.transport, who.address)},
            "refused " + who.transport + " " + who.address + ": " + goodbye.sentence + " (" +
                proto::goodbye_name(goodbye.code) + ")");
 }
@@ -36,7 +38,10 @@ void log_refusal(const PeerInfo& who, const Goodbye& goodbye) {
 }  // namespace
 
 WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& refusals)
-    : limits_(limits), judge_(std::move(judge)), refusals_(refusals), poll_(::epoll_create1(EPOLL_CLOEXEC)) {
+    : limits_(limits),
+      judge_(std::move(judge)),
+      refusals_(refusals),
+      poll_(::epoll_create1(EPOLL_CLOEXEC)) {
   if (poll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
 }
 
@@ -68,11 +73,12 @@ void WaitingRoom::enter(Stranger stranger, milliseconds now) {
 void WaitingRoom::make_place_for(std::string_view address, milliseconds now) {
   for (auto crowd = crowds_.find(address); crowd != crowds_.end(); crowd = crowds_.find(address)) {
     if (crowd->second.size() < limits_.handshakes_per_address) return;
-    end_waiting(
-        *crowd->second.front(),
-        "too many connections from this address wait for their HELLO (the hub's limit handshakes_per_address is " +
-            std::to_string(limits_.handshakes_per_address) + "); say it at once, and try again",
-        now);
+    end_waiting(*crowd->second.front(),
+                "too many connections from this address wait for their HELLO (the hub's limit "
+                "handshakes_per_address is " +
+                    std::to_string(limits_.handshakes_per_address) +
+                    "); say it at once, and try again",
+                now);
   }
 }
 
@@ -114,7 +120,8 @@ bool WaitingRoom::serve(milliseconds now) {
 
 void WaitingRoom::stood_still(milliseconds time, milliseconds now) {
   const auto put_off = [time](Peers& peers, milliseconds latest) {
-    for (Peer& peer : peers) peer.deadline = std::min(peer.deadline + time, latest);  // nothing began later than now
+    for (Peer& peer : peers)
+      peer.deadline = std::min(peer.deadline + time, latest);  // nothing began later than now
   };
   put_off(waiting_, now + milliseconds{limits_.handshake_ms});
   put_off(leaving_, now + milliseconds{limits_.farewell_ms});
@@ -122,7 +129,8 @@ void WaitingRoom::stood_still(milliseconds time, milliseconds now) {
 
 void WaitingRoom::tick(milliseconds now) {
   while (!waiting_.empty() && waiting_.front().deadline <= now) {
-    end_waiting(waiting_.front(), "no HELLO within " + std::to_string(limits_.handshake_ms) + " ms", now);
+    end_waiting(waiting_.front(), "no HELLO within " + std::to_string(limits_.handshake_ms) + " ms",
+                now);
   }
   while (!leaving_.empty() && leaving_.front().deadline <= now) remove(leaving_.front());
   keep_leaving_few();
@@ -136,7 +144,8 @@ void WaitingRoom::dismiss_all(const Goodbye& goodbye, milliseconds now) {
 std::optional<milliseconds> WaitingRoom::next_deadline() const {
   std::optional<milliseconds> deadline;
   if (!waiting_.empty()) deadline = waiting_.front().deadline;
-  if (!leaving_.empty() && (!deadline || leaving_.front().deadline < *deadline)) deadline = leaving_.front().deadline;
+  if (!leaving_.empty() && (!deadline || leaving_.front().deadline < *deadline))
+    deadline = leaving_.front().deadline;
   return deadline;
 }
 
@@ -158,7 +167,8 @@ void WaitingRoom::read(Peer& peer, milliseconds now) {
     }
     case Handshake::Verdict::garbage:
       refusals_.garbage.add(1);
-      log_line(LogLevel::debug, {"garbage", log_peer(peer.stranger.peer.transport, peer.stranger.peer.address)},
+      log_line(LogLevel::debug,
+               {"garbage", log_peer(peer.stranger.peer.transport, peer.stranger.peer.address)},
                "closed " + peer.stranger.peer.address + ": what it sent is not this protocol");
       return remove(peer);
   }
@@ -184,22 +194,25 @@ std::optional<Goodbye> WaitingRoom::refusal(Peer& peer) const {
   const proto::Hello& hello = peer.handshake->hello();
   if (peer.stranger.on_reserve && hello.role != proto::Role::admin) {
     return Goodbye{GoodbyeCode::no_memory,
-                   "the hub is out of descriptors, and keeps its last ones for administrators; try again later"};
+                   "the hub is out of descriptors, and keeps its last ones for administrators; try "
+                   "again later"};
   }
   return judge_(peer.stranger, hello);
 }
 
 Acceptor::Room WaitingRoom::give_way_to(const Stranger& newcomer) {
   const bool for_administrator = newcomer.may_administer;
-  auto gone =
-      std::ranges::find_if(leaving_, [&](const Peer& peer) { return for_administrator || !peer.stranger.on_reserve; });
+  auto gone = std::ranges::find_if(
+      leaving_, [&](const Peer& peer) { return for_administrator || !peer.stranger.on_reserve; });
   const bool told = gone != leaving_.end();
   if (!told) {
-    gone = std::ranges::find_if(waiting_, [](const Peer& peer) { return !peer.stranger.may_administer; });
+    gone = std::ranges::find_if(waiting_,
+                                [](const Peer& peer) { return !peer.stranger.may_administer; });
     if (gone == waiting_.end() && for_administrator) gone = waiting_.begin();
     if (gone == waiting_.end()) return Acceptor::Room::none;
-    const Goodbye goodbye{GoodbyeCode::no_memory,
-                          "the hub is out of descriptors, and others wait; say HELLO at once, or try again later"};
+    const Goodbye goodbye{
+        GoodbyeCode::no_memory,
+        "the hub is out of descriptors, and others wait; say HELLO at once, or try again later"};
     refusals_.no_descriptor.add(1);
     log_refusal(gone->stranger.peer, goodbye);
     static_cast<void>(send_goodbye(*gone->stranger.transport, goodbye.code, goodbye.sentence));

@@ -17,11 +17,11 @@
 
 namespace gimnet::hub {
 
-/// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else. Those who say HELLO are
-/// judged; those who are refused are told why, and given a moment to read it.
-/// Thread safety: none. Ownership: of their transports until they are admitted. Limits: limits.handshakes, and
-/// limits.handshakes_per_address of them from one address; one more ends the oldest of these, unless its HELLO is
-/// there by now. As many may leave. Time is an argument.
+/// Peers that have not been admitted: each owns one small buffer and a deadline, nothing else.
+/// Those who say HELLO are judged; those who are refused are told why, and given a moment to read
+/// it. Thread safety: none. Ownership: of their transports until they are admitted. Limits:
+/// limits.handshakes, and limits.handshakes_per_address of them from one address; one more ends the
+/// oldest of these, unless its HELLO is there by now. As many may leave. Time is an argument.
 class WaitingRoom {
  public:
   /// Takes the stranger's transport and returns nothing, or leaves it and says why not.
@@ -35,18 +35,21 @@ class WaitingRoom {
 
   /// REQUIRES: a transport with a descriptor.
   void enter(Stranger stranger, std::chrono::milliseconds now);
-  /// A peer to which GOODBYE was written elsewhere: it gets the same moment. REQUIRES: a transport with a descriptor.
+  /// A peer to which GOODBYE was written elsewhere: it gets the same moment. REQUIRES: a transport
+  /// with a descriptor.
   void see_off(std::unique_ptr<Transport> transport, std::chrono::milliseconds now);
-  /// There are no descriptors: ends the one who is leaving longest, else the one who waits longest without HELLO. Who
-  /// may administer the hub makes way only for its like.
+  /// There are no descriptors: ends the one who is leaving longest, else the one who waits longest
+  /// without HELLO. Who may administer the hub makes way only for its like.
   [[nodiscard]] Acceptor::Room give_way_to(const Stranger& newcomer);
   /// Reads what strangers said, one batch. True: there may be more.
   bool serve(std::chrono::milliseconds now);
-  /// The hub stood still for so long until now, and read nothing: so much more time have those who wait or leave.
+  /// The hub stood still for so long until now, and read nothing: so much more time have those who
+  /// wait or leave.
   void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
   /// Ends those whose time is over, but judges whose HELLO is there by now.
   void tick(std::chrono::milliseconds now);
-  /// Refuses everybody, as at the end of the hub: nobody enters any more, and each of those who leave has its time.
+  /// Refuses everybody, as at the end of the hub: nobody enters any more, and each of those who
+  /// leave has its time.
   void dismiss_all(const proto::Goodbye& goodbye, std::chrono::milliseconds now);
 
   /// Readable when serve() has something to do.
@@ -74,7 +77,8 @@ class WaitingRoom {
     Crowd::iterator in_crowd;
   };
 
-  /// There is no place for another one: ends this peer's waiting, with a HELLO that came by now or without.
+  /// There is no place for another one: ends this peer's waiting, with a HELLO that came by now or
+  /// without.
   void end_waiting(Peer& peer, const std::string& sentence, std::chrono::milliseconds now);
   void make_place_for(std::string_view address, std::chrono::milliseconds now);
   void join_crowd(Peer& peer, std::string_view address);

@@ -9,7 +9,9 @@
 namespace gimnet::hub {
 namespace {
 
-const unsigned char* as_chars(const std::byte* bytes) { return reinterpret_cast<const unsigned char*>(bytes); }
+const unsigned char* as_chars(const std::byte* bytes) {
+  return reinterpret_cast<const unsigned char*>(bytes);
+}
 unsigned char* as_chars(std::byte* bytes) { return reinterpret_cast<unsigned char*>(bytes); }
 
 }  // namespace
@@ -17,8 +19,9 @@ unsigned char* as_chars(std::byte* bytes) { return reinterpret_cast<unsigned cha
 Digest hmac_sha256(const Secret& key, std::span<const std::byte> text) {
   Digest digest{};
   unsigned int size = 0;
-  const unsigned char* done = ::HMAC(::EVP_sha256(), key.data(), static_cast<int>(key.size()), as_chars(text.data()),
-                                     text.size(), as_chars(digest.data()), &size);
+  const unsigned char* done =
+      ::HMAC(::EVP_sha256(), key.data(), static_cast<int>(key.size()), as_chars(text.data()),
+             text.size(), as_chars(digest.data()), &size);
   // Fails only without memory; a token without its proof must not leave.
   GIMNET_CHECK(done != nullptr && size == digest.size());
   return digest;
@@ -27,7 +30,8 @@ Digest hmac_sha256(const Secret& key, std::span<const std::byte> text) {
 Digest sha256(std::span<const std::byte> text) {
   Digest digest{};
   unsigned int size = 0;
-  const int done = ::EVP_Digest(text.data(), text.size(), as_chars(digest.data()), &size, ::EVP_sha256(), nullptr);
+  const int done = ::EVP_Digest(text.data(), text.size(), as_chars(digest.data()), &size,
+                                ::EVP_sha256(), nullptr);
   GIMNET_CHECK(done == 1 && size == digest.size());
   return digest;
 }

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <span>
 
-// The cryptography of the hub, all of it OpenSSL's (libcrypto): nothing of the kind is written here.
-// Thread safety: pure functions.
+// The cryptography of the hub, all of it OpenSSL's (libcrypto): nothing of the kind is written
+// here. Thread safety: pure functions.
 
 namespace gimnet::hub {
 

@@ -11,20 +11,21 @@ class BufferPool;
 
 /// Memory that a Buffer has before its bytes.
 inline constexpr std::uint32_t kBufferRoom = 64;
-/// Bytes of the largest chunk that several frames share. With its room it is the largest piece that jemalloc packs side
-/// by side (SC_SMALL_MAXCLASS): those from 16 KiB on begin at any line of a page, and so have a page more than their
-/// size, a fifth of the memory that thousands of waiting chunks take.
+/// Bytes of the largest chunk that several frames share. With its room it is the largest piece that
+/// jemalloc packs side by side (SC_SMALL_MAXCLASS): those from 16 KiB on begin at any line of a
+/// page, and so have a page more than their size, a fifth of the memory that thousands of waiting
+/// chunks take.
 inline constexpr std::uint32_t kSharedChunkBytes = 14 * 1024 - kBufferRoom;
 
 enum class BufferKind : std::uint8_t {
-  slab,     ///< what connections read into; frames are routed where they lie
-  chunk,    ///< smaller memory: for waiting frames that are copied, and for a frame that comes slowly
+  slab,   ///< what connections read into; frames are routed where they lie
+  chunk,  ///< smaller memory: for waiting frames that are copied, and for a frame that comes slowly
   foreign,  ///< stands on this shard for a slab or chunk of another one
 };
 
-/// Bytes with a reference count. The count is a plain integer: a buffer belongs to one shard, and another shard holds
-/// it through a `foreign` buffer of its own, so that only handing over between shards costs an atomic operation. Bytes
-/// that were handed on are immutable.
+/// Bytes with a reference count. The count is a plain integer: a buffer belongs to one shard, and
+/// another shard holds it through a `foreign` buffer of its own, so that only handing over between
+/// shards costs an atomic operation. Bytes that were handed on are immutable.
 struct Buffer {
   std::byte* data = nullptr;
   std::uint32_t capacity = 0;

@@ -43,7 +43,8 @@ BufferPool::~BufferPool() {
   for (FreeList& list : free_chunks_) {
     while (Buffer* chunk = list.pop()) free_buffer(chunk);
   }
-  // acquire pairs with the release in end_loan(); shards are joined before their pools go, so no loan is open.
+  // acquire pairs with the release in end_loan(); shards are joined before their pools go, so no
+  // loan is open.
   for (Buffer* buffer : lent_) {
     GIMNET_CHECK(buffer->lent.load(std::memory_order_acquire) == 0);
     free_buffer(buffer);
@@ -78,15 +79,16 @@ BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
 
 Buffer* BufferPool::lend(Buffer& buffer) {
   Buffer* owner = buffer.kind == BufferKind::foreign ? buffer.lender : &buffer;
-  // relaxed: the entry itself is published by the mailbox; the count only has to be there before the lender lets go,
-  // and the lender is this thread or holds a loan that this thread keeps open.
+  // relaxed: the entry itself is published by the mailbox; the count only has to be there before
+  // the lender lets go, and the lender is this thread or holds a loan that this thread keeps open.
   owner->lent.fetch_add(1, std::memory_order_relaxed);
   return owner;
 }
 
 BufferRef BufferPool::adopt(Buffer* lent) {
-  const auto known = std::find_if(adopted_.begin(), adopted_.end(),
-                                  [&](const Buffer* each) { return each->lender->pool == lent->pool; });
+  const auto known = std::find_if(adopted_.begin(), adopted_.end(), [&](const Buffer* each) {
+    return each->lender->pool == lent->pool;
+  });
   if (known != adopted_.end() && (*known)->lender == lent) {
     end_loan(lent);  // one loan is enough
     return BufferRef(*known);
@@ -109,7 +111,8 @@ BufferRef BufferPool::adopt(Buffer* lent) {
 }
 
 void BufferPool::end_loan(Buffer* lent) {
-  lent->lent.fetch_sub(1, std::memory_order_release);  // pairs with the acquire loads in recycle(), take_back_lent()
+  lent->lent.fetch_sub(
+      1, std::memory_order_release);  // pairs with the acquire loads in recycle(), take_back_lent()
 }
 
 void BufferPool::pin(Buffer& buffer) {
@@ -155,14 +158,16 @@ void BufferPool::keep_or_free(Buffer& buffer) {
 
 std::size_t BufferPool::kept_chunk_bytes() const {
   std::size_t bytes = 0;
-  for (std::size_t i = 0; i < free_chunks_.size(); ++i) bytes += free_chunks_[i].count * chunk_bytes_[i];
+  for (std::size_t i = 0; i < free_chunks_.size(); ++i)
+    bytes += free_chunks_[i].count * chunk_bytes_[i];
   return bytes;
 }
 
 void BufferPool::take_back_lent() {
   for (std::size_t i = 0; i < lent_.size();) {
     Buffer* buffer = lent_[i];
-    if (buffer->lent.load(std::memory_order_acquire) != 0) {  // pairs with the release in end_loan()
+    // acquire: pairs with the release in end_loan()
+    if (buffer->lent.load(std::memory_order_acquire) != 0) {
       ++i;
       continue;
     }
@@ -173,7 +178,8 @@ void BufferPool::take_back_lent() {
 }
 
 Buffer* BufferPool::allocate(std::uint32_t capacity, BufferKind kind) {
-  // One piece of memory, so that a small chunk is two neighbouring cache lines and not two somewhere.
+  // One piece of memory, so that a small chunk is two neighbouring cache lines and not two
+  // somewhere.
   void* memory = ::operator new(kBufferRoom + capacity, std::align_val_t{kAlignment});
   auto* buffer = new (memory) Buffer;
   buffer->data = static_cast<std::byte*>(memory) + kBufferRoom;

@@ -13,9 +13,9 @@ namespace gimnet::hub {
 /// Slab bytes in which a read may begin; the frame that is begun there ends in the room behind it.
 inline constexpr std::uint32_t kSlabReadBytes = 256 * 1024;
 
-/// The buffers of one shard. Memory that was used once is kept for the next time, within limits, so that after a
-/// warm-up no turn allocates. Thread safety: none; one shard (lend() and the end of a loan cross shards by an atomic).
-/// Ownership: owns every buffer; must outlive all references.
+/// The buffers of one shard. Memory that was used once is kept for the next time, within limits, so
+/// that after a warm-up no turn allocates. Thread safety: none; one shard (lend() and the end of a
+/// loan cross shards by an atomic). Ownership: owns every buffer; must outlive all references.
 class BufferPool {
  public:
   /// frame_bytes: the largest `length` of a frame.
@@ -26,18 +26,22 @@ class BufferPool {
 
   [[nodiscard]] BufferRef take_slab();
   [[nodiscard]] std::uint64_t slab_bytes() const { return slab_bytes_; }
-  /// A chunk of at least `bytes`. Up to the largest frame with its header it is kept for the next time.
+  /// A chunk of at least `bytes`. Up to the largest frame with its header it is kept for the next
+  /// time.
   [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
 
-  /// Counts a loan of the memory behind `buffer`, for one mailbox entry, and returns its owner. The bytes stay until
-  /// the borrowing shard has called adopt() and let its reference go, or end_loan().
+  /// Counts a loan of the memory behind `buffer`, for one mailbox entry, and returns its owner. The
+  /// bytes stay until the borrowing shard has called adopt() and let its reference go, or
+  /// end_loan().
   [[nodiscard]] static Buffer* lend(Buffer& buffer);
-  /// On the borrowing shard: a reference that ends the loan when it is let go. Loans of one buffer that follow each
-  /// other become one buffer, so that it is counted once and neighbouring frames in it are seen to be neighbours.
+  /// On the borrowing shard: a reference that ends the loan when it is let go. Loans of one buffer
+  /// that follow each other become one buffer, so that it is counted once and neighbouring frames
+  /// in it are seen to be neighbours.
   [[nodiscard]] BufferRef adopt(Buffer* lent);
   static void end_loan(Buffer* lent);
 
-  /// Counts the buffer against the budget until it is free again; once, however many frames keep it.
+  /// Counts the buffer against the budget until it is free again; once, however many frames keep
+  /// it.
   void pin(Buffer& buffer);
   /// No waiting frame keeps it any more, though somebody else does.
   void unpin(Buffer& buffer);
@@ -53,8 +57,9 @@ class BufferPool {
 
  private:
   static constexpr std::uint8_t kUnpooled = 0xFF;
-  /// As many slabs as a full mailbox of another shard (16 MiB unless configured) keeps on their way; with fewer, each
-  /// round trip of a burst between shards would free slabs and allocate them again.
+  /// As many slabs as a full mailbox of another shard (16 MiB unless configured) keeps on their
+  /// way; with fewer, each round trip of a burst between shards would free slabs and allocate them
+  /// again.
   static constexpr std::size_t kFreeSlabsMax = 64;
   static constexpr std::size_t kFreeChunkBytesMax = std::size_t{8} << 20;
 
@@ -74,7 +79,7 @@ class BufferPool {
   BudgetLease& budget_;
   FreeList free_slabs_;
   FreeList free_foreign_;
-  std::vector<Buffer*> adopted_;         ///< foreign buffers in use, the last one of each lending pool
+  std::vector<Buffer*> adopted_;  ///< foreign buffers in use, the last one of each lending pool
   std::array<FreeList, 5> free_chunks_;  ///< by size, as chunk_bytes_
   std::vector<Buffer*> lent_;            ///< free here, still read by another shard
   std::uint64_t pinned_bytes_ = 0;

@@ -9,10 +9,11 @@
 
 namespace gimnet::hub {
 
-/// A FIFO in a ring that doubles when it is full, and keeps its memory while it is in use: a queue that fills and runs
-/// empty in every turn does not allocate. trim() gives a long one back, so that an idle connection keeps next to
-/// nothing. An item keeps its number while it waits, so that it can be found again and replaced in place.
-/// Its users bound it by bytes. Thread safety: one shard. T is default-constructible and movable.
+/// A FIFO in a ring that doubles when it is full, and keeps its memory while it is in use: a queue
+/// that fills and runs empty in every turn does not allocate. trim() gives a long one back, so that
+/// an idle connection keeps next to nothing. An item keeps its number while it waits, so that it
+/// can be found again and replaced in place. Its users bound it by bytes. Thread safety: one shard.
+/// T is default-constructible and movable.
 template <class T>
 class RingQueue {
  public:
@@ -56,7 +57,8 @@ class RingQueue {
   }
 
  private:
-  static constexpr std::size_t kFirstItems = 1;  // a keep-alive is all that an idle connection ever has in one
+  static constexpr std::size_t kFirstItems =
+      1;  // a keep-alive is all that an idle connection ever has in one
   static constexpr std::size_t kKeepItems = 16;
 
   void grow() {

@@ -8,8 +8,8 @@
 
 namespace gimnet::hub {
 
-/// What a shard counts while it works, as plain integers; publish() adds them to the counters that others read, once a
-/// turn. Thread safety: one shard.
+/// What a shard counts while it works, as plain integers; publish() adds them to the counters that
+/// others read, once a turn. Thread safety: one shard.
 struct Tally {
   std::uint64_t accepted = 0;
   std::uint64_t copies = 0;
@@ -19,7 +19,8 @@ struct Tally {
   bool any_dropped = false;
   std::uint64_t received_bytes = 0;
   std::uint64_t sent_bytes = 0;
-  std::uint64_t sent_control_bytes = 0;  ///< of them, of FLOW, LINK, NS and CTRL frames; not published
+  std::uint64_t sent_control_bytes =
+      0;  ///< of them, of FLOW, LINK, NS and CTRL frames; not published
   std::uint64_t receive_calls = 0;
   std::uint64_t send_calls = 0;
   std::uint64_t copied_bytes = 0;
@@ -38,7 +39,8 @@ struct Tally {
     counters.accepted.add(accepted);
     counters.copies.add(copies);
     counters.delivered.add(delivered);
-    counters.queued.add(static_cast<std::uint64_t>(queued));  // wraps: only the sum over shards has to be right
+    counters.queued.add(
+        static_cast<std::uint64_t>(queued));  // wraps: only the sum over shards has to be right
     if (any_dropped) {
       for (std::size_t i = 0; i < dropped.size(); ++i) counters.dropped[i].add(dropped[i]);
     }

@@ -10,7 +10,8 @@
 
 namespace gimnet::hub {
 
-/// A number that one thread changes and any thread reads. Adding costs a plain load and store, no locked instruction.
+/// A number that one thread changes and any thread reads. Adding costs a plain load and store, no
+/// locked instruction.
 class Counter {
  public:
   void add(std::uint64_t n) {
@@ -26,7 +27,9 @@ class Counter {
     // relaxed: as in add().
     value_.store(value_.load(std::memory_order_relaxed) - n, std::memory_order_relaxed);
   }
-  void store(std::uint64_t n) { value_.store(n, std::memory_order_relaxed); }  // relaxed: as in add()
+  void store(std::uint64_t n) {
+    value_.store(n, std::memory_order_relaxed);  // relaxed: as in add()
+  }
   void raise_to(std::uint64_t n) {
     // relaxed: as in add().
     if (n > value_.load(std::memory_order_relaxed)) value_.store(n, std::memory_order_relaxed);
@@ -38,18 +41,20 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-/// What gap_frames of one shard stays within: a node may claim to have let go of as many frames as there are numbers,
-/// and what is asked for the sums of all shards takes them for numbers with a sign.
+/// What gap_frames of one shard stays within: a node may claim to have let go of as many frames as
+/// there are numbers, and what is asked for the sums of all shards takes them for numbers with a
+/// sign.
 inline constexpr std::uint64_t kGapFramesMost = std::uint64_t{1} << 56;
 
-/// What one shard did. The ledger: accepted + copies = delivered + dropped + queued, per frame and recipient.
-/// Thread safety: written by its shard only, read by anybody.
+/// What one shard did. The ledger: accepted + copies = delivered + dropped + queued, per frame and
+/// recipient. Thread safety: written by its shard only, read by anybody.
 struct alignas(64) ShardCounters {
   // The ledger, in frames
   Counter accepted;   ///< taken from the connections of this shard
   Counter copies;     ///< recipients beyond the first
   Counter delivered;  ///< handed to the kernel, or confirmed where resume is on
-  Counter queued;     ///< waiting in an outbox, a resume buffer or (counted at the sending shard) a mailbox
+  Counter queued;     ///< waiting in an outbox, a resume buffer or (counted at the sending shard) a
+                      ///< mailbox
   std::array<Counter, proto::kDropReasonCount> dropped;
 
   // Traffic
@@ -81,13 +86,14 @@ struct alignas(64) ShardCounters {
   Counter resumes;
   Counter reports;
   Counter held_reads;      ///< times a sender that ignored PAUSE was not read
-  Counter untaken_frames;  ///< read at the hub's end and left to their senders: not accepted, not confirmed
+  Counter untaken_frames;  ///< read at the hub's end and left to their senders: not accepted, not
+                           ///< confirmed
   Counter gap_frames;      ///< let go at a resume and announced with SKIP; at most kGapFramesMost
   Counter resumed;
   Counter lane0_demoted;  ///< frames
-  Counter bad_credits;    ///< CREDITs for no subscription of the node, or with a total that cannot be
-  Counter not_retained;   ///< messages of retained services that were not kept
-  Counter pinned_bytes;   ///< kept from being freed by waiting frames, now
+  Counter bad_credits;  ///< CREDITs for no subscription of the node, or with a total that cannot be
+  Counter not_retained;  ///< messages of retained services that were not kept
+  Counter pinned_bytes;  ///< kept from being freed by waiting frames, now
   Counter pinned_bytes_max;
   Counter allocated_bytes;  ///< by the shard's thread since it began
 };

@@ -14,8 +14,8 @@ namespace gimnet::hub {
 struct RefusalCounters {
   std::array<Counter, proto::kGoodbyeCount> by_code;  ///< told with GOODBYE
   Counter garbage;                                    ///< what they sent is not this protocol
-  Counter unfinished;                                 ///< they ended in the middle of their opening or HELLO
-  Counter no_descriptor;                              ///< the hub had no descriptor to keep them
+  Counter unfinished;     ///< they ended in the middle of their opening or HELLO
+  Counter no_descriptor;  ///< the hub had no descriptor to keep them
 
   /// A code that is not listed is not counted.
   void count(proto::GoodbyeCode code) {

@@ -10,8 +10,8 @@
 
 namespace gimnet::hub {
 
-/// Requests of admitted nodes, HubNS and HubCtrl each: by operation, and those that were not granted, by status.
-/// Thread safety: written by the conductor's thread only, read by anybody.
+/// Requests of admitted nodes, HubNS and HubCtrl each: by operation, and those that were not
+/// granted, by status. Thread safety: written by the conductor's thread only, read by anybody.
 struct RequestCounters {
   template <std::size_t operations>
   struct Protocol {
@@ -31,8 +31,10 @@ struct RequestCounters {
   Counter resyncs;  ///< watches that were too far behind and began again
 
   void count(proto::Kind kind, std::uint16_t operation, proto::Status status) {
-    if (kind == proto::Kind::ns) names.count(operation, proto::ns::operation_name(operation) != nullptr, status);
-    if (kind == proto::Kind::ctrl) ctrl.count(operation, proto::ctrl::operation_name(operation) != nullptr, status);
+    if (kind == proto::Kind::ns)
+      names.count(operation, proto::ns::operation_name(operation) != nullptr, status);
+    if (kind == proto::Kind::ctrl)
+      ctrl.count(operation, proto::ctrl::operation_name(operation) != nullptr, status);
   }
 };
 

@@ -11,9 +11,10 @@
 
 namespace gimnet::hub {
 
-/// What one session came to since it began, over all its connections. It counts with the shard's counters of the same
-/// names: of sessions that have not ended, the sum is the shards'; of `dropped`, of what was for a node that was found.
-/// Thread safety: written by the session's shard, read as SessionGauges says.
+/// What one session came to since it began, over all its connections. It counts with the shard's
+/// counters of the same names: of sessions that have not ended, the sum is the shards'; of
+/// `dropped`, of what was for a node that was found. Thread safety: written by the session's shard,
+/// read as SessionGauges says.
 struct SessionCounters {
   std::atomic<std::uint32_t> generation{0};  ///< of the session; 0: none yet
   Counter accepted;                          ///< frames taken from it
@@ -33,14 +34,15 @@ struct SessionCounts {
   std::uint64_t dropped = 0;
 };
 
-/// What a shard lets others know of each of its sessions. Thread safety: counts() by who gives out the slots,
-/// everything else by the shard. Limits: slots from `slots` on read as 0.
+/// What a shard lets others know of each of its sessions. Thread safety: counts() by who gives out
+/// the slots, everything else by the shard. Limits: slots from `slots` on read as 0.
 class SessionGauges {
  public:
   explicit SessionGauges(std::size_t slots)
       : slots_(slots), queued_(zeroed<Counter>(slots)), counters_(zeroed<SessionCounters>(slots)) {}
 
-  /// The counters of a session that begins, all 0. Valid until: another one begins in its slot, or this object goes.
+  /// The counters of a session that begins, all 0. Valid until: another one begins in its slot, or
+  /// this object goes.
   [[nodiscard]] SessionCounters& begin(ConnectionSlot slot, std::uint32_t generation) {
     if (!counters_ || slot.value() >= slots_) return beyond_;
     SessionCounters& counters = counters_[slot.value()];
@@ -50,7 +52,8 @@ class SessionGauges {
     counters.sent_bytes.store(0);
     counters.dropped.store(0);
     set_queued(slot, 0);
-    // release pairs with the acquire in counts(): who sees the session sees nothing of the one before.
+    // release pairs with the acquire in counts(): who sees the session sees nothing of the one
+    // before.
     counters.generation.store(generation, std::memory_order_release);
     return counters;
   }
@@ -61,22 +64,24 @@ class SessionGauges {
     Counter& queued = queued_[slot.value()];
     if (queued.value() != bytes) queued.store(bytes);
   }
-  /// As last written; all 0 of a session that its shard does not know yet. REQUIRES: the session holds its slot.
+  /// As last written; all 0 of a session that its shard does not know yet. REQUIRES: the session
+  /// holds its slot.
   [[nodiscard]] SessionCounts counts(ConnectionSlot slot, std::uint32_t generation) const {
     if (!counters_ || !queued_ || slot.value() >= slots_) return {};
     const SessionCounters& counters = counters_[slot.value()];
     // acquire pairs with the release in begin().
     if (counters.generation.load(std::memory_order_acquire) != generation) return {};
-    return {queued_[slot.value()].value(), counters.accepted.value(),   counters.received_bytes.value(),
-            counters.delivered.value(),    counters.sent_bytes.value(), counters.dropped.value()};
+    return {queued_[slot.value()].value(),   counters.accepted.value(),
+            counters.received_bytes.value(), counters.delivered.value(),
+            counters.sent_bytes.value(),     counters.dropped.value()};
   }
 
  private:
   struct Free {
     void operator()(void* memory) const { std::free(memory); }
   };
-  // Zeroed memory that the kernel hands out page by page: a slot that was never used costs nothing, and of `queued_`,
-  // which stands by itself for that, one that was never slow.
+  // Zeroed memory that the kernel hands out page by page: a slot that was never used costs nothing,
+  // and of `queued_`, which stands by itself for that, one that was never slow.
   template <class Each>
   using Zeroed = std::unique_ptr<Each[], Free>;
   template <class Each>

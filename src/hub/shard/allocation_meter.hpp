@@ -4,8 +4,9 @@
 
 namespace gimnet::hub {
 
-/// Bytes that the calling thread has allocated since it began, as jemalloc counts them. It shows that a shard's turn
-/// allocates nothing, and costs one read to ask. Thread safety: one thread, which also made it.
+/// Bytes that the calling thread has allocated since it began, as jemalloc counts them. It shows
+/// that a shard's turn allocates nothing, and costs one read to ask. Thread safety: one thread,
+/// which also made it.
 class AllocationMeter {
  public:
   AllocationMeter();

@@ -24,8 +24,8 @@ void Attacher::attach(AttachCommand command) {
   Connection& connection = session_of(command);
   closer_.fence(connection);
   connection.transport = std::move(command.transport);
-  connection.unsent_limit =
-      static_cast<std::uint32_t>(std::min<std::uint64_t>(kFirstUnsentBytes, state_.limits.unsent_bytes));
+  connection.unsent_limit = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(kFirstUnsentBytes, state_.limits.unsent_bytes));
   connection.transport->limit_unsent(connection.unsent_limit);
   connection.attachment = command.attachment;
   connection.connected = true;
@@ -47,7 +47,8 @@ void Attacher::attach(AttachCommand command) {
     // GOODBYE stands behind the opening, as WELCOME would.
     const iovec opening{const_cast<std::byte*>(proto::kOpening.data()), proto::kOpening.size()};
     static_cast<void>(connection.transport->send({&opening, 1}));
-    closer_.close(connection, proto::GoodbyeCode::no_memory, "the hub cannot wait for another connection; try later");
+    closer_.close(connection, proto::GoodbyeCode::no_memory,
+                  "the hub cannot wait for another connection; try later");
     return;
   }
   welcome(connection, command.welcome, gap);
@@ -68,7 +69,8 @@ void Attacher::renumber(Connection& connection, NodeId node) {
   }
   state_.retained.renumber_provider(connection.node, node);
   connection.former_nodes.push_back(std::exchange(connection.node, node));
-  // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold the new one anew.
+  // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold
+  // the new one anew.
   connection.holds = 0;
   state_.signals.arm(connection);
 }
@@ -77,7 +79,8 @@ Connection& Attacher::session_of(const AttachCommand& command) {
   if (Connection* known = state_.find(command.session)) return *known;
   const std::size_t slot = command.session.slot.value();
   if (slot >= state_.connections.size()) state_.connections.resize(slot + 1);
-  GIMNET_CHECK(state_.connections[slot] == nullptr);  // released before the conductor gives the slot to another session
+  GIMNET_CHECK(state_.connections[slot] ==
+               nullptr);  // released before the conductor gives the slot to another session
   auto connection = std::make_unique<Connection>();
   connection->node = command.node;
   connection->slot = command.session.slot;
@@ -106,7 +109,8 @@ std::uint64_t Attacher::settle_counts(Connection& connection, AttachCommand& com
   return gap;
 }
 
-bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& partial, std::uint64_t& gap) {
+bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& partial,
+                     std::uint64_t& gap) {
   RingQueue<Run> replay;
   const ResumeBuffer::Rewind rewind = connection.resume->kept.rewind(command.known_taken, replay);
   // A count that cannot be: this peer's life is not the one that we know.
@@ -129,11 +133,13 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   return true;
 }
 
-void Attacher::begin_anew(Connection& connection, const AttachCommand& command, const Run& partial) {
+void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
+                          const Run& partial) {
   closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
   connection.resume.reset();
-  // The node sends nothing of before again, under whatever id. Else no later REASSIGN would leave room for one more.
+  // The node sends nothing of before again, under whatever id. Else no later REASSIGN would leave
+  // room for one more.
   connection.ingress.former_nodes = {};
   connection.former_nodes.clear();
   count_anew(connection);
@@ -149,7 +155,8 @@ void Attacher::count_anew(Connection& connection) {
   if (!connection.paced) return;
   state_.pacer.on_new_epoch(connection);
   connection.paced->for_each([&](PacedSubscription& each) {
-    const bool has_newer = each.held() != 0 || connection.outbox.waiting_messages(each.group()) != 0;
+    const bool has_newer =
+        each.held() != 0 || connection.outbox.waiting_messages(each.group()) != 0;
     if (each.active && each.retained && !has_newer) state_.retained.ask_start(each);
   });
 }
@@ -159,10 +166,12 @@ void Attacher::welcome(Connection& connection, const proto::Welcome& welcome, st
   const std::vector<std::byte> frame =
       control_frame(proto::Kind::link, connection.node, state_.shared.hub, proto::encode(welcome));
   bytes.insert(bytes.end(), frame.begin(), frame.end());
-  // The opening is no frame: it goes past the outbox. A fresh connection takes this much at once, or it is of no use.
+  // The opening is no frame: it goes past the outbox. A fresh connection takes this much at once,
+  // or it is of no use.
   const iovec piece{bytes.data(), bytes.size()};
   const IoResult sent = connection.transport->send({&piece, 1});
-  if (sent.status != IoStatus::ok || sent.bytes != bytes.size()) return closer_.on_broken(connection);
+  if (sent.status != IoStatus::ok || sent.bytes != bytes.size())
+    return closer_.on_broken(connection);
   if (gap != 0) {
     send_flow(state_, connection, proto::flow::Skip{proto::DropReason::link_lost, gap});
   }

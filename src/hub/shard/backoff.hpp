@@ -5,13 +5,14 @@
 
 namespace gimnet::hub {
 
-/// Whether a call that may find nothing is worth its price: tried as long as it finds something, and ever more rarely
-/// while it does not, at last each kPauseMax + 1 times. Thread safety: none.
+/// Whether a call that may find nothing is worth its price: tried as long as it finds something,
+/// and ever more rarely while it does not, at last each kPauseMax + 1 times. Thread safety: none.
 class Backoff {
  public:
   static constexpr std::uint8_t kPauseMax = 63;
 
-  /// Asked once each time that the call could be made; if it then is, one of succeeded() and failed() follows.
+  /// Asked once each time that the call could be made; if it then is, one of succeeded() and
+  /// failed() follows.
   [[nodiscard]] bool is_due() {
     if (left_ == 0) return true;
     --left_;

@@ -35,16 +35,20 @@ void Closer::on_goodbye(Connection& connection, proto::GoodbyeCode code, std::st
 
 void Closer::fence(Connection& connection) {
   if (!connection.connected) return;
-  detach(connection, say_goodbye(connection, proto::GoodbyeCode::replaced,
-                                 "a newer connection of this session took its place; do not come back by yourself"));
+  detach(connection,
+         say_goodbye(
+             connection, proto::GoodbyeCode::replaced,
+             "a newer connection of this session took its place; do not come back by yourself"));
 }
 
 /// Returns whether it was written.
-bool Closer::say_goodbye(Connection& connection, proto::GoodbyeCode code, const std::string& sentence) {
+bool Closer::say_goodbye(Connection& connection, proto::GoodbyeCode code,
+                         const std::string& sentence) {
   // In the middle of a frame a GOODBYE would be read as the rest of it.
   if (connection.writer.in_frame()) return false;
-  const std::vector<std::byte> frame = control_frame(proto::Kind::link, connection.node, state_.shared.hub,
-                                                     proto::encode(proto::Goodbye{code, sentence}));
+  const std::vector<std::byte> frame =
+      control_frame(proto::Kind::link, connection.node, state_.shared.hub,
+                    proto::encode(proto::Goodbye{code, sentence}));
   // Past the outbox: nothing follows a GOODBYE. A peer that takes nothing any more does not get it.
   const iovec piece{const_cast<std::byte*>(frame.data()), frame.size()};
   const IoResult sent = connection.transport->send({&piece, 1});
@@ -57,7 +61,8 @@ void Closer::give_up_rest(Connection& connection) {
   // Its sender keeps what was not confirmed, or sees that the hub ends.
   const bool senders = connection.resume != nullptr || connection.draining;
   while (next != end) {
-    proto::NextRun found = proto::next_run(next, end, static_cast<std::uint32_t>(state_.limits.frame_bytes));
+    proto::NextRun found =
+        proto::next_run(next, end, static_cast<std::uint32_t>(state_.limits.frame_bytes));
     if (found.found != proto::Found::run) return;
     proto::RunView& view = found.run;
     const Admission admission =
@@ -104,9 +109,11 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
 }
 
-void Closer::tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code, std::string sentence) {
-  state_.tell_conductor({state_.self, DetachedEvent{connection.session(), connection.attachment, connection.node,
-                                                    said_by_peer, code, std::move(sentence)}});
+void Closer::tell(const Connection& connection, bool said_by_peer, proto::GoodbyeCode code,
+                  std::string sentence) {
+  state_.tell_conductor(
+      {state_.self, DetachedEvent{connection.session(), connection.attachment, connection.node,
+                                  said_by_peer, code, std::move(sentence)}});
 }
 
 void Closer::lose_unconfirmed(Connection& connection, const Run& partial) {
@@ -129,7 +136,8 @@ void Closer::release(SessionRef session) {
   Connection* connection = state_.find(session);
   if (connection == nullptr) return;
   if (connection->connected) {
-    detach(*connection, say_goodbye(*connection, proto::GoodbyeCode::kicked, "the session is over"));
+    detach(*connection,
+           say_goodbye(*connection, proto::GoodbyeCode::kicked, "the session is over"));
   }
   lose_unconfirmed(*connection, connection->writer.take_partial());
   connection->outbox.drop_all(proto::DropReason::link_lost, state_.egress);

@@ -14,19 +14,21 @@
 #include "hub/transport/transport.hpp"
 #include "proto/control/link.hpp"
 
-// All that the conductor tells a shard, one type each, and all that a shard tells the conductor. Nothing else crosses
-// between the two threads, but for the tables that control publishes.
+// All that the conductor tells a shard, one type each, and all that a shard tells the conductor.
+// Nothing else crosses between the two threads, but for the tables that control publishes.
 //
-// Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and sends AttachCommand
-// before it names the node to anybody else; it sends a SERVICE_MOVED before the answer that lets the provider send, and
-// once more with the AttachCommand of a node that may not have read it; it publishes a group before it sends the
-// PaceCommand of a member, and that before any answer; it sends a RenumberCommand before it names the new id to anybody
-// else, and publishes a group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
-// carried out before mail that came after them: a frame neither finds its recipient unattached, or on a connection on
-// which it has another id, nor overtakes the event about it.
+// Order: the conductor publishes a node before it sends AttachCommand, which lets WELCOME out, and
+// sends AttachCommand before it names the node to anybody else; it sends a SERVICE_MOVED before the
+// answer that lets the provider send, and once more with the AttachCommand of a node that may not
+// have read it; it publishes a group before it sends the PaceCommand of a member, and that before
+// any answer; it sends a RenumberCommand before it names the new id to anybody else, and publishes
+// a group that accepts data before SERVICE_MOVED tells senders of it. So commands that wait are
+// carried out before mail that came after them: a frame neither finds its recipient unattached, or
+// on a connection on which it has another id, nor overtakes the event about it.
 //
-// The other way round a shard's mail to other shards and its events to the conductor may overtake each other. Where the
-// conductor takes something away that such mail needs, a group, it fences first (hub/control/group_endings.hpp).
+// The other way round a shard's mail to other shards and its events to the conductor may overtake
+// each other. Where the conductor takes something away that such mail needs, a group, it fences
+// first (hub/control/group_endings.hpp).
 
 namespace gimnet::hub {
 
@@ -36,20 +38,23 @@ struct SessionRef {
   std::uint32_t generation = 0;
 };
 
-// ---- conductor -> shard --------------------------------------------------------------------------------------------
+// ---- conductor -> shard
+// --------------------------------------------------------------------------------------------
 
-/// An admitted connection for a session, new or come back. The shard fences the session's earlier connection, if it has
-/// one (told `replaced`), fixes its counts, writes the 8 bytes of the opening and WELCOME, then carries data.
+/// An admitted connection for a session, new or come back. The shard fences the session's earlier
+/// connection, if it has one (told `replaced`), fixes its counts, writes the 8 bytes of the opening
+/// and WELCOME, then carries data.
 struct AttachCommand {
   SessionRef session;
-  /// Numbers the connections of a session, from 1. What was said to or by an earlier one is told apart by it.
+  /// Numbers the connections of a session, from 1. What was said to or by an earlier one is told
+  /// apart by it.
   std::uint32_t attachment = 0;
   NodeId node;
   /// The shard finds out by itself: by this the simulations judge what the conductor decided.
   bool new_session = true;
   std::unique_ptr<Transport> transport;
-  /// All of WELCOME but what the shard puts in: resumed, and for a session that can resume taken, epoch and
-  /// resume_buffer_bytes.
+  /// All of WELCOME but what the shard puts in: resumed, and for a session that can resume taken,
+  /// epoch and resume_buffer_bytes.
   proto::Welcome welcome;
   /// What HELLO said of resume: wanted, epochs, count, buffer.
   bool resume_wanted = false;
@@ -58,18 +63,20 @@ struct AttachCommand {
   std::uint64_t known_taken = 0;
   std::uint32_t peer_resume_bytes = 0;
   std::uint32_t peer_frame_bytes = 0;
-  /// Whether the shard says so, with HeardEvent, when it first hears of the node on this connection.
+  /// Whether the shard says so, with HeardEvent, when it first hears of the node on this
+  /// connection.
   bool tell_heard = false;
-  /// Control frames that the node gets ahead of all that waits for it, whatever their size: events that it may have
-  /// missed. `told_move`: as SendControlCommand::move.
+  /// Control frames that the node gets ahead of all that waits for it, whatever their size: events
+  /// that it may have missed. `told_move`: as SendControlCommand::move.
   std::vector<std::byte> told;
   std::uint64_t told_move = 0;
 };
 
-/// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how many of the
-/// session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer is for the connection that
-/// asked: it is dropped if `attachment` is not the present one. 0 is whichever there is; without one it is dropped.
-/// `move`, if not 0: the shard says so, with MovesReadEvent, when the node has read the frame.
+/// A control frame (header and payload) for a session; goes before the data lanes. `answers` is how
+/// many of the session's unanswered requests it settles: 1 for an answer, 0 for an event. An answer
+/// is for the connection that asked: it is dropped if `attachment` is not the present one. 0 is
+/// whichever there is; without one it is dropped. `move`, if not 0: the shard says so, with
+/// MovesReadEvent, when the node has read the frame.
 struct SendControlCommand {
   SessionRef session;
   std::uint32_t attachment = 0;
@@ -85,13 +92,14 @@ struct CloseCommand {
   std::string sentence;
 };
 
-/// The session is over: what waits for it is dropped (`link_lost`), its slot is free for a later generation.
+/// The session is over: what waits for it is dropped (`link_lost`), its slot is free for a later
+/// generation.
 struct ReleaseCommand {
   SessionRef session;
 };
 
-/// The session's subscription to that group is paced from now on, or has other terms. `retained`: it begins with the
-/// last message. `was_plain`: until then it got everything.
+/// The session's subscription to that group is paced from now on, or has other terms. `retained`:
+/// it begins with the last message. `was_plain`: until then it got everything.
 struct PaceCommand {
   SessionRef session;
   GroupId group;
@@ -112,15 +120,17 @@ struct ForgetRetainedCommand {
   GroupId group;
 };
 
-/// The session's node has another id. Its connection, if it has one, is told so with GOODBYE `renumbered`; frames that
-/// it sent under the former id are taken for its own until it has come back and confirmed them.
+/// The session's node has another id. Its connection, if it has one, is told so with GOODBYE
+/// `renumbered`; frames that it sent under the former id are taken for its own until it has come
+/// back and confirmed them.
 struct RenumberCommand {
   SessionRef session;
   NodeId node;
   std::string sentence;
 };
 
-/// Asks each other shard to tell the conductor, with FencePassedEvent, when it has taken all that this one handed over.
+/// Asks each other shard to tell the conductor, with FencePassedEvent, when it has taken all that
+/// this one handed over.
 struct FenceCommand {
   std::uint32_t ticket = 0;  ///< numbers the fences of this shard
 };
@@ -130,8 +140,8 @@ struct LimitsCommand {
   Limits limits;
 };
 
-/// Read nothing more; when all shards have taken theirs, say GOODBYE `draining` to everybody after what waits was
-/// written, or at the deadline; then answer DrainedEvent.
+/// Read nothing more; when all shards have taken theirs, say GOODBYE `draining` to everybody after
+/// what waits was written, or at the deadline; then answer DrainedEvent.
 struct DrainCommand {
   std::uint64_t deadline_ms = 0;  ///< from now
 };
@@ -139,11 +149,12 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand =
-    std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand, RenumberCommand, LimitsCommand,
-                 PaceCommand, EndPaceCommand, ForgetRetainedCommand, FenceCommand, DrainCommand, StopCommand>;
+using ShardCommand = std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand,
+                                  RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand,
+                                  ForgetRetainedCommand, FenceCommand, DrainCommand, StopCommand>;
 
-// ---- shard -> conductor --------------------------------------------------------------------------------------------
+// ---- shard -> conductor
+// --------------------------------------------------------------------------------------------
 
 /// A frame of kind NS or CTRL for this hub; `frame` is header and payload.
 struct ControlFrameEvent {
@@ -153,14 +164,16 @@ struct ControlFrameEvent {
   std::vector<std::byte> frame;
 };
 
-/// Something came by this connection: its node has read WELCOME, since it says nothing before. Where that was wanted.
+/// Something came by this connection: its node has read WELCOME, since it says nothing before.
+/// Where that was wanted.
 struct HeardEvent {
   SessionRef session;
   std::uint32_t attachment = 0;
   NodeId node;
 };
 
-/// The node has read the frame that came with that `move`, and all that was sent before it by this connection.
+/// The node has read the frame that came with that `move`, and all that was sent before it by this
+/// connection.
 struct MovesReadEvent {
   SessionRef session;
   std::uint32_t attachment = 0;
@@ -168,10 +181,11 @@ struct MovesReadEvent {
   std::uint64_t move = 0;
 };
 
-/// A session has no connection any more. `code` is `done` only if the node said so itself: then the session is over,
-/// otherwise its grace time begins. `said_by_peer` tells who said GOODBYE; `sentence` is for the record. A connection
-/// that broke without a GOODBYE has code `done` and `said_by_peer` false. None is sent for a connection that was fenced
-/// by a newer one of its session.
+/// A session has no connection any more. `code` is `done` only if the node said so itself: then the
+/// session is over, otherwise its grace time begins. `said_by_peer` tells who said GOODBYE;
+/// `sentence` is for the record. A connection that broke without a GOODBYE has code `done` and
+/// `said_by_peer` false. None is sent for a connection that was fenced by a newer one of its
+/// session.
 struct DetachedEvent {
   SessionRef session;
   std::uint32_t attachment = 0;  ///< of the connection that ended
@@ -181,8 +195,9 @@ struct DetachedEvent {
   std::string sentence;
 };
 
-/// A connection to which GOODBYE was written: what its peer still sends is thrown away for a moment, since closing with
-/// unread bytes would reset the connection and could take the GOODBYE with it.
+/// A connection to which GOODBYE was written: what its peer still sends is thrown away for a
+/// moment, since closing with unread bytes would reset the connection and could take the GOODBYE
+/// with it.
 struct FarewellEvent {
   std::unique_ptr<Transport> transport;
 };
@@ -190,15 +205,16 @@ struct FarewellEvent {
 /// The shard has nothing left to write, nor any other for it (answer to DrainCommand).
 struct DrainedEvent {};
 
-/// The shard that tells it has taken all that shard `fence.of` handed over to it before it carried out FenceCommand.
+/// The shard that tells it has taken all that shard `fence.of` handed over to it before it carried
+/// out FenceCommand.
 struct FencePassedEvent {
   Fence fence;
 };
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, HeardEvent, MovesReadEvent, DetachedEvent, FarewellEvent, DrainedEvent,
-               FencePassedEvent>
+  std::variant<ControlFrameEvent, HeardEvent, MovesReadEvent, DetachedEvent, FarewellEvent,
+               DrainedEvent, FencePassedEvent>
       what;
 };
 

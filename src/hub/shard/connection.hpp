@@ -17,7 +17,8 @@
 
 namespace gimnet::hub {
 
-/// What outlives a broken connection, so that the next one can go on where it ended (docs/protocol.md, section 3).
+/// What outlives a broken connection, so that the next one can go on where it ended
+/// (docs/protocol.md, section 3).
 struct ResumeState {
   explicit ResumeState(std::uint64_t bytes_max) : kept(bytes_max) {}
 
@@ -37,32 +38,35 @@ inline constexpr std::uint64_t kAllShards = ~std::uint64_t{0};
 struct Progress {
   std::uint64_t taken_bytes = 0;  ///< that left the send queue, when last looked at
   std::uint64_t since_ms = 0;     ///< it has taken less than the least since then
-  std::uint64_t owed_bytes = 0;   ///< had been sent when messages were dropped because it took nothing
-  std::uint64_t data_end = 0;     ///< of all bytes sent, where those end that came from lanes
+  std::uint64_t owed_bytes =
+      0;                       ///< had been sent when messages were dropped because it took nothing
+  std::uint64_t data_end = 0;  ///< of all bytes sent, where those end that came from lanes
   std::uint64_t block_taken_bytes = 0;
   std::uint64_t block_since_ms = 0;
   std::uint64_t rate_bytes = 0;  ///< taken when the rate was last measured
   std::uint64_t rate_since_ms = 0;
 };
 
-/// Former ids of a session that count as its own. A node that was renumbered more often without having begun anew
-/// begins anew: it may hold frames under an id that is forgotten, and would be refused for them at each return.
+/// Former ids of a session that count as its own. A node that was renumbered more often without
+/// having begun anew begins anew: it may hold frames under an id that is forgotten, and would be
+/// refused for them at each return.
 inline constexpr std::size_t kFormerNodesMax = 8;
 
-/// A session on its shard, and its connection while it has one. There are as many as nodes, most of them idle: what few
-/// of them need is made when they need it, and the members stand so that little is lost between them. Thread safety:
-/// one shard.
+/// A session on its shard, and its connection while it has one. There are as many as nodes, most of
+/// them idle: what few of them need is made when they need it, and the members stand so that little
+/// is lost between them. Thread safety: one shard.
 struct Connection : Recipient {
   Interest armed;
-  bool blocked = false;         ///< the transport took less than was offered: wait for it
-  bool write_failed = false;    ///< takes nothing any more: read to its end, which tells that it broke
+  bool blocked = false;  ///< the transport took less than was offered: wait for it
+  bool write_failed =
+      false;  ///< takes nothing any more: read to its end, which tells that it broke
   bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
-  bool must_confirm = false;    ///< nothing more can be written before its CONFIRM: read even if held
-  bool gauged = false;          ///< its queue gauge is not 0
-  bool missed_resume = false;   ///< RESUME had no place: it would stay paused for ever
-  bool draining = false;        ///< closes once everything is written
-  bool tell_heard = false;      ///< the conductor waits for the first that is heard of it
-  Backoff read_again;           ///< of reading it twice in a turn
+  bool must_confirm = false;  ///< nothing more can be written before its CONFIRM: read even if held
+  bool gauged = false;        ///< its queue gauge is not 0
+  bool missed_resume = false;  ///< RESUME had no place: it would stay paused for ever
+  bool draining = false;       ///< closes once everything is written
+  bool tell_heard = false;     ///< the conductor waits for the first that is heard of it
+  Backoff read_again;          ///< of reading it twice in a turn
   std::uint32_t attachment = 0;
   std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
   std::uint32_t requests = 0;  ///< that are unanswered
@@ -88,10 +92,11 @@ struct Connection : Recipient {
     if (tail_since_ms != 0) tail_since_ms = now_ms;
   }
   [[nodiscard]] SessionRef session() const { return {slot, generation}; }
-  /// Slots are reused and connections replaced: an event of the poller is for exactly one attachment.
+  /// Slots are reused and connections replaced: an event of the poller is for exactly one
+  /// attachment.
   [[nodiscard]] std::uint64_t token() const {
-    return (static_cast<std::uint64_t>(attachment) << 32) | (static_cast<std::uint64_t>(generation & 0xFF) << 24) |
-           slot.value();
+    return (static_cast<std::uint64_t>(attachment) << 32) |
+           (static_cast<std::uint64_t>(generation & 0xFF) << 24) | slot.value();
   }
 };
 

@@ -12,8 +12,9 @@
 
 namespace gimnet::hub {
 
-/// What shards hand to the conductor: control frames and the ends of connections. Never on the data path.
-/// Thread safety: push() from each shard's thread with that shard's index; the rest from the conductor.
+/// What shards hand to the conductor: control frames and the ends of connections. Never on the data
+/// path. Thread safety: push() from each shard's thread with that shard's index; the rest from the
+/// conductor.
 class ControlInbox {
  public:
   explicit ControlInbox(std::size_t shards) : queue_(shards), pushed_(shards), taken_(shards) {}
@@ -22,7 +23,8 @@ class ControlInbox {
   void push(ShardEvent event) {
     const std::size_t shard = event.shard.value();
     queue_.push(shard, std::move(event));
-    pushed_[shard].fetch_add(1, std::memory_order_release);  // pairs with the acquire in drain_present()
+    pushed_[shard].fetch_add(
+        1, std::memory_order_release);  // pairs with the acquire in drain_present()
     waker_.wake();
   }
 
@@ -34,7 +36,8 @@ class ControlInbox {
       take(std::move(event));
     });
   }
-  /// Conductor: calls `take` for all events that were pushed before, however many; later ones may be among them.
+  /// Conductor: calls `take` for all events that were pushed before, however many; later ones may
+  /// be among them.
   template <class Take>
   void drain_present(Take&& take) {
     for (std::size_t shard = 0; shard < pushed_.size(); ++shard) {

@@ -6,23 +6,27 @@
 namespace gimnet::hub {
 namespace {
 
-/// What may wait unsent in the kernel on a connection that does not take everything at once: unsent_ms at its measured
-/// rate, at least so much, at most unsent_bytes (docs/architecture.md, "Freshness").
+/// What may wait unsent in the kernel on a connection that does not take everything at once:
+/// unsent_ms at its measured rate, at least so much, at most unsent_bytes (docs/architecture.md,
+/// "Freshness").
 constexpr std::uint64_t kUnsentBytesMin = 4 * 1024;
 constexpr std::uint64_t kRateWindowMs = 200;
-/// Above this rate what waits in the kernel is gone in a moment, and bounding it costs a quarter of the throughput.
+/// Above this rate what waits in the kernel is gone in a moment, and bounding it costs a quarter of
+/// the throughput.
 constexpr std::uint64_t kFastBytesPerS = 10 << 20;
 
 /// That left the send queue. WELCOME went past the flusher and may still be unsent.
 std::uint64_t taken_bytes(const Connection& connection) {
-  return connection.sent_bytes - std::min(connection.transport->unsent_bytes(), connection.sent_bytes);
+  return connection.sent_bytes -
+         std::min(connection.transport->unsent_bytes(), connection.sent_bytes);
 }
 
 }  // namespace
 
 bool Flusher::flush_dirty() {
   std::vector<Recipient*>& dirty = state_.recipients.dirty();
-  // Flushing may mark others (a sender that is told to go on): they come at the end of the same list.
+  // Flushing may mark others (a sender that is told to go on): they come at the end of the same
+  // list.
   for (std::size_t next = 0; next < dirty.size();) {
     auto& connection = static_cast<Connection&>(*dirty[next++]);
     connection.dirty = false;
@@ -40,7 +44,8 @@ void Flusher::flush(Connection& connection) {
   const std::uint64_t control_before = state_.tally.sent_control_bytes;
   const std::uint64_t delivered_before = state_.tally.delivered;
   const Flush result = connection.writer.flush(
-      connection.outbox, connection.resume ? &connection.resume->kept : nullptr, *connection.transport, state_.egress);
+      connection.outbox, connection.resume ? &connection.resume->kept : nullptr,
+      *connection.transport, state_.egress);
   const std::uint64_t sent = state_.tally.sent_bytes - sent_before;
   const bool sent_data = sent != state_.tally.sent_control_bytes - control_before;
   if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
@@ -71,7 +76,8 @@ void Flusher::flush(Connection& connection) {
   }
 }
 
-/// What was not written stays: for a transport that takes no more, for a confirmation, or for the node to come back.
+/// What was not written stays: for a transport that takes no more, for a confirmation, or for the
+/// node to come back.
 void Flusher::let_wait(Connection& connection) {
   connection.outbox.settle(state_.egress);
   connection.outbox.signal_room(state_.egress);
@@ -94,8 +100,9 @@ void Flusher::on_blocked(Connection& connection) {
   watch(connection);
 }
 
-/// Frames that the kernel has taken for the hub would go with the descriptor: its own, if it sent them, said GOODBYE
-/// and left, and those of a sender that is not read because of BLOCK, which promises that nothing is lost.
+/// Frames that the kernel has taken for the hub would go with the descriptor: its own, if it sent
+/// them, said GOODBYE and left, and those of a sender that is not read because of BLOCK, which
+/// promises that nothing is lost.
 void Flusher::on_write_failed(Connection& connection) {
   if (connection.draining) return closer_.on_broken(connection);  // it is read no more
   let_wait(connection);
@@ -134,16 +141,19 @@ void Flusher::on_writable(Connection& connection) {
 
 void Flusher::look_after(Connection& connection) {
   if (!connection.connected || !connection.progress) return;
-  // Nobody is slow whom nothing reaches any more: what waits for it waits as it will while it is away.
+  // Nobody is slow whom nothing reaches any more: what waits for it waits as it will while it is
+  // away.
   if (connection.write_failed && connection.waits_when_away) return;
   Progress& progress = *connection.progress;
-  // Where messages were dropped because it took nothing, an empty queue does not say that it has caught up.
+  // Where messages were dropped because it took nothing, an empty queue does not say that it has
+  // caught up.
   const bool caught_up = taken_bytes(connection) >= progress.owed_bytes;
   if (connection.outbox.empty() && !connection.writer.in_frame() && caught_up) {
     end_watch(connection);
     return;
   }
-  // What the kernel calls unsent counts its own bookkeeping on some transports: never less than before.
+  // What the kernel calls unsent counts its own bookkeeping on some transports: never less than
+  // before.
   const std::uint64_t taken = std::max(taken_bytes(connection), progress.rate_bytes);
   adapt_unsent_limit(connection, taken);
   // The hub's own words (PING, PONG, CONFIRM) may pass while data does not.
@@ -156,17 +166,19 @@ void Flusher::look_after(Connection& connection) {
     progress.block_since_ms = state_.now_ms;
     progress.owed_bytes = connection.sent_bytes;
   }
-  // A frame of which the transport took a part waits, too: it may be all that a reader who takes nothing was sent.
-  const bool nothing_waits =
-      connection.outbox.stale_bytes() == 0 && !connection.writer.in_stale_frame() && taken >= progress.owed_bytes;
+  // A frame of which the transport took a part waits, too: it may be all that a reader who takes
+  // nothing was sent.
+  const bool nothing_waits = connection.outbox.stale_bytes() == 0 &&
+                             !connection.writer.in_stale_frame() && taken >= progress.owed_bytes;
   if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
     progress.taken_bytes = taken;
     progress.since_ms = state_.now_ms;
-  } else if (!connection.write_failed && state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
+  } else if (!connection.write_failed &&
+             state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
     state_.counters.slow_consumers.add(1);
     closer_.close(connection, proto::GoodbyeCode::slow_consumer,
-                  "took less than " + std::to_string(state_.limits.slow_consumer_bytes) + " bytes in " +
-                      std::to_string(state_.limits.slow_consumer_ms) +
+                  "took less than " + std::to_string(state_.limits.slow_consumer_bytes) +
+                      " bytes in " + std::to_string(state_.limits.slow_consumer_ms) +
                       " ms while messages waited; read faster, or subscribe with delivery latest");
   }
 }
@@ -178,8 +190,8 @@ void Flusher::adapt_unsent_limit(Connection& connection, std::uint64_t taken) {
   const std::uint64_t rate = (taken - progress.rate_bytes) * 1'000 / passed_ms;
   progress.rate_bytes = taken;
   progress.rate_since_ms = state_.now_ms;
-  const std::uint64_t wanted =
-      std::clamp(rate * state_.limits.unsent_ms / 1'000, kUnsentBytesMin, state_.limits.unsent_bytes);
+  const std::uint64_t wanted = std::clamp(rate * state_.limits.unsent_ms / 1'000, kUnsentBytesMin,
+                                          state_.limits.unsent_bytes);
   const auto limit = rate > kFastBytesPerS ? 0u : static_cast<std::uint32_t>(wanted);
   // A change that matters; each is a system call.
   if (limit > connection.unsent_limit / 4 * 5 || limit < connection.unsent_limit / 4 * 3) {

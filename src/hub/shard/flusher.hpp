@@ -5,17 +5,21 @@
 
 namespace gimnet::hub {
 
-/// What may wait unsent in the kernel on a connection of which nothing is known yet. A fast one loses nothing by it
-/// that could be felt, and behind a slow one the first real-time message has little to wait for.
+/// What may wait unsent in the kernel on a connection of which nothing is known yet. A fast one
+/// loses nothing by it that could be felt, and behind a slow one the first real-time message has
+/// little to wait for.
 inline constexpr std::uint32_t kFirstUnsentBytes = 64 * 1024;
 
-/// Writes what the turn left in outboxes, once per connection, and looks after those that do not take everything.
-/// Thread safety: one shard.
+/// Writes what the turn left in outboxes, once per connection, and looks after those that do not
+/// take everything. Thread safety: one shard.
 class Flusher {
  public:
-  Flusher(ShardState& state, Closer& closer) : state_(state), closer_(closer) { spare_.reserve(kSpareMax); }
+  Flusher(ShardState& state, Closer& closer) : state_(state), closer_(closer) {
+    spare_.reserve(kSpareMax);
+  }
 
-  /// All connections that have something to write. Returns whether some of them could have written more.
+  /// All connections that have something to write. Returns whether some of them could have written
+  /// more.
   bool flush_dirty();
   /// One connection, at once. It may be closed by it.
   void flush(Connection& connection);
@@ -41,8 +45,9 @@ class Flusher {
 
   ShardState& state_;
   Closer& closer_;
-  std::vector<Connection*> again_;                ///< used up their share of this turn
-  std::vector<std::unique_ptr<Progress>> spare_;  ///< of connections that have got on. Limit: kSpareMax
+  std::vector<Connection*> again_;  ///< used up their share of this turn
+  std::vector<std::unique_ptr<Progress>>
+      spare_;  ///< of connections that have got on. Limit: kSpareMax
 };
 
 }  // namespace gimnet::hub

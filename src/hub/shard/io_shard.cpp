@@ -30,7 +30,8 @@ IoShard::IoShard(ShardIndex index, const HubShared& shared, Options options)
       commands_(1),
       options_(options) {
   Waker& waker = *shared.wakers[index.value()];
-  GIMNET_CHECK(state_.poller.add(waker.descriptor(), Poller::kOwnToken, Interest{.read = true, .write = false}));
+  GIMNET_CHECK(state_.poller.add(waker.descriptor(), Poller::kOwnToken,
+                                 Interest{.read = true, .write = false}));
 }
 
 IoShard::~IoShard() { join(); }
@@ -65,7 +66,8 @@ void IoShard::run() {
   std::span<const Ready> ready;
   std::uint64_t received = 0;
   while (!stopped_) {
-    const bool guessed = guess_.same_again(ready, received, flush_again_ || has_rest(), steady_now_ns);
+    const bool guessed =
+        guess_.same_again(ready, received, flush_again_ || has_rest(), steady_now_ns);
     if (!guessed) ready = wait();
     const std::int64_t now_ns = steady_now_ns();
     if (!guessed) guess_.woke(now_ns);
@@ -94,7 +96,8 @@ std::uint64_t IoShard::wake_at_ms() {
   if (flush_again_ || !state_.recipients.dirty().empty() || has_rest()) return Poller::kNow;
   std::uint64_t at_ms = std::min(keeper_.next_tick_at_ms(), state_.pacer.next_due_ms());
   if (state_.drops.pending()) {
-    at_ms = std::min(at_ms, state_.now_ms + std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
+    at_ms = std::min(at_ms,
+                     state_.now_ms + std::max<std::uint64_t>(1, state_.limits.report_interval_ms));
   }
   return at_ms > state_.now_ms ? at_ms : Poller::kNow;
 }
@@ -108,11 +111,12 @@ bool IoShard::has_rest() const {
 }
 
 bool IoShard::has_work() {
-  return !commands_.empty() || !state_.shared.mailboxes[state_.self.value()]->empty() || room_came();
+  return !commands_.empty() || !state_.shared.mailboxes[state_.self.value()]->empty() ||
+         room_came();
 }
 
-/// The word that a mailbox has room is said once, and is only heard asleep: one that came since the last look is found
-/// by looking, and the next one wakes.
+/// The word that a mailbox has room is said once, and is only heard asleep: one that came since the
+/// last look is found by looking, and the next one wakes.
 bool IoShard::room_came() {
   if (state_.waiting_for_room.empty()) return false;
   const std::uint64_t before = state_.fanout.crowded();
@@ -161,13 +165,13 @@ void IoShard::take_mail() {
   if (mailbox.empty() && !reader_.has_rest_of_mail()) return;
   reader_.begin_mail();
   if (!reader_.take_rest_of_mail()) return;
-  // A session whose node was seen by another shard has its AttachCommand waiting here: first all commands, then the
-  // frames.
+  // A session whose node was seen by another shard has its AttachCommand waiting here: first all
+  // commands, then the frames.
   const auto before_taking = [this] {
     while (!commands_.empty()) take_commands();
   };
-  // What waits is counted against the budget when it is flushed: a mailbox full of the smallest frames would go far
-  // beyond it before that.
+  // What waits is counted against the budget when it is flushed: a mailbox full of the smallest
+  // frames would go far beyond it before that.
   std::uint64_t unflushed = 0;
   mailbox.drain(kMailPerTurn, before_taking, [&](const Mail& mail) {
     const bool goes_on = reader_.take_mail(mail);
@@ -245,7 +249,8 @@ void IoShard::execute(ShardCommand& command) {
                  [&](SendControlCommand& control) {
                    Connection* connection = state_.find(control.session);
                    if (connection == nullptr || !connection->connected) return;
-                   if (control.attachment != 0 && control.attachment != connection->attachment) return;
+                   if (control.attachment != 0 && control.attachment != connection->attachment)
+                     return;
                    connection->requests -= std::min(control.answers, connection->requests);
                    if (connection->outbox.push_control(control.frame, state_.egress)) {
                      state_.recipients.mark_dirty(*connection);
@@ -264,7 +269,8 @@ void IoShard::execute(ShardCommand& command) {
                  [&](RenumberCommand& renumber) {
                    if (Connection* connection = state_.find(renumber.session)) {
                      attacher_.renumber(*connection, renumber.node);
-                     closer_.close(*connection, proto::GoodbyeCode::renumbered, std::move(renumber.sentence));
+                     closer_.close(*connection, proto::GoodbyeCode::renumbered,
+                                   std::move(renumber.sentence));
                    }
                  },
                  [&](const LimitsCommand& changed) { state_.limits = changed.limits; },

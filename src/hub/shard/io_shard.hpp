@@ -14,9 +14,10 @@
 
 namespace gimnet::hub {
 
-/// One io thread: its connections, their queues, and the turn that serves them. A turn takes commands and mail, reads
-/// every ready connection up to its share, routes all of it, then writes each connection once. Every step is bounded.
-/// Thread safety: send() from the conductor; start() and join() from who made it; the rest is the shard's own thread.
+/// One io thread: its connections, their queues, and the turn that serves them. A turn takes
+/// commands and mail, reads every ready connection up to its share, routes all of it, then writes
+/// each connection once. Every step is bounded. Thread safety: send() from the conductor; start()
+/// and join() from who made it; the rest is the shard's own thread.
 class IoShard {
  public:
   /// How the thread waits for work.
@@ -31,14 +32,15 @@ class IoShard {
   void start();
   /// After a StopCommand.
   void join();
-  /// Lets go what this shard holds of others: before any of them goes, when no shard's thread runs any more.
+  /// Lets go what this shard holds of others: before any of them goes, when no shard's thread runs
+  /// any more.
   void let_go();
 
   /// Conductor: hands a command over; order is kept.
   void send(ShardCommand command);
 
-  /// One turn, for tests that drive a shard without its thread: `ready` are connections of a transport that no poller
-  /// knows. now_ms is monotonic.
+  /// One turn, for tests that drive a shard without its thread: `ready` are connections of a
+  /// transport that no poller knows. now_ms is monotonic.
   void turn(std::span<const Ready> ready, std::uint64_t now_ms);
   [[nodiscard]] ShardState& state() { return state_; }
   /// Something was read, or handed over, and can be routed on in the next turn.
@@ -53,7 +55,8 @@ class IoShard {
 
   void run();
   [[nodiscard]] std::span<const Ready> wait();
-  /// When there is something to do again whatever comes: Poller::kNow, Poller::kNever, or a monotonic time.
+  /// When there is something to do again whatever comes: Poller::kNow, Poller::kNever, or a
+  /// monotonic time.
   [[nodiscard]] std::uint64_t wake_at_ms();
   /// After prepare_to_sleep(): is there something that nobody will wake this thread for any more?
   [[nodiscard]] bool has_work();
@@ -79,7 +82,8 @@ class IoShard {
   std::vector<std::uint64_t> going_on_;  ///< who had a rest when this turn began
   bool stopped_ = false;
   bool flush_again_ = false;
-  bool room_came_ = false;  ///< in a mailbox, since connections that wait for room were last looked at
+  bool room_came_ =
+      false;  ///< in a mailbox, since connections that wait for room were last looked at
   ReadyGuess guess_;
   AllocationMeter meter_;  ///< of the thread that takes the turns
   std::thread thread_;

@@ -22,8 +22,11 @@ void Keeper::tick() {
 }
 
 void Keeper::forgive(Connection& connection, std::uint64_t late_ms) const {
-  // Nothing began later than now, so what began after the tick was due has all its time, and no more.
-  const auto move = [&](std::uint64_t& since_ms) { since_ms = std::min(since_ms + late_ms, state_.now_ms); };
+  // Nothing began later than now, so what began after the tick was due has all its time, and no
+  // more.
+  const auto move = [&](std::uint64_t& since_ms) {
+    since_ms = std::min(since_ms + late_ms, state_.now_ms);
+  };
   if (connection.tail_since_ms != 0) move(connection.tail_since_ms);
   if (!connection.progress) return;
   move(connection.progress->since_ms);
@@ -31,16 +34,19 @@ void Keeper::forgive(Connection& connection, std::uint64_t late_ms) const {
 }
 
 bool Keeper::is_silent(Connection& connection) {
-  const auto over = [&] { return state_.now_ms - connection.last_heard_ms >= state_.limits.silent_ms; };
+  const auto over = [&] {
+    return state_.now_ms - connection.last_heard_ms >= state_.limits.silent_ms;
+  };
   if (!over()) return false;
-  // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or more were ready
-  // than are told at a time.
+  // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or
+  // more were ready than are told at a time.
   reader_.read(connection);
   return connection.connected && !connection.waits_for_room && over();
 }
 
 std::uint64_t Keeper::next_tick_at_ms() const {
-  if (state_.counters.connections.value() == 0 && (!draining_ || drained_told_)) return Poller::kNever;
+  if (state_.counters.connections.value() == 0 && (!draining_ || drained_told_))
+    return Poller::kNever;
   return next_tick_at_ms_;
 }
 
@@ -48,15 +54,16 @@ void Keeper::look_at(Connection& connection) {
   const Limits& limits = state_.limits;
   const bool written = connection.outbox.empty() && !connection.writer.in_frame();
   if (draining_ && (state_.now_ms >= drain_deadline_ms_ || (written && state_.nothing_follows))) {
-    return closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down; dial again");
+    return closer_.close(connection, proto::GoodbyeCode::draining,
+                         "the hub is shutting down; dial again");
   }
   if (connection.missed_resume) {
-    return closer_.close(
-        connection, proto::GoodbyeCode::too_many_requests,
-        "the hub's words wait and are not taken, RESUME among them; read what the hub says, come back");
+    return closer_.close(connection, proto::GoodbyeCode::too_many_requests,
+                         "the hub's words wait and are not taken, RESUME among them; read what the "
+                         "hub says, come back");
   }
-  // What a peer sent before it was gone waits for who holds it, but no longer than its session would wait for the peer:
-  // it may be held by what waits for itself, and would be for ever.
+  // What a peer sent before it was gone waits for who holds it, but no longer than its session
+  // would wait for the peer: it may be held by what waits for itself, and would be for ever.
   if (connection.write_failed &&
       state_.now_ms - connection.last_heard_ms >= std::max(limits.grace_ms, limits.silent_ms)) {
     return closer_.on_broken(connection);
@@ -70,13 +77,16 @@ void Keeper::look_at(Connection& connection) {
                          "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");
   }
   if (!connection.connected) return;
-  if (heard && connection.tail_since_ms != 0 && state_.now_ms - connection.tail_since_ms >= limits.stalled_frame_ms) {
+  if (heard && connection.tail_since_ms != 0 &&
+      state_.now_ms - connection.tail_since_ms >= limits.stalled_frame_ms) {
     state_.counters.stalled_frames.add(1);
     return closer_.close(connection, proto::GoodbyeCode::stalled_frame,
-                         "a frame was begun and not finished for " + std::to_string(limits.stalled_frame_ms) + " ms");
+                         "a frame was begun and not finished for " +
+                             std::to_string(limits.stalled_frame_ms) + " ms");
   }
   if (state_.now_ms - connection.last_sent_ms >= limits.keep_alive_ms) {
-    // Sent or not, not again before another interval: a peer that does not read gets no heap of them.
+    // Sent or not, not again before another interval: a peer that does not read gets no heap of
+    // them.
     connection.last_sent_ms = state_.now_ms;
     connection.outbox.trim();
     if (connection.resume) connection.resume->kept.trim();
@@ -87,8 +97,8 @@ void Keeper::look_at(Connection& connection) {
   flusher_.look_after(connection);
 }
 
-/// Written at once: ten thousand who are told at one tick would each take a piece of memory until its end, and the
-/// shard would keep all of it.
+/// Written at once: ten thousand who are told at one tick would each take a piece of memory until
+/// its end, and the shard would keep all of it.
 void Keeper::say_ping(Connection& connection) {
   const proto::flow::Ping ping{++connection.ping_sequence, wall_now_ns()};
   if (push_flow(state_, connection, ping)) flusher_.flush(connection);
@@ -123,7 +133,8 @@ void Keeper::look_for_others() {
 
 bool Keeper::take_drained() {
   const bool over = state_.nothing_follows || state_.now_ms >= drain_deadline_ms_;
-  if (!draining_ || drained_told_ || !over || state_.counters.connections.value() != 0) return false;
+  if (!draining_ || drained_told_ || !over || state_.counters.connections.value() != 0)
+    return false;
   drained_told_ = true;
   return true;
 }

@@ -7,9 +7,9 @@
 
 namespace gimnet::hub {
 
-/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that waited too long. Time
-/// in which the shard itself stood still counts against nobody.
-/// Thread safety: one shard.
+/// What a shard does by the clock: keep-alive, silent and stalled peers, slow ones, messages that
+/// waited too long. Time in which the shard itself stood still counts against nobody. Thread
+/// safety: one shard.
 class Keeper {
  public:
   Keeper(ShardState& state, Closer& closer, Flusher& flusher, Reader& reader)
@@ -23,8 +23,8 @@ class Keeper {
   /// When the next tick is, or Poller::kNever if there is nobody to look at.
   [[nodiscard]] std::uint64_t next_tick_at_ms() const;
 
-  /// Nothing is read any more. Every connection ends once all shards drain and what waits for it was written, or at the
-  /// deadline.
+  /// Nothing is read any more. Every connection ends once all shards drain and what waits for it
+  /// was written, or at the deadline.
   void drain(std::uint64_t deadline_ms);
   /// After mail was taken: do all shards drain?
   void look_for_others();
@@ -33,9 +33,11 @@ class Keeper {
 
  private:
   void look_at(Connection& connection);
-  /// This shard did nothing for so long: what is asked of the peer within a time began as much later.
+  /// This shard did nothing for so long: what is asked of the peer within a time began as much
+  /// later.
   void forgive(Connection& connection, std::uint64_t late_ms) const;
-  /// Was nothing heard for silent_ms, nor is anything there to read? The connection may be closed by what is.
+  /// Was nothing heard for silent_ms, nor is anything there to read? The connection may be closed
+  /// by what is.
   [[nodiscard]] bool is_silent(Connection& connection);
   void say_ping(Connection& connection);
 

@@ -12,7 +12,8 @@ namespace {
 epoll_event make_event(std::uint64_t token, Interest interest) {
   epoll_event event{};
   event.events = (interest.read ? EPOLLIN | EPOLLRDHUP : 0u) | (interest.write ? EPOLLOUT : 0u);
-  // The kernel tells the end of a connection to those who did not ask, too, at each wait. Nobody looks at it now.
+  // The kernel tells the end of a connection to those who did not ask, too, at each wait. Nobody
+  // looks at it now.
   if (!interest.read && !interest.write) event.events = EPOLLONESHOT;
   event.data.u64 = token;
   return event;
@@ -21,7 +22,8 @@ epoll_event make_event(std::uint64_t token, Interest interest) {
 }  // namespace
 
 Poller::Poller()
-    : epoll_(::epoll_create1(EPOLL_CLOEXEC)), timer_(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
+    : epoll_(::epoll_create1(EPOLL_CLOEXEC)),
+      timer_(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
   epoll_event event{};
   // Edge-triggered: to set it anew is all that it takes, nobody has to read it.
   event.events = EPOLLIN | EPOLLET;
@@ -48,7 +50,9 @@ void Poller::change(int descriptor, std::uint64_t token, Interest interest) {
   static_cast<void>(::epoll_ctl(epoll_, EPOLL_CTL_MOD, descriptor, &event));
 }
 
-void Poller::remove(int descriptor) { static_cast<void>(::epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr)); }
+void Poller::remove(int descriptor) {
+  static_cast<void>(::epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr));
+}
 
 void Poller::set_timer(std::uint64_t at_ms) {
   itimerspec when{};
@@ -65,7 +69,8 @@ std::span<const Ready> Poller::wait_until(std::uint64_t at_ms) {
 }
 
 std::span<const Ready> Poller::wait(int timeout_ms) {
-  const int count = ::epoll_wait(epoll_, events_.data(), static_cast<int>(events_.size()), timeout_ms);
+  const int count =
+      ::epoll_wait(epoll_, events_.data(), static_cast<int>(events_.size()), timeout_ms);
   // An interrupted wait is one in which nothing became ready.
   std::size_t ready = 0;
   for (int i = 0; i < count; ++i) {
@@ -74,7 +79,8 @@ std::span<const Ready> Poller::wait(int timeout_ms) {
       timer_at_ms_ = kNever;
       continue;
     }
-    ready_[ready++] = {event.data.u64, (event.events & (EPOLLIN | EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0,
+    ready_[ready++] = {event.data.u64,
+                       (event.events & (EPOLLIN | EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0,
                        (event.events & (EPOLLOUT | EPOLLHUP | EPOLLERR)) != 0};
   }
   return {ready_.data(), ready};

@@ -13,7 +13,8 @@
 namespace gimnet::hub {
 namespace {
 
-/// Where a newcomer sends to shows when it is read: so much of it, also where some shard has too much to do.
+/// Where a newcomer sends to shows when it is read: so much of it, also where some shard has too
+/// much to do.
 constexpr std::uint64_t kFirstReadBytes = 4 * 1024;
 
 template <class Word>
@@ -32,7 +33,8 @@ std::uint64_t Reader::share() const {
 }
 
 /// In read(), which is once a turn for each connection.
-[[gnu::always_inline]] inline void Reader::route_all(Connection& connection, ReceiveBuffer::Received received) {
+[[gnu::always_inline]] inline void Reader::route_all(Connection& connection,
+                                                     ReceiveBuffer::Received received) {
   const std::uint64_t accepted_before = state_.tally.accepted;
   deliveries_end_ = state_.router.deliveries() + share();
   const bool open = process(connection, received);
@@ -47,7 +49,8 @@ std::uint64_t Reader::share() const {
 void Reader::read(Connection& connection) {
   state_.egress.owner.check_here();
   if (connection.tail.rest) return;
-  std::uint64_t most = state_.receive_buffer.many_rests() ? kFirstReadBytes : state_.limits.turn_bytes;
+  std::uint64_t most =
+      state_.receive_buffer.many_rests() ? kFirstReadBytes : state_.limits.turn_bytes;
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
     if (connection.posted_shards != kAllShards) return wait_for_room(connection);
     most = kFirstReadBytes;
@@ -77,7 +80,8 @@ void Reader::go_on(Connection& connection) {
 
 void Reader::tell_heard(Connection& connection) {
   connection.tell_heard = false;
-  state_.tell_conductor({state_.self, HeardEvent{connection.session(), connection.attachment, connection.node}});
+  state_.tell_conductor(
+      {state_.self, HeardEvent{connection.session(), connection.attachment, connection.node}});
 }
 
 void Reader::wait_for_room(Connection& connection) {
@@ -110,10 +114,12 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
     }
     if (found.found == proto::Found::too_long) {
       connection.ingress.error = proto::FrameError::too_long;
-      return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                    "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
+      return refuse(
+          connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+          "the frame's length is over the largest frame, " + std::to_string(length_max) + " bytes");
     }
-    if (connection.tail_since_ms == 0 || next != received.begin) connection.tail_since_ms = state_.now_ms;
+    if (connection.tail_since_ms == 0 || next != received.begin)
+      connection.tail_since_ms = state_.now_ms;
     if (keep(connection, {next, received.end}, found.needed)) return true;
     closer_.close(connection, proto::GoodbyeCode::no_memory,
                   "the hub keeps too many begun frames; write frames whole, or in smaller pieces");
@@ -135,7 +141,8 @@ bool Reader::keep(Connection& connection, std::span<const std::byte> begun, std:
     Connection* const oldest = begun_before(connection);
     if (oldest == nullptr) return false;
     closer_.close(*oldest, proto::GoodbyeCode::no_memory,
-                  "the hub keeps too many begun frames, and this one was begun longest ago; write frames whole, or in "
+                  "the hub keeps too many begun frames, and this one was begun longest ago; write "
+                  "frames whole, or in "
                   "smaller pieces");
   }
   return true;
@@ -145,7 +152,8 @@ Connection* Reader::begun_before(const Connection& connection) const {
   Connection* oldest = nullptr;
   std::uint64_t since_ms = connection.tail_since_ms;
   for (const std::unique_ptr<Connection>& each : state_.connections) {
-    if (each == nullptr || each->tail.empty() || each->tail.rest || each->tail_since_ms >= since_ms) continue;
+    if (each == nullptr || each->tail.empty() || each->tail.rest || each->tail_since_ms >= since_ms)
+      continue;
     // Who is not read cannot end its frame.
     if (each->holds != 0 || each->waits_for_room) continue;
     since_ms = each->tail_since_ms;
@@ -160,8 +168,8 @@ bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
   const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
   if (admission == Admission::data) {
     if (connection.draining) {
-      // Read for the CONFIRM behind it. All shards were told that nothing follows, and may have closed whom it is for:
-      // it stays its sender's, like what is not read any more.
+      // Read for the CONFIRM behind it. All shards were told that nothing follows, and may have
+      // closed whom it is for: it stays its sender's, like what is not read any more.
       state_.counters.untaken_frames.add(view.frames);
     } else {
       route(connection, found);
@@ -181,14 +189,16 @@ bool Reader::handle_other(Connection& connection, const proto::RunView& view, Ad
       return handle_control(connection, view);
     case Admission::wrong_source:
       state_.counters.wrong_source.add(1);
-      return refuse(connection, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
-                    "a frame's source is not this connection's node id; put the id from WELCOME into src");
+      return refuse(
+          connection, proto::DropReason::wrong_source, proto::GoodbyeCode::wrong_source,
+          "a frame's source is not this connection's node id; put the id from WELCOME into src");
     case Admission::data:
     case Admission::malformed:
       break;
   }
-  return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
+  return refuse(
+      connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+      std::string("malformed frame: ") + proto::frame_error_text(connection.ingress.error));
 }
 
 bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::GoodbyeCode code,
@@ -225,25 +235,31 @@ void Reader::count_taken(Connection& connection, const proto::RunView& view) {
 void Reader::fill_trace(const proto::RunView& view) {
   const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
   if (!frame) return;
-  const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()), frame->extensions.size());
-  // Departure is set again when the frame is written; a frame that never waits leaves in the turn in which it came.
-  // Both are the time of their turn: read anew, an arrival could be later than a departure.
+  const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()),
+                                        frame->extensions.size());
+  // Departure is set again when the frame is written; a frame that never waits leaves in the turn
+  // in which it came. Both are the time of their turn: read anew, an arrival could be later than a
+  // departure.
   const std::int64_t now_ns = state_.egress.now_wall_ns;
   static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
 }
 
 bool Reader::handle_flow(Connection& connection, const proto::RunView& view) {
-  const auto message = proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
+  const auto message =
+      proto::flow::decode({view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize});
   if (!message) {
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
                   "malformed FLOW frame: unknown operation, or too short for it");
   }
   if (const auto* ping = std::get_if<proto::flow::Ping>(&*message)) on_ping(connection, *ping);
   if (const auto* pong = std::get_if<proto::flow::Pong>(&*message)) on_pong(connection, *pong);
-  if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message)) on_confirm(connection, *confirm);
-  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message)) return on_skip(connection, *skip);
+  if (const auto* confirm = std::get_if<proto::flow::Confirm>(&*message))
+    on_confirm(connection, *confirm);
+  if (const auto* skip = std::get_if<proto::flow::Skip>(&*message))
+    return on_skip(connection, *skip);
   if (const auto* credit = std::get_if<proto::flow::Credit>(&*message)) {
-    if (!state_.pacer.on_credit(connection, credit->group, credit->taken)) return take_bad_credit(connection);
+    if (!state_.pacer.on_credit(connection, credit->group, credit->taken))
+      return take_bad_credit(connection);
   }
   return true;
 }
@@ -253,9 +269,10 @@ bool Reader::take_bad_credit(Connection& connection) {
   const Limits& limits = state_.limits;
   const std::chrono::milliseconds now{state_.now_ms};
   if (connection.oddities.take({limits.oddities_per_s, limits.oddities_burst}, now)) return true;
-  closer_.close(connection, proto::GoodbyeCode::oddities,
-                "more than " + std::to_string(limits.oddities_burst) +
-                    " CREDITs in a short time were for no subscription of this node, or out of order");
+  closer_.close(
+      connection, proto::GoodbyeCode::oddities,
+      "more than " + std::to_string(limits.oddities_burst) +
+          " CREDITs in a short time were for no subscription of this node, or out of order");
   return false;
 }
 
@@ -269,8 +286,8 @@ void Reader::on_pong(Connection& connection, const proto::flow::Pong& pong) {
   if (found == state_.readings.end()) return;
   Reading& reading = found->second;
   if (reading.sequence == 0 || pong.sequence != reading.sequence) return;
-  state_.tell_conductor(
-      {state_.self, MovesReadEvent{connection.session(), connection.attachment, connection.node, reading.asked}});
+  state_.tell_conductor({state_.self, MovesReadEvent{connection.session(), connection.attachment,
+                                                     connection.node, reading.asked}});
   reading.sequence = 0;
   if (reading.wanted != reading.asked) return ask_whether_read(state_, connection, reading.wanted);
   state_.readings.erase(found);
@@ -301,7 +318,8 @@ bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
 }
 
 bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
-  const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize, view.size - proto::kHeaderSize);
+  const std::span<const std::byte> payload(view.bytes + proto::kHeaderSize,
+                                           view.size - proto::kHeaderSize);
   const auto goodbye = proto::decode<proto::Goodbye>(payload);
   if (!goodbye) {
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
@@ -324,7 +342,9 @@ bool Reader::handle_control(Connection& connection, const proto::RunView& view) 
   return true;
 }
 
-void Reader::begin_mail() { deliveries_end_ = state_.router.deliveries() + state_.limits.turn_deliveries; }
+void Reader::begin_mail() {
+  deliveries_end_ = state_.router.deliveries() + state_.limits.turn_deliveries;
+}
 
 bool Reader::take_rest_of_mail() {
   if (has_rest_of_mail()) take_frames(std::exchange(mail_rest_, Run{}));
@@ -365,8 +385,9 @@ void Reader::take_word(const Mail& mail) {
       state_.done_shards |= std::uint64_t{1} << word_of<Fence>(mail).of.value();
       return;
     case MailKind::retained:
-      return state_.retained.on_handed(word_of<GroupStart>(mail),
-                                       {state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});
+      return state_.retained.on_handed(
+          word_of<GroupStart>(mail),
+          {state_.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames});
   }
 }
 

@@ -5,22 +5,24 @@
 
 namespace gimnet::hub {
 
-/// Reads connections: bytes to frames, through the gate, to the router, or to who else they are for.
-/// Thread safety: one shard.
+/// Reads connections: bytes to frames, through the gate, to the router, or to who else they are
+/// for. Thread safety: one shard.
 class Reader {
  public:
   Reader(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
 
-  /// Reads what is there, up to one turn's share, and routes it, up to another. The connection may be closed by it.
-  /// Does nothing while it has a rest.
+  /// Reads what is there, up to one turn's share, and routes it, up to another. The connection may
+  /// be closed by it. Does nothing while it has a rest.
   void read(Connection& connection);
-  /// Routes the rest of what was read in an earlier turn, up to a turn's share. As read(). REQUIRES: it has one.
+  /// Routes the rest of what was read in an earlier turn, up to a turn's share. As read().
+  /// REQUIRES: it has one.
   void go_on(Connection& connection);
   /// Mail has a turn's share too, that of all shards together.
   void begin_mail();
   /// What was left of the mail before. Returns false once the share is used up.
   [[nodiscard]] bool take_rest_of_mail();
-  /// The same with frames or a word from another shard; frames that are too many are left. REQUIRES: none are left.
+  /// The same with frames or a word from another shard; frames that are too many are left.
+  /// REQUIRES: none are left.
   [[nodiscard]] bool take_mail(const Mail& mail);
   [[nodiscard]] bool has_rest_of_mail() const { return mail_rest_.frames != 0; }
   /// It lies in another shard's memory.
@@ -36,18 +38,21 @@ class Reader {
   void keep_rest(Connection& connection, std::span<const std::byte> rest);
   void take_frames(const Run& frames);
   void take_word(const Mail& mail);
-  /// The share that a connection has of this turn's deliveries: those with a rest have one together.
+  /// The share that a connection has of this turn's deliveries: those with a rest have one
+  /// together.
   [[nodiscard]] std::uint64_t share() const;
   /// False: the connection was closed.
   [[nodiscard]] bool process(Connection& connection, ReceiveBuffer::Received received);
-  /// Keeps the frame that was begun; where too much is kept, those go whose frames were begun before. False: nobody is
-  /// left to go.
-  [[nodiscard]] bool keep(Connection& connection, std::span<const std::byte> begun, std::uint32_t needed);
+  /// Keeps the frame that was begun; where too much is kept, those go whose frames were begun
+  /// before. False: nobody is left to go.
+  [[nodiscard]] bool keep(Connection& connection, std::span<const std::byte> begun,
+                          std::uint32_t needed);
   /// Who began its frame longest ago, and before this one; nullptr: nobody.
   [[nodiscard]] Connection* begun_before(const Connection& connection) const;
   /// May shorten `view` to the frames that it handled.
   [[nodiscard]] bool handle_run(Connection& connection, proto::NextRun& found);
-  [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view, Admission admission);
+  [[nodiscard]] bool handle_other(Connection& connection, const proto::RunView& view,
+                                  Admission admission);
   void route(Connection& connection, const proto::NextRun& found);
   [[nodiscard]] bool handle_flow(Connection& connection, const proto::RunView& view);
   [[nodiscard]] bool handle_link(Connection& connection, const proto::RunView& view);
@@ -63,8 +68,8 @@ class Reader {
   void count(Connection& connection, const proto::RunView& view);
   void count_taken(Connection& connection, const proto::RunView& view);
   void fill_trace(const proto::RunView& view);
-  [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason, proto::GoodbyeCode code,
-                            const std::string& sentence);
+  [[nodiscard]] bool refuse(Connection& connection, proto::DropReason reason,
+                            proto::GoodbyeCode code, const std::string& sentence);
 
   ShardState& state_;
   Closer& closer_;

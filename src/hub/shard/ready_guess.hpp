@@ -8,14 +8,15 @@
 
 namespace gimnet::hub {
 
-/// Guesses that what was ready in the last turn is ready again, where that is likely: who alone writes message by
-/// message has written the next one while the last was passed on, and to read at once costs less than to ask first
-/// (docs/performance.md, "Findings"). Thread safety: one shard.
+/// Guesses that what was ready in the last turn is ready again, where that is likely: who alone
+/// writes message by message has written the next one while the last was passed on, and to read at
+/// once costs less than to ask first (docs/performance.md, "Findings"). Thread safety: one shard.
 class ReadyGuess {
  public:
   /// Who reads more than this in a turn gains nothing by sparing a wait.
   static constexpr std::uint64_t kReceivedMax = 16 * 1024;
-  /// So long after a wait others are looked for again: turns that do much, whatever they read, are not repeated.
+  /// So long after a wait others are looked for again: turns that do much, whatever they read, are
+  /// not repeated.
   static constexpr std::int64_t kBusyNsMax = 50'000;
 
   /// A wait has ended.
@@ -24,10 +25,12 @@ class ReadyGuess {
     guessed_ = false;
   }
 
-  /// A turn has ended that was told `ready` and read `received` bytes; has_rest: it left work for the next one. True:
-  /// take that with the same `ready`. `now_ns` is called where the answer depends on it.
+  /// A turn has ended that was told `ready` and read `received` bytes; has_rest: it left work for
+  /// the next one. True: take that with the same `ready`. `now_ns` is called where the answer
+  /// depends on it.
   template <class Clock>
-  [[nodiscard]] bool same_again(std::span<const Ready> ready, std::uint64_t received, bool has_rest, Clock now_ns) {
+  [[nodiscard]] bool same_again(std::span<const Ready> ready, std::uint64_t received, bool has_rest,
+                                Clock now_ns) {
     if (guessed_) {
       if (received != 0) {
         backoff_.succeeded();
@@ -36,8 +39,10 @@ class ReadyGuess {
       }
     }
     guessed_ = false;
-    const bool alone = ready.size() == 1 && ready[0].token != Poller::kOwnToken && !ready[0].writable;
-    if (!alone || has_rest || received == 0 || received > kReceivedMax || !backoff_.is_due()) return false;
+    const bool alone =
+        ready.size() == 1 && ready[0].token != Poller::kOwnToken && !ready[0].writable;
+    if (!alone || has_rest || received == 0 || received > kReceivedMax || !backoff_.is_due())
+      return false;
     guessed_ = now_ns() - woke_ns_ < kBusyNsMax;
     return guessed_;
   }

@@ -4,7 +4,8 @@ namespace gimnet::hub {
 
 std::size_t receive_more(Connection& connection, std::span<std::byte> room, Tally& tally) {
   std::size_t bytes = 0;
-  for (int reads = 0; reads < kReadsMore && bytes < std::min(kSmallReadBytes, room.size()); ++reads) {
+  for (int reads = 0; reads < kReadsMore && bytes < std::min(kSmallReadBytes, room.size());
+       ++reads) {
     const IoResult more = connection.transport->receive(room.subspan(bytes));
     ++tally.receive_calls;
     if (more.status != IoStatus::ok) break;

@@ -15,12 +15,15 @@ inline constexpr std::size_t kSmallReadBytes = 16 * 1024;
 inline constexpr int kReadsMore = 4;
 
 /// What follows in the same room. An end or an error shows again at the next read.
-[[nodiscard]] std::size_t receive_more(Connection& connection, std::span<std::byte> room, Tally& tally);
+[[nodiscard]] std::size_t receive_more(Connection& connection, std::span<std::byte> room,
+                                       Tally& tally);
 
-/// What is there, and behind a small read what came meanwhile, where that is often the case: who writes message by
-/// message has written the next one while the first was read, and both then leave in one write, which is what a message
-/// costs (docs/performance.md, "Findings"). REQUIRES: `room` is not empty. Thread safety: one shard.
-[[nodiscard]] inline IoResult receive_repeatedly(Connection& connection, std::span<std::byte> room, Tally& tally) {
+/// What is there, and behind a small read what came meanwhile, where that is often the case: who
+/// writes message by message has written the next one while the first was read, and both then leave
+/// in one write, which is what a message costs (docs/performance.md, "Findings"). REQUIRES: `room`
+/// is not empty. Thread safety: one shard.
+[[nodiscard]] inline IoResult receive_repeatedly(Connection& connection, std::span<std::byte> room,
+                                                 Tally& tally) {
   IoResult result = connection.transport->receive(room);
   ++tally.receive_calls;
   if (result.status == IoStatus::ok && result.bytes < std::min(kSmallReadBytes, room.size()) &&

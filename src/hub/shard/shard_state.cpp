@@ -22,19 +22,23 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              .drops = drops,
              .signals = signals,
              .hub = hub_shared.hub},
-      fanout(index, hub_shared.mailboxes, recipients, egress, {hub_shared.hub, hub_shared.nodes, hub_shared.groups}),
+      fanout(index, hub_shared.mailboxes, recipients, egress,
+             {hub_shared.hub, hub_shared.nodes, hub_shared.groups}),
       pacer(fanout),
       retained(hub_shared.groups, fanout, pacer),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
-      receive_buffer(pool, tally,
-                     // Each shard keeps its part of all begun frames, and at least one: in a slab of its own.
-                     std::max(hub_shared.limits.partial_bytes / hub_shared.mailboxes.size(), pool.slab_bytes())),
+      receive_buffer(
+          pool, tally,
+          // Each shard keeps its part of all begun frames, and at least one: in a slab of its own.
+          std::max(hub_shared.limits.partial_bytes / hub_shared.mailboxes.size(),
+                   pool.slab_bytes())),
       gate(limits, tally) {}
 
 Connection* ShardState::find(SessionRef session) const {
   if (session.slot.value() >= connections.size()) return nullptr;
   Connection* connection = connections[session.slot.value()].get();
-  return connection != nullptr && connection->generation == session.generation ? connection : nullptr;
+  return connection != nullptr && connection->generation == session.generation ? connection
+                                                                               : nullptr;
 }
 
 Connection* ShardState::find(NodeId node) const {

@@ -25,16 +25,16 @@
 
 namespace gimnet::hub {
 
-/// What the conductor wants to know to be read by the node: asked with a PING behind it, and known by its PONG, as both
-/// ends read in order.
+/// What the conductor wants to know to be read by the node: asked with a PING behind it, and known
+/// by its PONG, as both ends read in order.
 struct Reading {
   std::uint32_t sequence = 0;  ///< of the PING under way; 0: none
   std::uint64_t asked = 0;     ///< the move behind which it stands
   std::uint64_t wanted = 0;    ///< the latest
 };
 
-/// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime: longer than any
-/// shard.
+/// What all shards of a hub share. Thread safety: immutable, but for what says otherwise. Lifetime:
+/// longer than any shard.
 struct HubShared {
   HubId hub;
   const Limits& limits;
@@ -49,8 +49,8 @@ struct HubShared {
   std::vector<SessionGauges*> sessions;  ///< by shard
 };
 
-/// All that a shard's parts work on. Thread safety: one shard. The members are in the order in which they need each
-/// other.
+/// All that a shard's parts work on. Thread safety: one shard. The members are in the order in
+/// which they need each other.
 struct ShardState {
   ShardState(ShardIndex index, const HubShared& hub_shared);
 
@@ -76,11 +76,14 @@ struct ShardState {
   Poller poller;
   std::vector<std::unique_ptr<Connection>> connections;  ///< by slot
   std::vector<Connection*> waiting_for_room;
-  std::unordered_map<std::uint32_t, Reading> readings;  ///< by slot, while the conductor waits for them
-  std::vector<std::uint64_t> with_rest;  ///< tokens of connections whose last read was not routed whole, by age
+  std::unordered_map<std::uint32_t, Reading>
+      readings;  ///< by slot, while the conductor waits for them
+  std::vector<std::uint64_t>
+      with_rest;  ///< tokens of connections whose last read was not routed whole, by age
   std::uint64_t now_ms = 0;
   std::uint64_t done_shards = 0;  ///< bit set: they drain, and what they had handed over was taken
-  bool nothing_follows = false;   ///< this shard drains, and so do all others: what waits is all that is to be written
+  bool nothing_follows =
+      false;  ///< this shard drains, and so do all others: what waits is all that is to be written
 
   [[nodiscard]] Connection* find(SessionRef session) const;
   /// A node whose session is on this shard; nullptr if it is not.
@@ -89,7 +92,9 @@ struct ShardState {
   [[nodiscard]] Connection* find_token(std::uint64_t token) const {
     const std::size_t slot = token & (kSlotsMax - 1);
     Connection* connection = slot < connections.size() ? connections[slot].get() : nullptr;
-    return connection != nullptr && connection->connected && connection->token() == token ? connection : nullptr;
+    return connection != nullptr && connection->connected && connection->token() == token
+               ? connection
+               : nullptr;
   }
   void tell_conductor(ShardEvent event) { shared.inbox.push(std::move(event)); }
 };

@@ -47,7 +47,8 @@ void Signals::send_control(NodeId node, std::span<const std::byte> frame) {
 void Signals::apply_control(NodeId node, std::span<const std::byte> frame) {
   Connection* connection = state_.find(node);
   if (connection == nullptr || !connection->connected) return;
-  if (connection->outbox.push_control(frame, state_.egress)) return state_.recipients.mark_dirty(*connection);
+  if (connection->outbox.push_control(frame, state_.egress))
+    return state_.recipients.mark_dirty(*connection);
   // PAUSE is told again, a REPORT may be missed; RESUME is said once.
   if (is_resume(frame)) connection->missed_resume = true;
 }
@@ -104,8 +105,8 @@ void Signals::send_reports() {
 
 void Signals::arm(Connection& connection) {
   if (!connection.connected) return;
-  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would wait for ever. And
-  // what waits for that could not be written before the hub ends.
+  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would
+  // wait for ever. And what waits for that could not be written before the hub ends.
   const bool may_read = (connection.holds == 0 && !connection.draining) || connection.must_confirm;
   const Interest wanted{.read = may_read && !connection.waits_for_room,
                         .write = connection.blocked && !connection.write_failed};

@@ -9,8 +9,8 @@ namespace gimnet::hub {
 struct ShardState;
 struct Connection;
 
-/// Words about senders, from the outboxes of this shard or from another one: PAUSE and RESUME frames, held reads,
-/// reports. A sender on another shard gets them through that shard's mailbox.
+/// Words about senders, from the outboxes of this shard or from another one: PAUSE and RESUME
+/// frames, held reads, reports. A sender on another shard gets them through that shard's mailbox.
 /// Thread safety: one shard.
 class Signals final : public SenderSignals {
  public:
@@ -31,8 +31,9 @@ class Signals final : public SenderSignals {
 
   /// Sets what the connection is waited for, from its state.
   void arm(Connection& connection);
-  /// Nothing is heard of a node that is not read, however long: bounds how long its machine may take nothing (for a
-  /// peer that is read it would end those too that have to take nothing but LATEST messages).
+  /// Nothing is heard of a node that is not read, however long: bounds how long its machine may
+  /// take nothing (for a peer that is read it would end those too that have to take nothing but
+  /// LATEST messages).
   void watch_unread(Connection& connection);
 
  private:

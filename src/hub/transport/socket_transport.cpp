@@ -33,7 +33,9 @@ IoResult failed_call() {
 }  // namespace
 
 SocketTransport::SocketTransport(int descriptor, Family family, const Limits& limits)
-    : descriptor_(descriptor), family_(family), send_buffer_bytes_(static_cast<int>(limits.socket_send_bytes)) {
+    : descriptor_(descriptor),
+      family_(family),
+      send_buffer_bytes_(static_cast<int>(limits.socket_send_bytes)) {
   GIMNET_CHECK(descriptor >= 0);
   static_cast<void>(::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK));
   if (family == Family::tcp) set_option(descriptor, IPPROTO_TCP, TCP_NODELAY, 1);
@@ -78,15 +80,16 @@ void SocketTransport::limit_unsent(std::uint32_t bytes) {
     // 0 is the system's own value: no bound.
     set_option(descriptor_, IPPROTO_TCP, TCP_NOTSENT_LOWAT, wanted);
   } else {
-    // A Unix socket has no mark for what is unsent, but its send buffer is all there is between the two ends. The bound
-    // is on top of the buffer's own, and never raises it.
+    // A Unix socket has no mark for what is unsent, but its send buffer is all there is between the
+    // two ends. The bound is on top of the buffer's own, and never raises it.
     set_option(descriptor_, SOL_SOCKET, SO_SNDBUF,
                bytes == 0 ? send_buffer_bytes_ : std::min(wanted, send_buffer_bytes_));
   }
 }
 
 void SocketTransport::limit_unacknowledged(std::uint32_t ms) {
-  if (family_ == Family::tcp) set_option(descriptor_, IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(ms));
+  if (family_ == Family::tcp)
+    set_option(descriptor_, IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(ms));
 }
 
 }  // namespace gimnet::hub

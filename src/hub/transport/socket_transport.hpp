@@ -12,8 +12,8 @@ class SocketTransport final : public Transport {
  public:
   enum class Family : std::uint8_t { tcp, unix_socket };
 
-  /// Takes `descriptor`, makes it non-blocking, and sets what the hub wants of it: no delay, a send buffer of
-  /// limits.socket_send_bytes. REQUIRES: a connected stream socket of that family.
+  /// Takes `descriptor`, makes it non-blocking, and sets what the hub wants of it: no delay, a send
+  /// buffer of limits.socket_send_bytes. REQUIRES: a connected stream socket of that family.
   SocketTransport(int descriptor, Family family, const Limits& limits);
   ~SocketTransport() override;
   SocketTransport(const SocketTransport&) = delete;

@@ -21,12 +21,16 @@ inline constexpr unsigned kTypeShift = 3;
 inline constexpr unsigned kArrayBit = 16;
 inline constexpr std::size_t kNumberKeySize = 3;
 
-[[nodiscard]] constexpr bool is_array(Type type) { return (static_cast<unsigned>(type) & kArrayBit) != 0; }
+[[nodiscard]] constexpr bool is_array(Type type) {
+  return (static_cast<unsigned>(type) & kArrayBit) != 0;
+}
 [[nodiscard]] constexpr Type element_type(Type array) {
   return static_cast<Type>(static_cast<unsigned>(array) & ~kArrayBit);
 }
 /// Numbers convert between each other; bool and time are no numbers.
-[[nodiscard]] constexpr bool is_number(Type type) { return type >= BITESTREAM_U8 && type <= BITESTREAM_F64; }
+[[nodiscard]] constexpr bool is_number(Type type) {
+  return type >= BITESTREAM_U8 && type <= BITESTREAM_F64;
+}
 
 /// Bytes of a value of that type or, for an array, of one element; 0: any number of bytes.
 [[nodiscard]] constexpr std::size_t unit_size(Type type) {

@@ -18,20 +18,24 @@
 namespace gimnet::proto::bitestream {
 
 template <class T>
-concept Number = (std::integral<T> && !std::same_as<T, bool>) || std::same_as<T, float> || std::same_as<T, double>;
+concept Number = (std::integral<T> && !std::same_as<T, bool>) || std::same_as<T, float> ||
+                 std::same_as<T, double>;
 
-/// True if a floating number holds the integer exactly: its bits from the first to the last one set fit in.
+/// True if a floating number holds the integer exactly: its bits from the first to the last one set
+/// fit in.
 template <std::floating_point To, std::integral From>
 [[nodiscard]] constexpr bool holds_exactly(From value) {
   using Unsigned = std::make_unsigned_t<From>;
-  const auto magnitude =
-      static_cast<std::uint64_t>(value < From{0} ? static_cast<Unsigned>(Unsigned{0} - static_cast<Unsigned>(value))
-                                                 : static_cast<Unsigned>(value));
+  const auto magnitude = static_cast<std::uint64_t>(
+      value < From{0} ? static_cast<Unsigned>(Unsigned{0} - static_cast<Unsigned>(value))
+                      : static_cast<Unsigned>(value));
   if (magnitude == 0) return true;
-  return 64 - std::countl_zero(magnitude) - std::countr_zero(magnitude) <= std::numeric_limits<To>::digits;
+  return 64 - std::countl_zero(magnitude) - std::countr_zero(magnitude) <=
+         std::numeric_limits<To>::digits;
 }
 
-/// The same number as another type; nothing where it is not the same. NaN stays NaN, -0.0 becomes 0.
+/// The same number as another type; nothing where it is not the same. NaN stays NaN, -0.0 becomes
+/// 0.
 template <Number To, Number From>
 [[nodiscard]] constexpr std::optional<To> convert_number(From value) {
   if constexpr (std::integral<To> && std::integral<From>) {
@@ -41,16 +45,20 @@ template <Number To, Number From>
     if (!holds_exactly<To>(value)) return std::nullopt;
     return static_cast<To>(value);
   } else if constexpr (std::integral<To>) {
-    // Both bounds are powers of two (or 0), so exact; the upper one is the first value that does not fit.
+    // Both bounds are powers of two (or 0), so exact; the upper one is the first value that does
+    // not fit.
     constexpr auto kMin = static_cast<From>(std::numeric_limits<To>::min());
-    constexpr auto kEnd = static_cast<From>(static_cast<To>(To{1} << (std::numeric_limits<To>::digits - 1))) * From{2};
+    constexpr auto kEnd =
+        static_cast<From>(static_cast<To>(To{1} << (std::numeric_limits<To>::digits - 1))) *
+        From{2};
     if (!(value >= kMin && value < kEnd)) return std::nullopt;
     const auto converted = static_cast<To>(value);
     if (static_cast<From>(converted) != value) return std::nullopt;
     return converted;
   } else {
     constexpr auto kLargest = static_cast<double>(std::numeric_limits<To>::max());
-    const bool finite = static_cast<double>(value) >= -kLargest && static_cast<double>(value) <= kLargest;
+    const bool finite =
+        static_cast<double>(value) >= -kLargest && static_cast<double>(value) <= kLargest;
     if (finite && static_cast<From>(static_cast<To>(value)) != value) return std::nullopt;
     const bool special = value != value || value == std::numeric_limits<From>::infinity() ||
                          value == -std::numeric_limits<From>::infinity();

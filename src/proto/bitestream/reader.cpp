@@ -4,7 +4,8 @@
 
 #include "proto/bitestream/utf8.hpp"
 
-// The implementation behind gimnet/bitestream.h. It links without the C++ library: no exceptions, no operator new.
+// The implementation behind gimnet/bitestream.h. It links without the C++ library: no exceptions,
+// no operator new.
 
 namespace gimnet::proto::bitestream {
 namespace {
@@ -105,13 +106,15 @@ bitestream_reader bitestream_reader_over(const void* bytes, size_t size) {
 bitestream_status bitestream_next(bitestream_reader* reader, bitestream_value* value) {
   if (reader->offset == reader->size) return BITESTREAM_END;
   Cursor cursor(*reader);
-  if (!take_value(cursor, value) || !legal_at_depth(*value, reader->depth)) return BITESTREAM_MALFORMED;
+  if (!take_value(cursor, value) || !legal_at_depth(*value, reader->depth))
+    return BITESTREAM_MALFORMED;
   value->depth = reader->depth;
   reader->offset = reader->size - cursor.left();
   return BITESTREAM_OK;
 }
 
-bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key, bitestream_value* value) {
+bitestream_status bitestream_find(const bitestream_reader* reader, bitestream_key key,
+                                  bitestream_value* value) {
   bitestream_reader scan = *reader;
   scan.offset = 0;
   for (;;) {
@@ -144,16 +147,36 @@ bitestream_status bitestream_check(const void* bytes, size_t size) {
   }
 }
 
-bool bitestream_get_u8(const bitestream_value* value, uint8_t* out) { return get_number(value, out); }
-bool bitestream_get_u16(const bitestream_value* value, uint16_t* out) { return get_number(value, out); }
-bool bitestream_get_u32(const bitestream_value* value, uint32_t* out) { return get_number(value, out); }
-bool bitestream_get_u64(const bitestream_value* value, uint64_t* out) { return get_number(value, out); }
-bool bitestream_get_i8(const bitestream_value* value, int8_t* out) { return get_number(value, out); }
-bool bitestream_get_i16(const bitestream_value* value, int16_t* out) { return get_number(value, out); }
-bool bitestream_get_i32(const bitestream_value* value, int32_t* out) { return get_number(value, out); }
-bool bitestream_get_i64(const bitestream_value* value, int64_t* out) { return get_number(value, out); }
-bool bitestream_get_f32(const bitestream_value* value, float* out) { return get_number(value, out); }
-bool bitestream_get_f64(const bitestream_value* value, double* out) { return get_number(value, out); }
+bool bitestream_get_u8(const bitestream_value* value, uint8_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_u16(const bitestream_value* value, uint16_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_u32(const bitestream_value* value, uint32_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_u64(const bitestream_value* value, uint64_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_i8(const bitestream_value* value, int8_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_i16(const bitestream_value* value, int16_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_i32(const bitestream_value* value, int32_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_i64(const bitestream_value* value, int64_t* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_f32(const bitestream_value* value, float* out) {
+  return get_number(value, out);
+}
+bool bitestream_get_f64(const bitestream_value* value, double* out) {
+  return get_number(value, out);
+}
 
 bool bitestream_get_bool(const bitestream_value* value, bool* out) {
   if (value->type != BITESTREAM_BOOL || value->bytes[0] > 1) return false;
@@ -194,8 +217,8 @@ size_t bitestream_count(const bitestream_value* value) {
 bool bitestream_element(const bitestream_value* value, size_t index, bitestream_value* element) {
   if (index >= bitestream_count(value)) return false;
   const std::size_t unit = unit_size(value->type);
-  *element = {value->key, element_type(value->type), static_cast<uint32_t>(unit), value->bytes + index * unit,
-              value->depth};
+  *element = {value->key, element_type(value->type), static_cast<uint32_t>(unit),
+              value->bytes + index * unit, value->depth};
   return true;
 }
 

@@ -16,7 +16,8 @@ namespace gimnet::proto::bitestream {
 class Reader;
 
 /// One value, in place. Valid until: the bytes that were read change.
-/// Errors: each as_...() gives nothing where the type does not fit; numbers convert where no value is lost.
+/// Errors: each as_...() gives nothing where the type does not fit; numbers convert where no value
+/// is lost.
 class Value {
  public:
   Value() = default;
@@ -46,7 +47,8 @@ class Value {
     if (value_.type != BITESTREAM_TEXT) return std::nullopt;
     const char* text = nullptr;
     std::size_t size = 0;
-    return bitestream_get_text(&value_, &text, &size) ? std::optional(std::string_view(text, size)) : std::nullopt;
+    return bitestream_get_text(&value_, &text, &size) ? std::optional(std::string_view(text, size))
+                                                      : std::nullopt;
   }
   [[nodiscard]] std::optional<std::span<const std::byte>> as_opaque() const {
     return value_.type == BITESTREAM_OPAQUE ? std::optional(bytes()) : std::nullopt;
@@ -65,12 +67,14 @@ class Value {
   bitestream_value value_ = {};
 };
 
-/// Reads a Bitestream in place, without allocating or copying; each step costs the same, however large the value.
-/// Thread safety: one thread. Errors: hostile bytes end the reading and failed() is true from then on.
+/// Reads a Bitestream in place, without allocating or copying; each step costs the same, however
+/// large the value. Thread safety: one thread. Errors: hostile bytes end the reading and failed()
+/// is true from then on.
 class Reader {
  public:
   Reader() : Reader(std::span<const std::byte>()) {}
-  explicit Reader(std::span<const std::byte> bytes) : state_(bitestream_reader_over(bytes.data(), bytes.size())) {}
+  explicit Reader(std::span<const std::byte> bytes)
+      : state_(bitestream_reader_over(bytes.data(), bytes.size())) {}
   explicit Reader(const bitestream_reader& state) : state_(state) {}
 
   /// The next value; nothing at the end and where the bytes are malformed.
@@ -82,10 +86,13 @@ class Reader {
   /// next() found bytes that are not a Bitestream.
   [[nodiscard]] bool failed() const { return status_ == BITESTREAM_MALFORMED; }
 
-  /// The first value with that key, wherever this reader stands. Costs a step for each value before it.
+  /// The first value with that key, wherever this reader stands. Costs a step for each value before
+  /// it.
   [[nodiscard]] std::optional<Value> find(Key key) const {
     bitestream_value value;
-    return bitestream_find(&state_, key.raw(), &value) == BITESTREAM_OK ? std::optional(Value(value)) : std::nullopt;
+    return bitestream_find(&state_, key.raw(), &value) == BITESTREAM_OK
+               ? std::optional(Value(value))
+               : std::nullopt;
   }
 
  private:

@@ -5,7 +5,8 @@
 
 #include "proto/bitestream/utf8.hpp"
 
-// The implementation behind gimnet/bitestream.h. It links without the C++ library: no exceptions, no operator new.
+// The implementation behind gimnet/bitestream.h. It links without the C++ library: no exceptions,
+// no operator new.
 
 namespace gimnet::proto::bitestream {
 namespace {
@@ -59,9 +60,11 @@ unsigned char* store(unsigned char* at, std::uint32_t value, std::size_t size) {
 }
 
 /// Head and key; returns where the length goes. REQUIRES: a valid key and room.
-unsigned char* store_label(unsigned char* at, const bitestream_key& key, Type type, unsigned length_code) {
+unsigned char* store_label(unsigned char* at, const bitestream_key& key, Type type,
+                           unsigned length_code) {
   const unsigned text_bit = key.text == nullptr ? 0 : kTextKeyBit;
-  *at++ = static_cast<unsigned char>((static_cast<unsigned>(type) << kTypeShift) | text_bit | length_code);
+  *at++ = static_cast<unsigned char>((static_cast<unsigned>(type) << kTypeShift) | text_bit |
+                                     length_code);
   if (key.text == nullptr) return store(at, key.number, kNumberKeySize);
   *at++ = static_cast<unsigned char>(key.text_size);
   std::memcpy(at, key.text, key.text_size);
@@ -78,7 +81,8 @@ bool valid_content(Type type, const unsigned char* bytes, std::size_t size) {
   return true;
 }
 
-void put(bitestream_writer* writer, const bitestream_key& key, Type type, const void* bytes, std::size_t size) {
+void put(bitestream_writer* writer, const bitestream_key& key, Type type, const void* bytes,
+         std::size_t size) {
   if (writer->status != BITESTREAM_OK) return;
   if (!valid_key(key)) {
     set_status(writer, BITESTREAM_BAD_KEY);
@@ -86,7 +90,8 @@ void put(bitestream_writer* writer, const bitestream_key& key, Type type, const 
   }
   if (size == 0 && unit_size(type) == 0) return;
   if (size == 0 && is_array(type)) return;
-  if (!size_fits(type, size) || !valid_content(type, static_cast<const unsigned char*>(bytes), size)) {
+  if (!size_fits(type, size) ||
+      !valid_content(type, static_cast<const unsigned char*>(bytes), size)) {
     set_status(writer, BITESTREAM_BAD_VALUE);
     return;
   }
@@ -99,7 +104,8 @@ void put(bitestream_writer* writer, const bitestream_key& key, Type type, const 
   writer->size += whole;
 }
 
-/// Where the content of the nested stream that starts at `start` begins, whose length field has 1 byte until it ends.
+/// Where the content of the nested stream that starts at `start` begins, whose length field has 1
+/// byte until it ends.
 std::size_t content_offset(const bitestream_writer* writer, std::size_t start) {
   const bool text_key = (writer->bytes[start] & kTextKeyBit) != 0;
   return start + 1 + (text_key ? 1 + std::size_t{writer->bytes[start + 1]} : kNumberKeySize) + 1;
@@ -121,7 +127,9 @@ bitestream_writer bitestream_writer_over(void* memory, size_t size) {
   return {static_cast<unsigned char*>(memory), 0, size, false, BITESTREAM_OK, 0, {}};
 }
 
-bitestream_writer bitestream_writer_growable(void) { return {nullptr, 0, 0, true, BITESTREAM_OK, 0, {}}; }
+bitestream_writer bitestream_writer_growable(void) {
+  return {nullptr, 0, 0, true, BITESTREAM_OK, 0, {}};
+}
 
 void bitestream_writer_free(bitestream_writer* writer) {
   if (writer->growable) std::free(writer->bytes);
@@ -133,7 +141,8 @@ bitestream_status bitestream_finish(const bitestream_writer* writer) {
   return writer->depth == 0 ? BITESTREAM_OK : BITESTREAM_NOT_BALANCED;
 }
 
-void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key, const void* bytes, size_t size) {
+void bitestream_put_opaque(bitestream_writer* writer, bitestream_key key, const void* bytes,
+                           size_t size) {
   put(writer, key, BITESTREAM_OPAQUE, bytes, size);
 }
 void bitestream_put_bool(bitestream_writer* writer, bitestream_key key, bool value) {
@@ -170,17 +179,19 @@ void bitestream_put_f32(bitestream_writer* writer, bitestream_key key, float val
 void bitestream_put_f64(bitestream_writer* writer, bitestream_key key, double value) {
   put(writer, key, BITESTREAM_F64, &value, sizeof value);
 }
-void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text, size_t size) {
+void bitestream_put_text(bitestream_writer* writer, bitestream_key key, const char* text,
+                         size_t size) {
   put(writer, key, BITESTREAM_TEXT, text, size);
 }
 void bitestream_put_time(bitestream_writer* writer, bitestream_key key, int64_t ns) {
   put(writer, key, BITESTREAM_TIME, &ns, sizeof ns);
 }
 
-void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type, const void* elements,
-                          size_t count) {
+void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestream_type type,
+                          const void* elements, size_t count) {
   // By division: a product could begin anew at 0 where size_t has 32 bits.
-  const bool legal = is_array(type) && is_known_type(type) && count <= BITESTREAM_VALUE_BYTES_MAX / unit_size(type);
+  const bool legal = is_array(type) && is_known_type(type) &&
+                     count <= BITESTREAM_VALUE_BYTES_MAX / unit_size(type);
   if (!legal) {
     set_status(writer, BITESTREAM_BAD_VALUE);
     return;
@@ -188,8 +199,8 @@ void bitestream_put_array(bitestream_writer* writer, bitestream_key key, bitestr
   put(writer, key, type, elements, count * unit_size(type));
 }
 
-void bitestream_put_value(bitestream_writer* writer, bitestream_key key, bitestream_type type, const void* bytes,
-                          size_t size) {
+void bitestream_put_value(bitestream_writer* writer, bitestream_key key, bitestream_type type,
+                          const void* bytes, size_t size) {
   if (!is_known_type(type) || type == BITESTREAM_NESTED) {
     set_status(writer, BITESTREAM_BAD_VALUE);
     return;

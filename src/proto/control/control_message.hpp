@@ -13,17 +13,17 @@
 #include "proto/bitestream/writer.hpp"
 #include "proto/control/fields.hpp"
 
-// What all payloads of kinds 16 and up have in common: {u16 operation, u16 request number} and a Bitestream with
-// integer keys (docs/protocol.md, sections 3, 8 and 9). The messages themselves are structs in link.hpp, ns.hpp and
-// ctrl.hpp; each has
+// What all payloads of kinds 16 and up have in common: {u16 operation, u16 request number} and a
+// Bitestream with integer keys (docs/protocol.md, sections 3, 8 and 9). The messages themselves are
+// structs in link.hpp, ns.hpp and ctrl.hpp; each has
 //
 //     static constexpr std::uint16_t kOperation;            // with kAnswerBit for answers
 //     static constexpr const char* kName;                   // for sentences
 //     void write(bitestream::Writer&) const;
 //     static Message read(Fields&);
 //
-// Thread safety: value types and pure functions. Errors: bytes from the network that are not the message give an Error
-// with a sentence; unknown keys are skipped.
+// Thread safety: value types and pure functions. Errors: bytes from the network that are not the
+// message give an Error with a sentence; unknown keys are skipped.
 
 namespace gimnet::proto {
 
@@ -94,13 +94,16 @@ template <class Answer>
   return assemble_control({Answer::kOperation, request}, body);
 }
 
-/// Reads a request, an event, or a message of a LINK frame; the operation is the caller's to have looked at.
+/// Reads a request, an event, or a message of a LINK frame; the operation is the caller's to have
+/// looked at.
 template <class Message>
 [[nodiscard]] Result<Message> decode(std::span<const std::byte> payload) {
   const auto view = split_control(payload);
-  if (!view) return Error{std::string(Message::kName) + ": shorter than an operation and a request number"};
+  if (!view)
+    return Error{std::string(Message::kName) + ": shorter than an operation and a request number"};
   if (view->header.operation != Message::kOperation) {
-    return Error{std::string(Message::kName) + ": has operation " + std::to_string(view->header.operation)};
+    return Error{std::string(Message::kName) + ": has operation " +
+                 std::to_string(view->header.operation)};
   }
   Fields fields(view->body, Message::kName);
   Message message = Message::read(fields);
@@ -108,10 +111,12 @@ template <class Message>
   return message;
 }
 
-/// Status and sentence of any answer; a body that cannot be read counts as refused with `bad_request`.
+/// Status and sentence of any answer; a body that cannot be read counts as refused with
+/// `bad_request`.
 [[nodiscard]] Refusal read_status(std::span<const std::byte> body);
 
-/// The status of an answer that this side wrote, at the cost of one value. `bad_request`: it is no answer.
+/// The status of an answer that this side wrote, at the cost of one value. `bad_request`: it is no
+/// answer.
 [[nodiscard]] Status peek_status(std::span<const std::byte> payload);
 
 /// Reads an answer. Refusal: the other side said no, or (bad_request) sent what cannot be read.

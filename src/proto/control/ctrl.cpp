@@ -2,8 +2,8 @@
 
 #include "proto/control/names.hpp"
 
-// The numbers are the keys in the table of docs/protocol.md, section 9; what a message writes and what it reads stand
-// side by side.
+// The numbers are the keys in the table of docs/protocol.md, section 9; what a message writes and
+// what it reads stand side by side.
 
 namespace gimnet::proto::ctrl {
 namespace {
@@ -17,7 +17,8 @@ std::vector<Counter> read_counters(Fields& counters) {
   bitestream::Reader reader = counters.reader();
   while (const auto value = reader.next()) {
     const auto count = value->as<std::uint64_t>();
-    if (value->key().is_text() && count) found.push_back({std::string(value->key().text()), *count});
+    if (value->key().is_text() && count)
+      found.push_back({std::string(value->key().text()), *count});
   }
   return found;
 }
@@ -74,7 +75,8 @@ void StatisticsAnswer::write(bitestream::Writer& writer) const {
     writer.begin_nested(3);
     writer.put_u16(1, record.shard);
     writer.begin_nested(2);
-    for (const Counter& counter : record.counters) writer.put_u64(std::string_view(counter.name), counter.value);
+    for (const Counter& counter : record.counters)
+      writer.put_u64(std::string_view(counter.name), counter.value);
     writer.end_nested();
     writer.end_nested();
   }
@@ -85,7 +87,8 @@ StatisticsAnswer StatisticsAnswer::read(Fields& fields) {
     ShardRecord shard;
     shard.shard = record.required_number<std::uint16_t>(1, "shard");
     const auto counters = record.records<std::vector<Counter>>(2, "counters", read_counters);
-    for (const auto& some : counters) shard.counters.insert(shard.counters.end(), some.begin(), some.end());
+    for (const auto& some : counters)
+      shard.counters.insert(shard.counters.end(), some.begin(), some.end());
     return shard;
   });
   return answer;
@@ -98,7 +101,8 @@ void Connections::write(bitestream::Writer& writer) const {
 Connections Connections::read(Fields& fields) {
   Connections connections;
   connections.after = NodeId{fields.number<std::uint32_t>(4, "node id to continue after", 0)};
-  connections.records_max = fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
+  connections.records_max =
+      fields.number<std::uint32_t>(5, "number of records", kPageRecordsDefault);
   return connections;
 }
 
@@ -137,7 +141,8 @@ ConnectionsAnswer ConnectionsAnswer::read(Fields& fields) {
     connection.connected = record.flag(6, "connected", false);
     connection.counts.queued_bytes = record.number<std::uint64_t>(7, "number of queued bytes", 0);
     connection.counts.accepted = record.number<std::uint64_t>(8, "number of accepted frames", 0);
-    connection.counts.received_bytes = record.number<std::uint64_t>(9, "number of received bytes", 0);
+    connection.counts.received_bytes =
+        record.number<std::uint64_t>(9, "number of received bytes", 0);
     connection.counts.delivered = record.number<std::uint64_t>(10, "number of delivered frames", 0);
     connection.counts.sent_bytes = record.number<std::uint64_t>(11, "number of sent bytes", 0);
     connection.counts.dropped = record.number<std::uint64_t>(12, "number of dropped frames", 0);
@@ -183,8 +188,12 @@ Kick Kick::read(Fields& fields) {
   return kick;
 }
 
-void KickAnswer::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, remark, kSentenceBytesMax); }
-KickAnswer KickAnswer::read(Fields& fields) { return {fields.text(3, "remark", kSentenceBytesMax)}; }
+void KickAnswer::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, remark, kSentenceBytesMax);
+}
+KickAnswer KickAnswer::read(Fields& fields) {
+  return {fields.text(3, "remark", kSentenceBytesMax)};
+}
 
 void Reassign::write(bitestream::Writer& writer) const {
   writer.put_u32(3, node.value());
@@ -226,10 +235,18 @@ ReloadAnswer ReloadAnswer::read(Fields& fields) {
   return answer;
 }
 
-void SetLogLevel::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, level, kRemarkBytesMax); }
-SetLogLevel SetLogLevel::read(Fields& fields) { return {fields.required_text(3, "level", kRemarkBytesMax)}; }
+void SetLogLevel::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, level, kRemarkBytesMax);
+}
+SetLogLevel SetLogLevel::read(Fields& fields) {
+  return {fields.required_text(3, "level", kRemarkBytesMax)};
+}
 
-void SetLogLevelAnswer::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, before, kRemarkBytesMax); }
-SetLogLevelAnswer SetLogLevelAnswer::read(Fields& fields) { return {fields.text(3, "level before", kRemarkBytesMax)}; }
+void SetLogLevelAnswer::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, before, kRemarkBytesMax);
+}
+SetLogLevelAnswer SetLogLevelAnswer::read(Fields& fields) {
+  return {fields.text(3, "level before", kRemarkBytesMax)};
+}
 
 }  // namespace gimnet::proto::ctrl

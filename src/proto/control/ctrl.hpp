@@ -8,9 +8,9 @@
 #include "base/ids.hpp"
 #include "proto/control/control_message.hpp"
 
-// HubCtrl, administration: the payloads of CTRL frames (docs/protocol.md, section 9), one struct for each request and
-// answer. Encode and decode with the templates of control_message.hpp.
-// Thread safety: value types.
+// HubCtrl, administration: the payloads of CTRL frames (docs/protocol.md, section 9), one struct
+// for each request and answer. Encode and decode with the templates of control_message.hpp. Thread
+// safety: value types.
 
 namespace gimnet::proto::ctrl {
 
@@ -26,14 +26,17 @@ enum class Operation : std::uint16_t {
   routes = 9,
 };
 
-[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) { return static_cast<std::uint16_t>(operation); }
+[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) {
+  return static_cast<std::uint16_t>(operation);
+}
 [[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
 /// Operations of requests are below this.
 inline constexpr std::size_t kRequestsEnd = 10;
-/// The request as counters and documents name it, for example "kick"; nullptr: there is no such request.
+/// The request as counters and documents name it, for example "kick"; nullptr: there is no such
+/// request.
 [[nodiscard]] const char* operation_name(std::uint16_t operation);
 
 /// Records of one page, if the request does not say.
@@ -111,8 +114,8 @@ struct Connections {
   friend bool operator==(const Connections&, const Connections&) = default;
 };
 
-/// What waits for a node now, and what it came to since its session began; but for the first, what the shards count
-/// under the same names. 0 of a hub that does not tell.
+/// What waits for a node now, and what it came to since its session began; but for the first, what
+/// the shards count under the same names. 0 of a hub that does not tell.
 struct ConnectionCounts {
   std::uint64_t queued_bytes = 0;
   std::uint64_t accepted = 0;  ///< frames from it

@@ -20,7 +20,8 @@ std::size_t character_size(std::string_view text) {
 
 }  // namespace
 
-void put_clean_text(bitestream::Writer& writer, bitestream::Key key, std::string_view text, std::size_t bytes_max) {
+void put_clean_text(bitestream::Writer& writer, bitestream::Key key, std::string_view text,
+                    std::size_t bytes_max) {
   std::string clean;
   while (!text.empty()) {
     const std::size_t size = character_size(text);
@@ -35,7 +36,8 @@ void put_clean_text(bitestream::Writer& writer, bitestream::Key key, std::string
   writer.put_text(key, clean);
 }
 
-Fields::Fields(std::span<const std::byte> body, const char* message) : body_(body), message_(message) {
+Fields::Fields(std::span<const std::byte> body, const char* message)
+    : body_(body), message_(message) {
   if (!bitestream::is_valid(body)) {
     fail("is not a valid Bitestream");
     return;
@@ -107,7 +109,8 @@ void Fields::fail(std::string_view clause) {
 }
 
 void Fields::require(std::uint32_t key, const char* name) {
-  if (!failed() && !has(key)) fail("has no " + std::string(name) + " (key " + std::to_string(key) + ")");
+  if (!failed() && !has(key))
+    fail("has no " + std::string(name) + " (key " + std::to_string(key) + ")");
 }
 
 void Fields::fail_type(const char* name, const char* wanted) {
@@ -116,8 +119,8 @@ void Fields::fail_type(const char* name, const char* wanted) {
 
 bool Fields::fits(const char* name, std::size_t size, std::size_t bytes_max) {
   if (size <= bytes_max) return true;
-  fail("has a " + std::string(name) + " of " + std::to_string(size) + " bytes; at most " + std::to_string(bytes_max) +
-       " are allowed");
+  fail("has a " + std::string(name) + " of " + std::to_string(size) + " bytes; at most " +
+       std::to_string(bytes_max) + " are allowed");
   return false;
 }
 

@@ -28,13 +28,16 @@ inline constexpr std::size_t kMetadataBytesMax = 4096;
 /// For texts that only people read, as the place of a peer or a version.
 inline constexpr std::size_t kRemarkBytesMax = 256;
 
-/// Writes a text so that every reader takes it: cut to `bytes_max` between two characters, and with '?' for each byte
-/// that is not UTF-8. Texts may come from users of the library and from peers, and must not break the message.
-void put_clean_text(bitestream::Writer& writer, bitestream::Key key, std::string_view text, std::size_t bytes_max);
+/// Writes a text so that every reader takes it: cut to `bytes_max` between two characters, and with
+/// '?' for each byte that is not UTF-8. Texts may come from users of the library and from peers,
+/// and must not break the message.
+void put_clean_text(bitestream::Writer& writer, bitestream::Key key, std::string_view text,
+                    std::size_t bytes_max);
 
-/// The values of a control message by key. The whole body is checked when it is constructed; the first thing that is
-/// wrong, there or in a later call, is kept as a sentence, and every call after it gives the fallback.
-/// Thread safety: one thread. Valid until: the body changes. Cost: one pass over the body, then O(1) a key.
+/// The values of a control message by key. The whole body is checked when it is constructed; the
+/// first thing that is wrong, there or in a later call, is kept as a sentence, and every call after
+/// it gives the fallback. Thread safety: one thread. Valid until: the body changes. Cost: one pass
+/// over the body, then O(1) a key.
 class Fields {
  public:
   /// Keys from here on are not looked at: no message has them.
@@ -63,10 +66,13 @@ class Fields {
   [[nodiscard]] std::int64_t time(std::uint32_t key, const char* name);
   /// Empty where it is absent.
   [[nodiscard]] std::string text(std::uint32_t key, const char* name, std::size_t bytes_max);
-  [[nodiscard]] std::string required_text(std::uint32_t key, const char* name, std::size_t bytes_max);
-  [[nodiscard]] std::vector<std::byte> opaque(std::uint32_t key, const char* name, std::size_t bytes_max);
+  [[nodiscard]] std::string required_text(std::uint32_t key, const char* name,
+                                          std::size_t bytes_max);
+  [[nodiscard]] std::vector<std::byte> opaque(std::uint32_t key, const char* name,
+                                              std::size_t bytes_max);
 
-  /// Calls `read(Fields&)` for each nested value with that key, in order, and keeps what it returns.
+  /// Calls `read(Fields&)` for each nested value with that key, in order, and keeps what it
+  /// returns.
   template <class Record, class Read>
   [[nodiscard]] std::vector<Record> records(std::uint32_t key, const char* name, Read read) {
     std::vector<Record> found;

@@ -58,10 +58,12 @@ enum : std::uint32_t { code = 1, sentence };
 
 Opening check_opening(std::span<const std::byte> bytes) {
   const std::size_t mark = std::min(bytes.size(), kVersionOffset);
-  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(mark), kOpening.begin())) {
+  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(mark),
+                  kOpening.begin())) {
     return Opening::other_protocol;
   }
-  if (bytes.size() > kVersionOffset && bytes[kVersionOffset] != std::byte{kVersionMajor}) return Opening::bad_version;
+  if (bytes.size() > kVersionOffset && bytes[kVersionOffset] != std::byte{kVersionMajor})
+    return Opening::bad_version;
   return bytes.size() < kOpeningSize ? Opening::need_more : Opening::accepted;
 }
 
@@ -90,7 +92,8 @@ Hello Hello::read(Fields& fields) {
   hello.token = fields.opaque(key::token, "session token", kTokenBytesMax);
   hello.epoch = fields.number<std::uint64_t>(key::epoch, "epoch", 0);
   hello.resume = fields.flag(key::resume, "resume wish", false);
-  hello.frame_length_max = fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
+  hello.frame_length_max =
+      fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
   hello.features = fields.number<std::uint64_t>(key::features, "feature set", 0);
   hello.description = fields.text(key::description, "description", kDescriptionBytesMax);
   hello.resume_epoch = fields.number<std::uint64_t>(key::resume_epoch, "hub epoch", 0);
@@ -131,27 +134,33 @@ Welcome Welcome::read(Fields& fields) {
   welcome.hub = HubId{fields.required_number<std::uint16_t>(key::hub, "hub id")};
   welcome.hub_name = fields.text(key::hub_name, "hub name", kNameBytesMax);
   welcome.epoch = fields.number<std::uint64_t>(key::epoch, "epoch", 0);
-  welcome.frame_length_max = fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
+  welcome.frame_length_max =
+      fields.number<std::uint32_t>(key::frame_length_max, "largest frame", kFrameLengthDefault);
   welcome.features = fields.number<std::uint64_t>(key::features, "feature set", 0);
-  welcome.keep_alive_ms = fields.number<std::uint32_t>(key::keep_alive_ms, "keep-alive interval", 0);
+  welcome.keep_alive_ms =
+      fields.number<std::uint32_t>(key::keep_alive_ms, "keep-alive interval", 0);
   welcome.silent_ms = fields.number<std::uint32_t>(key::silent_ms, "silent time", 0);
   welcome.hub_time_ns = fields.time(key::hub_time, "hub time");
   welcome.resumed = fields.flag(key::resumed, "resumed", false);
   welcome.taken = fields.number<std::uint64_t>(key::taken, "count of frames taken", 0);
-  welcome.resume_buffer_bytes = fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", 0);
+  welcome.resume_buffer_bytes =
+      fields.number<std::uint32_t>(key::resume_buffer_bytes, "resume buffer", 0);
   welcome.grace_ms = fields.number<std::uint32_t>(key::grace_ms, "grace time", 0);
   welcome.name_provisional = fields.flag(key::name_provisional, "provisional name", false);
-  welcome.last_goodbye_code = fields.number<std::uint16_t>(key::last_goodbye_code, "last GOODBYE", 0);
-  welcome.last_goodbye_sentence = fields.text(key::last_goodbye_sentence, "last sentence", kSentenceBytesMax);
+  welcome.last_goodbye_code =
+      fields.number<std::uint16_t>(key::last_goodbye_code, "last GOODBYE", 0);
+  welcome.last_goodbye_sentence =
+      fields.text(key::last_goodbye_sentence, "last sentence", kSentenceBytesMax);
   welcome.name = fields.text(key::name, "name", kNameBytesMax);
   return welcome;
 }
 
 const char* goodbye_name(GoodbyeCode code) {
   constexpr const char* kNames[kGoodbyeCount] = {
-      "done",          "bad_version", "malformed", "hello_timeout", "name_taken",   "bad_name",    "hub_full",
-      "draining",      "replaced",    "silent",    "slow_consumer", "wrong_source", "not_allowed", "too_many_requests",
-      "stalled_frame", "kicked",      "no_memory", "renumbered",    "oddities"};
+      "done",          "bad_version",  "malformed",   "hello_timeout",     "name_taken",
+      "bad_name",      "hub_full",     "draining",    "replaced",          "silent",
+      "slow_consumer", "wrong_source", "not_allowed", "too_many_requests", "stalled_frame",
+      "kicked",        "no_memory",    "renumbered",  "oddities"};
   const auto index = static_cast<std::size_t>(code);
   return index < kGoodbyeCount ? kNames[index] : "unknown";
 }
@@ -163,7 +172,8 @@ void Goodbye::write(bitestream::Writer& writer) const {
 
 Goodbye Goodbye::read(Fields& fields) {
   Goodbye goodbye;
-  goodbye.code = static_cast<GoodbyeCode>(fields.required_number<std::uint16_t>(goodbye_key::code, "code"));
+  goodbye.code =
+      static_cast<GoodbyeCode>(fields.required_number<std::uint16_t>(goodbye_key::code, "code"));
   goodbye.sentence = fields.text(goodbye_key::sentence, "sentence", kSentenceBytesMax);
   return goodbye;
 }

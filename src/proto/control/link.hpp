@@ -12,9 +12,9 @@
 #include "proto/control/control_message.hpp"
 #include "proto/frame/frame_header.hpp"
 
-// How a connection begins and ends: the opening bytes, HELLO, WELCOME and GOODBYE (docs/protocol.md, section 3).
-// Encode and decode with encode() and decode<>() of control_message.hpp.
-// Thread safety: value types and pure functions.
+// How a connection begins and ends: the opening bytes, HELLO, WELCOME and GOODBYE
+// (docs/protocol.md, section 3). Encode and decode with encode() and decode<>() of
+// control_message.hpp. Thread safety: value types and pure functions.
 
 namespace gimnet::proto {
 
@@ -83,13 +83,14 @@ struct Welcome {
   std::uint64_t features = 0;
   std::uint32_t keep_alive_ms = 0;
   std::uint32_t silent_ms = 0;
-  std::int64_t hub_time_ns = 0;           ///< since 1970
-  bool resumed = false;                   ///< both epochs matched: counts go on
-  std::uint64_t taken = 0;                ///< data frames of this epoch that the hub took from this node
+  std::int64_t hub_time_ns = 0;  ///< since 1970
+  bool resumed = false;          ///< both epochs matched: counts go on
+  std::uint64_t taken = 0;       ///< data frames of this epoch that the hub took from this node
   std::uint32_t resume_buffer_bytes = 0;  ///< 0: no resume on this connection
   std::uint32_t grace_ms = 0;
   bool name_provisional = false;
-  std::uint16_t last_goodbye_code = 0;  ///< with which the hub closed the session's last connection; 0: it did not
+  std::uint16_t last_goodbye_code =
+      0;  ///< with which the hub closed the session's last connection; 0: it did not
   std::string last_goodbye_sentence;
   std::string name;  ///< as registered
 

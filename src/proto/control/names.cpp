@@ -9,7 +9,8 @@ namespace gimnet::proto {
 namespace {
 
 constexpr bool is_name_character(char c) {
-  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
+  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' ||
+         c == '_' || c == '-';
 }
 
 constexpr bool is_wildcard(std::string_view part) { return part == "*" || part == "**"; }
@@ -47,7 +48,8 @@ bool is_number(std::string_view text) {
 /// Of numbers of any size: what is no id today may be one for somebody else.
 bool reads_as_id(std::string_view name) {
   const auto dot = name.find('.');
-  return dot != std::string_view::npos && is_number(name.substr(0, dot)) && is_number(name.substr(dot + 1));
+  return dot != std::string_view::npos && is_number(name.substr(0, dot)) &&
+         is_number(name.substr(dot + 1));
 }
 
 enum class Wildcards { refused, allowed };
@@ -73,7 +75,9 @@ const char* node_name_fault(std::string_view name) {
   return reads_as_id(name) ? "it reads as the id of a node does, NUMBER.NUMBER" : nullptr;
 }
 
-bool valid_pattern(std::string_view pattern) { return fault(pattern, Wildcards::allowed) == nullptr; }
+bool valid_pattern(std::string_view pattern) {
+  return fault(pattern, Wildcards::allowed) == nullptr;
+}
 
 bool matches(std::string_view pattern, std::string_view name) {
   const std::optional<Pattern> parsed = Pattern::parse(pattern);

@@ -5,7 +5,8 @@
 #include <string_view>
 
 // Names of nodes and services, and patterns over them (docs/protocol.md, section 8).
-// Thread safety: pure functions. Cost: linear in the name, at most 16 x 16 comparisons of parts for a pattern.
+// Thread safety: pure functions. Cost: linear in the name, at most 16 x 16 comparisons of parts for
+// a pattern.
 
 namespace gimnet::proto {
 
@@ -15,7 +16,8 @@ inline constexpr std::size_t kNamePartsMax = 16;
 /// What is wrong with a name, as a clause for a sentence ("it is empty"); nullptr: nothing is.
 [[nodiscard]] const char* name_fault(std::string_view name);
 [[nodiscard]] inline bool valid_name(std::string_view name) { return name_fault(name) == nullptr; }
-/// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends there means the id.
+/// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends
+/// there means the id.
 [[nodiscard]] const char* node_name_fault(std::string_view name);
 
 /// A name, of which parts may be `*` (one part) or `**` (any number, none included).

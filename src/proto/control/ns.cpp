@@ -2,8 +2,8 @@
 
 #include "proto/control/names.hpp"
 
-// The numbers are the keys in the tables of docs/protocol.md, section 8; what a message writes and what it reads stand
-// side by side.
+// The numbers are the keys in the tables of docs/protocol.md, section 8; what a message writes and
+// what it reads stand side by side.
 
 namespace gimnet::proto::ns {
 namespace {
@@ -88,11 +88,15 @@ const char* operation_name(std::uint16_t operation) {
   }
 }
 
-void Resolve::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
+void Resolve::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kWrittenNameBytesMax);
+}
 Resolve Resolve::read(Fields& fields) { return {read_name(fields, 3, "name")}; }
 
 void ResolveAnswer::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
-ResolveAnswer ResolveAnswer::read(Fields& fields) { return {read_required_id<NodeId>(fields, 3, "node id")}; }
+ResolveAnswer ResolveAnswer::read(Fields& fields) {
+  return {read_required_id<NodeId>(fields, 3, "node id")};
+}
 
 void Reverse::write(bitestream::Writer& writer) const { writer.put_u32(3, node.value()); }
 Reverse Reverse::read(Fields& fields) { return {read_required_id<NodeId>(fields, 3, "node id")}; }
@@ -209,7 +213,9 @@ AdvertiseAnswer AdvertiseAnswer::read(Fields& fields) {
 }
 
 void Withdraw::write(bitestream::Writer& writer) const { writer.put_u32(3, group.value()); }
-Withdraw Withdraw::read(Fields& fields) { return {read_required_id<GroupId>(fields, 3, "group id")}; }
+Withdraw Withdraw::read(Fields& fields) {
+  return {read_required_id<GroupId>(fields, 3, "group id")};
+}
 
 void Services::write(bitestream::Writer& writer) const {
   write_page_request(writer, pattern, after.value(), records_max);
@@ -310,8 +316,12 @@ SubscribeAnswer SubscribeAnswer::read(Fields& fields) {
   return answer;
 }
 
-void Unsubscribe::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
-Unsubscribe Unsubscribe::read(Fields& fields) { return {read_name(fields, 3, "full service name")}; }
+void Unsubscribe::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kWrittenNameBytesMax);
+}
+Unsubscribe Unsubscribe::read(Fields& fields) {
+  return {read_name(fields, 3, "full service name")};
+}
 
 namespace {
 

@@ -8,10 +8,10 @@
 #include "base/ids.hpp"
 #include "proto/control/control_message.hpp"
 
-// HubNS, names and services: the payloads of NS frames (docs/protocol.md, section 8), one struct for each request,
-// answer and event; those of names of one's own are in ns_register.hpp, those of watching in ns_watch.hpp. Encode and
-// decode with the templates of control_message.hpp. Thread safety: value types. Limits: names 255 bytes, metadata
-// 4,096, descriptions and places 256.
+// HubNS, names and services: the payloads of NS frames (docs/protocol.md, section 8), one struct
+// for each request, answer and event; those of names of one's own are in ns_register.hpp, those of
+// watching in ns_watch.hpp. Encode and decode with the templates of control_message.hpp. Thread
+// safety: value types. Limits: names 255 bytes, metadata 4,096, descriptions and places 256.
 
 namespace gimnet::proto::ns {
 
@@ -37,14 +37,17 @@ enum class Operation : std::uint16_t {
   watch_events = 37,
 };
 
-[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) { return static_cast<std::uint16_t>(operation); }
+[[nodiscard]] constexpr std::uint16_t request_of(Operation operation) {
+  return static_cast<std::uint16_t>(operation);
+}
 [[nodiscard]] constexpr std::uint16_t answer_of(Operation operation) {
   return static_cast<std::uint16_t>(request_of(operation) | kAnswerBit);
 }
 
 /// Operations of requests are below this, those of events above.
 inline constexpr std::size_t kRequestsEnd = 32;
-/// The request as counters and documents name it, for example "resolve"; nullptr: there is no such request.
+/// The request as counters and documents name it, for example "resolve"; nullptr: there is no such
+/// request.
 [[nodiscard]] const char* operation_name(std::uint16_t operation);
 
 enum class Direction : std::uint8_t { provides = 0, accepts = 1 };
@@ -52,7 +55,8 @@ enum class Delivery : std::uint8_t { stream = 0, latest = 1, sync = 2 };
 
 /// Records of one page, if the request does not say.
 inline constexpr std::uint32_t kPageRecordsDefault = 256;
-/// The longest proof of a group that a node keeps for a hub, and shows to it; a hub of today writes 16 bytes.
+/// The longest proof of a group that a node keeps for a hub, and shows to it; a hub of today writes
+/// 16 bytes.
 inline constexpr std::size_t kGroupProofBytesMax = 64;
 
 // RESOLVE: which node has that name?
@@ -164,7 +168,8 @@ struct AdvertiseAnswer {
   static constexpr const char* kName = "answer to ADVERTISE";
   GroupId group;
   std::uint32_t subscribers = 0;
-  std::vector<std::byte> proof{};  ///< opaque: that the service had the group, to show when it comes back
+  std::vector<std::byte>
+      proof{};  ///< opaque: that the service had the group, to show when it comes back
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static AdvertiseAnswer read(Fields& fields);
   friend bool operator==(const AdvertiseAnswer&, const AdvertiseAnswer&) = default;
@@ -237,9 +242,10 @@ struct Subscribe {
   static constexpr std::uint16_t kOperation = request_of(Operation::subscribe);
   static constexpr const char* kName = "SUBSCRIBE";
   std::string name;
-  std::uint32_t window = 0;  ///< of a service with sync(n): at most so many uncredited, n at most; 0: n
-  std::uint32_t depth = 1;   ///< newest messages that the hub holds for it
-  double rate_hz = 0.0;      ///< messages a second at most; 0: no bound
+  std::uint32_t window =
+      0;  ///< of a service with sync(n): at most so many uncredited, n at most; 0: n
+  std::uint32_t depth = 1;  ///< newest messages that the hub holds for it
+  double rate_hz = 0.0;     ///< messages a second at most; 0: no bound
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Subscribe read(Fields& fields);
   friend bool operator==(const Subscribe&, const Subscribe&) = default;
@@ -252,9 +258,10 @@ struct SubscribeAnswer {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
-  std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
+  std::uint32_t window = 0;  ///< in force: messages that may be uncredited; 0: none is credited
   bool retain = false;
-  Direction direction = Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
+  Direction direction =
+      Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static SubscribeAnswer read(Fields& fields);
   friend bool operator==(const SubscribeAnswer&, const SubscribeAnswer&) = default;
@@ -279,9 +286,10 @@ struct UnsubscribeAnswer {
 
 // Events
 
-/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells, at most. A provider
-/// can have a new group hundreds of times a second while a subscriber is away; of what waited for it then the latest
-/// counts, and a program that starts again comes under a new group once a start.
+/// Groups between the one that a subscriber knows and the present one of which SERVICE_MOVED tells,
+/// at most. A provider can have a new group hundreds of times a second while a subscriber is away;
+/// of what waited for it then the latest counts, and a program that starts again comes under a new
+/// group once a start.
 inline constexpr std::size_t kGroupsBetweenMax = 6;
 
 /// To subscribers, before the first frame under a new group id.
@@ -294,11 +302,14 @@ struct ServiceMoved {
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   Delivery delivery = Delivery::stream;  ///< as sent: may be a value that is not listed
-  std::uint32_t window = 0;              ///< in force: messages that may be uncredited; 0: none is credited
+  std::uint32_t window = 0;  ///< in force: messages that may be uncredited; 0: none is credited
   bool retain = false;
-  bool again = false;              ///< told at a return: the node may have heard of it before its connection ended
-  std::vector<GroupId> between{};  ///< that the service had meanwhile, in order; messages of them may still come
-  Direction direction = Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
+  bool again =
+      false;  ///< told at a return: the node may have heard of it before its connection ended
+  std::vector<GroupId>
+      between{};  ///< that the service had meanwhile, in order; messages of them may still come
+  Direction direction =
+      Direction::provides;  ///< as sent; accepts: nothing will come, but it can be sent to
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static ServiceMoved read(Fields& fields);
   friend bool operator==(const ServiceMoved&, const ServiceMoved&) = default;

@@ -4,8 +4,12 @@
 
 namespace gimnet::proto::ns {
 
-void RegisterName::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kWrittenNameBytesMax); }
-RegisterName RegisterName::read(Fields& fields) { return {fields.required_text(3, "name", kNameBytesMax)}; }
+void RegisterName::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kWrittenNameBytesMax);
+}
+RegisterName RegisterName::read(Fields& fields) {
+  return {fields.required_text(3, "name", kNameBytesMax)};
+}
 
 void RegisterNameAnswer::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kNameBytesMax);
@@ -21,10 +25,16 @@ RegisterNameAnswer RegisterNameAnswer::read(Fields& fields) {
 }
 
 void UnregisterNameAnswer::write(bitestream::Writer& writer) const { writer.put_opaque(5, token); }
-UnregisterNameAnswer UnregisterNameAnswer::read(Fields& fields) { return {fields.opaque(5, "token", kTokenBytesMax)}; }
+UnregisterNameAnswer UnregisterNameAnswer::read(Fields& fields) {
+  return {fields.opaque(5, "token", kTokenBytesMax)};
+}
 
-void NameConfirmed::write(bitestream::Writer& writer) const { put_clean_text(writer, 3, name, kNameBytesMax); }
-NameConfirmed NameConfirmed::read(Fields& fields) { return {fields.required_text(3, "name", kNameBytesMax)}; }
+void NameConfirmed::write(bitestream::Writer& writer) const {
+  put_clean_text(writer, 3, name, kNameBytesMax);
+}
+NameConfirmed NameConfirmed::read(Fields& fields) {
+  return {fields.required_text(3, "name", kNameBytesMax)};
+}
 
 void NameLost::write(bitestream::Writer& writer) const {
   put_clean_text(writer, 3, name, kNameBytesMax);

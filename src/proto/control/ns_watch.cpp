@@ -34,7 +34,8 @@ Watch Watch::read(Fields& fields) {
   watch.watch = fields.required_number<std::uint32_t>(3, "watch");
   watch.pattern = fields.text(4, "pattern", kNameBytesMax);
   watch.subjects = fields.number<std::uint8_t>(5, "set of subjects", kWatchAll);
-  if (watch.subjects == 0 || watch.subjects > kWatchAll) fields.fail("has an unknown set of subjects");
+  if (watch.subjects == 0 || watch.subjects > kWatchAll)
+    fields.fail("has an unknown set of subjects");
   watch.epoch = fields.number<std::uint64_t>(6, "epoch", 0);
   watch.version = fields.number<std::uint64_t>(7, "version", 0);
   if (watch.epoch == 0) watch.version = 0;
@@ -45,14 +46,17 @@ void WatchAnswer::write(bitestream::Writer& writer) const { writer.put_bool(3, s
 WatchAnswer WatchAnswer::read(Fields& fields) { return {fields.flag(3, "snapshot", true)}; }
 
 void Unwatch::write(bitestream::Writer& writer) const { writer.put_u32(3, watch); }
-Unwatch Unwatch::read(Fields& fields) { return {fields.required_number<std::uint32_t>(3, "watch")}; }
+Unwatch Unwatch::read(Fields& fields) {
+  return {fields.required_number<std::uint32_t>(3, "watch")};
+}
 
 void WatchTaken::write(bitestream::Writer& writer) const {
   writer.put_u32(3, watch);
   writer.put_u32(4, frames);
 }
 WatchTaken WatchTaken::read(Fields& fields) {
-  return {fields.required_number<std::uint32_t>(3, "watch"), fields.number<std::uint32_t>(4, "number of frames", 1)};
+  return {fields.required_number<std::uint32_t>(3, "watch"),
+          fields.number<std::uint32_t>(4, "number of frames", 1)};
 }
 
 void write_change(bitestream::Writer& writer, const Change& change) {

@@ -14,7 +14,8 @@ namespace gimnet::proto::ns {
 /// What a watch is about: a set of bits.
 enum WatchSubjects : std::uint8_t { kWatchNodes = 1, kWatchServices = 2, kWatchAll = 3 };
 
-// WATCH: tell me what there is under that pattern, and what changes. Again under the same number: from the start.
+// WATCH: tell me what there is under that pattern, and what changes. Again under the same number:
+// from the start.
 
 struct Watch {
   static constexpr std::uint16_t kOperation = request_of(Operation::watch);

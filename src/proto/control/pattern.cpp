@@ -16,7 +16,8 @@ std::optional<Pattern> Pattern::parse(std::string_view text) {
     if (part == "*") pattern.stars_ |= bit;
     if (part == "**") pattern.many_ |= bit;
     if (pattern.is_name()) pattern.beginning_ = static_cast<std::uint8_t>(end);
-    pattern.parts_[pattern.count_++] = {static_cast<std::uint8_t>(begin), static_cast<std::uint8_t>(part.size())};
+    pattern.parts_[pattern.count_++] = {static_cast<std::uint8_t>(begin),
+                                        static_cast<std::uint8_t>(part.size())};
     if (end == text.size()) return pattern;
     begin = end + 1;
   }

@@ -11,8 +11,8 @@
 namespace gimnet::proto {
 
 /// A pattern that was taken apart once and is compared with many names.
-/// Thread safety: immutable. Cost of matches(): one comparison of the beginning for most names that do not fit, else at
-/// most 16 x 16 comparisons of parts, whatever the pattern.
+/// Thread safety: immutable. Cost of matches(): one comparison of the beginning for most names that
+/// do not fit, else at most 16 x 16 comparisons of parts, whatever the pattern.
 class Pattern {
  public:
   /// Nothing: it is not a pattern.
@@ -22,8 +22,11 @@ class Pattern {
   [[nodiscard]] bool matches(std::string_view name) const;
 
   [[nodiscard]] const std::string& text() const { return text_; }
-  /// Every name that fits begins with this: all up to the first part with a `*`, without the '/' before it.
-  [[nodiscard]] std::string_view beginning() const { return std::string_view{text_}.substr(0, beginning_); }
+  /// Every name that fits begins with this: all up to the first part with a `*`, without the '/'
+  /// before it.
+  [[nodiscard]] std::string_view beginning() const {
+    return std::string_view{text_}.substr(0, beginning_);
+  }
   /// Has it no `*`? Then it fits one name.
   [[nodiscard]] bool is_name() const { return (stars_ | many_) == 0; }
 

@@ -39,7 +39,8 @@ std::optional<Extension> ExtensionReader::next() {
     return std::nullopt;
   }
 #endif
-  const Extension extension{static_cast<ExtensionType>(rest_[0]), {rest_.data() + kExtensionHeadSize, size}};
+  const Extension extension{static_cast<ExtensionType>(rest_[0]),
+                            {rest_.data() + kExtensionHeadSize, size}};
   rest_ = {rest_.data() + kExtensionHeadSize + size, rest_.size() - kExtensionHeadSize - size};
   return extension;
 }
@@ -64,17 +65,21 @@ std::optional<Age> find_age(std::span<const std::byte> extensions) {
 bool too_old(const Age& age, std::int64_t now_ns) {
   if (now_ns <= age.origin_ns) return false;
   // Unsigned, so that a time from the far past cannot overflow.
-  const auto passed_ns = static_cast<std::uint64_t>(now_ns) - static_cast<std::uint64_t>(age.origin_ns);
+  const auto passed_ns =
+      static_cast<std::uint64_t>(now_ns) - static_cast<std::uint64_t>(age.origin_ns);
   return passed_ns > static_cast<std::uint64_t>(age.longest_ms) * kNsPerMs;
 }
 
-std::size_t TraceView::used() const { return std::min(static_cast<std::size_t>(value_[0]), slots()); }
+std::size_t TraceView::used() const {
+  return std::min(static_cast<std::size_t>(value_[0]), slots());
+}
 
 TraceSlot TraceView::slot(std::size_t index) const {
   GIMNET_ASSERT(index < slots());
   const std::byte* bytes = value_.data() + kTraceHeadSize + index * kTraceSlotSize;
   const auto hub = load_le<std::uint32_t>(bytes) & kEveryHub.value();
-  return {HubId{static_cast<std::uint16_t>(hub)}, load_le<std::int64_t>(bytes + 8), load_le<std::int64_t>(bytes + 16)};
+  return {HubId{static_cast<std::uint16_t>(hub)}, load_le<std::int64_t>(bytes + 8),
+          load_le<std::int64_t>(bytes + 16)};
 }
 
 std::optional<TraceView> find_trace(std::span<const std::byte> extensions) {

@@ -7,9 +7,9 @@
 
 #include "base/ids.hpp"
 
-// What stands between a frame's header and its payload when EXT is set (docs/protocol.md, section 2). All functions
-// take the extensions without the u16 in front that counts them, as FrameView gives them; TRACE or AGE of a wrong size
-// count as unknown: they are carried and not looked at.
+// What stands between a frame's header and its payload when EXT is set (docs/protocol.md, section
+// 2). All functions take the extensions without the u16 in front that counts them, as FrameView
+// gives them; TRACE or AGE of a wrong size count as unknown: they are carried and not looked at.
 // Thread safety: pure functions on the caller's bytes.
 
 namespace gimnet::proto {
@@ -25,7 +25,8 @@ struct Extension {
   std::span<const std::byte> value;
 };
 
-/// Steps through extensions in order; stops at the end, and at one that does not fit (then failed() is true).
+/// Steps through extensions in order; stops at the end, and at one that does not fit (then failed()
+/// is true).
 class ExtensionReader {
  public:
   explicit ExtensionReader(std::span<const std::byte> extensions) : rest_(extensions) {}
@@ -77,7 +78,9 @@ class TraceView {
  public:
   /// REQUIRES: a value of 4 + 24 n bytes.
   explicit TraceView(std::span<const std::byte> value) : value_(value) {}
-  [[nodiscard]] std::size_t slots() const { return (value_.size() - kTraceHeadSize) / kTraceSlotSize; }
+  [[nodiscard]] std::size_t slots() const {
+    return (value_.size() - kTraceHeadSize) / kTraceSlotSize;
+  }
   /// Slots filled; never more than slots(), whatever the byte says.
   [[nodiscard]] std::size_t used() const;
   /// REQUIRES: index < slots().
@@ -99,7 +102,8 @@ bool stamp_departure(std::span<std::byte> extensions, HubId hub, std::int64_t de
 
 // Writing
 
-/// Writes extensions into the caller's memory. Errors: false where there is no room; nothing is written then.
+/// Writes extensions into the caller's memory. Errors: false where there is no room; nothing is
+/// written then.
 class ExtensionWriter {
  public:
   explicit ExtensionWriter(std::span<std::byte> memory) : memory_(memory) {}

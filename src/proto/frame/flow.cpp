@@ -33,7 +33,8 @@ constexpr std::size_t size_of(Operation operation) {
 std::optional<Target> load_target(const std::byte* bytes) {
   const auto lane = static_cast<std::uint8_t>(bytes[2]);
   if (lane >= kLaneCount) return std::nullopt;
-  return Target{static_cast<Kind>(bytes[1]), static_cast<Lane>(lane), load_le<std::uint32_t>(bytes + 4)};
+  return Target{static_cast<Kind>(bytes[1]), static_cast<Lane>(lane),
+                load_le<std::uint32_t>(bytes + 4)};
 }
 
 void store_target(std::byte* bytes, const Target& target) {
@@ -105,7 +106,8 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
   const auto operation = static_cast<Operation>(payload[0]);
   const std::size_t size = size_of(operation);
 #if defined(GIMNET_BUG_FLOW_SHORT_PONG)
-  if (size == 0 || payload.size() < (operation == Operation::pong ? kPingSize : size)) return std::nullopt;
+  if (size == 0 || payload.size() < (operation == Operation::pong ? kPingSize : size))
+    return std::nullopt;
 #else
   if (size == 0 || payload.size() < size) return std::nullopt;
 #endif
@@ -136,7 +138,8 @@ std::size_t encode(const Message& message, std::span<std::byte, kSizeMax> payloa
   return std::visit(Encoder{payload.data()}, message);
 }
 
-std::size_t encode_frame(const Message& message, NodeId src, std::span<std::byte, kFrameSizeMax> frame) {
+std::size_t encode_frame(const Message& message, NodeId src,
+                         std::span<std::byte, kFrameSizeMax> frame) {
   const std::size_t size = encode(message, frame.subspan<kHeaderSize, kSizeMax>());
   FrameHeader header;
   header.length = static_cast<std::uint32_t>(size);

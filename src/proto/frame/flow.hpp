@@ -9,12 +9,20 @@
 #include "base/ids.hpp"
 #include "proto/frame/frame_header.hpp"
 
-// Payloads of FLOW frames (docs/protocol.md, section 4): fixed layouts, handled without the control thread.
-// Thread safety: value types and pure functions.
+// Payloads of FLOW frames (docs/protocol.md, section 4): fixed layouts, handled without the control
+// thread. Thread safety: value types and pure functions.
 
 namespace gimnet::proto::flow {
 
-enum class Operation : std::uint8_t { ping = 1, pong = 2, credit = 3, pause = 4, resume = 5, confirm = 6, skip = 7 };
+enum class Operation : std::uint8_t {
+  ping = 1,
+  pong = 2,
+  credit = 3,
+  pause = 4,
+  resume = 5,
+  confirm = 6,
+  skip = 7
+};
 
 /// Are you there? Times in ns since 1970.
 struct Ping {
@@ -77,7 +85,8 @@ using Message = std::variant<Ping, Pong, Credit, Pause, Resume, Confirm, Skip>;
 
 inline constexpr std::size_t kSizeMax = 24;
 
-/// Nothing: the payload is malformed (unknown operation, too short, a lane over 3). Bytes after the layout are skipped.
+/// Nothing: the payload is malformed (unknown operation, too short, a lane over 3). Bytes after the
+/// layout are skipped.
 [[nodiscard]] std::optional<Message> decode(std::span<const std::byte> payload);
 
 /// Writes the payload and returns its size, at most kSizeMax.
@@ -85,6 +94,7 @@ std::size_t encode(const Message& message, std::span<std::byte, kSizeMax> payloa
 
 /// Writes a whole FLOW frame (dst 0, lane 0) and returns its size, at most kFrameSizeMax.
 inline constexpr std::size_t kFrameSizeMax = kHeaderSize + kSizeMax;
-std::size_t encode_frame(const Message& message, NodeId src, std::span<std::byte, kFrameSizeMax> frame);
+std::size_t encode_frame(const Message& message, NodeId src,
+                         std::span<std::byte, kFrameSizeMax> frame);
 
 }  // namespace gimnet::proto::flow

@@ -9,7 +9,8 @@ namespace gimnet::proto {
 
 inline constexpr std::size_t kFragmentHeaderSize = 12;
 
-/// Which part of which message a frame carries (docs/protocol.md, section 6). Offset and total count payload bytes.
+/// Which part of which message a frame carries (docs/protocol.md, section 6). Offset and total
+/// count payload bytes.
 struct FragmentHeader {
   std::uint32_t message = 0;  ///< number, unique per sender over all kinds and destinations
   std::uint32_t offset = 0;
@@ -19,7 +20,8 @@ struct FragmentHeader {
 
 /// REQUIRES: 12 readable bytes.
 [[nodiscard]] inline FragmentHeader load_fragment_header(const std::byte* bytes) {
-  return {load_le<std::uint32_t>(bytes), load_le<std::uint32_t>(bytes + 4), load_le<std::uint32_t>(bytes + 8)};
+  return {load_le<std::uint32_t>(bytes), load_le<std::uint32_t>(bytes + 4),
+          load_le<std::uint32_t>(bytes + 8)};
 }
 
 /// REQUIRES: 12 writable bytes.

@@ -15,10 +15,11 @@ namespace gimnet::proto {
 inline constexpr std::uint32_t kFragmentPayload = 32 * 1024;
 /// A larger message travels as fragments.
 inline constexpr std::uint32_t kUncutMessageMax = 8 * 1024;
-/// A larger message has a fragment header, even if it travels as one frame, so that a hub may cut it finer.
+/// A larger message has a fragment header, even if it travels as one frame, so that a hub may cut
+/// it finer.
 inline constexpr std::uint32_t kPlainMessageMax = 4 * 1024;
-/// Largest message of the protocol: 1 GiB of an application's data, and room for the headers that a library puts
-/// before.
+/// Largest message of the protocol: 1 GiB of an application's data, and room for the headers that a
+/// library puts before.
 inline constexpr std::uint32_t kMessageBytesMax = (std::uint32_t{1} << 30) + 64 * 1024;
 
 /// True for messages over 4 KiB.
@@ -36,7 +37,8 @@ struct Piece {
 /// Yields the pieces of one message in order: one piece up to 8 KiB, then pieces of `piece_size`.
 class Fragmenter {
  public:
-  /// REQUIRES: total <= kMessageBytesMax, piece_size >= 1. A smaller `piece_size` than 8 KiB cuts small messages too.
+  /// REQUIRES: total <= kMessageBytesMax, piece_size >= 1. A smaller `piece_size` than 8 KiB cuts
+  /// small messages too.
   explicit Fragmenter(std::uint32_t total, std::uint32_t piece_size = kFragmentPayload)
       : total_(total), piece_size_(piece_size) {
     GIMNET_CHECK(total <= kMessageBytesMax && piece_size >= 1);

@@ -56,7 +56,8 @@ std::size_t write_prefix(const FrameParts& parts, std::span<std::byte> memory) {
   return size;
 }
 
-std::size_t write_frame(const FrameParts& parts, std::span<const std::byte> payload, std::span<std::byte> memory) {
+std::size_t write_frame(const FrameParts& parts, std::span<const std::byte> payload,
+                        std::span<std::byte> memory) {
   FrameParts whole = parts;
   whole.payload_size = payload.size();
   const std::size_t prefix = prefix_size(whole);

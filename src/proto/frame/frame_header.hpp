@@ -6,8 +6,8 @@
 
 #include "base/ids.hpp"
 
-// The 16 bytes before every frame; the layout, with an annotated example, is in docs/protocol.md, section 2.
-// Thread safety: value types and pure functions.
+// The 16 bytes before every frame; the layout, with an annotated example, is in docs/protocol.md,
+// section 2. Thread safety: value types and pure functions.
 
 namespace gimnet::proto {
 
@@ -47,8 +47,8 @@ inline constexpr std::uint8_t kFlagKeyed = 0x20;
 inline constexpr std::uint8_t kFlagReservedMask = 0xC0;
 inline constexpr std::uint8_t kLaneMask = 0x03;
 
-/// A header as fields. On the wire all integers are little-endian; so is every machine this builds for, which
-/// load_header() asserts at compile time.
+/// A header as fields. On the wire all integers are little-endian; so is every machine this builds
+/// for, which load_header() asserts at compile time.
 struct FrameHeader {
   std::uint32_t length = 0;
   std::uint32_t dst = 0;
@@ -58,7 +58,9 @@ struct FrameHeader {
   std::uint8_t hops = 0;
   std::uint8_t lane = static_cast<std::uint8_t>(Lane::normal);
 
-  [[nodiscard]] constexpr Policy policy() const { return static_cast<Policy>(flags & kFlagPolicyMask); }
+  [[nodiscard]] constexpr Policy policy() const {
+    return static_cast<Policy>(flags & kFlagPolicyMask);
+  }
   [[nodiscard]] constexpr bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   /// Header and what follows it.
   [[nodiscard]] constexpr std::size_t frame_size() const { return kHeaderSize + length; }
@@ -94,7 +96,9 @@ inline constexpr std::size_t kKeySize = 8;
 }
 
 /// REQUIRES: 16 writable bytes at `bytes`.
-inline void store_header(std::byte* bytes, const FrameHeader& header) { std::memcpy(bytes, &header, kHeaderSize); }
+inline void store_header(std::byte* bytes, const FrameHeader& header) {
+  std::memcpy(bytes, &header, kHeaderSize);
+}
 
 /// What became of a frame that was not delivered: the closed list of docs/protocol.md, section 5.
 enum class DropReason : std::uint8_t {
@@ -125,9 +129,10 @@ inline constexpr std::size_t kDropReasonCount = 21;
 /// The reason's name as documents and tools print it, for example "queue_full".
 [[nodiscard]] constexpr const char* drop_reason_name(DropReason reason) {
   constexpr const char* kNames[kDropReasonCount] = {
-      "none",       "no_such_node", "no_route",    "away",        "queue_full",    "replaced",   "too_old",
-      "hop_limit",  "too_large",    "not_allowed", "wrong_way",   "link_lost",     "shard_full", "no_such_group",
-      "renumbered", "over_budget",  "timed_out",   "cut_message", "no_subscriber", "malformed",  "wrong_source"};
+      "none",          "no_such_node",  "no_route",    "away",        "queue_full", "replaced",
+      "too_old",       "hop_limit",     "too_large",   "not_allowed", "wrong_way",  "link_lost",
+      "shard_full",    "no_such_group", "renumbered",  "over_budget", "timed_out",  "cut_message",
+      "no_subscriber", "malformed",     "wrong_source"};
   const auto index = static_cast<std::size_t>(reason);
   return index < kDropReasonCount ? kNames[index] : "unknown";
 }

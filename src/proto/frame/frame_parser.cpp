@@ -81,7 +81,8 @@ FrameError check_fragment(const FragmentHeader& fragment, std::size_t payload_si
 FrameError check_header(const FrameHeader& header, Origin origin) {
   if (origin == Origin::node) return check_header_from_node(header);
   if ((header.lane & ~kLaneMask) != 0) return FrameError::reserved_lane_bits;
-  if (static_cast<std::uint8_t>(header.kind) > static_cast<std::uint8_t>(Kind::route)) return FrameError::unknown_kind;
+  if (static_cast<std::uint8_t>(header.kind) > static_cast<std::uint8_t>(Kind::route))
+    return FrameError::unknown_kind;
   if (header.kind == Kind::list && header.dst > kListRecipientsMax) return FrameError::list_count;
   return FrameError::none;
 }
@@ -101,14 +102,15 @@ FrameError take_apart(Rest& rest, FrameView& view) {
 }  // namespace
 
 /// Four at a time without a branch between: half the instructions of a frame.
-std::uint32_t count_equal_fours(const std::byte* next, std::size_t available, std::size_t frame_size,
-                                const std::byte* like) {
+std::uint32_t count_equal_fours(const std::byte* next, std::size_t available,
+                                std::size_t frame_size, const std::byte* like) {
   const HeaderWords wanted = load_words(like);
   std::uint32_t count = 0;
-  for (const std::size_t fours = 4 * frame_size; available >= fours; available -= fours, next += fours, count += 4) {
-    const HeaderWords differ = (load_words(next) ^ wanted) | (load_words(next + frame_size) ^ wanted) |
-                               (load_words(next + 2 * frame_size) ^ wanted) |
-                               (load_words(next + 3 * frame_size) ^ wanted);
+  for (const std::size_t fours = 4 * frame_size; available >= fours;
+       available -= fours, next += fours, count += 4) {
+    const HeaderWords differ =
+        (load_words(next) ^ wanted) | (load_words(next + frame_size) ^ wanted) |
+        (load_words(next + 2 * frame_size) ^ wanted) | (load_words(next + 3 * frame_size) ^ wanted);
     if ((differ[0] | differ[1]) != 0) break;
   }
   return count;

@@ -13,8 +13,8 @@
 #include "proto/frame/frame_error.hpp"
 #include "proto/frame/frame_header.hpp"
 
-// Finds frames in a read buffer, in place: no copy, no allocation, and nothing read beyond the bytes that are there.
-// Thread safety: pure functions; views refer to the caller's bytes.
+// Finds frames in a read buffer, in place: no copy, no allocation, and nothing read beyond the
+// bytes that are there. Thread safety: pure functions; views refer to the caller's bytes.
 
 namespace gimnet::proto {
 
@@ -27,7 +27,8 @@ struct RunView {
 
 enum class Found : std::uint8_t {
   run,        ///< `run` has at least one frame
-  need_more,  ///< the first frame is not whole yet: `needed` says how many bytes that takes, counted from `begin`
+  need_more,  ///< the first frame is not whole yet: `needed` says how many bytes that takes,
+              ///< counted from `begin`
   too_long,   ///< the first frame is longer than allowed: the stream cannot be read on
 };
 
@@ -41,31 +42,35 @@ struct NextRun {
 /// Bytes of a read buffer that one call looks at.
 inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
 
-/// True where neighbouring frames with equal headers mean the same to a router, so that they may travel as one run:
-/// not for LIST (its ids differ), FLOW and control kinds, fragments, extensions and LATEST, which are looked at singly.
+/// True where neighbouring frames with equal headers mean the same to a router, so that they may
+/// travel as one run: not for LIST (its ids differ), FLOW and control kinds, fragments, extensions
+/// and LATEST, which are looked at singly.
 [[nodiscard]] constexpr bool may_form_run(const FrameHeader& header) {
-  constexpr std::uint32_t kRunKinds =
-      0xFFFFu & ~(1u << static_cast<unsigned>(Kind::list)) & ~(1u << static_cast<unsigned>(Kind::flow));
+  constexpr std::uint32_t kRunKinds = 0xFFFFu & ~(1u << static_cast<unsigned>(Kind::list)) &
+                                      ~(1u << static_cast<unsigned>(Kind::flow));
   const auto kind = static_cast<unsigned>(header.kind);
-  return kind < kFirstControlKind && ((kRunKinds >> kind) & 1u) != 0 && !header.has(kFlagFragment | kFlagExt) &&
-         header.policy() != Policy::latest;
+  return kind < kFirstControlKind && ((kRunKinds >> kind) & 1u) != 0 &&
+         !header.has(kFlagFragment | kFlagExt) && header.policy() != Policy::latest;
 }
 
-/// Of the frames at `next`, taken to be `frame_size` bytes each, how many of the first have all 16 bytes of `like` as
-/// their header, in fours: whoever sends a thousand small messages sends a thousand equal headers. REQUIRES: frame_size
+/// Of the frames at `next`, taken to be `frame_size` bytes each, how many of the first have all 16
+/// bytes of `like` as their header, in fours: whoever sends a thousand small messages sends a
+/// thousand equal headers. REQUIRES: frame_size
 /// >= 16.
-[[nodiscard]] std::uint32_t count_equal_fours(const std::byte* next, std::size_t available, std::size_t frame_size,
-                                              const std::byte* like);
+[[nodiscard]] std::uint32_t count_equal_fours(const std::byte* next, std::size_t available,
+                                              std::size_t frame_size, const std::byte* like);
 
-/// The longest run of whole frames at `begin` whose bytes 4..15 (dst, src, kind, flags, hops, lane) are all equal; a
-/// frame that may_form_run() excludes is a run of its own. Of the rules of section 2 only the length is checked: the
-/// caller checks one header per run. REQUIRES: begin <= end.
-[[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end, std::uint32_t max_length) {
+/// The longest run of whole frames at `begin` whose bytes 4..15 (dst, src, kind, flags, hops, lane)
+/// are all equal; a frame that may_form_run() excludes is a run of its own. Of the rules of section
+/// 2 only the length is checked: the caller checks one header per run. REQUIRES: begin <= end.
+[[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end,
+                                      std::uint32_t max_length) {
 #if defined(GIMNET_BUG_SLOW_PARSER)
   asm volatile("nop\n\tnop\n\tnop\n\tnop");
 #endif
   const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
-  if (available < kHeaderSize) return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize), 0};
+  if (available < kHeaderSize)
+    return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize), 0};
   const FrameHeader header = load_header(begin);
   if (header.length > max_length) return {Found::too_long, {}, 0, 0};
   if (header.frame_size() > available) {
@@ -80,8 +85,9 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
     const auto dst = load_le<std::uint32_t>(begin + kDstOffset);
     const auto src_and_attributes = load_le<std::uint64_t>(begin + kSrcOffset);
     while (true) {
-      // Most frames are as long as the one before. Where the next one begins is then known without waiting for what
-      // this one says, so that several are compared at a time: half the time of a run of small frames.
+      // Most frames are as long as the one before. Where the next one begins is then known without
+      // waiting for what this one says, so that several are compared at a time: half the time of a
+      // run of small frames.
 #if defined(GIMNET_BUG_PARSER_RUN_PAST_END)
       while (available - size >= frame_size - 1 &&
 #else
@@ -90,8 +96,8 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
              load_le<std::uint64_t>(begin + size) == length_and_dst &&
              load_le<std::uint64_t>(begin + size + kSrcOffset) == src_and_attributes) {
         size += frame_size;
-        const std::uint32_t more =
-            count_equal_fours(begin + size, available - size, frame_size, begin + size - frame_size);
+        const std::uint32_t more = count_equal_fours(begin + size, available - size, frame_size,
+                                                     begin + size - frame_size);
         size += more * frame_size;
         frames += 1 + more;
       }
@@ -109,11 +115,12 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
   return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0, shortest};
 }
 
-/// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0 and without ids.
+/// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0
+/// and without ids.
 enum class Origin : std::uint8_t { node, hub };
 
-/// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind, which flags that may
-/// carry, policy, n of LIST.
+/// The rules for a frame of a node that its 16 bytes alone can break: reserved bits, hops, kind,
+/// which flags that may carry, policy, n of LIST.
 [[nodiscard]] constexpr FrameError check_header_from_node(const FrameHeader& header) {
   const auto kind = static_cast<std::uint8_t>(header.kind);
   if ((header.lane & ~kLaneMask) != 0) return FrameError::reserved_lane_bits;
@@ -121,7 +128,9 @@ enum class Origin : std::uint8_t { node, hub };
   if (header.hops != 0) return FrameError::hops_not_zero;
   if (kind > static_cast<std::uint8_t>(Kind::route)) return FrameError::unknown_kind;
   // Six kinds in one test: it is made for every frame that is not like the one before it.
-  constexpr auto bit = [](Kind each) { return std::uint32_t{1} << static_cast<std::uint8_t>(each); };
+  constexpr auto bit = [](Kind each) {
+    return std::uint32_t{1} << static_cast<std::uint8_t>(each);
+  };
   constexpr std::uint32_t kNotForNodes = bit(Kind::report) | bit(Kind::route);
   constexpr std::uint32_t kForThisConnection = bit(Kind::flow) | bit(Kind::link);
   constexpr std::uint32_t kRequests = bit(Kind::ns) | bit(Kind::ctrl);
@@ -133,11 +142,14 @@ enum class Origin : std::uint8_t { node, hub };
         for_this_connection ? kFlagFragment | kFlagKeyed | kFlagExt : kFlagFragment | kFlagKeyed;
     if (header.has(forbidden)) return FrameError::flag_not_allowed;
   }
-  const bool to_many = header.kind == Kind::group || header.kind == Kind::list || header.kind == Kind::broadcast;
+  const bool to_many =
+      header.kind == Kind::group || header.kind == Kind::list || header.kind == Kind::broadcast;
   if (header.policy() == Policy::block && to_many) return FrameError::block_not_allowed;
   const bool to_one = header.kind == Kind::unicast || header.kind == Kind::service;
-  if (header.policy() == Policy::latest && to_one && !header.has(kFlagKeyed)) return FrameError::latest_without_key;
-  if (header.kind == Kind::list && (header.dst == 0 || header.dst > kListRecipientsMax)) return FrameError::list_count;
+  if (header.policy() == Policy::latest && to_one && !header.has(kFlagKeyed))
+    return FrameError::latest_without_key;
+  if (header.kind == Kind::list && (header.dst == 0 || header.dst > kListRecipientsMax))
+    return FrameError::list_count;
   return FrameError::none;
 }
 
@@ -163,19 +175,23 @@ class ListIds {
 /// One legal frame, taken apart. Valid until: its bytes change.
 struct FrameView {
   FrameHeader header;
-  ListIds recipients;                       ///< LIST only
-  std::span<const std::byte> extensions;    ///< without the u16 before them; see extensions.hpp
-  std::optional<FragmentHeader> fragment;   ///< where FRAGMENT is set
-  std::optional<std::uint64_t> key;         ///< where KEYED is set: its 8 bytes as a little-endian number
+  ListIds recipients;                      ///< LIST only
+  std::span<const std::byte> extensions;   ///< without the u16 before them; see extensions.hpp
+  std::optional<FragmentHeader> fragment;  ///< where FRAGMENT is set
+  std::optional<std::uint64_t> key;  ///< where KEYED is set: its 8 bytes as a little-endian number
   std::span<const std::byte> payload;       ///< what is left
   std::span<const std::byte> after_header;  ///< everything after the 16 bytes
 
   /// It is a message, or the last fragment of one.
-  [[nodiscard]] bool ends_message() const { return !fragment || fragment->offset + payload.size() == fragment->total; }
+  [[nodiscard]] bool ends_message() const {
+    return !fragment || fragment->offset + payload.size() == fragment->total;
+  }
 };
 
-/// Takes one frame apart and checks all of section 2 that a frame shows by itself. `frame` may be longer than the
-/// frame; shorter is FrameError::incomplete. The largest length and the source are the caller's to check.
-[[nodiscard]] Result<FrameView, FrameError> parse_frame(std::span<const std::byte> frame, Origin origin);
+/// Takes one frame apart and checks all of section 2 that a frame shows by itself. `frame` may be
+/// longer than the frame; shorter is FrameError::incomplete. The largest length and the source are
+/// the caller's to check.
+[[nodiscard]] Result<FrameView, FrameError> parse_frame(std::span<const std::byte> frame,
+                                                        Origin origin);
 
 }  // namespace gimnet::proto

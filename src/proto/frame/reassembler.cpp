@@ -15,7 +15,8 @@ Reassembler::Reassembler(const ReassemblyLimits& limits) : limits_(limits) {
 std::size_t Reassembler::StreamHash::operator()(const FragmentStream& stream) const noexcept {
   const std::uint64_t ids = (static_cast<std::uint64_t>(stream.src) << 32) | stream.dst;
   const std::uint64_t rest = (static_cast<std::uint64_t>(stream.kind) << 8) | stream.lane;
-  constexpr std::uint64_t kOdd = 0x9E3779B97F4A7C15ull;  // 2^64 over the golden ratio: spreads neighbouring ids
+  constexpr std::uint64_t kOdd =
+      0x9E3779B97F4A7C15ull;  // 2^64 over the golden ratio: spreads neighbouring ids
   return static_cast<std::size_t>(((ids ^ (rest << 48)) * kOdd) >> 17);
 }
 
@@ -33,7 +34,8 @@ Reassembled Reassembler::take(const FragmentStream& stream, const FragmentHeader
     result = follows ? append(entry, payload) : refuse(entry, fragment.message, State::lost);
   } else {
     lose(entry);
-    result = fragment.offset == 0 ? begin(entry, fragment, payload) : refuse(entry, fragment.message, State::lost);
+    result = fragment.offset == 0 ? begin(entry, fragment, payload)
+                                  : refuse(entry, fragment.message, State::lost);
   }
   result.lost_messages = static_cast<std::uint32_t>(lost_messages_ - lost_before);
   return result;
@@ -71,7 +73,8 @@ std::uint32_t Reassembler::clear() {
   return lost;
 }
 
-/// The stream's entry, moved to the end of those that wait; where there are too many, the first one goes.
+/// The stream's entry, moved to the end of those that wait; where there are too many, the first one
+/// goes.
 Reassembler::Entry& Reassembler::touch(const FragmentStream& stream) {
   if (const auto found = by_stream_.find(stream); found != by_stream_.end()) {
     entries_.splice(entries_.end(), entries_, found->second);
@@ -107,7 +110,8 @@ void Reassembler::lose(Entry& entry) {
   remember_lost(entry, entry.message);
 }
 
-/// Loses messages that waited longest until `bytes` more fit. False: they do not fit beside the one that is kept.
+/// Loses messages that waited longest until `bytes` more fit. False: they do not fit beside the one
+/// that is kept.
 bool Reassembler::make_room(const Entry& keep, std::size_t bytes) {
   for (auto& entry : entries_) {
     if (waiting_bytes_ + bytes <= limits_.waiting_bytes_max) return true;
@@ -116,8 +120,10 @@ bool Reassembler::make_room(const Entry& keep, std::size_t bytes) {
   return waiting_bytes_ + bytes <= limits_.waiting_bytes_max;
 }
 
-Reassembled Reassembler::begin(Entry& entry, const FragmentHeader& fragment, std::span<const std::byte> payload) {
-  if (fragment.total > limits_.message_bytes_max) return refuse(entry, fragment.message, State::too_large);
+Reassembled Reassembler::begin(Entry& entry, const FragmentHeader& fragment,
+                               std::span<const std::byte> payload) {
+  if (fragment.total > limits_.message_bytes_max)
+    return refuse(entry, fragment.message, State::too_large);
   if (payload.size() == fragment.total) {
     return {.state = State::whole, .taken = fragment.total, .message = payload, .storage = {}};
   }
@@ -134,9 +140,11 @@ Reassembled Reassembler::append(Entry& entry, std::span<const std::byte> payload
   if (!room) return refuse(entry, entry.message, State::no_memory);
   waiting_bytes_ += payload.size();
   const auto taken = static_cast<std::uint32_t>(entry.bytes.size());
-  if (taken < entry.total) return {.state = State::part, .taken = taken, .message = {}, .storage = {}};
+  if (taken < entry.total)
+    return {.state = State::part, .taken = taken, .message = {}, .storage = {}};
   waiting_bytes_ -= entry.bytes.size();
-  Reassembled whole{.state = State::whole, .taken = taken, .message = {}, .storage = std::move(entry.bytes)};
+  Reassembled whole{
+      .state = State::whole, .taken = taken, .message = {}, .storage = std::move(entry.bytes)};
   entry.bytes = ByteBuffer();
   entry.open = false;
   --open_messages_;

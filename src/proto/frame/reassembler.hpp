@@ -18,9 +18,10 @@ namespace gimnet::proto {
 
 /// Memory is bounded by these numbers, never by what a fragment claims.
 struct ReassemblyLimits {
-  std::uint32_t message_bytes_max = 64u << 20;     ///< of one message; at most kMessageBytesMax
-  std::uint64_t waiting_bytes_max = 256ull << 20;  ///< received bytes of all unfinished messages together
-  std::uint32_t streams_max = 256;                 ///< streams that are remembered, each with at most one message
+  std::uint32_t message_bytes_max = 64u << 20;  ///< of one message; at most kMessageBytesMax
+  std::uint64_t waiting_bytes_max = 256ull
+                                    << 20;  ///< received bytes of all unfinished messages together
+  std::uint32_t streams_max = 256;  ///< streams that are remembered, each with at most one message
 };
 
 /// Within one of these, fragments come in order and one message after the other.
@@ -40,22 +41,26 @@ struct Reassembled {
   enum class State : std::uint8_t {
     part,       ///< taken; more is to come
     whole,      ///< taken; the message is in `message`
-    too_large,  ///< discarded: the message is over message_bytes_max (tell a UNICAST sender with a refusing TAKEN)
-    lost,       ///< discarded: the fragment does not follow what was received, or belongs to a message lost before
+    too_large,  ///< discarded: the message is over message_bytes_max (tell a UNICAST sender with a
+                ///< refusing TAKEN)
+    lost,  ///< discarded: the fragment does not follow what was received, or belongs to a message
+           ///< lost before
     no_memory,  ///< discarded: the system has no memory
   };
   State state = State::part;
-  std::uint32_t lost_messages = 0;  ///< messages, this one or others, that ended as lost by this call
-  std::uint32_t taken = 0;          ///< bytes of this message received so far
+  std::uint32_t lost_messages =
+      0;                    ///< messages, this one or others, that ended as lost by this call
+  std::uint32_t taken = 0;  ///< bytes of this message received so far
   /// The whole message: in `storage`, or, where it came in one fragment, in the caller's bytes.
   std::span<const std::byte> message;
   ByteBuffer storage;
 };
 
-/// Takes the fragments of any number of streams. A message that is cut short by the rules, by a limit or by forget()
-/// is lost as a whole and counted once; nothing incomplete is ever given out.
-/// Thread safety: one thread. Ownership: bytes of unfinished messages. Cost: O(1) a fragment beside copying its bytes;
-/// a message's memory grows as its bytes come, at most to twice of what was received.
+/// Takes the fragments of any number of streams. A message that is cut short by the rules, by a
+/// limit or by forget() is lost as a whole and counted once; nothing incomplete is ever given out.
+/// Thread safety: one thread. Ownership: bytes of unfinished messages. Cost: O(1) a fragment beside
+/// copying its bytes; a message's memory grows as its bytes come, at most to twice of what was
+/// received.
 class Reassembler {
  public:
   /// REQUIRES: message_bytes_max <= kMessageBytesMax and <= waiting_bytes_max, streams_max >= 1.
@@ -66,7 +71,8 @@ class Reassembler {
   [[nodiscard]] Reassembled take(const FragmentStream& stream, const FragmentHeader& fragment,
                                  std::span<const std::byte> payload);
 
-  /// An unfragmented message came in the stream: an unfinished one before it is lost. Returns messages lost, 0 or 1.
+  /// An unfragmented message came in the stream: an unfinished one before it is lost. Returns
+  /// messages lost, 0 or 1.
   std::uint32_t interrupt(const FragmentStream& stream);
 
   /// The node is gone: its unfinished messages are lost. Returns how many.
@@ -83,7 +89,8 @@ class Reassembler {
   struct StreamHash {
     std::size_t operator()(const FragmentStream& stream) const noexcept;
   };
-  /// A stream's unfinished message, or the last one that was lost, whose other fragments are not counted again.
+  /// A stream's unfinished message, or the last one that was lost, whose other fragments are not
+  /// counted again.
   struct Entry {
     FragmentStream stream;
     bool open = false;
@@ -100,7 +107,8 @@ class Reassembler {
   void close(Entry& entry);
   void lose(Entry& entry);
   bool make_room(const Entry& keep, std::size_t bytes);
-  Reassembled begin(Entry& entry, const FragmentHeader& fragment, std::span<const std::byte> payload);
+  Reassembled begin(Entry& entry, const FragmentHeader& fragment,
+                    std::span<const std::byte> payload);
   Reassembled append(Entry& entry, std::span<const std::byte> payload);
   Reassembled refuse(Entry& entry, std::uint32_t message, Reassembled::State state);
 

@@ -7,8 +7,8 @@
 
 #include "proto/frame/frame_header.hpp"
 
-// The payload of REPORT frames: what became of frames that could not be delivered (docs/protocol.md, section 5).
-// Thread safety: value types and pure functions.
+// The payload of REPORT frames: what became of frames that could not be delivered
+// (docs/protocol.md, section 5). Thread safety: value types and pure functions.
 
 namespace gimnet::proto {
 

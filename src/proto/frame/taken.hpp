@@ -27,7 +27,8 @@ struct Taken {
 [[nodiscard]] inline std::optional<Taken> decode_taken(std::span<const std::byte> payload) {
   if (payload.size() < kTakenSize) return std::nullopt;
   const std::byte* bytes = payload.data();
-  return Taken{load_le<std::uint32_t>(bytes), load_le<std::uint32_t>(bytes + 4), load_le<std::uint32_t>(bytes + 8)};
+  return Taken{load_le<std::uint32_t>(bytes), load_le<std::uint32_t>(bytes + 4),
+               load_le<std::uint32_t>(bytes + 8)};
 }
 
 inline void encode_taken(const Taken& taken, std::span<std::byte, kTakenSize> payload) {

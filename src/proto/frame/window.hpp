@@ -8,13 +8,14 @@
 #include "proto/frame/fragmenter.hpp"
 #include "proto/frame/taken.hpp"
 
-// The window of a fragmented UNICAST message, so that a gigabyte reaches a slow node without filling a queue on the
-// way (docs/protocol.md, section 6).
-// Thread safety: value types without threads or clocks; the owner guards them.
+// The window of a fragmented UNICAST message, so that a gigabyte reaches a slow node without
+// filling a queue on the way (docs/protocol.md, section 6). Thread safety: value types without
+// threads or clocks; the owner guards them.
 
 namespace gimnet::proto {
 
-/// What a sender may have under way before the first TAKEN, and what a receiver allows unless it decides otherwise.
+/// What a sender may have under way before the first TAKEN, and what a receiver allows unless it
+/// decides otherwise.
 inline constexpr std::uint32_t kWindowDefault = 1024 * 1024;
 
 /// The sender's side, one per message.
@@ -59,13 +60,15 @@ class SendWindow {
   std::uint32_t taken_ = 0;
 };
 
-/// The receiver's side, one per message: says when a TAKEN is due, after each quarter of the window and at the end.
+/// The receiver's side, one per message: says when a TAKEN is due, after each quarter of the window
+/// and at the end.
 class ReceiveWindow {
  public:
   ReceiveWindow(std::uint32_t message, std::uint32_t total, std::uint32_t window = kWindowDefault)
       : message_(message), total_(total), window_(std::max(window, 1u)) {}
 
-  /// Should the sender be told that so many were received of the message in total, as Reassembled says?
+  /// Should the sender be told that so many were received of the message in total, as Reassembled
+  /// says?
   [[nodiscard]] bool due(std::uint32_t taken) const {
     return taken >= total_ || taken - told_ >= std::max(window_ / 4, 1u);
   }
@@ -75,8 +78,8 @@ class ReceiveWindow {
     return current(taken);
   }
 
-  /// Opens or narrows the window; what was allowed once stays allowed. Only between due() and tell(): with a window
-  /// that nobody was told of, none might be due again.
+  /// Opens or narrows the window; what was allowed once stays allowed. Only between due() and
+  /// tell(): with a window that nobody was told of, none might be due again.
   void set_window(std::uint32_t window) { window_ = std::max(window, 1u); }
 
   /// The answer to a message that is too large to take.

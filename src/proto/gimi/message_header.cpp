@@ -7,8 +7,8 @@
 namespace gimnet::proto::gimi {
 
 MessageHeader load_message_header(const std::byte* bytes) {
-  return {load_le<std::uint32_t>(bytes), static_cast<Operation>(bytes[4]), static_cast<std::uint8_t>(bytes[5]),
-          load_le<std::uint16_t>(bytes + 6)};
+  return {load_le<std::uint32_t>(bytes), static_cast<Operation>(bytes[4]),
+          static_cast<std::uint8_t>(bytes[5]), load_le<std::uint16_t>(bytes + 6)};
 }
 
 void store_message_header(std::byte* bytes, const MessageHeader& header) {
@@ -39,8 +39,8 @@ std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
                                  std::span<std::byte, kMessagePrefixMax> bytes) {
   header.extension_bytes = timestamp_ns ? kTimestampSize : 0;
-  header.flags =
-      static_cast<std::uint8_t>(timestamp_ns ? header.flags | kFlagTimestamp : header.flags & ~kFlagTimestamp);
+  header.flags = static_cast<std::uint8_t>(timestamp_ns ? header.flags | kFlagTimestamp
+                                                        : header.flags & ~kFlagTimestamp);
   store_message_header(bytes.data(), header);
   if (timestamp_ns) store_le(bytes.data() + kMessageHeaderSize, *timestamp_ns);
   return kMessageHeaderSize + header.extension_bytes;
@@ -80,9 +80,11 @@ std::vector<std::byte> encode_failure(const Failure& failure) {
   const bool to_service = failure.group != 0;
   const std::size_t head = kErrorStatusSize + (to_service ? sizeof failure.group : 0);
   std::vector<std::byte> data(head + failure.sentence.size());
-  store_le(data.data(), static_cast<std::uint16_t>(failure.status | (to_service ? kErrorGroupBit : 0)));
+  store_le(data.data(),
+           static_cast<std::uint16_t>(failure.status | (to_service ? kErrorGroupBit : 0)));
   if (to_service) store_le(data.data() + kErrorStatusSize, failure.group);
-  std::ranges::copy(std::as_bytes(std::span(failure.sentence)), data.begin() + static_cast<std::ptrdiff_t>(head));
+  std::ranges::copy(std::as_bytes(std::span(failure.sentence)),
+                    data.begin() + static_cast<std::ptrdiff_t>(head));
   return data;
 }
 

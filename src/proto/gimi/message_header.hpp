@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-// The header of GIMI messages: the first bytes of the payload of a KEYED frame (docs/protocol.md, section 7).
-// Thread safety: value types and pure functions.
+// The header of GIMI messages: the first bytes of the payload of a KEYED frame (docs/protocol.md,
+// section 7). Thread safety: value types and pure functions.
 
 namespace gimnet::proto::gimi {
 
@@ -24,14 +24,24 @@ struct StreamKey {
   std::uint32_t type = 0;
   std::uint32_t instance = 0;
 
-  [[nodiscard]] constexpr std::uint64_t value() const { return type | (static_cast<std::uint64_t>(instance) << 32); }
+  [[nodiscard]] constexpr std::uint64_t value() const {
+    return type | (static_cast<std::uint64_t>(instance) << 32);
+  }
   [[nodiscard]] static constexpr StreamKey of(std::uint64_t key) {
     return {static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32)};
   }
   friend constexpr bool operator==(const StreamKey&, const StreamKey&) = default;
 };
 
-enum class Operation : std::uint8_t { data = 0, ack = 1, request = 2, reply = 3, error = 4, ping = 5, pong = 6 };
+enum class Operation : std::uint8_t {
+  data = 0,
+  ack = 1,
+  request = 2,
+  reply = 3,
+  error = 4,
+  ping = 5,
+  pong = 6
+};
 
 inline constexpr std::uint8_t kFlagAckWanted = 0x01;
 inline constexpr std::uint8_t kFlagTimestamp = 0x02;
@@ -58,11 +68,12 @@ struct MessageView {
   std::span<const std::byte> data;
 };
 
-/// Nothing: shorter than its header or extension, an unknown operation, or a time stamp flag without 8 bytes.
+/// Nothing: shorter than its header or extension, an unknown operation, or a time stamp flag
+/// without 8 bytes.
 [[nodiscard]] std::optional<MessageView> parse_message(std::span<const std::byte> payload);
 
-/// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it. Sets the flag and
-/// `extension_bytes` of the header. Returns the size, 8 or 16.
+/// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it.
+/// Sets the flag and `extension_bytes` of the header. Returns the size, 8 or 16.
 inline constexpr std::size_t kMessagePrefixMax = kMessageHeaderSize + kTimestampSize;
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
                                  std::span<std::byte, kMessagePrefixMax> bytes);
@@ -71,7 +82,8 @@ std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_
 struct Ack {
   std::uint64_t bitmap = 0;         ///< bit i: sequence - 1 - i was taken too
   std::uint32_t pong_sequence = 0;  ///< of the PONG that this repeats an ACK for, or 0
-  std::uint32_t group = 0;          ///< of the service that the stream leads to; 0 and not written: to a node
+  std::uint32_t group =
+      0;  ///< of the service that the stream leads to; 0 and not written: to a node
   friend constexpr bool operator==(const Ack&, const Ack&) = default;
 };
 /// Nothing: too short. Bytes after the layout are skipped.
@@ -83,7 +95,8 @@ std::size_t encode_ack(const Ack& ack, std::span<std::byte, kAckSizeMax> data);
 struct Failure {
   std::uint16_t status = 0;
   std::string_view sentence;
-  std::uint32_t group = 0;  ///< of the service that the stream leads to; 0 and not written: to a node
+  std::uint32_t group =
+      0;  ///< of the service that the stream leads to; 0 and not written: to a node
 };
 /// In the status as written: a group id follows it.
 inline constexpr std::uint16_t kErrorGroupBit = 0x8000;

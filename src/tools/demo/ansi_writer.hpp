@@ -17,18 +17,21 @@ struct TerminalStyle {
   ColourDepth colours = ColourDepth::k256;
 };
 
-/// Turns canvases into the bytes that show them: plain escape sequences (ECMA-48), only what changed since the canvas
-/// before. Without UTF-8 every character gets the nearest of ASCII. Thread safety: one thread.
+/// Turns canvases into the bytes that show them: plain escape sequences (ECMA-48), only what
+/// changed since the canvas before. Without UTF-8 every character gets the nearest of ASCII. Thread
+/// safety: one thread.
 class AnsiWriter {
  public:
   explicit AnsiWriter(TerminalStyle style) : style_(style) {}
 
-  /// What brings a terminal that shows the last canvas to show this one; everything after redraw() or a new extent.
+  /// What brings a terminal that shows the last canvas to show this one; everything after redraw()
+  /// or a new extent.
   [[nodiscard]] std::string update(const Canvas& canvas);
   /// The next update() draws everything: the terminal shows something else.
   void redraw() { shown_.reset(); }
 
-  /// The canvas as lines, without cursor movements, trailing blanks and grounds: for files and plain terminals.
+  /// The canvas as lines, without cursor movements, trailing blanks and grounds: for files and
+  /// plain terminals.
   [[nodiscard]] std::string lines(const Canvas& canvas) const;
 
  private:

@@ -10,7 +10,8 @@ namespace {
 constexpr int kExtentMax = 1000;
 constexpr char32_t kReplacement = U'\uFFFD';
 
-// The character at the front, and its bytes in `size`; kReplacement and 1 for what is no UTF-8 (RFC 3629).
+// The character at the front, and its bytes in `size`; kReplacement and 1 for what is no UTF-8 (RFC
+// 3629).
 char32_t decode_front(std::string_view text, std::size_t& size) {
   const auto byte = [&](std::size_t index) { return static_cast<unsigned char>(text[index]); };
   const unsigned char lead = byte(0);
@@ -43,7 +44,9 @@ std::u32string decoded_utf8(std::string_view text) {
 }
 
 void append_utf8(std::string& text, char32_t code) {
-  const auto add = [&text](char32_t byte) { text += static_cast<char>(static_cast<unsigned char>(byte)); };
+  const auto add = [&text](char32_t byte) {
+    text += static_cast<char>(static_cast<unsigned char>(byte));
+  };
   if (code < 0x80) {
     add(code);
   } else if (code < 0x800) {
@@ -66,7 +69,8 @@ Canvas::Canvas(Extent extent)
       glyphs_(static_cast<std::size_t>(extent_.columns) * static_cast<std::size_t>(extent_.rows)) {}
 
 bool Canvas::inside(Place place) const {
-  return place.column >= 0 && place.row >= 0 && place.column < extent_.columns && place.row < extent_.rows;
+  return place.column >= 0 && place.row >= 0 && place.column < extent_.columns &&
+         place.row < extent_.rows;
 }
 
 std::size_t Canvas::index_of(Place place) const {

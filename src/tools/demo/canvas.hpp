@@ -8,7 +8,8 @@
 
 namespace gimnet::demo {
 
-/// What a character means, from which its colour follows. In a plot a later one lies over an earlier one.
+/// What a character means, from which its colour follows. In a plot a later one lies over an
+/// earlier one.
 enum class Ink : std::uint8_t {
   kPlain,
   kDim,
@@ -55,8 +56,8 @@ struct Glyph {
   bool operator==(const Glyph&) const = default;
 };
 
-/// A screen full of characters, to be drawn on and then shown. What lies outside is not drawn. All characters are one
-/// column wide. Thread safety: one thread.
+/// A screen full of characters, to be drawn on and then shown. What lies outside is not drawn. All
+/// characters are one column wide. Thread safety: one thread.
 class Canvas {
  public:
   /// Limits: 1,000 columns and rows; a larger extent is cut.
@@ -67,7 +68,8 @@ class Canvas {
   [[nodiscard]] const Glyph& at(Place place) const;
 
   void put(Place place, const Glyph& glyph);
-  /// Writes UTF-8 from there to the right; bytes that are no UTF-8 become U+FFFD. Gives the column after it.
+  /// Writes UTF-8 from there to the right; bytes that are no UTF-8 become U+FFFD. Gives the column
+  /// after it.
   int text(Place place, std::string_view utf8, Ink ink);
   /// Lays a ground under a part of a row.
   void lay_ground(Place place, int columns, Ground ground);

@@ -21,7 +21,8 @@ class Words {
     const std::size_t begin = rest_.find_first_not_of(" \t");
     if (begin == std::string_view::npos) return std::nullopt;
     const std::size_t end = rest_.find_first_of(" \t", begin);
-    const std::string_view word = rest_.substr(begin, end == std::string_view::npos ? end : end - begin);
+    const std::string_view word =
+        rest_.substr(begin, end == std::string_view::npos ? end : end - begin);
     rest_ = end == std::string_view::npos ? std::string_view{} : rest_.substr(end);
     ++taken_;
     return word;
@@ -74,7 +75,8 @@ class Fields {
       return 0.0;
     }
     if (value < range.least || value > range.most) {
-      complain(fmt::format("{}: {} is {}, outside {} .. {}", message_, name, value, range.least, range.most));
+      complain(fmt::format("{}: {} is {}, outside {} .. {}", message_, name, value, range.least,
+                           range.most));
       return 0.0;
     }
     return value;
@@ -92,7 +94,8 @@ class Fields {
 
   void end() {
     if (complaint_.empty() && words_.next()) {
-      complain(fmt::format("{}: more than the {} fields it should have", message_, words_.taken() - 1));
+      complain(
+          fmt::format("{}: more than the {} fields it should have", message_, words_.taken() - 1));
     }
   }
 
@@ -130,10 +133,12 @@ void read_odometry(Fields& fields, LogRecord& record) {
 // count ranges... x y theta odom_x odom_y odom_theta stamp host logger_stamp
 void read_scan(Fields& fields, LogRecord& record) {
   const double beams = fields.number("number of beams", {1.0, static_cast<double>(kLogBeamsMax)});
-  if (beams != std::floor(beams)) fields.complain(fmt::format("FLASER: {} is no number of beams", beams));
+  if (beams != std::floor(beams))
+    fields.complain(fmt::format("FLASER: {} is no number of beams", beams));
   if (!fields.complaint().empty()) return;
   record.ranges_m.resize(static_cast<std::size_t>(beams));
-  for (float& range : record.ranges_m) range = static_cast<float>(fields.number("range", kDistance));
+  for (float& range : record.ranges_m)
+    range = static_cast<float>(fields.number("range", kDistance));
   record.pose = fields.pose("");
   (void)fields.pose("odom_");
   record.stamp_s = fields.number("timestamp", kStamp);
@@ -165,8 +170,9 @@ Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record) {
   } else if (is_message_name(*name)) {
     return LineKind::kIgnored;
   } else {
-    return Error{fmt::format("the line begins with {}, which is no CARMEN message (expected ODOM, FLASER, PARAM, ...)",
-                             quoted(*name))};
+    return Error{fmt::format(
+        "the line begins with {}, which is no CARMEN message (expected ODOM, FLASER, PARAM, ...)",
+        quoted(*name))};
   }
   if (!fields.complaint().empty()) return Error{fields.complaint()};
   return *name == "FLASER" ? LineKind::kScan : LineKind::kOdometry;
@@ -183,17 +189,19 @@ Result<RobotLog> load_robot_log(const std::string& path) {
     if (!*more) break;
     LogRecord record;
     const Result<LineKind> kind = parse_carmen_line(line, record);
-    if (!kind) return Error{fmt::format("{}:{}: {}", path, reader->line_number(), kind.error().sentence)};
+    if (!kind)
+      return Error{fmt::format("{}:{}: {}", path, reader->line_number(), kind.error().sentence)};
     if (*kind == LineKind::kIgnored) continue;
     if (*kind == LineKind::kScan) ++log.scans;
     log.records.push_back(std::move(record));
     if (log.records.size() > kLogRecordsMax) {
-      return Error{fmt::format("{}: more than {} ODOM and FLASER lines; cut the log", path, kLogRecordsMax)};
+      return Error{
+          fmt::format("{}: more than {} ODOM and FLASER lines; cut the log", path, kLogRecordsMax)};
     }
   }
   if (log.records.empty()) {
-    return Error{
-        fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?", path, reader->line_number())};
+    return Error{fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?",
+                             path, reader->line_number())};
   }
   pace_log(log);
   return log;

@@ -11,11 +11,13 @@
 
 namespace gimnet::demo {
 
-/// One ODOM or FLASER line of a log in the format of CARMEN (carmen.sourceforge.net/logger_playback.html).
+/// One ODOM or FLASER line of a log in the format of CARMEN
+/// (carmen.sourceforge.net/logger_playback.html).
 struct LogRecord {
   /// Where the robot was, as its odometry or whoever corrected the log says.
   Pose pose;
-  /// Seconds as logged; 0 where the line has none (a marker behind each scan of corrected logs has not).
+  /// Seconds as logged; 0 where the line has none (a marker behind each scan of corrected logs has
+  /// not).
   double stamp_s = 0.0;
   /// When to play it, in seconds after the first record; ascending. Filled in by pace_log().
   double due_s = 0.0;
@@ -29,7 +31,8 @@ struct LogRecord {
 struct RobotLog {
   std::vector<LogRecord> records;
   std::size_t scans = 0;
-  /// A sentence for the user about how the playback is timed; empty where the log's own stamps are followed.
+  /// A sentence for the user about how the playback is timed; empty where the log's own stamps are
+  /// followed.
   std::string pacing_note;
 
   [[nodiscard]] double duration_s() const { return records.empty() ? 0.0 : records.back().due_s; }
@@ -37,19 +40,20 @@ struct RobotLog {
 
 inline constexpr std::size_t kLogBeamsMax = 4096;
 inline constexpr std::size_t kLogRecordsMax = 4'000'000;
-/// A distance from here on means that the beam met nothing: scanners of those days answer 81.83 or 81.91.
+/// A distance from here on means that the beam met nothing: scanners of those days answer 81.83
+/// or 81.91.
 inline constexpr float kLogRangeMax_m = 50.0F;
 
 /// What parse_carmen_line() found.
 enum class LineKind : std::uint8_t { kIgnored, kOdometry, kScan };
 
-/// Reads one line. Comments, empty lines and other kinds of messages (PARAM, NEFF, RLASER, ...) are ignored.
-/// Errors: a line that is none of these, wrong number of fields, a field that is no number or out of range; the
-/// sentence says which, without file and line. Thread safety: any thread.
+/// Reads one line. Comments, empty lines and other kinds of messages (PARAM, NEFF, RLASER, ...) are
+/// ignored. Errors: a line that is none of these, wrong number of fields, a field that is no number
+/// or out of range; the sentence says which, without file and line. Thread safety: any thread.
 [[nodiscard]] Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record);
 
-/// Reads a whole log, compressed or not, and paces it. Errors: those of the file and of its lines, with file and line
-/// number; a log without ODOM and FLASER lines.
+/// Reads a whole log, compressed or not, and paces it. Errors: those of the file and of its lines,
+/// with file and line number; a log without ODOM and FLASER lines.
 [[nodiscard]] Result<RobotLog> load_robot_log(const std::string& path);
 
 }  // namespace gimnet::demo

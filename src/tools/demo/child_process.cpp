@@ -41,21 +41,24 @@ constexpr std::size_t kLineMax = 4096;
   ::_exit(127);
 }
 
-int exit_status(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+int exit_status(int status) {
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
 
 }  // namespace
 
 Result<ChildProcess> ChildProcess::start(Command command) {
   const std::string& path = command.words.front();
   if (::access(path.c_str(), X_OK) != 0) {
-    return Error{
-        fmt::format("cannot start {}: {}: {}; build it with ./dev build", command.title, path, std::strerror(errno))};
+    return Error{fmt::format("cannot start {}: {}: {}; build it with ./dev build", command.title,
+                             path, std::strerror(errno))};
   }
   int pipe_ends[2];
   if (::pipe2(pipe_ends, O_CLOEXEC) != 0) {
     return Error{fmt::format("cannot start {}: no pipe: {}", command.title, std::strerror(errno))};
   }
-  const int errors = ::open(command.log_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const int errors =
+      ::open(command.log_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   std::vector<char*> words;
   words.reserve(command.words.size() + 1);
   for (std::string& word : command.words) words.push_back(word.data());
@@ -68,7 +71,8 @@ Result<ChildProcess> ChildProcess::start(Command command) {
   if (errors >= 0) ::close(errors);
   if (id < 0) {
     ::close(pipe_ends[0]);
-    return Error{fmt::format("cannot start {}: no process: {}", command.title, std::strerror(fork_error))};
+    return Error{
+        fmt::format("cannot start {}: no process: {}", command.title, std::strerror(fork_error))};
   }
   ChildProcess child;
   child.command_ = std::move(command);
@@ -116,11 +120,12 @@ Result<std::string> ChildProcess::read_line(std::int64_t wait_ns) {
     }
     const std::int64_t left_ns = until_ns - steady_now_ns();
     if (left_ns <= 0 || pending_.size() > kLineMax) {
-      return Error{
-          fmt::format("{} is not ready after {} s: {}", command_.title, wait_ns / 1'000'000'000, last_words())};
+      return Error{fmt::format("{} is not ready after {} s: {}", command_.title,
+                               wait_ns / 1'000'000'000, last_words())};
     }
     pollfd waiting{output_, POLLIN, 0};
-    if (::poll(&waiting, 1, static_cast<int>(left_ns / kMillisecond_ns) + 1) < 0 && errno != EINTR) continue;
+    if (::poll(&waiting, 1, static_cast<int>(left_ns / kMillisecond_ns) + 1) < 0 && errno != EINTR)
+      continue;
     if (waiting.revents == 0) continue;
     char buffer[512];
     const ssize_t got = ::read(output_, buffer, sizeof buffer);
@@ -151,10 +156,11 @@ std::optional<int> ChildProcess::wait(std::int64_t wait_ns) {
 std::optional<Error> ChildProcess::ended(std::int64_t wait_ns) {
   if (!wait(wait_ns)) return std::nullopt;
   if (*status_ >= 128) {
-    return Error{fmt::format("{} was ended by signal {} ({}); its last words: {}", command_.title, *status_ - 128,
-                             ::strsignal(*status_ - 128), last_words())};
+    return Error{fmt::format("{} was ended by signal {} ({}); its last words: {}", command_.title,
+                             *status_ - 128, ::strsignal(*status_ - 128), last_words())};
   }
-  return Error{fmt::format("{} ended by itself with status {}: {}", command_.title, *status_, last_words())};
+  return Error{
+      fmt::format("{} ended by itself with status {}: {}", command_.title, *status_, last_words())};
 }
 
 void ChildProcess::end() {

@@ -11,9 +11,10 @@
 
 namespace gimnet::demo {
 
-/// A program that this one started and ends: with it at the latest, even if it crashes. It gets a process group of its
-/// own, so that Ctrl-C in a terminal does not reach it. Its standard input is empty, its standard error goes to a file.
-/// Thread safety: one thread; start children from the main thread only, whose end ends them.
+/// A program that this one started and ends: with it at the latest, even if it crashes. It gets a
+/// process group of its own, so that Ctrl-C in a terminal does not reach it. Its standard input is
+/// empty, its standard error goes to a file. Thread safety: one thread; start children from the
+/// main thread only, whose end ends them.
 class ChildProcess {
  public:
   /// What to start.
@@ -36,7 +37,8 @@ class ChildProcess {
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess() { end(); }
 
-  /// One line of its standard output, without the end. Errors: none within `wait_ns`, or it ended; with its last words.
+  /// One line of its standard output, without the end. Errors: none within `wait_ns`, or it ended;
+  /// with its last words.
   [[nodiscard]] Result<std::string> read_line(std::int64_t wait_ns);
 
   /// Why it ended, with its last words, if it did by itself; waits for that at most so long.
@@ -45,7 +47,8 @@ class ChildProcess {
   /// Asks it to end (SIGTERM), waits, and kills it if need be. Harmless where it has ended.
   void end();
 
-  /// Waits until it ends by itself, at most so long. Its exit status: code, or 128 + signal; nothing if it goes on.
+  /// Waits until it ends by itself, at most so long. Its exit status: code, or 128 + signal;
+  /// nothing if it goes on.
   [[nodiscard]] std::optional<int> wait(std::int64_t wait_ns);
 
   [[nodiscard]] pid_t id() const { return id_; }

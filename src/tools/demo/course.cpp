@@ -25,7 +25,8 @@ Twist Course::steer(const Pose& pose) {
   const double direction_rad = std::atan2(target.y_m - pose.y_m, target.x_m - pose.x_m);
   const double error_rad = normalized_angle(direction_rad - pose.heading_rad);
   const double ahead = std::max(0.0, 1.0 - std::abs(error_rad) / kTurnFirst_rad);
-  return {kCruise_mps * ahead, std::clamp(kTurnGain_per_s * error_rad, -kTurnMax_radps, kTurnMax_radps)};
+  return {kCruise_mps * ahead,
+          std::clamp(kTurnGain_per_s * error_rad, -kTurnMax_radps, kTurnMax_radps)};
 }
 
 }  // namespace gimnet::demo

@@ -7,8 +7,9 @@
 
 namespace gimnet::demo {
 
-/// A driver that visits corners in turn, for ever: turns towards the next one, then drives, slower where it must turn.
-/// It steers by what it hears from the robot, so that the loop is closed over the network. Thread safety: one thread.
+/// A driver that visits corners in turn, for ever: turns towards the next one, then drives, slower
+/// where it must turn. It steers by what it hears from the robot, so that the loop is closed over
+/// the network. Thread safety: one thread.
 class Course {
  public:
   explicit Course(std::vector<Point> corners) : corners_(std::move(corners)) {}

@@ -8,15 +8,20 @@
 namespace gimnet::demo {
 namespace {
 
-double approach(double from, double to, double most) { return from + std::clamp(to - from, -most, most); }
+double approach(double from, double to, double most) {
+  return from + std::clamp(to - from, -most, most);
+}
 
-// Exact for constant wheel speeds: an arc, or a line where the arc's radius has no meaning any more.
+// Exact for constant wheel speeds: an arc, or a line where the arc's radius has no meaning any
+// more.
 Pose moved(const Pose& pose, const Twist& twist, double dt_s) {
   const double turn_rad = twist.angular_radps * dt_s;
   const double way_m = twist.linear_mps * dt_s;
-  const double chord = std::abs(turn_rad) < 1e-9 ? 1.0 : std::sin(turn_rad / 2.0) / (turn_rad / 2.0);
+  const double chord =
+      std::abs(turn_rad) < 1e-9 ? 1.0 : std::sin(turn_rad / 2.0) / (turn_rad / 2.0);
   const double along_rad = pose.heading_rad + turn_rad / 2.0;
-  return {pose.x_m + way_m * chord * std::cos(along_rad), pose.y_m + way_m * chord * std::sin(along_rad),
+  return {pose.x_m + way_m * chord * std::cos(along_rad),
+          pose.y_m + way_m * chord * std::sin(along_rad),
           normalized_angle(pose.heading_rad + turn_rad)};
 }
 

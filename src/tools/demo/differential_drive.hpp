@@ -13,14 +13,14 @@ struct DriveSpec {
   double wheel_acceleration_mps2 = 2.5;
 };
 
-/// A robot on two driven wheels, in a hall. Wheels follow a command as fast as they accelerate; walls stop the robot.
-/// Thread safety: one thread.
+/// A robot on two driven wheels, in a hall. Wheels follow a command as fast as they accelerate;
+/// walls stop the robot. Thread safety: one thread.
 class DifferentialDrive {
  public:
   DifferentialDrive(const Pose& start, const DriveSpec& spec) : spec_(spec), pose_(start) {}
 
-  /// Lets `dt_s` seconds pass under a command. A command beyond the wheels' speed is scaled down as a whole, so that
-  /// the curve stays the same. REQUIRES: 0 < dt_s <= 0.1.
+  /// Lets `dt_s` seconds pass under a command. A command beyond the wheels' speed is scaled down as
+  /// a whole, so that the curve stays the same. REQUIRES: 0 < dt_s <= 0.1.
   void step(const Twist& command, double dt_s, const WorldMap& map);
 
   [[nodiscard]] const Pose& pose() const { return pose_; }

@@ -8,7 +8,8 @@
 namespace gimnet::demo {
 namespace {
 
-constexpr double kSpeeds[] = {kPlaySpeedMin, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, kPlaySpeedMax};
+constexpr double kSpeeds[] = {kPlaySpeedMin, 0.25, 0.5,  1.0,  2.0,
+                              5.0,           10.0, 20.0, 50.0, kPlaySpeedMax};
 
 double faster_than(double speed) {
   const double* next = std::upper_bound(std::begin(kSpeeds), std::end(kSpeeds), speed);
@@ -41,8 +42,8 @@ void Driver::press(Key key, const Monitor& monitor, std::int64_t now_ns) {
     return;
   }
   if (key == Key::kAutopilot) autopilot_ = !autopilot_;
-  const bool drives =
-      key == Key::kForward || key == Key::kBack || key == Key::kLeft || key == Key::kRight || key == Key::kStop;
+  const bool drives = key == Key::kForward || key == Key::kBack || key == Key::kLeft ||
+                      key == Key::kRight || key == Key::kStop;
   // Whoever takes the wheel has it.
   if (drives) autopilot_ = false;
   teleop_.press(key, now_ns);

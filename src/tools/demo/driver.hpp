@@ -10,8 +10,8 @@
 
 namespace gimnet::demo {
 
-/// Decides what the robot is told, and when: a simulated one 20 times a second, by the keyboard or by the course; a log
-/// only when its speed or its holding changes. Thread safety: one thread.
+/// Decides what the robot is told, and when: a simulated one 20 times a second, by the keyboard or
+/// by the course; a log only when its speed or its holding changes. Thread safety: one thread.
 class Driver {
  public:
   static constexpr std::int64_t kPeriod_ns = 50'000'000;

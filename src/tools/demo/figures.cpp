@@ -35,7 +35,8 @@ class Column {
     ++row_;
   }
   // A label on the left, one or two figures that end at fixed columns.
-  void row(std::string_view label, std::string_view first, std::string_view second, Ink ink = Ink::kPlain) {
+  void row(std::string_view label, std::string_view first, std::string_view second,
+           Ink ink = Ink::kPlain) {
     put(left(), label, Ink::kLabel);
     put_right(right() - 9, first, ink);
     put_right(right(), second, ink);
@@ -72,14 +73,16 @@ std::string driver_text(const Monitor& monitor, const ScreenState& state) {
     const RobotInfo& info = *monitor.info();
     if (!info.ended) return "recorded";
     // It also ends because the time is up, or the user quits.
-    return info.played_s < info.duration_s ? fmt::format("stopped after {:.0f} s", info.played_s) : "log has ended";
+    return info.played_s < info.duration_s ? fmt::format("stopped after {:.0f} s", info.played_s)
+                                           : "log has ended";
   }
   return state.autopilot ? "autopilot" : "driven by you";
 }
 
 void draw_robot_figures(Column& column, const Monitor& monitor, const ScreenState& state) {
   const bool bumped = monitor.odometry() && monitor.odometry()->bumped;
-  column.heading("ROBOT", bumped ? "at a wall" : driver_text(monitor, state), bumped ? Ink::kWarn : Ink::kDim);
+  column.heading("ROBOT", bumped ? "at a wall" : driver_text(monitor, state),
+                 bumped ? Ink::kWarn : Ink::kDim);
   const Pose pose = monitor.pose().value_or(Pose{});
   const Twist twist = monitor.odometry().value_or(Odometry{}).twist;
   column.row("x, y", fmt::format("{:.2f}", pose.x_m), fmt::format("{:.2f} m", pose.y_m));
@@ -103,12 +106,14 @@ void draw_stream_figures(Column& column, const Monitor& monitor, std::int64_t no
 void draw_latency_figures(Column& column, const Monitor& monitor) {
   column.heading_over("LATENCY", "p50", "p99");
   const auto age = [&](std::string_view label, const SampleWindow& window) {
-    column.row(label, duration_text(window.percentile_ns(50)), duration_text(window.percentile_ns(99)));
+    column.row(label, duration_text(window.percentile_ns(50)),
+               duration_text(window.percentile_ns(99)));
   };
   age("odom", monitor.odometry_age());
   age("scan", monitor.scan_age());
   age("loop", monitor.loop_age());
-  column.curve(monitor.odometry_age().latest(static_cast<std::size_t>(column.right() - column.left())));
+  column.curve(
+      monitor.odometry_age().latest(static_cast<std::size_t>(column.right() - column.left())));
 }
 
 void draw_hub_figures(Column& column, const Monitor& monitor) {
@@ -118,7 +123,8 @@ void draw_hub_figures(Column& column, const Monitor& monitor) {
   }
   const HubCounters& hub = *monitor.hub();
   const bool exact = hub.exact();
-  column.heading("HUB", exact ? "ledger exact ✓" : "ledger open ✗", exact ? Ink::kGood : Ink::kWarn);
+  column.heading("HUB", exact ? "ledger exact ✓" : "ledger open ✗",
+                 exact ? Ink::kGood : Ink::kWarn);
   column.row("accepted", "", count_text(hub.accepted + hub.copies));
   column.row("delivered", "", count_text(hub.delivered));
   column.row("dropped", "", count_text(hub.dropped()), hub.dropped() == 0 ? Ink::kGood : Ink::kBad);
@@ -126,7 +132,8 @@ void draw_hub_figures(Column& column, const Monitor& monitor) {
 
 }  // namespace
 
-void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
+void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state,
+                const Area& area) {
   Column column(canvas, area);
   // Four blocks of 4, 4, 5 and 4 rows; blank rows between them only where all of them fit.
   const bool roomy = area.extent.rows >= 20;
@@ -142,14 +149,15 @@ void draw_panel(Canvas& canvas, const Monitor& monitor, const ScreenState& state
   draw_hub_figures(column, monitor);
 }
 
-void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
+void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state,
+                const Area& area) {
   const Pose pose = monitor.pose().value_or(Pose{});
   const Twist twist = monitor.odometry().value_or(Odometry{}).twist;
   const int column = area.corner.column + 1;
   int row = area.corner.row;
   canvas.text({column, row++},
-              fmt::format("{:.2f} {:.2f} m  {:.0f}°  {:.2f} m/s  {}", pose.x_m, pose.y_m, degrees(pose.heading_rad),
-                          twist.linear_mps, driver_text(monitor, state)),
+              fmt::format("{:.2f} {:.2f} m  {:.0f}°  {:.2f} m/s  {}", pose.x_m, pose.y_m,
+                          degrees(pose.heading_rad), twist.linear_mps, driver_text(monitor, state)),
               Ink::kPlain);
   canvas.text({column, row++},
               fmt::format("odom {:.0f} Hz  scan {:.0f} Hz  p50 {}  p99 {}",
@@ -161,7 +169,8 @@ void draw_strip(Canvas& canvas, const Monitor& monitor, const ScreenState& state
   if (!monitor.hub()) return;
   const std::uint64_t dropped = monitor.hub()->dropped();
   canvas.text({column, row},
-              fmt::format("hub: {} delivered, {} dropped", count_text(monitor.hub()->delivered), count_text(dropped)),
+              fmt::format("hub: {} delivered, {} dropped", count_text(monitor.hub()->delivered),
+                          count_text(dropped)),
               dropped == 0 ? Ink::kGood : Ink::kBad);
 }
 

@@ -14,7 +14,8 @@
 namespace gimnet::demo {
 namespace {
 
-// A viewer that draws is not at its queue for a few milliseconds; a log played fast sends hundreds in them.
+// A viewer that draws is not at its queue for a few milliseconds; a log played fast sends hundreds
+// in them.
 constexpr std::size_t kQueueMessages = 4096;
 constexpr Timeout kSend{2000};
 constexpr Timeout kCounters{500};
@@ -24,14 +25,16 @@ struct ServiceInfo {
   std::string_view name;
   std::string_view metadata;
 };
-constexpr std::array<ServiceInfo, 3> kProvided{{{Service::kOdometry, "odom", "pose and speed of the robot, Bitestream"},
-                                                {Service::kScan, "scan", "laser scan, Bitestream"},
-                                                {Service::kInfo, "info", "what the robot is, Bitestream"}}};
+constexpr std::array<ServiceInfo, 3> kProvided{
+    {{Service::kOdometry, "odom", "pose and speed of the robot, Bitestream"},
+     {Service::kScan, "scan", "laser scan, Bitestream"},
+     {Service::kInfo, "info", "what the robot is, Bitestream"}}};
 constexpr std::string_view kDriveName = "drive";
 
 MessageKey key_of(Service service) { return {static_cast<std::uint32_t>(service) + 1, 0}; }
 
-// Nothing overwritten: when the queue is full the node stops reading, and the hub counts what it drops.
+// Nothing overwritten: when the queue is full the node stops reading, and the hub counts what it
+// drops.
 QueueOptions lossless() { return {kQueueMessages, AtFullQueue::stop_reading}; }
 
 // For good: everything that trying again cannot heal.
@@ -46,7 +49,8 @@ class GimiPort : public NodePort {
 
   Result<std::optional<Event>> receive(std::int64_t wait_ns) override {
     constexpr std::int64_t kMillisecond_ns = 1'000'000;
-    const Timeout timeout((std::max<std::int64_t>(wait_ns, 0) + kMillisecond_ns - 1) / kMillisecond_ns);
+    const Timeout timeout((std::max<std::int64_t>(wait_ns, 0) + kMillisecond_ns - 1) /
+                          kMillisecond_ns);
     Outcome<Message> message = node_.receive(timeout);
     if (!message) {
       if (is_final(message.failure())) return Error{message.failure().sentence};
@@ -54,7 +58,8 @@ class GimiPort : public NodePort {
     }
     const std::optional<Service> service = service_of(*message);
     if (!service) return std::optional<Event>();
-    return std::optional(Event{*service, Bytes(message->data().begin(), message->data().end()), message->arrival_ns()});
+    return std::optional(Event{*service, Bytes(message->data().begin(), message->data().end()),
+                               message->arrival_ns()});
   }
 
   [[nodiscard]] bool connected() const override { return node_.state().connected; }
@@ -74,7 +79,8 @@ class GimiPort : public NodePort {
 
  private:
   static std::optional<Service> service_of(const Message& message) {
-    for (const Service service : {Service::kOdometry, Service::kScan, Service::kInfo, Service::kDrive}) {
+    for (const Service service :
+         {Service::kOdometry, Service::kScan, Service::kInfo, Service::kDrive}) {
       if (message.key() == key_of(service)) return service;
     }
     return std::nullopt;
@@ -108,12 +114,15 @@ class RobotPort final : public GimiPort {
 
   std::optional<Error> publish(Service service, std::span<const std::byte> payload) override {
     // However long the hub is away: what both ends show at the end counts every message.
-    const Outcome<void> outcome = publishers_[static_cast<std::size_t>(service)].publish(payload, kForever);
+    const Outcome<void> outcome =
+        publishers_[static_cast<std::size_t>(service)].publish(payload, kForever);
     if (!outcome && is_final(outcome.failure())) return Error{outcome.failure().sentence};
     return std::nullopt;
   }
 
-  std::optional<Error> command(std::span<const std::byte>) override { return Error{"a robot commands nobody"}; }
+  std::optional<Error> command(std::span<const std::byte>) override {
+    return Error{"a robot commands nobody"};
+  }
 
   [[nodiscard]] bool heard() const override {
     return std::all_of(publishers_.begin(), publishers_.end(),
@@ -131,7 +140,8 @@ class ViewerPort final : public GimiPort {
 
   std::optional<Error> open() {
     for (const ServiceInfo& info : kProvided) {
-      Outcome<Subscription> subscription = node().subscribe(fmt::format("{}/{}", robot_, info.name), lossless());
+      Outcome<Subscription> subscription =
+          node().subscribe(fmt::format("{}/{}", robot_, info.name), lossless());
       if (!subscription) return Error{subscription.failure().sentence};
       subscriptions_.push_back(std::move(*subscription));
     }
@@ -147,7 +157,8 @@ class ViewerPort final : public GimiPort {
     if (!drive_) {
       SendOptions options;
       options.lane = Lane::real_time;
-      Outcome<Sender> sender = node().sender_to_service(fmt::format("{}/{}", robot_, kDriveName), options, kSend);
+      Outcome<Sender> sender =
+          node().sender_to_service(fmt::format("{}/{}", robot_, kDriveName), options, kSend);
       if (!sender) return Error{sender.failure().sentence};
       drive_.emplace(std::move(*sender));
     }

@@ -16,12 +16,12 @@ struct PortOptions {
   std::string robot;
 };
 
-/// A robot's end: a node of that name that provides odom, scan and info, and accepts drive. Errors: no hub there, the
-/// name is taken, a service was refused.
+/// A robot's end: a node of that name that provides odom, scan and info, and accepts drive. Errors:
+/// no hub there, the name is taken, a service was refused.
 [[nodiscard]] Result<std::unique_ptr<NodePort>> connect_robot(const PortOptions& options);
 
-/// A viewer's end: a node without a name that subscribes to the robot's services, whether they exist already or not,
-/// and commands it. Errors: as connect_robot().
+/// A viewer's end: a node without a name that subscribes to the robot's services, whether they
+/// exist already or not, and commands it. Errors: as connect_robot().
 [[nodiscard]] Result<std::unique_ptr<NodePort>> connect_viewer(const PortOptions& options);
 
 }  // namespace gimnet::demo

@@ -38,7 +38,8 @@ std::uint64_t HubCounters::dropped() const {
 
 std::string HubCounters::drops_text() const {
   std::string text;
-  for (const Drop& drop : drops) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", drop.frames, drop.reason);
+  for (const Drop& drop : drops)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", drop.frames, drop.reason);
   return text.empty() ? "none" : text;
 }
 

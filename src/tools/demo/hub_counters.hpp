@@ -7,7 +7,8 @@
 
 namespace gimnet::demo {
 
-/// What the hub counted, summed over its shards: the ledger of docs/protocol.md, section 9. Thread safety: one thread.
+/// What the hub counted, summed over its shards: the ledger of docs/protocol.md, section 9. Thread
+/// safety: one thread.
 struct HubCounters {
   struct Drop {
     std::string reason;
@@ -21,7 +22,8 @@ struct HubCounters {
   /// Reasons with at least one frame.
   std::vector<Drop> drops;
 
-  /// Adds one counter of one shard, by its name in docs/operations.md; others than the ledger's are passed over.
+  /// Adds one counter of one shard, by its name in docs/operations.md; others than the ledger's are
+  /// passed over.
   void add(std::string_view name, std::uint64_t value);
 
   [[nodiscard]] std::uint64_t dropped() const;

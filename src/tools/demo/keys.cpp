@@ -87,8 +87,8 @@ struct Sequence {
   bool whole = false;
 };
 
-// CSI and SS3 (ECMA-48, 5.4 and 8.3.143). A control character is in none of them: it is a key of its own, as is what
-// stands behind an Esc that begins neither.
+// CSI and SS3 (ECMA-48, 5.4 and 8.3.143). A control character is in none of them: it is a key of
+// its own, as is what stands behind an Esc that begins neither.
 Sequence sequence_at_front(std::string_view text) {
   if (text.size() < 2) return {};
   if (text[1] != '[' && text[1] != 'O') return {1, false};
@@ -127,7 +127,8 @@ std::vector<Key> KeyParser::take(std::string_view bytes, std::int64_t now_ns) {
     const Sequence sequence = sequence_at_front(rest);
     if (sequence.size == 0) break;
     if (sequence.whole) {
-      if (const std::optional<Key> key = key_of_sequence(rest.substr(0, sequence.size))) keys.push_back(*key);
+      if (const std::optional<Key> key = key_of_sequence(rest.substr(0, sequence.size)))
+        keys.push_back(*key);
     }
     rest.remove_prefix(sequence.size);
   }

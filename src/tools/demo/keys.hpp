@@ -27,16 +27,18 @@ enum class Key : std::uint8_t {
   kQuit,
 };
 
-/// Turns the bytes of a terminal into keys: letters in either case, arrows, Ctrl-C and Ctrl-L. A sequence that was cut
-/// waits for its rest; unknown ones are skipped whole. Esc alone means nothing, and swallows nothing but what makes a
-/// sequence of it within `kSequencePatience_ns`. Thread safety: one thread.
+/// Turns the bytes of a terminal into keys: letters in either case, arrows, Ctrl-C and Ctrl-L. A
+/// sequence that was cut waits for its rest; unknown ones are skipped whole. Esc alone means
+/// nothing, and swallows nothing but what makes a sequence of it within `kSequencePatience_ns`.
+/// Thread safety: one thread.
 class KeyParser {
  public:
-  /// A terminal writes a sequence at once, and a network delivers it in pieces at worst; nobody types that fast.
+  /// A terminal writes a sequence at once, and a network delivers it in pieces at worst; nobody
+  /// types that fast.
   static constexpr std::int64_t kSequencePatience_ns = 100'000'000;
 
-  /// What came since the last call, also nothing: that is how it learns that no more of a sequence comes. Times are of
-  /// any clock that does not go back.
+  /// What came since the last call, also nothing: that is how it learns that no more of a sequence
+  /// comes. Times are of any clock that does not go back.
   [[nodiscard]] std::vector<Key> take(std::string_view bytes, std::int64_t now_ns);
 
  private:

@@ -21,7 +21,8 @@ struct LaserSpec {
   /// Direction of a beam relative to the heading. REQUIRES: beam < beams.
   [[nodiscard]] double bearing_rad(std::size_t beam) const {
     if (beams < 2) return 0.0;
-    return -field_rad / 2.0 + field_rad * static_cast<double>(beam) / static_cast<double>(beams - 1);
+    return -field_rad / 2.0 +
+           field_rad * static_cast<double>(beam) / static_cast<double>(beams - 1);
   }
 };
 

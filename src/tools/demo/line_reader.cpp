@@ -11,7 +11,8 @@ namespace gimnet::demo {
 
 void LineReader::Closer::operator()(gzFile_s* file) const { (void)gzclose(file); }
 
-LineReader::LineReader(std::string path, gzFile_s* file) : path_(std::move(path)), file_(file), buffer_(1U << 16) {}
+LineReader::LineReader(std::string path, gzFile_s* file)
+    : path_(std::move(path)), file_(file), buffer_(1U << 16) {}
 
 Result<LineReader> LineReader::open(const std::string& path) {
   struct stat status{};
@@ -19,11 +20,13 @@ Result<LineReader> LineReader::open(const std::string& path) {
     return Error{fmt::format("cannot open {}: {}; check the path", path, std::strerror(errno))};
   }
   if (!S_ISREG(status.st_mode)) {
-    return Error{fmt::format("cannot read {}: it is not a regular file; give the path of a file", path)};
+    return Error{
+        fmt::format("cannot read {}: it is not a regular file; give the path of a file", path)};
   }
   gzFile file = gzopen(path.c_str(), "rb");
   if (file == nullptr) {
-    return Error{fmt::format("cannot open {}: {}", path, errno != 0 ? std::strerror(errno) : "out of memory")};
+    return Error{fmt::format("cannot open {}: {}", path,
+                             errno != 0 ? std::strerror(errno) : "out of memory")};
   }
   return LineReader(path, file);
 }
@@ -32,22 +35,27 @@ Error LineReader::failure(std::string_view what) const {
   return Error{fmt::format("{}:{}: {}", path_, line_number_ + 1, what)};
 }
 
-// Moves what is left to the front, doubles the buffer where a line fills it, and reads. False: nothing more came.
+// Moves what is left to the front, doubles the buffer where a line fills it, and reads. False:
+// nothing more came.
 Result<bool> LineReader::fill() {
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
   if (end_ == buffer_.size()) {
-    if (buffer_.size() >= kLineBytesMax) return failure("the line is longer than 1 MiB; is this a text file?");
+    if (buffer_.size() >= kLineBytesMax)
+      return failure("the line is longer than 1 MiB; is this a text file?");
     buffer_.resize(buffer_.size() * 2);
   }
-  const int got = gzread(file_.get(), buffer_.data() + end_, static_cast<unsigned>(buffer_.size() - end_));
+  const int got =
+      gzread(file_.get(), buffer_.data() + end_, static_cast<unsigned>(buffer_.size() - end_));
   if (got <= 0) {
     int code = Z_OK;
     const char* text = gzerror(file_.get(), &code);
-    // zlib tells of an archive that was cut only by this code, after it has given what it could read.
+    // zlib tells of an archive that was cut only by this code, after it has given what it could
+    // read.
     if (code == Z_BUF_ERROR) return failure("the gzip archive ends too early; copy the file again");
-    if (got < 0) return failure(fmt::format("damaged gzip archive ({}); copy the file again", text));
+    if (got < 0)
+      return failure(fmt::format("damaged gzip archive ({}); copy the file again", text));
     return false;
   }
   end_ += static_cast<std::size_t>(got);
@@ -62,7 +70,9 @@ Result<bool> LineReader::next(std::string_view& line) {
     const void* found = std::memchr(buffer_.data() + searched, '\n', end_ - searched);
     if (found != nullptr || (at_end_ && begin_ < end_)) {
       const std::size_t stop =
-          found == nullptr ? end_ : static_cast<std::size_t>(static_cast<const char*>(found) - buffer_.data());
+          found == nullptr
+              ? end_
+              : static_cast<std::size_t>(static_cast<const char*>(found) - buffer_.data());
       line = std::string_view(buffer_.data() + begin_, stop - begin_);
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       begin_ = found == nullptr ? end_ : stop + 1;

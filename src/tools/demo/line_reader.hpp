@@ -14,8 +14,9 @@ struct gzFile_s;
 namespace gimnet::demo {
 
 /// Reads a text file line by line; a file compressed with gzip is read as what it holds.
-/// Ownership: closes its file. Thread safety: one thread. Limits: `kLineBytesMax` a line, `kFileBytesMax` altogether,
-/// so that a hostile archive ends with a sentence and not with the machine's memory.
+/// Ownership: closes its file. Thread safety: one thread. Limits: `kLineBytesMax` a line,
+/// `kFileBytesMax` altogether, so that a hostile archive ends with a sentence and not with the
+/// machine's memory.
 class LineReader {
  public:
   static constexpr std::size_t kLineBytesMax = 1U << 20;
@@ -25,7 +26,8 @@ class LineReader {
   static Result<LineReader> open(const std::string& path);
 
   /// Stores the next line without its end in `line`; false at the end of the file.
-  /// Errors: damaged or cut archive, a limit passed; the sentence names file and line. Valid until: the next call.
+  /// Errors: damaged or cut archive, a limit passed; the sentence names file and line. Valid until:
+  /// the next call.
   [[nodiscard]] Result<bool> next(std::string_view& line);
 
   /// Number of the line that next() gave last, from 1.

@@ -17,7 +17,8 @@ constexpr double kPaceLeastStep_s = 0.05;
 constexpr double kMoved_m = 0.01;
 constexpr double kTurned_rad = 0.01;
 
-// Stamps can be used if enough of them differ: a log with seconds since 1970 printed in six digits has a handful.
+// Stamps can be used if enough of them differ: a log with seconds since 1970 printed in six digits
+// has a handful.
 bool stamps_usable(const RobotLog& log) {
   std::set<double> different;
   std::size_t stamped = 0;
@@ -65,7 +66,8 @@ void pace_by_stamps(RobotLog& log) {
     const double stamp_s = stamps[index];
     if (stamp_s != 0.0) {
       if (started && stamp_s > clock_s) due_s += std::min(stamp_s - clock_s, kLongestPause_s);
-      // Far back is another clock, to be followed from here on; a little back is a merge that was not quite in order.
+      // Far back is another clock, to be followed from here on; a little back is a merge that was
+      // not quite in order.
       const bool other_clock = stamp_s < clock_s - kLongestPause_s;
       clock_s = started && !other_clock ? std::max(clock_s, stamp_s) : stamp_s;
       started = true;
@@ -80,8 +82,10 @@ void pace_by_way(RobotLog& log) {
   for (LogRecord& record : log.records) {
     if (before != nullptr && record.stamp_s != 0.0) {
       const double way_m = distance_m(position(record.pose), position(before->pose));
-      const double turn_rad = std::abs(normalized_angle(record.pose.heading_rad - before->pose.heading_rad));
-      const double step_s = std::max({kPaceLeastStep_s, way_m / kPaceLinear_mps, turn_rad / kPaceAngular_radps});
+      const double turn_rad =
+          std::abs(normalized_angle(record.pose.heading_rad - before->pose.heading_rad));
+      const double step_s =
+          std::max({kPaceLeastStep_s, way_m / kPaceLinear_mps, turn_rad / kPaceAngular_radps});
       due_s += std::min(step_s, kLongestPause_s);
     }
     record.due_s = due_s;
@@ -93,8 +97,9 @@ void pace_by_way(RobotLog& log) {
 double first_event_s(const RobotLog& log) {
   const Pose& start = log.records.front().pose;
   for (const LogRecord& record : log.records) {
-    const bool moved = distance_m(position(record.pose), position(start)) > kMoved_m ||
-                       std::abs(normalized_angle(record.pose.heading_rad - start.heading_rad)) > kTurned_rad;
+    const bool moved =
+        distance_m(position(record.pose), position(start)) > kMoved_m ||
+        std::abs(normalized_angle(record.pose.heading_rad - start.heading_rad)) > kTurned_rad;
     if (moved || record.is_scan()) return record.due_s;
   }
   return 0.0;
@@ -107,14 +112,17 @@ void pace_log(RobotLog& log) {
     pace_by_stamps(log);
   } else {
     pace_by_way(log);
-    log.pacing_note = "the log's time stamps are rounded too far to follow: paced by the robot's way at 0.5 m/s";
+    log.pacing_note =
+        "the log's time stamps are rounded too far to follow: paced by the robot's way at 0.5 m/s";
   }
   const double left_out_s = first_event_s(log) - kLeadIn_s;
   if (left_out_s < kShortestLeftOut_s) return;
-  std::erase_if(log.records, [left_out_s](const LogRecord& record) { return record.due_s < left_out_s; });
+  std::erase_if(log.records,
+                [left_out_s](const LogRecord& record) { return record.due_s < left_out_s; });
   for (LogRecord& record : log.records) record.due_s -= left_out_s;
   if (!log.pacing_note.empty()) log.pacing_note += "; ";
-  log.pacing_note += fmt::format("left out the first {:.0f} s, in which the robot stands still", left_out_s);
+  log.pacing_note +=
+      fmt::format("left out the first {:.0f} s, in which the robot stands still", left_out_s);
 }
 
 }  // namespace gimnet::demo

@@ -15,7 +15,10 @@ constexpr double kTwistWindow_s = 0.5;
 }  // namespace
 
 LogPlayer::LogPlayer(RobotLog log, Start start)
-    : log_(std::move(log)), source_(std::move(start.source)), speed_(start.speed), clock_ns_(start.start_ns) {}
+    : log_(std::move(log)),
+      source_(std::move(start.source)),
+      speed_(start.speed),
+      clock_ns_(start.start_ns) {}
 
 void LogPlayer::let_time_pass(std::int64_t now_ns) {
   if (!paused_) played_s_ += speed_ * static_cast<double>(now_ns - clock_ns_) * 1e-9;
@@ -37,8 +40,10 @@ Twist LogPlayer::twist_at(const LogRecord& record) {
   if (dt_s < 0.05) return {};
   const double dx_m = record.pose.x_m - before.pose.x_m;
   const double dy_m = record.pose.y_m - before.pose.y_m;
-  const double ahead_m = dx_m * std::cos(record.pose.heading_rad) + dy_m * std::sin(record.pose.heading_rad);
-  return {ahead_m / dt_s, normalized_angle(record.pose.heading_rad - before.pose.heading_rad) / dt_s};
+  const double ahead_m =
+      dx_m * std::cos(record.pose.heading_rad) + dy_m * std::sin(record.pose.heading_rad);
+  return {ahead_m / dt_s,
+          normalized_angle(record.pose.heading_rad - before.pose.heading_rad) / dt_s};
 }
 
 void LogPlayer::say(const LogRecord& record, std::int64_t now_ns, const Output& output) {
@@ -54,9 +59,11 @@ void LogPlayer::say(const LogRecord& record, std::int64_t now_ns, const Output& 
   Scan scan;
   scan.stamp = {++scan_total_, now_ns};
   scan.pose = record.pose;
-  // n beams over half a circle: 180 are half a degree off centre each way, 181 and 361 reach both ends.
+  // n beams over half a circle: 180 are half a degree off centre each way, 181 and 361 reach both
+  // ends.
   const auto beams = static_cast<double>(record.ranges_m.size());
-  scan.bearing_step_rad = std::numbers::pi / (record.ranges_m.size() % 2 == 0 ? beams : std::max(1.0, beams - 1.0));
+  scan.bearing_step_rad =
+      std::numbers::pi / (record.ranges_m.size() % 2 == 0 ? beams : std::max(1.0, beams - 1.0));
   scan.first_bearing_rad = -scan.bearing_step_rad * (beams - 1.0) / 2.0;
   scan.range_max_m = static_cast<double>(kLogRangeMax_m);
   scan.ranges_m = record.ranges_m;

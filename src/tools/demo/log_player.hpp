@@ -13,7 +13,8 @@ namespace gimnet::demo {
 inline constexpr double kPlaySpeedMin = 0.1;
 inline constexpr double kPlaySpeedMax = 100.0;
 
-/// Plays a recorded run. Commands set the speed and hold it; the robot itself cannot be driven any more.
+/// Plays a recorded run. Commands set the speed and hold it; the robot itself cannot be driven any
+/// more.
 class LogPlayer final : public RobotSource {
  public:
   /// How a playback begins. `speed` is within kPlaySpeedMin .. kPlaySpeedMax.

@@ -24,5 +24,6 @@ int main(int count, char** words) {
   constexpr unsigned kRobotPatience_s = 1;
   constexpr unsigned kViewerPatience_s = 20;
   remember_stop_signals(options->role == Role::kRobot ? kRobotPatience_s : kViewerPatience_s);
-  return static_cast<int>(options->role == Role::kRobot ? run_robot(*options) : run_viewer(*options));
+  return static_cast<int>(options->role == Role::kRobot ? run_robot(*options)
+                                                        : run_viewer(*options));
 }

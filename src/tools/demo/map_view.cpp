@@ -25,11 +25,13 @@ void draw_plan(Plot& plot, const WorldMap& map) {
   };
   for (long row = 0; row < rows; ++row) {
     for (long column = 0; column < columns; ++column) {
-      const bool outline = floor_at(column - 1, row) || floor_at(column + 1, row) || floor_at(column, row - 1) ||
-                           floor_at(column, row + 1);
+      const bool outline = floor_at(column - 1, row) || floor_at(column + 1, row) ||
+                           floor_at(column, row - 1) || floor_at(column, row + 1);
       if (!map.wall(column, row) || !outline) continue;
-      const Point least{static_cast<double>(column) * WorldMap::kCell_m, static_cast<double>(row) * WorldMap::kCell_m};
-      plot.fill({least, {least.x_m + WorldMap::kCell_m, least.y_m + WorldMap::kCell_m}}, Ink::kPlan);
+      const Point least{static_cast<double>(column) * WorldMap::kCell_m,
+                        static_cast<double>(row) * WorldMap::kCell_m};
+      plot.fill({least, {least.x_m + WorldMap::kCell_m, least.y_m + WorldMap::kCell_m}},
+                Ink::kPlan);
     }
   }
 }
@@ -42,20 +44,23 @@ void draw_seen(Plot& plot, const OccupancyMap& seen) {
       plot.ground(at, Ground::kSeen);
       return;
     }
-    plot.fill({{at.x_m - kHalf_m, at.y_m - kHalf_m}, {at.x_m + kHalf_m, at.y_m + kHalf_m}}, Ink::kWall);
+    plot.fill({{at.x_m - kHalf_m, at.y_m - kHalf_m}, {at.x_m + kHalf_m, at.y_m + kHalf_m}},
+              Ink::kWall);
   });
 }
 
 void draw_scan(Plot& plot, const PlacedScan& scan) {
   const double step_m = plot.view().metres_per_dot;
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
-    const double bearing_rad = scan.first_bearing_rad + scan.bearing_step_rad * static_cast<double>(beam);
+    const double bearing_rad =
+        scan.first_bearing_rad + scan.bearing_step_rad * static_cast<double>(beam);
     const Ray ray{position(scan.pose), scan.pose.heading_rad + bearing_rad};
     const bool hit = scan.hit(beam);
-    const double reach_m =
-        hit ? static_cast<double>(scan.ranges_m[beam]) : std::min(OccupancyMap::kFreeWithoutHit_m, scan.range_max_m);
+    const double reach_m = hit ? static_cast<double>(scan.ranges_m[beam])
+                               : std::min(OccupancyMap::kFreeWithoutHit_m, scan.range_max_m);
     const int steps = static_cast<int>(reach_m / step_m);
-    for (int step = 0; step <= steps; ++step) plot.ground(point_along(ray, step * step_m), Ground::kBeam);
+    for (int step = 0; step <= steps; ++step)
+      plot.ground(point_along(ray, step * step_m), Ground::kBeam);
     if (hit) plot.dot(scan.end_of(beam), Ink::kScan);
   }
 }
@@ -83,11 +88,13 @@ View choose_view(const Monitor& monitor, const MapChoice& choice, Extent extent)
   const Point robot = position(monitor.pose().value_or(Pose{}));
   View view;
   if (monitor.plan()) {
-    view = Plot::fitted({{0.0, 0.0}, {monitor.plan()->width_m(), monitor.plan()->height_m()}}, extent);
+    view =
+        Plot::fitted({{0.0, 0.0}, {monitor.plan()->width_m(), monitor.plan()->height_m()}}, extent);
   } else if (!monitor.seen().empty()) {
     view = Plot::fitted(widened({monitor.seen().least(), monitor.seen().most()}, robot), extent);
   } else {
-    view = Plot::fitted({{robot.x_m - 5.0, robot.y_m - 5.0}, {robot.x_m + 5.0, robot.y_m + 5.0}}, extent);
+    view = Plot::fitted({{robot.x_m - 5.0, robot.y_m - 5.0}, {robot.x_m + 5.0, robot.y_m + 5.0}},
+                        extent);
   }
   if (choice.follow) view.metres_per_dot = std::min(view.metres_per_dot, kFollowMetresPerDot);
   view.metres_per_dot /= choice.zoom;

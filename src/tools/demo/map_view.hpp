@@ -17,7 +17,8 @@ struct MapChoice {
 /// The view that shows what was chosen, for a plot of that extent. Thread safety: pure functions.
 [[nodiscard]] View choose_view(const Monitor& monitor, const MapChoice& choice, Extent extent);
 
-/// Draws the hall, what scans saw of the world, the trail, the latest scan and the robot, in this order.
+/// Draws the hall, what scans saw of the world, the trail, the latest scan and the robot, in this
+/// order.
 void draw_map(Plot& plot, const Monitor& monitor, const MapChoice& choice);
 
 /// Draws a bar of a round length with its length in metres, from that place to the right.

@@ -33,7 +33,8 @@ void put(Writer& writer, const Twist& twist) {
   writer.put_f64("w", twist.angular_radps);
 }
 
-// Reads values in the order in which they were written, and remembers whether one was missing or not as it should be.
+// Reads values in the order in which they were written, and remembers whether one was missing or
+// not as it should be.
 class Decoder {
  public:
   explicit Decoder(std::span<const std::byte> bytes) : reader_(bytes) {}
@@ -67,7 +68,8 @@ class Decoder {
   }
   void get(std::string_view key, std::vector<float>& out) {
     const std::optional<Value> value = take(key);
-    good_ = good_ && value && value->type() == BITESTREAM_F32_ARRAY && value->count() <= kScanBeamsMax;
+    good_ =
+        good_ && value && value->type() == BITESTREAM_F32_ARRAY && value->count() <= kScanBeamsMax;
     if (!good_) return;
     out.reserve(value->count());
     for (std::size_t index = 0; index < value->count(); ++index) {
@@ -94,7 +96,9 @@ class Decoder {
   [[nodiscard]] bool good() const { return good_; }
 
  private:
-  std::optional<Value> take(std::string_view key) { return good_ ? reader_.find(key) : std::nullopt; }
+  std::optional<Value> take(std::string_view key) {
+    return good_ ? reader_.find(key) : std::nullopt;
+  }
 
   template <class From, class To>
   void keep(bool fits, const std::optional<From>& from, To& to) {

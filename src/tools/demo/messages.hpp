@@ -11,16 +11,17 @@
 
 namespace gimnet::demo {
 
-// What the robot and its driver tell each other: Bitestream with text keys, so that any tool can print them.
+// What the robot and its driver tell each other: Bitestream with text keys, so that any tool can
+// print them.
 //
 //     robot/odom   provided by the robot, 40 a second   Odometry
 //     robot/scan   provided by the robot, 10 a second   Scan
 //     robot/info   provided by the robot, 2 a second    RobotInfo
 //     robot/drive  accepted by the robot                DriveCommand
 //
-// Every message has a number, counted from 1 per service and sender, so that each end can tell what it missed, and the
-// time at which it was made, so that the other can tell how old it is.
-// Thread safety: pure functions. Errors: decode_...() gives nothing for bytes that are not such a message.
+// Every message has a number, counted from 1 per service and sender, so that each end can tell what
+// it missed, and the time at which it was made, so that the other can tell how old it is. Thread
+// safety: pure functions. Errors: decode_...() gives nothing for bytes that are not such a message.
 // Limits: `kScanBeamsMax` beams, `kInfoTextMax` bytes of map text.
 
 inline constexpr std::size_t kScanBeamsMax = 4096;
@@ -38,7 +39,8 @@ struct Odometry {
   Pose pose;
   Twist twist;
   bool bumped = false;
-  /// The command under which the robot moves; number 0: none. Its age is the time of the whole loop.
+  /// The command under which the robot moves; number 0: none. Its age is the time of the whole
+  /// loop.
   Stamp answers;
 };
 
@@ -53,8 +55,9 @@ struct Scan {
   std::vector<float> ranges_m;
 };
 
-/// What the robot is, and how much it has said: the totals let a reader tell that it has everything.
-/// Keys: n, t, source, note, map, played, duration, speed, paused, ended, odom_total, scan_total, drive_total.
+/// What the robot is, and how much it has said: the totals let a reader tell that it has
+/// everything. Keys: n, t, source, note, map, played, duration, speed, paused, ended, odom_total,
+/// scan_total, drive_total.
 struct RobotInfo {
   Stamp stamp;
   /// "simulation", or the name of the log.

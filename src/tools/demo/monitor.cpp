@@ -40,8 +40,8 @@ void Monitor::take(const Odometry& message, std::int64_t now_ns) {
 void Monitor::take(const Scan& message, std::int64_t now_ns) {
   scan_stream_.take(message.stamp.number, now_ns);
   scan_age_.add(now_ns - message.stamp.made_ns);
-  scan_ = PlacedScan{message.pose, message.first_bearing_rad, message.bearing_step_rad, message.range_max_m,
-                     message.ranges_m};
+  scan_ = PlacedScan{message.pose, message.first_bearing_rad, message.bearing_step_rad,
+                     message.range_max_m, message.ranges_m};
   seen_.add(*scan_);
 }
 

@@ -26,14 +26,15 @@ struct StreamRecord {
   void take(std::uint64_t number, std::int64_t now_ns);
 };
 
-/// Everything that the viewer has heard, ready to be shown. Times are ns since 1970. Thread safety: one thread.
-/// Limits: a trail of `kTrailPointsMax` points, thinned out when it is full.
+/// Everything that the viewer has heard, ready to be shown. Times are ns since 1970. Thread safety:
+/// one thread. Limits: a trail of `kTrailPointsMax` points, thinned out when it is full.
 class Monitor {
  public:
   static constexpr std::size_t kTrailPointsMax = 20'000;
   static constexpr double kTrailStep_m = 0.04;
 
-  /// `joined_late`: the robot may have begun before, so what came before the first message is not missed.
+  /// `joined_late`: the robot may have begun before, so what came before the first message is not
+  /// missed.
   explicit Monitor(std::int64_t start_ns, bool joined_late = false) : start_ns_(start_ns) {
     odometry_stream_.joined_late = scan_stream_.joined_late = joined_late;
   }
@@ -50,7 +51,8 @@ class Monitor {
   [[nodiscard]] std::int64_t start_ns() const { return start_ns_; }
   [[nodiscard]] const std::optional<Odometry>& odometry() const { return odometry_; }
   [[nodiscard]] const std::optional<PlacedScan>& scan() const { return scan_; }
-  /// Where the robot is, by its odometry; by its last scan, if it has none: a log may hold only one of them.
+  /// Where the robot is, by its odometry; by its last scan, if it has none: a log may hold only one
+  /// of them.
   [[nodiscard]] std::optional<Pose> pose() const;
   [[nodiscard]] const std::optional<RobotInfo>& info() const { return info_; }
   [[nodiscard]] const std::optional<HubCounters>& hub() const { return hub_; }

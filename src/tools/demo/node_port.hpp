@@ -17,8 +17,8 @@ namespace gimnet::demo {
 /// The four services of the demo (messages.hpp).
 enum class Service : std::uint8_t { kOdometry, kScan, kInfo, kDrive };
 
-/// What robot and viewer need of the network: a seam, so that tests put two ends together without a hub.
-/// Thread safety: one thread. Ownership: of its connection, which ends with it.
+/// What robot and viewer need of the network: a seam, so that tests put two ends together without a
+/// hub. Thread safety: one thread. Ownership: of its connection, which ends with it.
 class NodePort {
  public:
   /// A message of a service: to the viewer from odom, scan and info; to the robot from drive.
@@ -35,13 +35,15 @@ class NodePort {
   [[nodiscard]] virtual std::int64_t now_ns() const { return wall_now_ns(); }
 
   /// Sends a message to all subscribers of an own service. Errors: the connection ended for good.
-  [[nodiscard]] virtual std::optional<Error> publish(Service service, std::span<const std::byte> payload) = 0;
+  [[nodiscard]] virtual std::optional<Error> publish(Service service,
+                                                     std::span<const std::byte> payload) = 0;
 
-  /// Sends a command to the robot, in the lane that goes first. Errors: the connection ended for good.
+  /// Sends a command to the robot, in the lane that goes first. Errors: the connection ended for
+  /// good.
   [[nodiscard]] virtual std::optional<Error> command(std::span<const std::byte> payload) = 0;
 
-  /// The next message; nothing if none comes within `wait_ns`. Also the time in which events are seen to.
-  /// Errors: the connection ended for good.
+  /// The next message; nothing if none comes within `wait_ns`. Also the time in which events are
+  /// seen to. Errors: the connection ended for good.
   [[nodiscard]] virtual Result<std::optional<Event>> receive(std::int64_t wait_ns) = 0;
 
   /// Are there subscribers of all own services that are provided?

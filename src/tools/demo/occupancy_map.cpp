@@ -18,13 +18,16 @@ void add_weight(std::int8_t& weight, int change) {
   weight = static_cast<std::int8_t>(sum);
 }
 
-long floor_divided(long value, long by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
+long floor_divided(long value, long by) {
+  return value >= 0 ? value / by : -((by - 1 - value) / by);
+}
 
 }  // namespace
 
 Point PlacedScan::end_of(std::size_t beam) const {
   const double bearing_rad = first_bearing_rad + bearing_step_rad * static_cast<double>(beam);
-  return point_along({position(pose), pose.heading_rad + bearing_rad}, static_cast<double>(ranges_m[beam]));
+  return point_along({position(pose), pose.heading_rad + bearing_rad},
+                     static_cast<double>(ranges_m[beam]));
 }
 
 std::size_t OccupancyMap::IndexHash::operator()(const Index& index) const {
@@ -34,7 +37,8 @@ std::size_t OccupancyMap::IndexHash::operator()(const Index& index) const {
 }
 
 OccupancyMap::Index OccupancyMap::index_of(const Point& point) {
-  return {static_cast<long>(std::floor(point.x_m / kCell_m)), static_cast<long>(std::floor(point.y_m / kCell_m))};
+  return {static_cast<long>(std::floor(point.x_m / kCell_m)),
+          static_cast<long>(std::floor(point.y_m / kCell_m))};
 }
 
 std::int8_t* OccupancyMap::weight_of(const Index& index) {
@@ -49,8 +53,8 @@ std::int8_t* OccupancyMap::weight_of(const Index& index) {
   return &found->second[static_cast<std::size_t>(row * kChunkCells + column)];
 }
 
-// Steps of half a square: no square of any length on the way is left out, and none before the end is taken twice often
-// enough to matter.
+// Steps of half a square: no square of any length on the way is left out, and none before the end
+// is taken twice often enough to matter.
 void OccupancyMap::clear_along(const Point& from, const Point& to) {
   const double length_m = distance_m(from, to);
   const auto steps = static_cast<long>(length_m / (kCell_m / 2.0));
@@ -59,7 +63,8 @@ void OccupancyMap::clear_along(const Point& from, const Point& to) {
   bool first = true;
   for (long step = 0; step < steps; ++step) {
     const double part = static_cast<double>(step) / static_cast<double>(steps);
-    const Index at = index_of({from.x_m + part * (to.x_m - from.x_m), from.y_m + part * (to.y_m - from.y_m)});
+    const Index at =
+        index_of({from.x_m + part * (to.x_m - from.x_m), from.y_m + part * (to.y_m - from.y_m)});
     if (at == last || (!first && at == before)) continue;
     first = false;
     before = at;
@@ -87,9 +92,11 @@ void OccupancyMap::add(const PlacedScan& scan) {
       if (static_cast<double>(scan.ranges_m[beam]) <= kBoundsReach_m) widen(scan.end_of(beam));
       continue;
     }
-    const double bearing_rad = scan.first_bearing_rad + scan.bearing_step_rad * static_cast<double>(beam);
+    const double bearing_rad =
+        scan.first_bearing_rad + scan.bearing_step_rad * static_cast<double>(beam);
     const Ray ray{position(scan.pose), scan.pose.heading_rad + bearing_rad};
-    clear_along(position(scan.pose), point_along(ray, std::min(kFreeWithoutHit_m, scan.range_max_m)));
+    clear_along(position(scan.pose),
+                point_along(ray, std::min(kFreeWithoutHit_m, scan.range_max_m)));
   }
 }
 
@@ -100,7 +107,8 @@ void OccupancyMap::for_each(const std::function<void(const Cell&)>& visit) const
       if (weight == 0) continue;
       const long column = at.column * kChunkCells + offset % kChunkCells;
       const long row = at.row * kChunkCells + offset / kChunkCells;
-      visit({{(static_cast<double>(column) + 0.5) * kCell_m, (static_cast<double>(row) + 0.5) * kCell_m},
+      visit({{(static_cast<double>(column) + 0.5) * kCell_m,
+              (static_cast<double>(row) + 0.5) * kCell_m},
              weight >= kOccupiedFrom});
     }
   }

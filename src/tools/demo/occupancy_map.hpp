@@ -23,13 +23,15 @@ struct PlacedScan {
 
   /// Where a beam ended. REQUIRES: beam < ranges_m.size().
   [[nodiscard]] Point end_of(std::size_t beam) const;
-  [[nodiscard]] bool hit(std::size_t beam) const { return static_cast<double>(ranges_m[beam]) < range_max_m; }
+  [[nodiscard]] bool hit(std::size_t beam) const {
+    return static_cast<double>(ranges_m[beam]) < range_max_m;
+  }
 };
 
-/// A picture of the world built from scans: squares that beams ended in, and squares that they passed. Each square
-/// keeps a weight, so that what moves away fades (Moravec and Elfes, "High Resolution Maps from Wide Angle Sonar",
-/// 1985). Grows where scans reach. Thread safety: one thread. Limits: `kChunksMax` pieces, about 64 MiB; beyond them
-/// what is new is not drawn.
+/// A picture of the world built from scans: squares that beams ended in, and squares that they
+/// passed. Each square keeps a weight, so that what moves away fades (Moravec and Elfes, "High
+/// Resolution Maps from Wide Angle Sonar", 1985). Grows where scans reach. Thread safety: one
+/// thread. Limits: `kChunksMax` pieces, about 64 MiB; beyond them what is new is not drawn.
 class OccupancyMap {
  public:
   static constexpr double kCell_m = 0.1;
@@ -37,7 +39,8 @@ class OccupancyMap {
   /// A beam that met nothing still shows that this much before it is free.
   static constexpr double kFreeWithoutHit_m = 4.0;
 
-  /// What is farther away from the scanner does not widen the bounds: far hits are few, and often wrong.
+  /// What is farther away from the scanner does not widen the bounds: far hits are few, and often
+  /// wrong.
   static constexpr double kBoundsReach_m = 15.0;
 
   void add(const PlacedScan& scan);

@@ -40,9 +40,9 @@ struct Argument {
   std::string_view name;
   bool takes_value;
 };
-constexpr Argument kArguments[] = {{"--log", true},   {"--map", true},   {"--speed", true},  {"--seconds", true},
-                                   {"--hub", true},   {"--robot", true}, {"--ascii", false}, {"--utf8", false},
-                                   {"--help", false}, {"-h", false}};
+constexpr Argument kArguments[] = {
+    {"--log", true},   {"--map", true},    {"--speed", true}, {"--seconds", true}, {"--hub", true},
+    {"--robot", true}, {"--ascii", false}, {"--utf8", false}, {"--help", false},   {"-h", false}};
 
 struct Bounds {
   double least;
@@ -55,7 +55,8 @@ Result<double> number_of(std::string_view name, std::string_view text, const Bou
   // The comparison is false for what is no number, too.
   const bool within = value >= bounds.least && value <= bounds.most;
   if (code != std::errc{} || end != text.data() + text.size() || !within) {
-    return Error{fmt::format("{} takes a number from {} to {}, not '{}'", name, bounds.least, bounds.most, text)};
+    return Error{fmt::format("{} takes a number from {} to {}, not '{}'", name, bounds.least,
+                             bounds.most, text)};
   }
   return value;
 }
@@ -66,10 +67,11 @@ constexpr std::size_t kRobotNameBytesMax = 200;
 // Is it a node's name by docs/protocol.md, section 8, of one part?
 bool is_node_name(std::string_view name) {
   const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
-           c == '-';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
   };
-  return !name.empty() && name.size() <= kRobotNameBytesMax && std::all_of(name.begin(), name.end(), allowed);
+  return !name.empty() && name.size() <= kRobotNameBytesMax &&
+         std::all_of(name.begin(), name.end(), allowed);
 }
 
 std::optional<Error> apply(Options& options, std::string_view name, std::string_view value) {
@@ -81,7 +83,8 @@ std::optional<Error> apply(Options& options, std::string_view name, std::string_
   if (name == "--help" || name == "-h") options.help = true;
   if (name == "--robot") {
     if (!is_node_name(value)) {
-      return Error{fmt::format("--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
+      return Error{fmt::format(
+          "--robot takes a name of letters, digits, '.', '_' and '-', not '{}'", value)};
     }
     options.robot = value;
   }
@@ -98,29 +101,39 @@ std::optional<Error> apply(Options& options, std::string_view name, std::string_
   return std::nullopt;
 }
 
-std::optional<Error> contradiction(const Options& options, const std::vector<std::string_view>& given) {
-  const auto has = [&](std::string_view name) { return std::find(given.begin(), given.end(), name) != given.end(); };
+std::optional<Error> contradiction(const Options& options,
+                                   const std::vector<std::string_view>& given) {
+  const auto has = [&](std::string_view name) {
+    return std::find(given.begin(), given.end(), name) != given.end();
+  };
   if (has("--log") && has("--map")) {
     return Error{"--log and --map exclude each other: a log brings its own world; leave one out"};
   }
-  if (has("--speed") && !has("--log")) return Error{"--speed is the speed of a log; add --log FILE, or leave it out"};
-  if (has("--ascii") && has("--utf8")) return Error{"--ascii and --utf8 exclude each other; leave one out"};
+  if (has("--speed") && !has("--log"))
+    return Error{"--speed is the speed of a log; add --log FILE, or leave it out"};
+  if (has("--ascii") && has("--utf8"))
+    return Error{"--ascii and --utf8 exclude each other; leave one out"};
   if (options.role == Role::kAll && has("--hub")) {
     return Error{"--hub is for one part of the demo: say 'robot' or 'view' first, or leave it out"};
   }
   if (options.role == Role::kView) {
     for (const std::string_view name : {"--log", "--map", "--speed"}) {
-      if (has(name)) return Error{fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", name)};
+      if (has(name))
+        return Error{fmt::format("{} is the robot's; give it to 'gimnet-demo robot'", name)};
     }
   }
   if (options.role == Role::kRobot) {
     for (const std::string_view name : {"--seconds", "--ascii", "--utf8"}) {
-      if (has(name)) return Error{fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", name)};
+      if (has(name))
+        return Error{fmt::format("{} is the viewer's; give it to 'gimnet-demo view'", name)};
     }
   }
   for (const std::string_view name : {"--log", "--map", "--hub"}) {
-    const std::string& value = name == "--log" ? options.log : name == "--map" ? options.map : options.hub_url;
-    if (has(name) && value.empty()) return Error{fmt::format("{} is empty; give it a value, or leave it out", name)};
+    const std::string& value = name == "--log"   ? options.log
+                               : name == "--map" ? options.map
+                                                 : options.hub_url;
+    if (has(name) && value.empty())
+      return Error{fmt::format("{} is empty; give it a value, or leave it out", name)};
   }
   return std::nullopt;
 }
@@ -144,8 +157,9 @@ Result<Options> parse_options(std::span<const char* const> arguments) {
     const std::string_view word = arguments[index];
     const std::size_t equals = word.starts_with("--") ? word.find('=') : std::string_view::npos;
     const std::string_view name = word.substr(0, equals);
-    const auto* known = std::find_if(std::begin(kArguments), std::end(kArguments),
-                                     [&](const Argument& argument) { return argument.name == name; });
+    const auto* known =
+        std::find_if(std::begin(kArguments), std::end(kArguments),
+                     [&](const Argument& argument) { return argument.name == name; });
     if (known == std::end(kArguments)) {
       return Error{fmt::format("there is no argument '{}'; 'gimnet-demo --help' lists them", word)};
     }
@@ -155,10 +169,12 @@ Result<Options> parse_options(std::span<const char* const> arguments) {
     given.push_back(name);
     std::string_view value;
     if (equals != std::string_view::npos) {
-      if (!known->takes_value) return Error{fmt::format("{} takes no value; write only {}", name, name)};
+      if (!known->takes_value)
+        return Error{fmt::format("{} takes no value; write only {}", name, name)};
       value = word.substr(equals + 1);
     } else if (known->takes_value) {
-      if (++index >= arguments.size()) return Error{fmt::format("{} needs a value behind it", name)};
+      if (++index >= arguments.size())
+        return Error{fmt::format("{} needs a value behind it", name)};
       value = arguments[index];
     }
     if (const std::optional<Error> error = apply(options, name, value)) return *error;

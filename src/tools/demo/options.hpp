@@ -36,8 +36,9 @@ struct Options {
   Glyphs glyphs = Glyphs::kAuto;
 };
 
-/// Reads the arguments behind the program's name. Errors: unknown or repeated arguments, values that are missing or
-/// out of range, and combinations that mean nothing; the sentence says what to do.
+/// Reads the arguments behind the program's name. Errors: unknown or repeated arguments, values
+/// that are missing or out of range, and combinations that mean nothing; the sentence says what to
+/// do.
 [[nodiscard]] Result<Options> parse_options(std::span<const char* const> arguments);
 
 /// The text of --help.

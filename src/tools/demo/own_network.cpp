@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::int64_t kReady_ns = 10'000'000'000;
 
-std::vector<std::string> robot_words(const Options& options, const std::string& program, const std::string& hub_url) {
+std::vector<std::string> robot_words(const Options& options, const std::string& program,
+                                     const std::string& hub_url) {
   std::vector<std::string> words = {program, "robot", "--hub", hub_url, "--robot", options.robot};
   if (!options.map.empty()) words.insert(words.end(), {"--map", options.map});
   if (!options.log.empty()) {
@@ -35,7 +36,8 @@ Result<HubAddresses> parse_ready_line(const std::string& line) {
     }
   }
   if (addresses.tcp.empty() || addresses.unix_socket.empty()) {
-    return Error{fmt::format("the hub said '{}' instead of 'ready' and its addresses; is it another version?", line)};
+    return Error{fmt::format(
+        "the hub said '{}' instead of 'ready' and its addresses; is it another version?", line)};
   }
   return addresses;
 }
@@ -46,15 +48,16 @@ std::string folder_of_this_program() {
   return error ? "." : program.parent_path().string();
 }
 
-Result<OwnNetwork> OwnNetwork::start(const Options& options, const std::string& folder_of_programs) {
+Result<OwnNetwork> OwnNetwork::start(const Options& options,
+                                     const std::string& folder_of_programs) {
   Result<TemporaryFolder> folder = TemporaryFolder::make();
   if (!folder) return folder.error();
   const std::string hub_log = *folder / "tcphub.log";
-  Result<ChildProcess> hub =
-      ChildProcess::start({"the hub",
-                           {folder_of_programs + "/tcphub", "--listen", "tcp://127.0.0.1:0", "--listen",
-                            "unix:" + (*folder / "hub.sock"), "--state-dir", *folder / "state"},
-                           hub_log});
+  Result<ChildProcess> hub = ChildProcess::start(
+      {"the hub",
+       {folder_of_programs + "/tcphub", "--listen", "tcp://127.0.0.1:0", "--listen",
+        "unix:" + (*folder / "hub.sock"), "--state-dir", *folder / "state"},
+       hub_log});
   if (!hub) return hub.error();
   const Result<std::string> ready = hub->read_line(kReady_ns);
   if (!ready) return ready.error();
@@ -65,7 +68,9 @@ Result<OwnNetwork> OwnNetwork::start(const Options& options, const std::string& 
   OwnNetwork network(std::move(*folder), std::move(*hub));
   network.hub_url_ = addresses->tcp;
   Result<ChildProcess> robot = ChildProcess::start(
-      {"the robot", robot_words(options, folder_of_programs + "/gimnet-demo", addresses->unix_socket), robot_log});
+      {"the robot",
+       robot_words(options, folder_of_programs + "/gimnet-demo", addresses->unix_socket),
+       robot_log});
   if (!robot) return robot.error();
   network.robot_ = std::move(*robot);
   const Result<std::string> there = network.robot_->read_line(kReady_ns);

@@ -10,22 +10,25 @@
 
 namespace gimnet::demo {
 
-/// The demo's own hub and robot, each a process, with their files in a temporary folder. Ends them, the robot first,
-/// when it goes. Thread safety: one thread.
+/// The demo's own hub and robot, each a process, with their files in a temporary folder. Ends them,
+/// the robot first, when it goes. Thread safety: one thread.
 class OwnNetwork {
  public:
-  /// Starts a hub on a free port and a Unix socket, then a robot that connects over the socket. `folder_of_programs`
-  /// holds tcphub and gimnet-demo. Errors: a program is missing, does not start, or does not say that it is ready.
+  /// Starts a hub on a free port and a Unix socket, then a robot that connects over the socket.
+  /// `folder_of_programs` holds tcphub and gimnet-demo. Errors: a program is missing, does not
+  /// start, or does not say that it is ready.
   static Result<OwnNetwork> start(const Options& options, const std::string& folder_of_programs);
 
   /// Where the viewer connects: the TCP address.
   [[nodiscard]] const std::string& hub_url() const { return hub_url_; }
 
-  /// What happened to hub or robot, if one of them ended by itself; waits for the hub's end at most so long.
+  /// What happened to hub or robot, if one of them ended by itself; waits for the hub's end at most
+  /// so long.
   [[nodiscard]] std::optional<Error> trouble(std::int64_t wait_ns = 0);
 
  private:
-  OwnNetwork(TemporaryFolder folder, ChildProcess hub) : folder_(std::move(folder)), hub_(std::move(hub)) {}
+  OwnNetwork(TemporaryFolder folder, ChildProcess hub)
+      : folder_(std::move(folder)), hub_(std::move(hub)) {}
 
   // The order is that of the end: robot, hub, folder.
   TemporaryFolder folder_;

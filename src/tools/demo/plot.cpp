@@ -18,7 +18,8 @@ double cross(const Point& a, const Point& b, const Point& p) {
 Plot::Plot(Extent extent, const View& view)
     : extent_{std::max(0, extent.columns), std::max(0, extent.rows)},
       view_(view),
-      patches_(static_cast<std::size_t>(extent_.columns) * static_cast<std::size_t>(extent_.rows)) {}
+      patches_(static_cast<std::size_t>(extent_.columns) * static_cast<std::size_t>(extent_.rows)) {
+}
 
 View Plot::fitted(const Box& box, Extent extent) {
   const double dot_columns = std::max(1, extent.columns * kDotColumns);
@@ -30,8 +31,9 @@ View Plot::fitted(const Box& box, Extent extent) {
 }
 
 Plot::Dot Plot::dot_of(const Point& point) const {
-  return {(point.x_m - view_.centre.x_m) / view_.metres_per_dot + extent_.columns * kDotColumns / 2.0,
-          (view_.centre.y_m - point.y_m) / view_.metres_per_dot + extent_.rows * kDotRows / 2.0};
+  return {
+      (point.x_m - view_.centre.x_m) / view_.metres_per_dot + extent_.columns * kDotColumns / 2.0,
+      (view_.centre.y_m - point.y_m) / view_.metres_per_dot + extent_.rows * kDotRows / 2.0};
 }
 
 Box Plot::seen() const {
@@ -54,7 +56,8 @@ void Plot::set(long column, long row, Ink ink) {
   Patch* patch = patch_at(column, row);
   if (patch == nullptr) return;
   // Bits of the braille patterns: Unicode, chapter 21.1.
-  constexpr std::uint8_t kBits[kDotRows][kDotColumns] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
+  constexpr std::uint8_t kBits[kDotRows][kDotColumns] = {
+      {0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
   const std::uint8_t bit = kBits[row % kDotRows][column % kDotColumns];
   patch->dots = static_cast<std::uint8_t>(patch->dots | bit);
   if (ink == Ink::kRobot) patch->robot_dots = static_cast<std::uint8_t>(patch->robot_dots | bit);
@@ -81,7 +84,8 @@ void Plot::fill(const Box& box, Ink ink) {
   const int columns = extent_.columns * kDotColumns;
   const int rows = extent_.rows * kDotRows;
   for (long row = first(low.row, rows); row <= last(low.row, high.row, rows); ++row) {
-    for (long column = first(low.column, columns); column <= last(low.column, high.column, columns); ++column) {
+    for (long column = first(low.column, columns); column <= last(low.column, high.column, columns);
+         ++column) {
       set(column, row, ink);
     }
   }
@@ -116,7 +120,8 @@ void Plot::triangle(const Point& a, const Point& b, const Point& c, Ink ink) {
 void Plot::ground(const Point& point, Ground ground) {
   const Dot at = dot_of(point);
   if (std::abs(at.column) > 1e6 || std::abs(at.row) > 1e6) return;
-  Patch* patch = patch_at(static_cast<long>(std::floor(at.column)), static_cast<long>(std::floor(at.row)));
+  Patch* patch =
+      patch_at(static_cast<long>(std::floor(at.column)), static_cast<long>(std::floor(at.row)));
   if (patch != nullptr) patch->ground = std::max(patch->ground, ground);
 }
 

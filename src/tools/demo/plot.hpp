@@ -20,9 +20,9 @@ struct Box {
   Point most;
 };
 
-/// A picture in dots, 2 by 4 to a character: Unicode's braille patterns are a display of that resolution. A character
-/// has one colour, that of the highest ink in it; the robot's dots push all others out of their character. Thread
-/// safety: one thread.
+/// A picture in dots, 2 by 4 to a character: Unicode's braille patterns are a display of that
+/// resolution. A character has one colour, that of the highest ink in it; the robot's dots push all
+/// others out of their character. Thread safety: one thread.
 class Plot {
  public:
   static constexpr int kDotColumns = 2;

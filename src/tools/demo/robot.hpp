@@ -11,9 +11,9 @@
 
 namespace gimnet::demo {
 
-/// The robot's process: publishes what a source says and passes commands to it. It begins when somebody listens, so
-/// that nothing is said to nobody; from then on it goes on until told to stop. Thread safety: one thread. Ownership: of
-/// the source; not of the port.
+/// The robot's process: publishes what a source says and passes commands to it. It begins when
+/// somebody listens, so that nothing is said to nobody; from then on it goes on until told to stop.
+/// Thread safety: one thread. Ownership: of the source; not of the port.
 class Robot {
  public:
   static constexpr std::int64_t kInfoPeriod_ns = 500'000'000;
@@ -23,9 +23,11 @@ class Robot {
   /// Makes the source when the robot begins, at that time.
   using SourceMaker = std::function<std::unique_ptr<RobotSource>(std::int64_t now_ns)>;
 
-  Robot(NodePort& port, SourceMaker make_source) : port_(port), make_source_(std::move(make_source)) {}
+  Robot(NodePort& port, SourceMaker make_source)
+      : port_(port), make_source_(std::move(make_source)) {}
 
-  /// Waits for a message or for what is due next, and sees to it. Errors: the connection ended for good.
+  /// Waits for a message or for what is due next, and sees to it. Errors: the connection ended for
+  /// good.
   [[nodiscard]] std::optional<Error> step();
 
   /// Was told by a driver to say no more, and has said so.

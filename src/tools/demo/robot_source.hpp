@@ -7,8 +7,9 @@
 
 namespace gimnet::demo {
 
-/// Where a robot's data come from: a simulation, or a log. A source has no clock of its own: it is told the time, in ns
-/// since 1970, and says when it wants to be told again. Thread safety: one thread.
+/// Where a robot's data come from: a simulation, or a log. A source has no clock of its own: it is
+/// told the time, in ns since 1970, and says when it wants to be told again. Thread safety: one
+/// thread.
 class RobotSource {
  public:
   /// Takes what the robot says. Numbers and stamps are filled in.

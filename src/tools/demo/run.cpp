@@ -25,7 +25,8 @@ namespace {
 
 constexpr Extent kPicture{80, 24};
 
-// fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep the children alive.
+// fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep
+// the children alive.
 void say(const std::string& text) {
   (void)std::fwrite(text.data(), 1, text.size(), stderr);
   (void)std::fflush(stderr);
@@ -38,14 +39,17 @@ Result<Robot::SourceMaker> source_maker(const Options& options) {
     Result<RobotLog> log = load_robot_log(options.log);
     if (!log) return log.error();
     const std::string name = std::filesystem::path(options.log).filename().string();
-    return Robot::SourceMaker([log = std::move(*log), name, speed = options.speed](std::int64_t now_ns) {
-      return std::make_unique<LogPlayer>(log, LogPlayer::Start{name, speed, now_ns});
-    });
+    return Robot::SourceMaker(
+        [log = std::move(*log), name, speed = options.speed](std::int64_t now_ns) {
+          return std::make_unique<LogPlayer>(log, LogPlayer::Start{name, speed, now_ns});
+        });
   }
-  Result<WorldMap> map = options.map.empty() ? Result<WorldMap>(WorldMap::hall()) : WorldMap::load(options.map);
+  Result<WorldMap> map =
+      options.map.empty() ? Result<WorldMap>(WorldMap::hall()) : WorldMap::load(options.map);
   if (!map) return map.error();
-  return Robot::SourceMaker(
-      [map = std::move(*map)](std::int64_t now_ns) { return std::make_unique<SimulatedRobot>(map, now_ns); });
+  return Robot::SourceMaker([map = std::move(*map)](std::int64_t now_ns) {
+    return std::make_unique<SimulatedRobot>(map, now_ns);
+  });
 }
 
 // What the screen can show: the choice of the user, then the environment, then the terminal itself.
@@ -64,14 +68,16 @@ bool drives_itself(const Options& options, const Terminal* terminal) {
   return options.seconds.has_value() || terminal == nullptr;
 }
 
-// Checks what the robot's process would only find later, where the sentence would be harder to find.
+// Checks what the robot's process would only find later, where the sentence would be harder to
+// find.
 std::optional<Error> unusable_input(const Options& options) {
   if (options.role != Role::kAll) return std::nullopt;
   const Result<Robot::SourceMaker> maker = source_maker(options);
   return maker ? std::nullopt : std::optional(maker.error());
 }
 
-[[nodiscard]] bool show_summary(const Viewer& viewer, const TerminalStyle& style, bool interactive) {
+[[nodiscard]] bool show_summary(const Viewer& viewer, const TerminalStyle& style,
+                                bool interactive) {
   const std::string picture = interactive ? "" : viewer.last_picture(kPicture) + "\n";
   return show(picture + summary_text(viewer.monitor(), viewer.record(), style.utf8));
 }
@@ -145,7 +151,8 @@ ExitCode run_viewer(const Options& options) {
   if (error) complain(*error);
   if (error && !viewer.monitor().info()) return ExitCode::kLost;
   if (!show_summary(viewer, style, interactive)) return ExitCode::kLost;
-  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood : ExitCode::kLost;
+  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood
+                                                                     : ExitCode::kLost;
 }
 
 }  // namespace gimnet::demo

@@ -7,7 +7,8 @@
 
 namespace gimnet::demo {
 
-/// The latest durations, for percentiles and a little curve. Thread safety: one thread. Limits: keeps `capacity`.
+/// The latest durations, for percentiles and a little curve. Thread safety: one thread. Limits:
+/// keeps `capacity`.
 class SampleWindow {
  public:
   /// REQUIRES: capacity > 0.
@@ -15,7 +16,8 @@ class SampleWindow {
 
   void add(std::int64_t duration_ns);
 
-  /// The smallest duration that `percent` of all are not above (nearest rank); nothing if there are none.
+  /// The smallest duration that `percent` of all are not above (nearest rank); nothing if there are
+  /// none.
   [[nodiscard]] std::optional<std::int64_t> percentile_ns(double percent) const;
 
   /// The latest `count` durations, oldest first; fewer if there are fewer.

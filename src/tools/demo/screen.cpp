@@ -24,10 +24,12 @@ struct KeyHint {
   std::string_view keys;
   std::string_view what;
 };
-constexpr KeyHint kDriveHints[] = {{"W A S D", "drive"}, {"space", "stop"}, {"Q", "quit"},  {"P", "autopilot"},
-                                   {"F", "follow"},      {"+ -", "zoom"},   {"T", "trail"}, {"?", "help"}};
-constexpr KeyHint kPlayHints[] = {{"space", "hold"}, {"[ ]", "speed"}, {"Q", "quit"}, {"F", "follow"},
-                                  {"+ -", "zoom"},   {"T", "trail"},   {"?", "help"}};
+constexpr KeyHint kDriveHints[] = {{"W A S D", "drive"}, {"space", "stop"}, {"Q", "quit"},
+                                   {"P", "autopilot"},   {"F", "follow"},   {"+ -", "zoom"},
+                                   {"T", "trail"},       {"?", "help"}};
+constexpr KeyHint kPlayHints[] = {{"space", "hold"}, {"[ ]", "speed"}, {"Q", "quit"},
+                                  {"F", "follow"},   {"+ -", "zoom"},  {"T", "trail"},
+                                  {"?", "help"}};
 
 template <std::size_t size>
 void draw_hints(Canvas& canvas, const KeyHint (&hints)[size]) {
@@ -71,43 +73,47 @@ void draw_help(Canvas& canvas, const Area& area, bool log) {
   };
   const std::vector<std::string_view> own =
       log ? std::vector<std::string_view>{"space    hold the log, go on", "[ ]      slower, faster"}
-          : std::vector<std::string_view>{"W A S D  drive, as do the arrows; hold to go on", "space    stop",
-                                          "P        let the course drive, or you"};
+          : std::vector<std::string_view>{"W A S D  drive, as do the arrows; hold to go on",
+                                          "space    stop", "P        let the course drive, or you"};
   lines.insert(lines.begin(), own.begin(), own.end());
   const int columns = std::min(area.extent.columns, 51);
   const int rows = std::min(area.extent.rows, static_cast<int>(lines.size()) + 2);
   const Place corner{area.corner.column + (area.extent.columns - columns) / 2,
                      area.corner.row + (area.extent.rows - rows) / 2};
   for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) canvas.put({corner.column + column, corner.row + row}, Glyph{});
+    for (int column = 0; column < columns; ++column)
+      canvas.put({corner.column + column, corner.row + row}, Glyph{});
   }
   canvas.frame({corner, {columns, rows}});
   canvas.text({corner.column + 2, corner.row}, " keys ", Ink::kTitle);
   for (int index = 0; index + 2 < rows; ++index) {
     const std::string_view line = lines[static_cast<std::size_t>(index)];
-    canvas.text({corner.column + 2, corner.row + 1 + index}, line.substr(0, static_cast<std::size_t>(columns - 3)),
-                Ink::kPlain);
+    canvas.text({corner.column + 2, corner.row + 1 + index},
+                line.substr(0, static_cast<std::size_t>(columns - 3)), Ink::kPlain);
   }
 }
 
 // The progress of a log, over the lower edge of the map.
 void draw_progress(Canvas& canvas, const Area& area, const RobotInfo& info) {
   const std::string_view sign = info.ended ? "●" : info.paused ? "‖" : "▶";
-  const std::string text =
-      fmt::format(" {} {} / {} ×{:g} ", sign, clock_text(info.played_s), clock_text(info.duration_s), info.speed);
+  const std::string text = fmt::format(" {} {} / {} ×{:g} ", sign, clock_text(info.played_s),
+                                       clock_text(info.duration_s), info.speed);
   const int row = area.corner.row + area.extent.rows - 1;
   int column = canvas.text({area.corner.column + 1, row}, text, Ink::kTitle);
   const int bar = area.corner.column + area.extent.columns - 2 - column;
-  const double part = info.duration_s > 0.0 ? std::clamp(info.played_s / info.duration_s, 0.0, 1.0) : 1.0;
+  const double part =
+      info.duration_s > 0.0 ? std::clamp(info.played_s / info.duration_s, 0.0, 1.0) : 1.0;
   for (int index = 0; index < bar; ++index) {
     canvas.put({column + index, row},
                {index < part * bar ? U'━' : U'─', index < part * bar ? Ink::kTitle : Ink::kFrame});
   }
 }
 
-void draw_picture(Canvas& canvas, const Monitor& monitor, const ScreenState& state, const Area& area) {
+void draw_picture(Canvas& canvas, const Monitor& monitor, const ScreenState& state,
+                  const Area& area) {
   canvas.frame(area);
-  const Area inner{{area.corner.column + 1, area.corner.row + 1}, {area.extent.columns - 2, area.extent.rows - 2}};
+  const Area inner{{area.corner.column + 1, area.corner.row + 1},
+                   {area.extent.columns - 2, area.extent.rows - 2}};
   const View view = choose_view(monitor, state.map, inner.extent);
   Plot plot(inner.extent, view);
   draw_map(plot, monitor, state.map);
@@ -122,7 +128,8 @@ void draw_picture(Canvas& canvas, const Monitor& monitor, const ScreenState& sta
   if (log && !monitor.info()->note.empty() && state.now_ns - monitor.start_ns() < 8'000'000'000) {
     const std::string& note = monitor.info()->note;
     canvas.text({inner.corner.column + 1, inner.corner.row},
-                note.substr(0, static_cast<std::size_t>(std::max(0, inner.extent.columns - 2))), Ink::kWarn);
+                note.substr(0, static_cast<std::size_t>(std::max(0, inner.extent.columns - 2))),
+                Ink::kWarn);
   }
   if (state.help) draw_help(canvas, area, log);
 }
@@ -134,7 +141,8 @@ Canvas draw_screen(const Monitor& monitor, const ScreenState& state, Extent exte
   extent = canvas.extent();
   if (extent.columns < kScreenLeast.columns || extent.rows < kScreenLeast.rows) {
     canvas.text({0, 0}, "GIMnet demo", Ink::kTitle);
-    canvas.text({0, 1}, fmt::format("needs {} x {}", kScreenLeast.columns, kScreenLeast.rows), Ink::kPlain);
+    canvas.text({0, 1}, fmt::format("needs {} x {}", kScreenLeast.columns, kScreenLeast.rows),
+                Ink::kPlain);
     return canvas;
   }
   draw_title(canvas, monitor, state);
@@ -143,8 +151,10 @@ Canvas draw_screen(const Monitor& monitor, const ScreenState& state, Extent exte
   const int picture_columns = extent.columns - (panel ? kPanelColumns : 0);
   const int picture_rows = extent.rows - 2 - (strip ? kStripRows : 0);
   draw_picture(canvas, monitor, state, {{0, 1}, {picture_columns, picture_rows}});
-  if (panel) draw_panel(canvas, monitor, state, {{picture_columns, 1}, {kPanelColumns, picture_rows}});
-  if (strip) draw_strip(canvas, monitor, state, {{0, 1 + picture_rows}, {extent.columns, kStripRows}});
+  if (panel)
+    draw_panel(canvas, monitor, state, {{picture_columns, 1}, {kPanelColumns, picture_rows}});
+  if (strip)
+    draw_strip(canvas, monitor, state, {{0, 1 + picture_rows}, {extent.columns, kStripRows}});
   if (monitor.info() && monitor.info()->is_log()) {
     draw_hints(canvas, kPlayHints);
   } else {

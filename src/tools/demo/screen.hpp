@@ -27,8 +27,8 @@ struct ScreenState {
 /// Smallest screen on which something can be shown.
 inline constexpr Extent kScreenLeast{24, 6};
 
-/// Draws the whole screen: the map, beside it (or, where it is narrow, below) the figures. Thread safety: pure
-/// function.
+/// Draws the whole screen: the map, beside it (or, where it is narrow, below) the figures. Thread
+/// safety: pure function.
 [[nodiscard]] Canvas draw_screen(const Monitor& monitor, const ScreenState& state, Extent extent);
 
 }  // namespace gimnet::demo

@@ -9,8 +9,8 @@
 
 namespace gimnet::demo {
 
-/// A robot with a laser scanner in a hall: odometry at 40 Hz, scans at 10 Hz. Without a new command for `kDeadMan_ns`
-/// it stops, as every robot should when its driver is gone.
+/// A robot with a laser scanner in a hall: odometry at 40 Hz, scans at 10 Hz. Without a new command
+/// for `kDeadMan_ns` it stops, as every robot should when its driver is gone.
 class SimulatedRobot final : public RobotSource {
  public:
   static constexpr std::int64_t kPeriod_ns = 25'000'000;

@@ -14,7 +14,8 @@ namespace {
 
 std::string reduced_to_ascii(const std::string& text) {
   std::string reduced;
-  for (const char32_t code : decoded_utf8(text)) reduced += code == U'\n' ? '\n' : ascii_for({code});
+  for (const char32_t code : decoded_utf8(text))
+    reduced += code == U'\n' ? '\n' : ascii_for({code});
   return reduced;
 }
 
@@ -32,7 +33,9 @@ std::string percentile(const SampleWindow& window, double percent) {
   return duration_text(window.percentile_ns(percent));
 }
 
-std::uint64_t lost_of(std::uint64_t sent, std::uint64_t received) { return sent > received ? sent - received : 0; }
+std::uint64_t lost_of(std::uint64_t sent, std::uint64_t received) {
+  return sent > received ? sent - received : 0;
+}
 
 std::string rate(std::uint64_t count, double seconds) {
   return seconds > 0.0 ? fmt::format("{:.1f}", static_cast<double>(count) / seconds) : "–";
@@ -43,26 +46,31 @@ std::string rate(std::uint64_t count, double seconds) {
 std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecord& run) {
   std::vector<std::string> complaints;
   if (!run.broken.empty()) complaints.push_back(run.broken);
-  if (!monitor.info()) return {run.broken.empty() ? "the robot was never heard; did its process start?" : run.broken};
+  if (!monitor.info())
+    return {run.broken.empty() ? "the robot was never heard; did its process start?" : run.broken};
   const RobotInfo& info = *monitor.info();
   const auto stream = [&](std::string_view name, const StreamRecord& record, std::uint64_t sent) {
-    if (record.missed != 0) complaints.push_back(fmt::format("{}: {} messages were missed", name, record.missed));
+    if (record.missed != 0)
+      complaints.push_back(fmt::format("{}: {} messages were missed", name, record.missed));
     if (record.disordered != 0) {
-      complaints.push_back(fmt::format("{}: {} messages came twice or out of order", name, record.disordered));
+      complaints.push_back(
+          fmt::format("{}: {} messages came twice or out of order", name, record.disordered));
     }
     if (run.finished && record.received != sent) {
-      complaints.push_back(fmt::format("{}: the robot sent {} messages, {} arrived", name, sent, record.received));
+      complaints.push_back(
+          fmt::format("{}: the robot sent {} messages, {} arrived", name, sent, record.received));
     }
   };
   stream("robot/odom", monitor.odometry_stream(), info.odometry_total);
   stream("robot/scan", monitor.scan_stream(), info.scan_total);
   if (run.finished && info.drive_total != run.commands) {
-    complaints.push_back(
-        fmt::format("robot/drive: {} commands were sent, {} reached the robot", run.commands, info.drive_total));
+    complaints.push_back(fmt::format("robot/drive: {} commands were sent, {} reached the robot",
+                                     run.commands, info.drive_total));
   }
   // A log may hold only odometry, or only scans: what the robot does not say is not missed.
   const bool heard_nothing = monitor.odometry_stream().received == 0;
-  if (heard_nothing && info.odometry_total != 0) complaints.emplace_back("robot/odom: no message came at all");
+  if (heard_nothing && info.odometry_total != 0)
+    complaints.emplace_back("robot/odom: no message came at all");
   if (heard_nothing && monitor.scan_stream().received == 0) {
     complaints.emplace_back("robot/odom, robot/scan: no message came at all");
   }
@@ -78,20 +86,23 @@ std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecor
       complaints.push_back(fmt::format("the hub dropped {} frames: {}", drop.frames, drop.reason));
     }
   }
-  if (run.finished && !monitor.hub()->exact()) complaints.emplace_back("the hub's ledger does not add up");
+  if (run.finished && !monitor.hub()->exact())
+    complaints.emplace_back("the hub's ledger does not add up");
   return complaints;
 }
 
 std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8) {
   const RobotInfo info = monitor.info().value_or(RobotInfo{});
-  std::string text = fmt::format("{} for {:.1f} s over {}\n\n", info.source.empty() ? "nothing" : info.source,
-                                 run.seconds, run.hub_url);
+  std::string text =
+      fmt::format("{} for {:.1f} s over {}\n\n", info.source.empty() ? "nothing" : info.source,
+                  run.seconds, run.hub_url);
   text += row("", {"sent", "received", "lost", "Hz", "p50", "p99", "worst"});
   const auto stream = [&](std::string_view name, const StreamRecord& record, std::uint64_t sent,
                           const SampleWindow& age) {
     text +=
-        row(name, {count_text(sent), count_text(record.received), count_text(lost_of(sent, record.received)),
-                   rate(record.received, run.seconds), percentile(age, 50), percentile(age, 99), percentile(age, 100)});
+        row(name, {count_text(sent), count_text(record.received),
+                   count_text(lost_of(sent, record.received)), rate(record.received, run.seconds),
+                   percentile(age, 50), percentile(age, 99), percentile(age, 100)});
   };
   // Totals of a robot that is still running are a second old.
   const bool final = run.finished;
@@ -99,19 +110,25 @@ std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8
   const StreamRecord& scan = monitor.scan_stream();
   stream("robot/odom", odometry, final ? info.odometry_total : odometry.received + odometry.missed,
          monitor.odometry_age());
-  stream("robot/scan", scan, final ? info.scan_total : scan.received + scan.missed, monitor.scan_age());
+  stream("robot/scan", scan, final ? info.scan_total : scan.received + scan.missed,
+         monitor.scan_age());
   const std::uint64_t driven = final ? info.drive_total : run.commands;
-  text += row("robot/drive", {count_text(run.commands), count_text(driven), count_text(lost_of(run.commands, driven)),
-                              rate(driven, run.seconds), percentile(monitor.loop_age(), 50),
-                              percentile(monitor.loop_age(), 99), percentile(monitor.loop_age(), 100)});
   text +=
-      "\n  p50, p99, worst: age of a message on arrival; of a command, time until the\n  first odometry that follows "
+      row("robot/drive",
+          {count_text(run.commands), count_text(driven), count_text(lost_of(run.commands, driven)),
+           rate(driven, run.seconds), percentile(monitor.loop_age(), 50),
+           percentile(monitor.loop_age(), 99), percentile(monitor.loop_age(), 100)});
+  text +=
+      "\n  p50, p99, worst: age of a message on arrival; of a command, time until the\n  first "
+      "odometry that follows "
       "it.\n\n";
   if (monitor.hub()) {
     const HubCounters& hub = *monitor.hub();
-    text += fmt::format("  hub: accepted {} + copies {}\n       = delivered {} + dropped {} + queued {}: {}\n",
-                        count_text(hub.accepted), count_text(hub.copies), count_text(hub.delivered),
-                        count_text(hub.dropped()), count_text(hub.queued), hub.exact() ? "exact" : "does not add up");
+    text += fmt::format(
+        "  hub: accepted {} + copies {}\n       = delivered {} + dropped {} + queued {}: {}\n",
+        count_text(hub.accepted), count_text(hub.copies), count_text(hub.delivered),
+        count_text(hub.dropped()), count_text(hub.queued),
+        hub.exact() ? "exact" : "does not add up");
     if (hub.dropped() != 0) text += fmt::format("  dropped: {}\n", hub.drops_text());
   }
   text += fmt::format("  way: {:.1f} m", monitor.way_m());

@@ -24,9 +24,11 @@ struct RunRecord {
   std::string broken;
 };
 
-/// Everything that went wrong, a sentence each; empty: nothing was lost. Messages are counted at both ends, drops by
-/// an own hub; a message `replaced` by a newer one of its stream is not lost. Thread safety: pure functions.
-[[nodiscard]] std::vector<std::string> complaints_about(const Monitor& monitor, const RunRecord& run);
+/// Everything that went wrong, a sentence each; empty: nothing was lost. Messages are counted at
+/// both ends, drops by an own hub; a message `replaced` by a newer one of its stream is not lost.
+/// Thread safety: pure functions.
+[[nodiscard]] std::vector<std::string> complaints_about(const Monitor& monitor,
+                                                        const RunRecord& run);
 
 /// The figures of a run as a table, and the verdict.
 [[nodiscard]] std::string summary_text(const Monitor& monitor, const RunRecord& run, bool utf8);

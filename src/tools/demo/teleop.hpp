@@ -7,9 +7,10 @@
 
 namespace gimnet::demo {
 
-/// Turns keys into a wanted speed. A terminal tells that a key goes down and repeats, never that it goes up: a key
-/// holds for a while and then lets go, long enough to bridge the pause before the first repeat. Two axes are held
-/// apart, so that W and A together drive a curve. Thread safety: one thread.
+/// Turns keys into a wanted speed. A terminal tells that a key goes down and repeats, never that it
+/// goes up: a key holds for a while and then lets go, long enough to bridge the pause before the
+/// first repeat. Two axes are held apart, so that W and A together drive a curve. Thread safety:
+/// one thread.
 class Teleop {
  public:
   static constexpr double kLinear_mps = 0.8;

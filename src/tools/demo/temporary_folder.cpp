@@ -23,13 +23,15 @@ Result<TemporaryFolder> TemporaryFolder::make() {
   if (parent.size() > kParentMax) parent = "/tmp";
   std::string path = parent + "/gimnet-demo.XXXXXX";
   if (::mkdtemp(path.data()) == nullptr) {
-    return Error{fmt::format("cannot make a folder in {}: {}; set TMPDIR to a place that can be written", parent,
-                             std::strerror(errno))};
+    return Error{
+        fmt::format("cannot make a folder in {}: {}; set TMPDIR to a place that can be written",
+                    parent, std::strerror(errno))};
   }
   return TemporaryFolder(path);
 }
 
-TemporaryFolder::TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+TemporaryFolder::TemporaryFolder(TemporaryFolder&& other) noexcept
+    : path_(std::exchange(other.path_, {})) {}
 
 TemporaryFolder& TemporaryFolder::operator=(TemporaryFolder&& other) noexcept {
   std::swap(path_, other.path_);

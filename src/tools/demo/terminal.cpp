@@ -71,7 +71,8 @@ std::unique_ptr<Terminal> Terminal::open(const Ends& ends) {
   taken.active = 1;
   on_crash(restore_and_crash);
   termios raw = before;
-  // Signals off as well: Ctrl-C is a key, so that it is not lost between two programs of the foreground.
+  // Signals off as well: Ctrl-C is a key, so that it is not lost between two programs of the
+  // foreground.
   raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO | ISIG | IEXTEN);
   raw.c_iflag &= ~static_cast<tcflag_t>(IXON | ICRNL | INLCR);
   raw.c_cc[VMIN] = 0;
@@ -91,7 +92,8 @@ Terminal::~Terminal() {
 
 Extent Terminal::extent() const {
   winsize size{};
-  if (::ioctl(ends_.screen, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) return {80, 24};
+  if (::ioctl(ends_.screen, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0)
+    return {80, 24};
   return {size.ws_col, size.ws_row};
 }
 
@@ -127,7 +129,8 @@ std::optional<bool> Terminal::understands_utf8() {
   while (answer.find('R') == std::string::npos) {
     const std::int64_t left_ns = until_ns - steady_now_ns();
     if (left_ns <= 0 || answer.size() > 64) return std::nullopt;
-    if (!wait_readable(ends_.keyboard, static_cast<int>(left_ns / 1'000'000) + 1)) return std::nullopt;
+    if (!wait_readable(ends_.keyboard, static_cast<int>(left_ns / 1'000'000) + 1))
+      return std::nullopt;
     std::string more;
     if (!read(more)) return std::nullopt;
     answer += more;
@@ -141,10 +144,12 @@ std::optional<bool> Terminal::understands_utf8() {
 
 ColourDepth colours_of_environment() {
   const std::string term = environment("TERM");
-  if (!environment("NO_COLOR").empty() || term.empty() || term == "dumb" || term.starts_with("vt")) {
+  if (!environment("NO_COLOR").empty() || term.empty() || term == "dumb" ||
+      term.starts_with("vt")) {
     return ColourDepth::kNone;
   }
-  const bool rich = term.find("256color") != std::string::npos || term.find("direct") != std::string::npos ||
+  const bool rich = term.find("256color") != std::string::npos ||
+                    term.find("direct") != std::string::npos ||
                     term.find("kitty") != std::string::npos || !environment("COLORTERM").empty();
   return rich ? ColourDepth::k256 : ColourDepth::k16;
 }
@@ -157,7 +162,8 @@ std::optional<bool> utf8_of_environment() {
     if (value.empty()) continue;
     std::transform(value.begin(), value.end(), value.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (value.find("utf-8") != std::string::npos || value.find("utf8") != std::string::npos) return true;
+    if (value.find("utf-8") != std::string::npos || value.find("utf8") != std::string::npos)
+      return true;
     if (value.find('.') != std::string::npos) return false;
     return std::nullopt;
   }

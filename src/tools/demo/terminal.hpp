@@ -12,9 +12,9 @@
 
 namespace gimnet::demo {
 
-/// The terminal of this process, taken over: keys come at once and unseen, the screen is a second one, the cursor is
-/// hidden. All of that is undone when the object goes, and also when the process crashes.
-/// Thread safety: one thread. Limits: one object at a time.
+/// The terminal of this process, taken over: keys come at once and unseen, the screen is a second
+/// one, the cursor is hidden. All of that is undone when the object goes, and also when the process
+/// crashes. Thread safety: one thread. Limits: one object at a time.
 class Terminal {
  public:
   /// The descriptors of keyboard and screen.
@@ -23,7 +23,8 @@ class Terminal {
     int screen = 1;
   };
 
-  /// Takes a terminal over; nothing if the ends are no terminal, or one that can do nothing (TERM=dumb).
+  /// Takes a terminal over; nothing if the ends are no terminal, or one that can do nothing
+  /// (TERM=dumb).
   static std::unique_ptr<Terminal> open(const Ends& ends);
 
   ~Terminal();
@@ -39,8 +40,8 @@ class Terminal {
   /// Writes all of it. What a terminal that is gone does not take is lost.
   void write(std::string_view bytes);
 
-  /// Asks the terminal itself whether it reads UTF-8: shows a character of three bytes and asks where the cursor is
-  /// now. Waits for the answer at most 300 ms; nothing if none comes.
+  /// Asks the terminal itself whether it reads UTF-8: shows a character of three bytes and asks
+  /// where the cursor is now. Waits for the answer at most 300 ms; nothing if none comes.
   [[nodiscard]] std::optional<bool> understands_utf8();
 
  private:
@@ -50,8 +51,8 @@ class Terminal {
   termios before_;
 };
 
-/// What the environment says of a terminal: colours from NO_COLOR, TERM and COLORTERM; UTF-8 from LC_ALL, LC_CTYPE and
-/// LANG, nothing where these do not name an encoding.
+/// What the environment says of a terminal: colours from NO_COLOR, TERM and COLORTERM; UTF-8 from
+/// LC_ALL, LC_CTYPE and LANG, nothing where these do not name an encoding.
 [[nodiscard]] ColourDepth colours_of_environment();
 [[nodiscard]] std::optional<bool> utf8_of_environment();
 

@@ -97,19 +97,22 @@ ScreenState Viewer::screen_state(std::int64_t now_ns) const {
 void Viewer::draw(std::int64_t now_ns) {
   if (terminal_ == nullptr || now_ns < next_frame_ns_) return;
   next_frame_ns_ = now_ns + kFramePeriod_ns;
-  terminal_->write(writer_.update(draw_screen(monitor_, screen_state(now_ns), terminal_->extent())));
+  terminal_->write(
+      writer_.update(draw_screen(monitor_, screen_state(now_ns), terminal_->extent())));
 }
 
 void Viewer::report_progress(std::int64_t now_ns) {
   if (!options_.on_progress || now_ns < next_progress_ns_ || first_heard_ns_ == 0) return;
   next_progress_ns_ = now_ns + kProgressPeriod_ns;
   const Pose pose = monitor_.pose().value_or(Pose{});
-  options_.on_progress(
-      fmt::format("{:>6.1f} s  odom {:5.1f} Hz  scan {:5.1f} Hz  p50 {}  p99 {}  at {:.2f} {:.2f} m  dropped {}",
-                  static_cast<double>(now_ns - first_heard_ns_) * 1e-9, monitor_.odometry_stream().rate.rate_hz(now_ns),
-                  monitor_.scan_stream().rate.rate_hz(now_ns), duration_text(monitor_.odometry_age().percentile_ns(50)),
-                  duration_text(monitor_.odometry_age().percentile_ns(99)), pose.x_m, pose.y_m,
-                  monitor_.hub() ? count_text(monitor_.hub()->dropped()) : "?"));
+  options_.on_progress(fmt::format(
+      "{:>6.1f} s  odom {:5.1f} Hz  scan {:5.1f} Hz  p50 {}  p99 {}  at {:.2f} {:.2f} m  dropped "
+      "{}",
+      static_cast<double>(now_ns - first_heard_ns_) * 1e-9,
+      monitor_.odometry_stream().rate.rate_hz(now_ns), monitor_.scan_stream().rate.rate_hz(now_ns),
+      duration_text(monitor_.odometry_age().percentile_ns(50)),
+      duration_text(monitor_.odometry_age().percentile_ns(99)), pose.x_m, pose.y_m,
+      monitor_.hub() ? count_text(monitor_.hub()->dropped()) : "?"));
 }
 
 std::optional<Error> Viewer::step(std::int64_t wait_ns) {
@@ -144,7 +147,8 @@ std::optional<Error> Viewer::run() {
   if (!error) return std::nullopt;
   if (ended_ns_ == 0) ended_ns_ = port_.now_ns();
   // The connection notices the end of a process before the process is seen to end, and knows less.
-  if (std::optional<Error> why = options_.trouble ? options_.trouble(kWhy_ns) : std::nullopt) error = why;
+  if (std::optional<Error> why = options_.trouble ? options_.trouble(kWhy_ns) : std::nullopt)
+    error = why;
   broken_ = error->sentence;
   return error;
 }
@@ -155,8 +159,9 @@ std::optional<Error> Viewer::watch() {
     if (std::optional<Error> error = step(kWait_ns)) return error;
     const bool impatient = options_.own_robot || options_.seconds.has_value();
     if (impatient && first_heard_ns_ == 0 && steady_now_ns() - start_ns > kFirstSign_ns) {
-      return Error{fmt::format("no robot was heard at {} within {} s; is it running there, under that name?",
-                               options_.hub_url, kFirstSign_ns / 1'000'000'000)};
+      return Error{
+          fmt::format("no robot was heard at {} within {} s; is it running there, under that name?",
+                      options_.hub_url, kFirstSign_ns / 1'000'000'000)};
     }
   }
   ended_ns_ = port_.now_ns();
@@ -170,7 +175,8 @@ bool Viewer::everything_arrived() const {
          monitor_.scan_stream().received >= info->scan_total;
 }
 
-// Tells an own robot to say no more, waits for what it said before, and then for a hub in which nothing moves.
+// Tells an own robot to say no more, waits for what it said before, and then for a hub in which
+// nothing moves.
 std::optional<Error> Viewer::finish() {
   const std::int64_t until_ns = steady_now_ns() + kFinish_ns;
   if (options_.own_robot && monitor_.info()) {
@@ -192,8 +198,10 @@ std::optional<Error> Viewer::finish() {
 
 RunRecord Viewer::record() const {
   const std::int64_t end_ns = ended_ns_ != 0 ? ended_ns_ : port_.now_ns();
-  const double seconds = first_heard_ns_ == 0 ? 0.0 : static_cast<double>(end_ns - first_heard_ns_) * 1e-9;
-  return {options_.hub_url, seconds, commands_, driver_.corners_reached(), finished_, options_.own_robot, broken_};
+  const double seconds =
+      first_heard_ns_ == 0 ? 0.0 : static_cast<double>(end_ns - first_heard_ns_) * 1e-9;
+  return {options_.hub_url,   seconds, commands_, driver_.corners_reached(), finished_,
+          options_.own_robot, broken_};
 }
 
 std::string Viewer::last_picture(Extent extent) const {

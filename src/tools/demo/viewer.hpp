@@ -32,8 +32,9 @@ struct ViewerOptions {
   std::function<void(const std::string&)> on_progress;
 };
 
-/// The viewer and driver: listens, draws, steers, until the time is over, the user quits, or a signal comes; then makes
-/// sure that everything has arrived. Thread safety: one thread. Ownership: none of port and terminal.
+/// The viewer and driver: listens, draws, steers, until the time is over, the user quits, or a
+/// signal comes; then makes sure that everything has arrived. Thread safety: one thread. Ownership:
+/// none of port and terminal.
 class Viewer {
  public:
   static constexpr std::int64_t kFramePeriod_ns = 80'000'000;
@@ -48,7 +49,8 @@ class Viewer {
   /// `terminal` may be null.
   Viewer(NodePort& port, Terminal* terminal, ViewerOptions options);
 
-  /// Runs to the end. Errors: the connection or another process ended, or the robot was never heard.
+  /// Runs to the end. Errors: the connection or another process ended, or the robot was never
+  /// heard.
   [[nodiscard]] std::optional<Error> run();
 
   [[nodiscard]] const Monitor& monitor() const { return monitor_; }

@@ -25,18 +25,24 @@ std::vector<std::string_view> lines_of(std::string_view text) {
   return lines;
 }
 
-double cell_centre_m(std::size_t index) { return (static_cast<double>(index) + 0.5) * WorldMap::kCell_m; }
+double cell_centre_m(std::size_t index) {
+  return (static_cast<double>(index) + 0.5) * WorldMap::kCell_m;
+}
 
-long cell_of(double coordinate_m) { return static_cast<long>(std::floor(coordinate_m / WorldMap::kCell_m)); }
+long cell_of(double coordinate_m) {
+  return static_cast<long>(std::floor(coordinate_m / WorldMap::kCell_m));
+}
 
-// One axis of a walk through a grid: which cell, which way, and how far along the ray the next border is.
+// One axis of a walk through a grid: which cell, which way, and how far along the ray the next
+// border is.
 struct Axis {
   long cell;
   long step;
   double next_m;
   double period_m;
 
-  Axis(double origin_m, double direction) : cell(cell_of(origin_m)), step(direction < 0.0 ? -1 : 1) {
+  Axis(double origin_m, double direction)
+      : cell(cell_of(origin_m)), step(direction < 0.0 ? -1 : 1) {
     if (direction == 0.0) {
       next_m = period_m = std::numeric_limits<double>::infinity();
       return;
@@ -63,8 +69,8 @@ Result<WorldMap> WorldMap::parse(std::string_view text) {
   map.rows_ = lines.size();
   for (const std::string_view line : lines) map.columns_ = std::max(map.columns_, line.size());
   if (map.rows_ > kRowsMax || map.columns_ > kColumnsMax) {
-    return Error{fmt::format("the map has {} columns and {} rows; at most {} and {} are allowed", map.columns_,
-                             map.rows_, kColumnsMax, kRowsMax)};
+    return Error{fmt::format("the map has {} columns and {} rows; at most {} and {} are allowed",
+                             map.columns_, map.rows_, kColumnsMax, kRowsMax)};
   }
   map.walls_.assign(map.rows_ * map.columns_, 0);
   std::array<std::optional<Point>, 10> corners;
@@ -83,13 +89,15 @@ Result<WorldMap> WorldMap::parse(std::string_view text) {
         started = true;
       } else if (c >= '1' && c <= '9') {
         std::optional<Point>& corner = corners[static_cast<std::size_t>(c - '0')];
-        if (corner) return Error{fmt::format("{}: a second waypoint '{}'; each digit may stand once", where(), c)};
+        if (corner)
+          return Error{
+              fmt::format("{}: a second waypoint '{}'; each digit may stand once", where(), c)};
         corner = centre;
       } else if (c != ' ' && c != '.') {
-        return Error{
-            fmt::format("{}: a character (code {}) that means nothing; use # for walls, blanks or . for floor, "
-                        "@ for the start, 1 to 9 for the course",
-                        where(), static_cast<unsigned char>(c))};
+        return Error{fmt::format(
+            "{}: a character (code {}) that means nothing; use # for walls, blanks or . for floor, "
+            "@ for the start, 1 to 9 for the course",
+            where(), static_cast<unsigned char>(c))};
       }
     }
   }
@@ -131,7 +139,8 @@ bool WorldMap::wall(long column, long row) const {
 
 bool WorldMap::touches_wall(const Point& centre, double radius_m) const {
   for (long row = cell_of(centre.y_m - radius_m); row <= cell_of(centre.y_m + radius_m); ++row) {
-    for (long column = cell_of(centre.x_m - radius_m); column <= cell_of(centre.x_m + radius_m); ++column) {
+    for (long column = cell_of(centre.x_m - radius_m); column <= cell_of(centre.x_m + radius_m);
+         ++column) {
       if (!wall(column, row)) continue;
       const double left_m = static_cast<double>(column) * kCell_m;
       const double bottom_m = static_cast<double>(row) * kCell_m;

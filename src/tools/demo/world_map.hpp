@@ -10,7 +10,8 @@
 
 namespace gimnet::demo {
 
-/// A hall for the simulated robot: a grid of walls and floor, read from text. Each character is a square of `kCell_m`:
+/// A hall for the simulated robot: a grid of walls and floor, read from text. Each character is a
+/// square of `kCell_m`:
 ///
 ///     #          wall
 ///     blank, .   floor
@@ -25,7 +26,8 @@ class WorldMap {
   static constexpr std::size_t kColumnsMax = 256;
   static constexpr std::size_t kRowsMax = 128;
 
-  /// Errors: a character of no meaning, no start, too many rows or columns, a repeated waypoint; with line and column.
+  /// Errors: a character of no meaning, no start, too many rows or columns, a repeated waypoint;
+  /// with line and column.
   static Result<WorldMap> parse(std::string_view text);
 
   /// Reads a map from a file. Errors: as parse(), and those of the file.

@@ -25,7 +25,8 @@ Data goes to standard output, words to standard error. Ends with 0 done, 1 faile
 inline constexpr const char* kEverywhere =
     "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
 
-inline constexpr const char* kSendAbout = R"(Send messages to a node, and wait until it has acknowledged them all.
+inline constexpr const char* kSendAbout =
+    R"(Send messages to a node, and wait until it has acknowledged them all.
 
 Examples:
   gimnet send B < lines                     a message for each line
@@ -57,7 +58,8 @@ Examples:
                                             who comes later, while it stays, gets the last line
 )";
 
-inline constexpr const char* kEchoAbout = R"(Print the messages of services. A service need not exist yet.
+inline constexpr const char* kEchoAbout =
+    R"(Print the messages of services. A service need not exist yet.
 
 Examples:
   gimnet echo robot/odom
@@ -81,7 +83,8 @@ Once a second: messages a second, the shortest, longest and mean gap between two
 last --window seconds, and how many did not come. At the end the same over all of it.
 )";
 
-inline constexpr const char* kBwAbout = R"(Measure how many bytes services send, and how large their messages are.
+inline constexpr const char* kBwAbout =
+    R"(Measure how many bytes services send, and how large their messages are.
 
 Examples:
   gimnet bw robot/camera
@@ -90,7 +93,8 @@ Examples:
 Payload bytes, as the publisher gave them; once a second over the last --window seconds, at the end over all of it.
 )";
 
-inline constexpr const char* kPingAbout = R"(Measure the way to a node and back. Its library answers by itself.
+inline constexpr const char* kPingAbout =
+    R"(Measure the way to a node and back. Its library answers by itself.
 
 Examples:
   gimnet ping B

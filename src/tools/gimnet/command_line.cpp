@@ -25,7 +25,8 @@ struct Called {
   std::string_view action;
   [[nodiscard]] std::string text() const {
     std::string text = "gimnet";
-    for (const std::string_view word : {command, action}) text += word.empty() ? "" : " " + std::string(word);
+    for (const std::string_view word : {command, action})
+      text += word.empty() ? "" : " " + std::string(word);
     return text;
   }
 };
@@ -51,10 +52,12 @@ Called called_by(std::span<const char* const> arguments) {
 }
 
 CommandLineEnding wrong(const std::string& sentence, const Called& called) {
-  return {ExitCode::usage, "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
+  return {ExitCode::usage,
+          "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
 }
 
-/// What the tools of other networks call their commands, and ours that does it; "" if none is known.
+/// What the tools of other networks call their commands, and ours that does it; "" if none is
+/// known.
 std::string_view command_meant(std::string_view word) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kWords{{
       {"sub", "echo"},
@@ -75,25 +78,29 @@ std::string_view command_meant(std::string_view word) {
 
 CommandLineEnding unknown_command(std::string_view word) {
   if (const std::string_view meant = command_meant(word); !meant.empty()) {
-    return wrong("there is no command '" + std::string(word) + "'; did you mean " + std::string(meant) + "?", {});
+    return wrong(
+        "there is no command '" + std::string(word) + "'; did you mean " + std::string(meant) + "?",
+        {});
   }
   std::array<std::string_view, kCommands.size()> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kCommands[i].first;
   // What other tools have as commands.
   const bool is_option = word == "help" || word == "version";
-  const std::string nearest = is_option ? "; did you mean --" + std::string(word) + "?" : did_you_mean(word, names);
+  const std::string nearest =
+      is_option ? "; did you mean --" + std::string(word) + "?" : did_you_mean(word, names);
   return wrong("there is no command '" + std::string(word) + "'" + nearest, {});
 }
 
-/// A word before the command that looks like an option and is none, whose value was taken for the command; "" if there
-/// is no such word. REQUIRES: `command` is one of the arguments.
+/// A word before the command that looks like an option and is none, whose value was taken for the
+/// command; "" if there is no such word. REQUIRES: `command` is one of the arguments.
 std::string_view stranger_before(std::string_view command, std::span<const char* const> arguments,
                                  const CLI::App& app) {
   for (const char* const argument : arguments) {
     if (argument == command.data()) break;
     const std::string_view word = argument;
     if (!word.starts_with('-') || word == kEndOfOptions) continue;
-    if (app.get_option_no_throw(std::string(word.substr(0, word.find('=')))) == nullptr) return word;
+    if (app.get_option_no_throw(std::string(word.substr(0, word.find('=')))) == nullptr)
+      return word;
   }
   return {};
 }
@@ -104,8 +111,8 @@ CommandLineEnding missing_command(const CLI::App& app) {
   std::string text = "gimnet: the command is missing; these are there:\n";
   for (const auto& [word, command] : kCommands) {
     const std::string about = app.get_subcommand(std::string(word))->get_description();
-    text +=
-        "  " + std::string(word) + std::string(kColumn - word.size(), ' ') + about.substr(0, about.find('\n')) + "\n";
+    text += "  " + std::string(word) + std::string(kColumn - word.size(), ' ') +
+            about.substr(0, about.find('\n')) + "\n";
   }
   text += "`gimnet --help` shows examples and options, `gimnet COMMAND --help` those of one.\n";
   return {ExitCode::usage, text};
@@ -114,7 +121,10 @@ CommandLineEnding missing_command(const CLI::App& app) {
 std::string all_actions() {
   std::string names;
   for (const std::string_view action : kCtlActions) {
-    names += (names.empty() ? "" : action == kCtlActions.back() ? " or " : ", ") + std::string(action);
+    names += (names.empty()                  ? ""
+              : action == kCtlActions.back() ? " or "
+                                             : ", ") +
+             std::string(action);
   }
   return names;
 }
@@ -126,23 +136,28 @@ CommandLineEnding unknown_action(std::string_view word) {
                {"ctl", ""});
 }
 
-CommandLineEnding missing_action() { return wrong("action is missing: " + all_actions(), {"ctl", ""}); }
+CommandLineEnding missing_action() {
+  return wrong("action is missing: " + all_actions(), {"ctl", ""});
+}
 
 /// A pattern where one node is meant.
 std::string too_many(const Options& options, const Called& called) {
   const bool acts = options.command == Command::ctl;
   const std::string& word = acts ? options.ctl.node : options.target;
-  const bool names_node = acts || options.command == Command::ping || options.command == Command::send;
+  const bool names_node =
+      acts || options.command == Command::ping || options.command == Command::send;
   if (!names_node || !is_pattern(word)) return {};
-  return "'" + word + "' is a pattern, and " + called.text() + " takes one node: `gimnet nodes '" + word +
-         "'` lists those that match";
+  return "'" + word + "' is a pattern, and " + called.text() + " takes one node: `gimnet nodes '" +
+         word + "'` lists those that match";
 }
 
 /// What CLI11 cannot know.
 std::string contradiction(const Options& options) {
-  if (options.json && options.raw) return "--json and --raw contradict each other: give one of them";
+  if (options.json && options.raw)
+    return "--json and --raw contradict each other: give one of them";
   if (options.command != Command::ctl && options.target.find_first_of("#+>") != std::string::npos) {
-    return "'" + options.target + "' has a character that no name has; in patterns `*` is one part, `**` any number";
+    return "'" + options.target +
+           "' has a character that no name has; in patterns `*` is one part, `**` any number";
   }
   const bool names_service = options.command == Command::pub || options.command == Command::echo ||
                              options.command == Command::hz || options.command == Command::bw;
@@ -152,7 +167,8 @@ std::string contradiction(const Options& options) {
   const bool is_one_part = options.target.find('/') == std::string::npos;
   if (names_service && options.command != Command::pub && is_one_part &&
       options.target.find("**") == std::string::npos) {
-    return "'" + options.target + "' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all";
+    return "'" + options.target +
+           "' matches no service: full names are NODE/SERVICE, so write NODE/*, or ** for all";
   }
   if (options.command == Command::pub) {
     const auto slash = options.target.rfind('/');
@@ -161,8 +177,8 @@ std::string contradiction(const Options& options) {
     }
     const std::string node = options.target.substr(0, slash);
     if (!options.name.empty() && options.name != node) {
-      return "the service " + options.target + " belongs to the node " + node + ", not to " + options.name +
-             ": leave --name out";
+      return "the service " + options.target + " belongs to the node " + node + ", not to " +
+             options.name + ": leave --name out";
     }
   }
   return {};
@@ -183,13 +199,16 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, const Called& ca
   return all;
 }
 
-/// The first word that CLI11 left over, and whether it stands behind the end of options, which it leaves over, too.
+/// The first word that CLI11 left over, and whether it stands behind the end of options, which it
+/// leaves over, too.
 struct LeftOver {
   std::string word;
   bool behind_end = false;
 };
-std::optional<LeftOver> left_over(std::vector<std::string> extras, std::span<const char* const> arguments) {
-  const auto end = std::ranges::find(arguments, kEndOfOptions, [](const char* word) { return std::string_view(word); });
+std::optional<LeftOver> left_over(std::vector<std::string> extras,
+                                  std::span<const char* const> arguments) {
+  const auto end = std::ranges::find(arguments, kEndOfOptions,
+                                     [](const char* word) { return std::string_view(word); });
   if (end != arguments.end()) {
     const auto mark = std::ranges::find(extras, kEndOfOptions);
     if (mark != extras.end()) extras.erase(mark);
@@ -200,13 +219,14 @@ std::optional<LeftOver> left_over(std::vector<std::string> extras, std::span<con
 }
 
 /// A word that nothing takes.
-std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option*>& options, const Called& called) {
+std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option*>& options,
+                       const Called& called) {
   const std::string& word = left.word;
   if (left.behind_end || !word.starts_with('-')) {
     const bool reads_lines = called.command == "send" || called.command == "pub";
     const std::string advice = called.command == "recv" ? "; did you mean --name " + word + "?"
-                               : reads_lines            ? ": messages are lines of its standard input"
-                                                        : "";
+                               : reads_lines ? ": messages are lines of its standard input"
+                                             : "";
     return "'" + word + "' is one word too many for " + called.text() + advice;
   }
   const std::string given = word.substr(0, word.find('='));
@@ -219,10 +239,11 @@ std::string unexpected(const LeftOver& left, const std::vector<const CLI::Option
 }
 
 /// What CLI11 would take for something else; "": nothing.
-std::string wrong_word(std::span<const char* const> words, const std::vector<const CLI::Option*>& options) {
+std::string wrong_word(std::span<const char* const> words,
+                       const std::vector<const CLI::Option*>& options) {
   return wrong_option_word(words, [&options](std::string_view name) {
-    const auto found =
-        std::ranges::find_if(options, [&](const CLI::Option* option) { return option->check_name(std::string(name)); });
+    const auto found = std::ranges::find_if(
+        options, [&](const CLI::Option* option) { return option->check_name(std::string(name)); });
     if (found == options.end()) return Takes::unknown;
     if ((*found)->get_items_expected_max() != 0) return Takes::value;
     return name == "--help" || name == "--version" ? Takes::nothing : Takes::boolean;
@@ -230,7 +251,8 @@ std::string wrong_word(std::span<const char* const> words, const std::vector<con
 }
 
 /// What CLI11 says, in words that name the option, what was given and what it takes.
-std::string explained(const CLI::ParseError& error, const std::vector<const CLI::Option*>& options) {
+std::string explained(const CLI::ParseError& error,
+                      const std::vector<const CLI::Option*>& options) {
   std::string said = error.what();
   const CLI::Option* concerned = nullptr;
   std::size_t longest = 0;
@@ -240,19 +262,23 @@ std::string explained(const CLI::ParseError& error, const std::vector<const CLI:
     concerned = option;
     longest = name.size();
   }
-  // One that the help does not show has no name for CLI11, which then begins with what would be behind it.
+  // One that the help does not show has no name for CLI11, which then begins with what would be
+  // behind it.
   const bool hidden = concerned == nullptr && said.starts_with(':');
   if (hidden) {
-    const auto found =
-        std::ranges::find_if(options, [](const CLI::Option* option) { return option->get_group().empty(); });
+    const auto found = std::ranges::find_if(
+        options, [](const CLI::Option* option) { return option->get_group().empty(); });
     if (found != options.end()) concerned = *found;
   }
   if (concerned == nullptr) return said;
-  const std::string name = hidden ? "--" + concerned->get_lnames().front() : concerned->get_name(false, true);
+  const std::string name =
+      hidden ? "--" + concerned->get_lnames().front() : concerned->get_name(false, true);
   const std::string& takes = concerned->get_description();
-  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return name + " is missing: " + takes;
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
+    return name + " is missing: " + takes;
   const auto given = concerned->results();
-  if (given.size() > 1) return name + " is given " + std::to_string(given.size()) + " times: give it once";
+  if (given.size() > 1)
+    return name + " is given " + std::to_string(given.size()) + " times: give it once";
   if (given.empty() || given.back().empty()) return name + " needs a value: " + takes;
   return "'" + given.back() + "' is no value for " + name + ": " + takes;
 }

@@ -14,7 +14,9 @@ struct CommandLineEnding {
   std::string text;  ///< for standard output with code `done`, else for standard error
 };
 
-/// Reads the command line. Errors: code `usage` and a sentence that names the argument and says what to write.
-[[nodiscard]] std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char* const* argv);
+/// Reads the command line. Errors: code `usage` and a sentence that names the argument and says
+/// what to write.
+[[nodiscard]] std::variant<Options, CommandLineEnding> parse_command_line(int argc,
+                                                                          const char* const* argv);
 
 }  // namespace gimnet::tool

@@ -15,8 +15,8 @@
 namespace gimnet::tool {
 namespace {
 
-/// A decimal number from `least` to `most`, of a whole type without a point. CLI11 by itself takes "nan", "0x10" and
-/// " 5", and "010" for 8: what it is left to read is written anew.
+/// A decimal number from `least` to `most`, of a whole type without a point. CLI11 by itself takes
+/// "nan", "0x10" and " 5", and "010" for 8: what it is left to read is written anew.
 template <class Number>
 CLI::Validator within(Number least, Number most) {
   return CLI::Validator(
@@ -33,7 +33,9 @@ CLI::Validator within(Number least, Number most) {
 }
 
 void add_key(CLI::App& command, Options& options) {
-  command.add_option("--type", options.key.type, "message type, a whole number up to 4294967295, default 0")
+  command
+      .add_option("--type", options.key.type,
+                  "message type, a whole number up to 4294967295, default 0")
       ->transform(within(std::uint32_t{0}, UINT32_MAX));
   command
       .add_option("--instance", options.key.instance,
@@ -41,21 +43,26 @@ void add_key(CLI::App& command, Options& options) {
       ->transform(within(std::uint32_t{0}, UINT32_MAX));
 }
 
-// The most that any hub can be told to take (docs/operations.md); what this one takes it says itself.
+// The most that any hub can be told to take (docs/operations.md); what this one takes it says
+// itself.
 constexpr std::uint32_t kSyncWindowMax = 1'000'000;
 constexpr std::uint32_t kDepthMax = 4'096;
 
 void add_lane(CLI::App& command, Options& options) {
-  static const std::map<std::string, Lane> kLanes{
-      {"real_time", Lane::real_time}, {"normal", Lane::normal}, {"bulk", Lane::bulk}, {"background", Lane::background}};
+  static const std::map<std::string, Lane> kLanes{{"real_time", Lane::real_time},
+                                                  {"normal", Lane::normal},
+                                                  {"bulk", Lane::bulk},
+                                                  {"background", Lane::background}};
   command.add_option("--lane", options.lane, "real_time, normal, bulk or background")
       ->transform(CLI::CheckedTransformer(kLanes).description(""));
 }
 
 void add_bounds(CLI::App& command, Options& options) {
-  command.add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
+  command
+      .add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
       ->transform(within(std::uint64_t{1}, std::uint64_t{1} << 62));
-  command.add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
+  command
+      .add_option("--seconds", options.seconds, "end after that many seconds, 0.001 to 1000000000")
       ->transform(within(0.001, 1e9));
 }
 
@@ -67,7 +74,9 @@ void add_printing(CLI::App& command, Options& options) {
 
 void add_send(CLI::App& app, Options& options) {
   CLI::App& send = *app.add_subcommand("send", help::kSendAbout);
-  send.add_option("node", options.target, "name or id of the receiver")->required()->check(not_empty());
+  send.add_option("node", options.target, "name or id of the receiver")
+      ->required()
+      ->check(not_empty());
   send.add_option("--file", options.file, "send this file as one message")->check(not_empty());
   send.add_option("--name", options.name, "name of this node, default none")->check(not_empty());
   add_lane(send, options);
@@ -76,8 +85,11 @@ void add_send(CLI::App& app, Options& options) {
 
 void add_recv(CLI::App& app, Options& options) {
   CLI::App& recv = *app.add_subcommand("recv", help::kRecvAbout);
-  recv.add_option("--name", options.name, "name of this node, to which others send")->required()->check(not_empty());
-  recv.add_option("--max-size", options.bytes_max, "largest message taken, in bytes, 1 to 1073741824, default 67108864")
+  recv.add_option("--name", options.name, "name of this node, to which others send")
+      ->required()
+      ->check(not_empty());
+  recv.add_option("--max-size", options.bytes_max,
+                  "largest message taken, in bytes, 1 to 1073741824, default 67108864")
       ->transform(within(std::size_t{1}, std::size_t{1} << 30));
   add_printing(recv, options);
 }
@@ -86,7 +98,9 @@ void add_recv(CLI::App& app, Options& options) {
 void read_delivery(const std::string& word, Options& options) {
   constexpr std::string_view kSync = "sync:";
   if (word == "stream" || word == "latest" || word == "sync") {
-    options.delivery = word == "stream" ? Delivery::stream : word == "latest" ? Delivery::latest : Delivery::sync;
+    options.delivery = word == "stream"   ? Delivery::stream
+                       : word == "latest" ? Delivery::latest
+                                          : Delivery::sync;
     return;
   }
   options.delivery = Delivery::sync;
@@ -97,24 +111,32 @@ void read_delivery(const std::string& word, Options& options) {
       options.window <= kSyncWindowMax)
     return;
   throw CLI::ValidationError(
-      "--delivery",
-      "'" + word + "' is none of stream, latest, sync and sync:N, with N from 1 to " + std::to_string(kSyncWindowMax));
+      "--delivery", "'" + word + "' is none of stream, latest, sync and sync:N, with N from 1 to " +
+                        std::to_string(kSyncWindowMax));
 }
 
 void add_pub(CLI::App& app, Options& options) {
   CLI::App& pub = *app.add_subcommand("pub", help::kPubAbout);
-  pub.add_option("service", options.target, "full name: node/service")->required()->check(not_empty());
-  pub.add_option("--name", options.name, "name of this node, default: the service's name up to its last /")
+  pub.add_option("service", options.target, "full name: node/service")
+      ->required()
+      ->check(not_empty());
+  pub.add_option("--name", options.name,
+                 "name of this node, default: the service's name up to its last /")
       ->check(not_empty());
   pub.add_option_function<std::string>(
       "--delivery", [&options](const std::string& word) { read_delivery(word, options); },
-      "stream: all messages; latest: only the newest waits; sync:N: at most N, 1 to 1000000, that a subscriber has not "
+      "stream: all messages; latest: only the newest waits; sync:N: at most N, 1 to 1000000, that "
+      "a subscriber has not "
       "taken; sync: as sync:1");
-  pub.add_flag("--retain", options.retain, "the hub keeps the last line and gives it to each new subscriber first");
-  pub.add_flag("--stay", options.stay, "go on after the input has ended, until Ctrl-C: the service stays");
-  pub.add_option("--rate", options.rate_hz, "lines a second, 0.001 to 1000000, default as fast as possible")
+  pub.add_flag("--retain", options.retain,
+               "the hub keeps the last line and gives it to each new subscriber first");
+  pub.add_flag("--stay", options.stay,
+               "go on after the input has ended, until Ctrl-C: the service stays");
+  pub.add_option("--rate", options.rate_hz,
+                 "lines a second, 0.001 to 1000000, default as fast as possible")
       ->transform(within(0.001, 1e6));
-  pub.add_option("--wait", options.subscribers, "wait until so many have subscribed, 0 to 1000000, default 0")
+  pub.add_option("--wait", options.subscribers,
+                 "wait until so many have subscribed, 0 to 1000000, default 0")
       ->transform(within(std::size_t{0}, std::size_t{1'000'000}));
   add_lane(pub, options);
   add_key(pub, options);
@@ -122,25 +144,33 @@ void add_pub(CLI::App& app, Options& options) {
 
 void add_echo(CLI::App& app, Options& options) {
   CLI::App& echo = *app.add_subcommand("echo", help::kEchoAbout);
-  echo.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
+  echo.add_option("service", options.target,
+                  "full name, node/service, or a pattern: `*` one part, `**` any number")
       ->required()
       ->check(not_empty());
-  echo.add_option("--window", options.pace.window, "of delivery sync:N: fewer than N untaken messages, from 1")
+  echo.add_option("--window", options.pace.window,
+                  "of delivery sync:N: fewer than N untaken messages, from 1")
       ->transform(within(std::uint32_t{1}, kSyncWindowMax));
-  echo.add_option("--depth", options.pace.depth,
-                  "newest messages that the hub holds meanwhile, 1 to 4096, of most hubs to 64, default 1")
+  echo.add_option(
+          "--depth", options.pace.depth,
+          "newest messages that the hub holds meanwhile, 1 to 4096, of most hubs to 64, default 1")
       ->transform(within(std::uint32_t{1}, kDepthMax));
-  echo.add_option("--rate", options.pace.rate_hz, "messages a second at most, 0.001 to 1000, default all")
+  echo.add_option("--rate", options.pace.rate_hz,
+                  "messages a second at most, 0.001 to 1000, default all")
       ->transform(within(0.001, 1e3));
   add_printing(echo, options);
 }
 
 void add_meter(CLI::App& app, const char* name, const char* about, Options& options) {
   CLI::App& meter = *app.add_subcommand(name, about);
-  meter.add_option("service", options.target, "full name, node/service, or a pattern: `*` one part, `**` any number")
+  meter
+      .add_option("service", options.target,
+                  "full name, node/service, or a pattern: `*` one part, `**` any number")
       ->required()
       ->check(not_empty());
-  meter.add_option("--window", options.window_s, "seconds that a line speaks of, 0.001 to 3600, default 5")
+  meter
+      .add_option("--window", options.window_s,
+                  "seconds that a line speaks of, 0.001 to 3600, default 5")
       ->transform(within(0.001, 3600.0));
   add_bounds(meter, options);
 }
@@ -150,16 +180,19 @@ void add_ping(CLI::App& app, Options& options) {
   ping.add_option("node", options.target, "name or id")->required()->check(not_empty());
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
       ->transform(within(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
-  ping.add_option("-i,--interval", options.interval_s, "seconds between two, 0 to 3600, default 0.1")
+  ping.add_option("-i,--interval", options.interval_s,
+                  "seconds between two, 0 to 3600, default 0.1")
       ->transform(within(0.0, 3600.0));
-  ping.add_option("-W,--timeout", options.timeout_s, "seconds after which one is lost, 0.001 to 3600, default 1")
+  ping.add_option("-W,--timeout", options.timeout_s,
+                  "seconds after which one is lost, 0.001 to 3600, default 1")
       ->transform(within(0.001, 3600.0));
   add_lane(ping, options);
 }
 
 void add_lists(CLI::App& app, Options& options) {
   CLI::App& nodes = *app.add_subcommand("nodes", help::kNodesAbout);
-  nodes.add_option("pattern", options.target, "`*` is one part of a name, `**` any number; or an id, 7.17");
+  nodes.add_option("pattern", options.target,
+                   "`*` is one part of a name, `**` any number; or an id, 7.17");
   nodes.add_flag("--all", options.all, "those of gimnet itself, too");
   CLI::App& services = *app.add_subcommand("services", help::kServicesAbout);
   services.add_option("pattern", options.target, "`*` is one part of a name, `**` any number");
@@ -174,7 +207,8 @@ void add_lists(CLI::App& app, Options& options) {
 }  // namespace
 
 const CLI::Validator& not_empty() {
-  static const CLI::Validator kNotEmpty([](std::string& word) { return word.empty() ? "empty" : std::string(); }, "");
+  static const CLI::Validator kNotEmpty(
+      [](std::string& word) { return word.empty() ? "empty" : std::string(); }, "");
   return kNotEmpty;
 }
 
@@ -182,10 +216,13 @@ void add_commands(CLI::App& app, Options& options) {
   static const std::map<std::string, Colour> kColours{
       {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
   app.formatter(help_format());  // before the commands, which take it over
-  app.add_option("--hub", options.hub, "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
+  app.add_option("--hub", options.hub,
+                 "tcp://host:port or unix:/path, default GIMNET_HUB, else this machine's hub")
       ->check(not_empty());
-  app.add_flag("--json", options.json, "print JSON: one document, or an object a line where there is no end");
-  app.add_option("--color", options.colour, "auto (on a terminal, unless NO_COLOR is set), always or never")
+  app.add_flag("--json", options.json,
+               "print JSON: one document, or an object a line where there is no end");
+  app.add_option("--color", options.colour,
+                 "auto (on a terminal, unless NO_COLOR is set), always or never")
       ->transform(CLI::CheckedTransformer(kColours).description(""));
   app.add_option("--shard", options.shard, "the hub's shard on which to live, 0 to 255")
       ->group("")
@@ -200,7 +237,8 @@ void add_commands(CLI::App& app, Options& options) {
   add_ping(app, options);
   add_lists(app, options);
   add_ctl(app, options.ctl);
-  app.require_subcommand(0, 1);  // the name of a second one is an argument: nodes may be called as commands are
+  app.require_subcommand(
+      0, 1);  // the name of a second one is an argument: nodes may be called as commands are
   for (CLI::App* command : app.get_subcommands({})) {
     command->fallthrough();
     command->footer(help::kEverywhere);

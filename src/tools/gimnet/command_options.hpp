@@ -14,21 +14,23 @@ class Validator;
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{{{"send", Command::send},
-                                                                                 {"recv", Command::recv},
-                                                                                 {"pub", Command::pub},
-                                                                                 {"echo", Command::echo},
-                                                                                 {"hz", Command::hz},
-                                                                                 {"bw", Command::bw},
-                                                                                 {"ping", Command::ping},
-                                                                                 {"nodes", Command::nodes},
-                                                                                 {"services", Command::services},
-                                                                                 {"watch", Command::watch},
-                                                                                 {"status", Command::status},
-                                                                                 {"ctl", Command::ctl}}};
+inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{
+    {{"send", Command::send},
+     {"recv", Command::recv},
+     {"pub", Command::pub},
+     {"echo", Command::echo},
+     {"hz", Command::hz},
+     {"bw", Command::bw},
+     {"ping", Command::ping},
+     {"nodes", Command::nodes},
+     {"services", Command::services},
+     {"watch", Command::watch},
+     {"status", Command::status},
+     {"ctl", Command::ctl}}};
 
-/// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each option's description
-/// says its unit, range and default: it is what a wrong value is answered with.
+/// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each
+/// option's description says its unit, range and default: it is what a wrong value is answered
+/// with.
 void add_commands(CLI::App& app, Options& options);
 
 /// An empty word is a mistake of a script, not a default.

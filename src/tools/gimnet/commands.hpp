@@ -3,7 +3,8 @@
 #include "tools/gimnet/exit_code.hpp"
 #include "tools/gimnet/session.hpp"
 
-// The commands, a file for each. They print data to the session's output and words to standard error.
+// The commands, a file for each. They print data to the session's output and words to standard
+// error.
 
 namespace gimnet::tool {
 

@@ -25,7 +25,8 @@ void ConnectionWatch::look(const char* afterwards) {
   if (state.connected && (broke || !connected_)) {
     // Why it was closed, the hub often tells only who is back.
     const bool knows_more = !broke && state.trouble != told_;
-    say("connected again as " + state.peer.text() + (knows_more ? " (before: " + state.trouble + ")" : ""));
+    say("connected again as " + state.peer.text() +
+        (knows_more ? " (before: " + state.trouble + ")" : ""));
   }
   if (broke) told_ = state.trouble;
   connected_ = state.connected;

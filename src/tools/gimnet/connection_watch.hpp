@@ -7,8 +7,8 @@
 
 namespace gimnet::tool {
 
-/// Tells breaks of the connection to the user, once each; not the last one, after which there is nothing to wait for.
-/// Thread safety: one thread.
+/// Tells breaks of the connection to the user, once each; not the last one, after which there is
+/// nothing to wait for. Thread safety: one thread.
 class ConnectionWatch {
  public:
   /// How long a break goes unnoticed at most by whoever looks now and then.
@@ -17,10 +17,11 @@ class ConnectionWatch {
   /// `node` must outlive it.
   explicit ConnectionWatch(Node& node) : node_(node) {}
   void look();
-  /// As look(), at most once in kPeriod: for a loop in which something comes all the time. `now_ns` as steady_now_ns().
+  /// As look(), at most once in kPeriod: for a loop in which something comes all the time. `now_ns`
+  /// as steady_now_ns().
   void look_now_and_then(std::int64_t now_ns);
-  /// A message says over which connection it came: looks if that is a newer one than was known. Not at those that wait
-  /// since before a break: a tool that lags behind may have thousands of them.
+  /// A message says over which connection it came: looks if that is a newer one than was known. Not
+  /// at those that wait since before a break: a tool that lags behind may have thousands of them.
   void take(const Message& message) {
     if (message.reconnects() > reconnects_) look();
   }

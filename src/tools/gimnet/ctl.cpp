@@ -16,7 +16,10 @@ std::string json_of(const std::vector<RouteRecord>& routes) {
   json.begin_array();
   for (const RouteRecord& route : routes) {
     json.begin_object().member("hub_id", route.hub_id).member("name", route.name);
-    json.member("next_hop", route.next_hop).member("cost", route.cost).member("nodes", route.nodes).end_object();
+    json.member("next_hop", route.next_hop)
+        .member("cost", route.cost)
+        .member("nodes", route.nodes)
+        .end_object();
   }
   return json.end_array().str() + "\n";
 }
@@ -24,8 +27,8 @@ std::string json_of(const std::vector<RouteRecord>& routes) {
 std::string table_of(const std::vector<RouteRecord>& routes) {
   Table table({"HUB", "NAME", "NEXT", "COST", "NODES"});
   for (const RouteRecord& route : routes) {
-    table.add({std::to_string(route.hub_id), route.name, std::to_string(route.next_hop), std::to_string(route.cost),
-               std::to_string(route.nodes)});
+    table.add({std::to_string(route.hub_id), route.name, std::to_string(route.next_hop),
+               std::to_string(route.cost), std::to_string(route.nodes)});
   }
   return table.text();
 }
@@ -34,7 +37,10 @@ std::string json_of(const std::vector<HubChange>& changes) {
   JsonWriter json;
   json.begin_array();
   for (const HubChange& change : changes) {
-    json.begin_object().member("key", change.key).member("from", change.from).member("to", change.to);
+    json.begin_object()
+        .member("key", change.key)
+        .member("from", change.from)
+        .member("to", change.to);
     json.member("needs_restart", change.needs_restart).end_object();
   }
   return json.end_array().str() + "\n";
@@ -44,8 +50,8 @@ std::string text_of(const std::vector<HubChange>& changes) {
   if (changes.empty()) return "nothing changed\n";
   std::string text;
   for (const HubChange& change : changes) {
-    text += change.key + ": " + change.from + " -> " + change.to + (change.needs_restart ? " (needs a restart)" : "") +
-            "\n";
+    text += change.key + ": " + change.from + " -> " + change.to +
+            (change.needs_restart ? " (needs a restart)" : "") + "\n";
   }
   return text;
 }
@@ -55,7 +61,8 @@ std::optional<Peer> parse_new_id(const std::string& text, Peer node) {
   if (const auto id = Peer::parse(text)) return id;
   std::uint32_t index = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (error != std::errc{} || end != text.data() + text.size() || index > kIndexMask) return std::nullopt;
+  if (error != std::errc{} || end != text.data() + text.size() || index > kIndexMask)
+    return std::nullopt;
   return Peer{make_id<NodeId>(hub_of(NodeId{node.id}), index).value()};
 }
 
@@ -73,7 +80,8 @@ ExitCode done(Session& session, const Outcome<void>& outcome, const std::string&
 ExitCode connections(Session& session) {
   const auto found = session.node().hub_connections();
   if (!found) return session.fail(found.failure());
-  session.output().write(session.options().json ? tool::json_of(*found) : tool::text_of(*found, session.paint()));
+  session.output().write(session.options().json ? tool::json_of(*found)
+                                                : tool::text_of(*found, session.paint()));
   return session.finish();
 }
 
@@ -103,7 +111,8 @@ ExitCode reassign(Session& session) {
     say("'" + ctl.new_id + "' is no id: write HUB.NUMBER, for example " + peer->text());
     return ExitCode::usage;
   }
-  return done(session, session.node().reassign(*peer, *new_id), peer->text() + " is " + new_id->text() + " now");
+  return done(session, session.node().reassign(*peer, *new_id),
+              peer->text() + " is " + new_id->text() + " now");
 }
 
 ExitCode reload(Session& session) {
@@ -127,15 +136,21 @@ ExitCode log(Session& session) {
   }
   if (session.options().json) {
     JsonWriter json;
-    session.output().write(
-        json.begin_object().member("done", true).member("level", level).member("before", *before).end_object().str() +
-        "\n");
+    session.output().write(json.begin_object()
+                               .member("done", true)
+                               .member("level", level)
+                               .member("before", *before)
+                               .end_object()
+                               .str() +
+                           "\n");
     return session.finish();
   }
   return done(session, {}, "log level " + level + ", before " + *before);
 }
 
-bool only_reads(CtlAction action) { return action == CtlAction::connections || action == CtlAction::routes; }
+bool only_reads(CtlAction action) {
+  return action == CtlAction::connections || action == CtlAction::routes;
+}
 
 }  // namespace
 
@@ -146,7 +161,8 @@ ExitCode run_ctl(Session& session) {
   // It asks once: coming back by itself would have it wait for a hub that it has just ended.
   how.reconnect = false;
   if (const auto ending = only_reads(action) ? session.join_to_look(how) : session.join(how)) {
-    // At the default addresses too: the socket there is this user's own, who would have been let in.
+    // At the default addresses too: the socket there is this user's own, who would have been let
+    // in.
     if (*ending == ExitCode::denied && !session.hub().starts_with("unix:"))
       say("changing needs the hub's Unix socket: --hub unix:/PATH, as `tcphub` prints it");
     return *ending;

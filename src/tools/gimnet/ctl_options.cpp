@@ -48,7 +48,8 @@ Examples:
   gimnet --hub unix:/run/tcphub.sock ctl reassign robot 1.100
 )";
 
-constexpr const char* kDrainAbout = R"(End the hub: it writes what waits, says goodbye to everybody, and ends.
+constexpr const char* kDrainAbout =
+    R"(End the hub: it writes what waits, says goodbye to everybody, and ends.
 
 Examples:
   gimnet --hub unix:/run/tcphub.sock ctl drain
@@ -94,7 +95,9 @@ void add_ctl(CLI::App& app, CtlOptions& options) {
   add(ctl, options, kDrainAbout, CtlAction::drain);
   add(ctl, options, kReloadAbout, CtlAction::reload);
   CLI::App& log = add(ctl, options, kLogAbout, CtlAction::log);
-  log.add_option("level", options.level, "error, warning, info, debug or off")->required()->check(not_empty());
+  log.add_option("level", options.level, "error, warning, info, debug or off")
+      ->required()
+      ->check(not_empty());
 }
 
 }  // namespace gimnet::tool

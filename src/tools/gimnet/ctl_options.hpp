@@ -14,8 +14,8 @@ namespace gimnet::tool {
 enum class CtlAction : std::uint8_t { connections, routes, kick, reassign, drain, reload, log };
 
 /// The words that name the actions.
-inline constexpr std::array<std::string_view, 7> kCtlActions{"connections", "routes", "kick", "reassign",
-                                                             "drain",       "reload", "log"};
+inline constexpr std::array<std::string_view, 7> kCtlActions{
+    "connections", "routes", "kick", "reassign", "drain", "reload", "log"};
 
 /// What `gimnet ctl` is to do. Thread safety: immutable once read.
 struct CtlOptions {

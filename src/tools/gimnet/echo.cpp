@@ -11,9 +11,11 @@ ExitCode run_echo(Session& session) {
   const bool all = !wants_less(session.options().pace);
   if (const auto opened = subscriptions.open(); !opened) return session.fail(opened.failure());
   if (const std::string words = subscriptions.waits_for(); !words.empty()) say(words);
-  MissedMessages missed([&](std::string_view service) { return subscriptions.take_lateness(service); });
-  const ExitCode code =
-      print_messages(session, [&](Timeout timeout) { return subscriptions.receive(timeout); }, all ? &missed : nullptr);
+  MissedMessages missed(
+      [&](std::string_view service) { return subscriptions.take_lateness(service); });
+  const ExitCode code = print_messages(
+      session, [&](Timeout timeout) { return subscriptions.receive(timeout); },
+      all ? &missed : nullptr);
   subscriptions.say_rest();
   return code;
 }

@@ -39,9 +39,11 @@ Outcome<FileContent> FileContent::read(const std::string& path, std::size_t byte
 Outcome<void> FileContent::fill(int file, const std::string& path, std::size_t bytes_max) {
   struct stat about{};
   const bool known = ::fstat(file, &about) == 0 && S_ISREG(about.st_mode) && about.st_size > 0;
-  if (known && static_cast<std::size_t>(about.st_size) > bytes_max) return too_large(path, bytes_max);
+  if (known && static_cast<std::size_t>(about.st_size) > bytes_max)
+    return too_large(path, bytes_max);
   // One more, so that the end of a file that does not grow is seen without growing.
-  if (!grow(known ? static_cast<std::size_t>(about.st_size) + 1 : kFirstBytes)) return cannot_read(path, ENOMEM);
+  if (!grow(known ? static_cast<std::size_t>(about.st_size) + 1 : kFirstBytes))
+    return cannot_read(path, ENOMEM);
   for (;;) {
     if (size_ == capacity_ && !grow(2 * capacity_)) return cannot_read(path, ENOMEM);
     const ssize_t count = ::read(file, memory_.get() + size_, capacity_ - size_);

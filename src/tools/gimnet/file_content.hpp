@@ -16,8 +16,8 @@ namespace gimnet::tool {
 /// All bytes of a file, a pipe or a device, in memory once. Thread safety: immutable.
 class FileContent {
  public:
-  /// Reads it. Errors: system (the sentence names the file and says why), too_large (over `bytes_max`; of a file known
-  /// before it is read).
+  /// Reads it. Errors: system (the sentence names the file and says why), too_large (over
+  /// `bytes_max`; of a file known before it is read).
   [[nodiscard]] static Outcome<FileContent> read(const std::string& path, std::size_t bytes_max);
   [[nodiscard]] std::span<const std::byte> bytes() const { return {memory_.get(), size_}; }
 

@@ -12,8 +12,8 @@ class HelpFormat final : public CLI::Formatter {
   std::string make_subcommand(const CLI::App* command) const override {
     const std::string about = command->get_description();
     std::ostringstream line;
-    CLI::detail::format_help(line, command->get_display_name(true), about.substr(0, about.find('\n')),
-                             get_column_width());
+    CLI::detail::format_help(line, command->get_display_name(true),
+                             about.substr(0, about.find('\n')), get_column_width());
     return line.str();
   }
 

@@ -12,8 +12,8 @@ constexpr std::string_view kDropped = "dropped.";
 constexpr std::string_view kRefused = "refused.";
 
 std::uint64_t value_of(const Counters& counters, std::string_view name) {
-  const auto found =
-      std::ranges::find(counters, name, [](const auto& counter) { return std::string_view(counter.first); });
+  const auto found = std::ranges::find(
+      counters, name, [](const auto& counter) { return std::string_view(counter.first); });
   return found == counters.end() ? 0 : found->second;
 }
 
@@ -37,7 +37,10 @@ void write(JsonWriter& json, const Ledger& ledger) {
 }
 
 void write(JsonWriter& json, const HubRecord& hub) {
-  json.begin_object().member("id", hub.hub_id).member("name", hub.name).member("version", hub.version);
+  json.begin_object()
+      .member("id", hub.hub_id)
+      .member("name", hub.name)
+      .member("version", hub.version);
   json.member("shards", hub.shards).member("uptime_ms", hub.uptime_ms).member("nodes", hub.nodes);
   json.member("services", hub.services).end_object();
 }
@@ -60,9 +63,12 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
   json.begin_array();
   for (const ConnectionRecord& connection : connections) {
     json.begin_object().member("id", connection.node.text()).member("name", connection.name);
-    json.member("shard", connection.shard).member("transport", connection.transport).member("peer", connection.peer);
+    json.member("shard", connection.shard)
+        .member("transport", connection.transport)
+        .member("peer", connection.peer);
     json.member("connected", connection.connected).member("queued_bytes", connection.queued_bytes);
-    json.member("accepted", connection.accepted).member("received_bytes", connection.received_bytes);
+    json.member("accepted", connection.accepted)
+        .member("received_bytes", connection.received_bytes);
     json.member("delivered", connection.delivered).member("sent_bytes", connection.sent_bytes);
     json.member("dropped", connection.dropped).end_object();
   }
@@ -70,12 +76,14 @@ void write(JsonWriter& json, const std::vector<ConnectionRecord>& connections) {
 }
 
 std::string connections_table(const std::vector<ConnectionRecord>& connections, Paint paint) {
-  Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "ACCEPTED", "DELIVERED", "DROPPED", "QUEUED", "PEER"});
+  Table table({"ID", "NAME", "SHARD", "TRANSPORT", "STATE", "ACCEPTED", "DELIVERED", "DROPPED",
+               "QUEUED", "PEER"});
   for (const ConnectionRecord& connection : connections) {
     table.add({connection.node.text(), connection.name.empty() ? "-" : connection.name,
-               std::to_string(connection.shard), connection.transport, connection.connected ? "connected" : "away",
-               std::to_string(connection.accepted), std::to_string(connection.delivered),
-               std::to_string(connection.dropped), std::to_string(connection.queued_bytes), connection.peer},
+               std::to_string(connection.shard), connection.transport,
+               connection.connected ? "connected" : "away", std::to_string(connection.accepted),
+               std::to_string(connection.delivered), std::to_string(connection.dropped),
+               std::to_string(connection.queued_bytes), connection.peer},
               connection.connected ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
@@ -99,8 +107,8 @@ Counters summed(const std::vector<ShardCounts>& shards) {
 }
 
 Ledger ledger_of(const Counters& counters) {
-  Ledger ledger{value_of(counters, "accepted"), value_of(counters, "copies"), value_of(counters, "delivered"), 0,
-                value_of(counters, "queued")};
+  Ledger ledger{value_of(counters, "accepted"), value_of(counters, "copies"),
+                value_of(counters, "delivered"), 0, value_of(counters, "queued")};
   for (const auto& [name, value] : counters) {
     if (name.starts_with(kDropped)) ledger.dropped += value;
   }
@@ -132,13 +140,15 @@ std::string json_of(const HubStatus& status) {
 std::string text_of(const HubStatus& status, Paint paint) {
   const Counters counters = summed(status.shards);
   const Ledger ledger = ledger_of(counters);
-  std::string text = "hub " + std::to_string(status.hub.hub_id) + " " + status.hub.name + ", version " +
-                     status.hub.version + ", up " + std::to_string(status.hub.uptime_ms / 1000) + " s, " +
-                     std::to_string(status.hub.shards) + " shards, " + std::to_string(status.hub.nodes) + " nodes, " +
-                     std::to_string(status.hub.services) + " services\n";
-  text += "ledger: " + std::to_string(ledger.accepted) + " accepted + " + std::to_string(ledger.copies) +
-          " copies = " + std::to_string(ledger.delivered) + " delivered + " + std::to_string(ledger.dropped) +
-          " dropped + " + std::to_string(ledger.queued) + " queued" +
+  std::string text =
+      "hub " + std::to_string(status.hub.hub_id) + " " + status.hub.name + ", version " +
+      status.hub.version + ", up " + std::to_string(status.hub.uptime_ms / 1000) + " s, " +
+      std::to_string(status.hub.shards) + " shards, " + std::to_string(status.hub.nodes) +
+      " nodes, " + std::to_string(status.hub.services) + " services\n";
+  text += "ledger: " + std::to_string(ledger.accepted) + " accepted + " +
+          std::to_string(ledger.copies) + " copies = " + std::to_string(ledger.delivered) +
+          " delivered + " + std::to_string(ledger.dropped) + " dropped + " +
+          std::to_string(ledger.queued) + " queued" +
           (ledger.exact() ? "\n" : " (not balanced: frames are on their way)\n");
   for (const auto& [name, value] : counters) {
     if (name.starts_with(kDropped) && value != 0)
@@ -147,7 +157,8 @@ std::string text_of(const HubStatus& status, Paint paint) {
   text += "mailbox: " + std::to_string(value_of(counters, "mailbox_entries")) + " entries, " +
           std::to_string(value_of(counters, "mailbox_wakeups")) + " wake-ups\n";
   for (const auto& [name, value] : counters) {
-    if (name.starts_with(kRefused) && value != 0) text += name + ": " + std::to_string(value) + "\n";
+    if (name.starts_with(kRefused) && value != 0)
+      text += name + ": " + std::to_string(value) + "\n";
   }
   return text + "\n" + connections_table(status.connections, paint);
 }

@@ -20,7 +20,8 @@ struct HubStatus {
 
 using Counters = std::vector<std::pair<std::string, std::uint64_t>>;
 
-/// Each counter over all shards and the conductor: the sum, and the largest of those that end in `_max`.
+/// Each counter over all shards and the conductor: the sum, and the largest of those that end in
+/// `_max`.
 [[nodiscard]] Counters summed(const std::vector<ShardCounts>& shards);
 
 /// accepted + copies = delivered + dropped + queued (docs/protocol.md, section 9).
@@ -40,6 +41,7 @@ struct Ledger {
 [[nodiscard]] std::string text_of(const HubStatus& status, Paint paint = Paint{});
 /// The same for connections alone: a list of objects, a table.
 [[nodiscard]] std::string json_of(const std::vector<ConnectionRecord>& connections);
-[[nodiscard]] std::string text_of(const std::vector<ConnectionRecord>& connections, Paint paint = Paint{});
+[[nodiscard]] std::string text_of(const std::vector<ConnectionRecord>& connections,
+                                  Paint paint = Paint{});
 
 }  // namespace gimnet::tool

@@ -12,7 +12,8 @@ namespace {
 constexpr std::string_view kHexDigits = "0123456789abcdef";
 
 bool is_utf8(std::string_view text) {
-  return proto::bitestream::valid_utf8(reinterpret_cast<const unsigned char*>(text.data()), text.size());
+  return proto::bitestream::valid_utf8(reinterpret_cast<const unsigned char*>(text.data()),
+                                       text.size());
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 
 namespace gimnet::tool {
 
-/// Writes one JSON value. Text that is no UTF-8 has U+FFFD in place of the bytes that are wrong; bytes() does not lose
-/// them. Thread safety: one thread.
+/// Writes one JSON value. Text that is no UTF-8 has U+FFFD in place of the bytes that are wrong;
+/// bytes() does not lose them. Thread safety: one thread.
 class JsonWriter {
  public:
   JsonWriter& begin_object() { return open('{'); }

@@ -18,7 +18,9 @@ constexpr int kAskMs = 500;
 
 LineInput::State LineInput::next(std::string_view& line) {
   for (;;) {
-    const void* newline = searched_ < end_ ? std::memchr(buffer_.data() + searched_, '\n', end_ - searched_) : nullptr;
+    const void* newline = searched_ < end_
+                              ? std::memchr(buffer_.data() + searched_, '\n', end_ - searched_)
+                              : nullptr;
     if (newline != nullptr) {
       const auto at = static_cast<std::size_t>(static_cast<const char*>(newline) - buffer_.data());
       line = {buffer_.data() + begin_, at - begin_};
@@ -37,7 +39,8 @@ LineInput::State LineInput::next(std::string_view& line) {
 }
 
 bool LineInput::has_line() const {
-  return begin_ < end_ && (at_end_ || std::memchr(buffer_.data() + begin_, '\n', end_ - begin_) != nullptr);
+  return begin_ < end_ &&
+         (at_end_ || std::memchr(buffer_.data() + begin_, '\n', end_ - begin_) != nullptr);
 }
 
 /// State::line: something was read, or the end.
@@ -48,7 +51,8 @@ LineInput::State LineInput::fill() {
     searched_ -= begin_;
     begin_ = 0;
   }
-  if (buffer_.size() < end_ + kReadBytes) buffer_.resize(std::max(2 * buffer_.size(), end_ + kReadBytes));
+  if (buffer_.size() < end_ + kReadBytes)
+    buffer_.resize(std::max(2 * buffer_.size(), end_ + kReadBytes));
   for (;;) {
     std::array<pollfd, 2> ready{pollfd{input_, POLLIN, 0}, pollfd{stop_, POLLIN, 0}};
     const int found = ::poll(ready.data(), ready.size(), go_on_ ? kAskMs : -1);

@@ -9,13 +9,13 @@
 
 namespace gimnet::tool {
 
-/// The lines of a descriptor, without their newline; the last one need not have one. Waits for them, for a second
-/// descriptor that ends the waiting, and asks now and then whether to go on. Thread safety: one thread. Memory: the
-/// longest line.
+/// The lines of a descriptor, without their newline; the last one need not have one. Waits for
+/// them, for a second descriptor that ends the waiting, and asks now and then whether to go on.
+/// Thread safety: one thread. Memory: the longest line.
 class LineInput {
  public:
-  /// `stop`: readable when the waiting should end; -1: none. Neither is closed. `go_on` is asked each half second
-  /// without a line; empty: nobody is.
+  /// `stop`: readable when the waiting should end; -1: none. Neither is closed. `go_on` is asked
+  /// each half second without a line; empty: nobody is.
   explicit LineInput(int input, int stop = -1, std::function<bool()> go_on = {})
       : input_(input), stop_(stop), go_on_(std::move(go_on)) {}
 

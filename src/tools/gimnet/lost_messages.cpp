@@ -10,10 +10,11 @@ struct Words {
   std::string_view why;
 };
 
-void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std::uint64_t told, const Words& words) {
+void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std::uint64_t told,
+                  const Words& words) {
   if (count == told) return;
-  sentences.push_back(std::to_string(count) + " " + words.what + (count == 1 ? " was lost: " : "s were lost: ") +
-                      std::string(words.why));
+  sentences.push_back(std::to_string(count) + " " + words.what +
+                      (count == 1 ? " was lost: " : "s were lost: ") + std::string(words.why));
 }
 
 }  // namespace
@@ -27,9 +28,11 @@ std::vector<std::string> LostMessages::rest() {
   std::vector<std::string> sentences;
   add_sentence(sentences, counts_.incomplete, told_.incomplete,
                {"message", "a part did not come, or did not fit the others"});
-  add_sentence(sentences, counts_.too_large, told_.too_large, {"message", "larger than this end takes"});
-  add_sentence(sentences, counts_.frames_broken_off, told_.frames_broken_off,
-               {"frame", "on the way when the connection broke, and a large message has many frames"});
+  add_sentence(sentences, counts_.too_large, told_.too_large,
+               {"message", "larger than this end takes"});
+  add_sentence(
+      sentences, counts_.frames_broken_off, told_.frames_broken_off,
+      {"frame", "on the way when the connection broke, and a large message has many frames"});
   add_sentence(sentences, counts_.unknown_service, told_.unknown_service,
                {"message", "of a service that this end does not know to have subscribed"});
   told_ = counts_;

@@ -16,7 +16,8 @@ class LostMessages {
   void take(const LostCounts& counts) { counts_ = counts; }
   [[nodiscard]] std::uint64_t all() const { return counts_.all(); }
 
-  /// Sentences about what was not told yet, one a reason; none within NewsPace::kPeriodNs of the last ones.
+  /// Sentences about what was not told yet, one a reason; none within NewsPace::kPeriodNs of the
+  /// last ones.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns);
   /// As news(), at the end: whatever the time is.
   [[nodiscard]] std::vector<std::string> rest();

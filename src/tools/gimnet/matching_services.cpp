@@ -54,7 +54,8 @@ void MatchingServices::on_snapshot_end() {
 
 void MatchingServices::settle(std::string_view name) {
   std::erase(wanted_, name);
-  if (const auto found = services_.find(name); found != services_.end()) found->second.settled = true;
+  if (const auto found = services_.find(name); found != services_.end())
+    found->second.settled = true;
 }
 
 void MatchingServices::forget(const std::string& name) {

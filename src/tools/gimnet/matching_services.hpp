@@ -13,12 +13,13 @@
 
 namespace gimnet::tool {
 
-/// The services that match a pattern, as a watch tells, and which of them want a subscription. Thread safety: one
-/// thread.
+/// The services that match a pattern, as a watch tells, and which of them want a subscription.
+/// Thread safety: one thread.
 class MatchingServices {
  public:
-  /// How many services that are gone are remembered. Their subscriptions stay, so that a service that is back loses
-  /// nothing: more than programs that are started again, fewer than would fill the hub's subscriptions_per_node.
+  /// How many services that are gone are remembered. Their subscriptions stay, so that a service
+  /// that is back loses nothing: more than programs that are started again, fewer than would fill
+  /// the hub's subscriptions_per_node.
   static constexpr std::size_t kGoneMax = 256;
 
   /// Takes what the watch tells next. Returns the name of a latecomer that is withdrawn again.
@@ -27,18 +28,23 @@ class MatchingServices {
   [[nodiscard]] bool complete() const { return complete_; }
   [[nodiscard]] bool any() const { return services_.size() > gone_.size(); }
 
-  /// The one to subscribe to next, also one that is gone already: it may come back. Null: none. Valid until: the next
-  /// call that changes something.
-  [[nodiscard]] const std::string* wanted() const { return wanted_.empty() ? nullptr : &wanted_.front(); }
+  /// The one to subscribe to next, also one that is gone already: it may come back. Null: none.
+  /// Valid until: the next call that changes something.
+  [[nodiscard]] const std::string* wanted() const {
+    return wanted_.empty() ? nullptr : &wanted_.front();
+  }
   /// It has its subscription, or will not get one. REQUIRES: is wanted() or was.
   void settle(std::string_view name);
-  /// Of those that are gone and remembered, the one that has been for longest. Null: none. As wanted().
-  [[nodiscard]] const std::string* oldest_gone() const { return gone_.empty() ? nullptr : &gone_.front(); }
+  /// Of those that are gone and remembered, the one that has been for longest. Null: none. As
+  /// wanted().
+  [[nodiscard]] const std::string* oldest_gone() const {
+    return gone_.empty() ? nullptr : &gone_.front();
+  }
   [[nodiscard]] bool remembers_too_many() const { return gone_.size() > kGoneMax; }
   void forget(const std::string& name);
 
-  /// Did the service come while its pattern was watched, and without a subscription, so that there may be messages from
-  /// before that? True once each time it came.
+  /// Did the service come while its pattern was watched, and without a subscription, so that there
+  /// may be messages from before that? True once each time it came.
   bool take_lateness(std::string_view name);
 
  private:
@@ -56,8 +62,10 @@ class MatchingServices {
   void on_snapshot_end();
 
   Services services_;
-  std::deque<std::string> wanted_;  ///< in the order of their coming. Limit: the services there are, and gone_
-  std::deque<std::string> gone_;    ///< those not there. Limit: kGoneMax, and what is still to be forgotten
+  std::deque<std::string>
+      wanted_;  ///< in the order of their coming. Limit: the services there are, and gone_
+  std::deque<std::string>
+      gone_;  ///< those not there. Limit: kGoneMax, and what is still to be forgotten
   bool complete_ = false;
 };
 

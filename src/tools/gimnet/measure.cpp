@@ -37,7 +37,9 @@ class Meters {
     if (!message) return message.failure();
     const std::int64_t begin_ns = message->arrival_ns();
     auto& counted =
-        counted_.try_emplace(std::string(message->service()), Counted{Meter(begin_ns, window_ns_), 0}).first->second;
+        counted_
+            .try_emplace(std::string(message->service()), Counted{Meter(begin_ns, window_ns_), 0})
+            .first->second;
     counted.meter.add(message->arrival_ns(), message->size());
     ++messages_;
     return {};
@@ -50,7 +52,8 @@ class Meters {
     readings.reserve(counted_.size());
     for (auto& [name, counted] : counted_) {
       readings.push_back(
-          {name, span == Span::whole ? counted.meter.whole(now_ns) : counted.meter.recent(now_ns), counted.missed});
+          {name, span == Span::whole ? counted.meter.whole(now_ns) : counted.meter.recent(now_ns),
+           counted.missed});
     }
     const bool json = session_.options().json;
     session_.output().write(json ? json_of(readings, measure_, span)
@@ -70,7 +73,8 @@ class Meters {
   /// Services that are there count from now on, also those that send nothing.
   void look() {
     for (const auto& [name, missed] : subscriptions_.missed()) {
-      auto& counted = counted_.try_emplace(name, Counted{Meter(wall_now_ns(), window_ns_), 0}).first->second;
+      auto& counted =
+          counted_.try_emplace(name, Counted{Meter(wall_now_ns(), window_ns_), 0}).first->second;
       counted.missed = missed;
     }
   }
@@ -91,9 +95,11 @@ ExitCode measure(Session& session, Measure measure) {
   ConnectionWatch watch(session.node());
   Failure failure;
   std::int64_t report_ns = steady_now_ns() + kReportNs;
-  while (!bounds.enough(meters.messages()) && !bounds.late() && !session.stopped() && session.output().ok()) {
+  while (!bounds.enough(meters.messages()) && !bounds.late() && !session.stopped() &&
+         session.output().ok()) {
     const std::int64_t left_ns = std::max<std::int64_t>(report_ns - steady_now_ns(), 0);
-    const auto received = meters.receive(bounds.wait(std::min(kReport, Timeout{left_ns / 1'000'000 + 1})));
+    const auto received =
+        meters.receive(bounds.wait(std::min(kReport, Timeout{left_ns / 1'000'000 + 1})));
     if (!received && !received.is(Status::timeout)) {
       failure = received.failure();
       break;

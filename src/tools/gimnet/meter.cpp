@@ -6,7 +6,9 @@
 namespace gimnet::tool {
 namespace {
 
-double seconds_of(std::int64_t ns) { return static_cast<double>(std::max<std::int64_t>(ns, 0)) / 1e9; }
+double seconds_of(std::int64_t ns) {
+  return static_cast<double>(std::max<std::int64_t>(ns, 0)) / 1e9;
+}
 
 }  // namespace
 
@@ -55,7 +57,8 @@ Reading Meter::recent(std::int64_t now_ns) {
 Reading Meter::whole(std::int64_t now_ns) const {
   Reading reading = whole_;
   reading.seconds = seconds_of(now_ns - begin_ns_);
-  reading.silent_s = reading.sizes_bytes.count() == 0 ? reading.seconds : seconds_of(now_ns - last_ns_);
+  reading.silent_s =
+      reading.sizes_bytes.count() == 0 ? reading.seconds : seconds_of(now_ns - last_ns_);
   return reading;
 }
 

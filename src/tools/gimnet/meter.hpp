@@ -6,7 +6,8 @@
 
 namespace gimnet::tool {
 
-/// Values seen one after the other: how many, least, most, mean and standard deviation. Thread safety: one thread.
+/// Values seen one after the other: how many, least, most, mean and standard deviation. Thread
+/// safety: one thread.
 class Statistics {
  public:
   void add(double value);
@@ -32,19 +33,24 @@ struct Reading {
   Statistics sizes_bytes;  ///< payloads; its count is the number of messages
   double seconds = 0.0;    ///< the time itself
   double silent_s = 0.0;   ///< since the last message; of none: the whole time
-  /// Messages a second by their gaps: exact however the time begins and ends. 0: fewer than two ever came.
+  /// Messages a second by their gaps: exact however the time begins and ends. 0: fewer than two
+  /// ever came.
   [[nodiscard]] double rate_hz() const;
-  [[nodiscard]] double bytes_per_s() const { return seconds > 0.0 ? sizes_bytes.sum() / seconds : 0.0; }
+  [[nodiscard]] double bytes_per_s() const {
+    return seconds > 0.0 ? sizes_bytes.sum() / seconds : 0.0;
+  }
 };
 
-/// Measures the messages of one service, over all the time and over the last of it. Times are nanoseconds of any clock.
-/// Memory: the messages of the last window, at most kMessagesMax. Thread safety: one thread.
+/// Measures the messages of one service, over all the time and over the last of it. Times are
+/// nanoseconds of any clock. Memory: the messages of the last window, at most kMessagesMax. Thread
+/// safety: one thread.
 class Meter {
  public:
   /// Messages of the window that are remembered; of more, the newest.
   static constexpr std::size_t kMessagesMax = 1'000'000;
 
-  Meter(std::int64_t begin_ns, std::int64_t window_ns) : begin_ns_(begin_ns), window_ns_(window_ns) {}
+  Meter(std::int64_t begin_ns, std::int64_t window_ns)
+      : begin_ns_(begin_ns), window_ns_(window_ns) {}
   void add(std::int64_t at_ns, std::size_t bytes);
   /// Of the last window, or of the time since the beginning if that is shorter.
   [[nodiscard]] Reading recent(std::int64_t now_ns);

@@ -14,13 +14,16 @@ constexpr double kSilentGaps = 3.0;
 constexpr double kSilentLeastS = 1.0;
 
 bool is_silent(const Reading& reading) {
-  return reading.silent_s >= kSilentLeastS && reading.silent_s * 1000.0 > kSilentGaps * reading.gaps_ms.max();
+  return reading.silent_s >= kSilentLeastS &&
+         reading.silent_s * 1000.0 > kSilentGaps * reading.gaps_ms.max();
 }
 
 std::vector<std::string> rate_cells(const ServiceReading& one) {
   const Reading& reading = one.reading;
   const Statistics& gaps = reading.gaps_ms;
-  const auto gap = [&](double value) { return gaps.count() == 0 ? std::string("-") : decimal(value, 3); };
+  const auto gap = [&](double value) {
+    return gaps.count() == 0 ? std::string("-") : decimal(value, 3);
+  };
   return {one.service,
           decimal(reading.rate_hz(), 1),
           gap(gaps.min()),
@@ -34,7 +37,9 @@ std::vector<std::string> rate_cells(const ServiceReading& one) {
 std::vector<std::string> byte_cells(const ServiceReading& one) {
   const Reading& reading = one.reading;
   const Statistics& sizes = reading.sizes_bytes;
-  const auto size = [&](double value) { return sizes.count() == 0 ? std::string("-") : byte_count(value); };
+  const auto size = [&](double value) {
+    return sizes.count() == 0 ? std::string("-") : byte_count(value);
+  };
   return {one.service,
           byte_count(reading.bytes_per_s()) + "/s",
           size(sizes.min()),
@@ -57,7 +62,9 @@ std::string json_of(const std::vector<ServiceReading>& readings, Measure measure
     json.member("missed", one.missed).member("silent_s", reading.silent_s);
     if (measure == Measure::rate) {
       const Statistics& gaps = reading.gaps_ms;
-      json.member("rate_hz", reading.rate_hz()).member("gap_min_ms", gaps.min()).member("gap_mean_ms", gaps.mean());
+      json.member("rate_hz", reading.rate_hz())
+          .member("gap_min_ms", gaps.min())
+          .member("gap_mean_ms", gaps.mean());
       json.member("gap_max_ms", gaps.max()).member("gap_std_ms", gaps.deviation());
     } else {
       const Statistics& sizes = reading.sizes_bytes;
@@ -70,16 +77,20 @@ std::string json_of(const std::vector<ServiceReading>& readings, Measure measure
   return lines;
 }
 
-std::string text_of(const std::vector<ServiceReading>& readings, Measure measure, Span span, Paint paint) {
+std::string text_of(const std::vector<ServiceReading>& readings, Measure measure, Span span,
+                    Paint paint) {
   if (readings.empty()) return {};
   const bool is_rate = measure == Measure::rate;
-  Table table(
-      is_rate ? std::vector<std::string>{"SERVICE", "HZ", "GAP MIN", "MEAN", "MAX", "STD ms", "MESSAGES", "MISSED"}
-              : std::vector<std::string>{"SERVICE", "BYTES/S", "SIZE MIN", "MEAN", "MAX", "SUM", "MESSAGES", "MISSED"});
+  Table table(is_rate ? std::vector<std::string>{"SERVICE", "HZ", "GAP MIN", "MEAN", "MAX",
+                                                 "STD ms", "MESSAGES", "MISSED"}
+                      : std::vector<std::string>{"SERVICE", "BYTES/S", "SIZE MIN", "MEAN", "MAX",
+                                                 "SUM", "MESSAGES", "MISSED"});
   for (const ServiceReading& one : readings) {
-    table.add(is_rate ? rate_cells(one) : byte_cells(one), is_silent(one.reading) ? Tone::warning : Tone::plain);
+    table.add(is_rate ? rate_cells(one) : byte_cells(one),
+              is_silent(one.reading) ? Tone::warning : Tone::plain);
   }
-  std::string text = span == Span::whole ? "in all " + decimal(readings.front().reading.seconds, 1) + " s:\n" : "";
+  std::string text =
+      span == Span::whole ? "in all " + decimal(readings.front().reading.seconds, 1) + " s:\n" : "";
   return text + table.text(paint);
 }
 

@@ -21,9 +21,10 @@ struct ServiceReading {
 };
 
 /// An object a service, each on a line. Gaps in milliseconds.
-[[nodiscard]] std::string json_of(const std::vector<ServiceReading>& readings, Measure measure, Span span);
+[[nodiscard]] std::string json_of(const std::vector<ServiceReading>& readings, Measure measure,
+                                  Span span);
 /// A table with a row a service.
-[[nodiscard]] std::string text_of(const std::vector<ServiceReading>& readings, Measure measure, Span span,
-                                  Paint paint = Paint{});
+[[nodiscard]] std::string text_of(const std::vector<ServiceReading>& readings, Measure measure,
+                                  Span span, Paint paint = Paint{});
 
 }  // namespace gimnet::tool

@@ -4,17 +4,19 @@
 
 namespace gimnet::tool {
 
-void MissedMessages::add_sentence(std::vector<std::string>& sentences, Count& count, const std::string& service,
-                                  std::string_view why) {
+void MissedMessages::add_sentence(std::vector<std::string>& sentences, Count& count,
+                                  const std::string& service, std::string_view why) {
   if (count.told == count.missed) return;
   count.told = count.missed;
-  sentences.push_back(std::to_string(count.missed) + (count.missed == 1 ? " message of " : " messages of ") + service +
+  sentences.push_back(std::to_string(count.missed) +
+                      (count.missed == 1 ? " message of " : " messages of ") + service +
                       " did not come: " + std::string(why));
 }
 
 std::uint64_t MissedMessages::take(const Message& message) {
   const auto found = services_.find(message.service());
-  auto& service = found != services_.end() ? found->second : services_[std::string(message.service())];
+  auto& service =
+      found != services_.end() ? found->second : services_[std::string(message.service())];
   const auto step = static_cast<std::int32_t>(message.sequence() - service.sequence);
   // The first of a provider says where it stands; a provider that began again counts from 1.
   if (message.from().id == service.provider && step > 0) {
@@ -63,9 +65,9 @@ std::vector<std::string> MissedMessages::rest() {
                  "published before this node had heard of the service and subscribed to it");
     add_sentence(sentences, service.broken, name, "the connection to the hub was broken");
     // Nobody tells a reader whether it or the sender was in the way.
-    add_sentence(
-        sentences, service.unknown, name,
-        "this reader was too slow, or the sender's connection broke (`gimnet status` counts what the hub dropped)");
+    add_sentence(sentences, service.unknown, name,
+                 "this reader was too slow, or the sender's connection broke (`gimnet status` "
+                 "counts what the hub dropped)");
   }
   untold_ = false;
   return sentences;

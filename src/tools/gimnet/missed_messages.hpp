@@ -13,21 +13,24 @@
 
 namespace gimnet::tool {
 
-/// What did not come of services, by the gaps between the numbers of what came, why, and when to say so. Times are
-/// those of steady_now_ns(). Thread safety: one thread.
+/// What did not come of services, by the gaps between the numbers of what came, why, and when to
+/// say so. Times are those of steady_now_ns(). Thread safety: one thread.
 class MissedMessages {
  public:
   /// Was the service subscribed to later than it began? As MatchingServices::take_lateness().
   using TakeLateness = std::function<bool(std::string_view)>;
 
-  explicit MissedMessages(TakeLateness take_lateness = {}) : take_lateness_(std::move(take_lateness)) {}
+  explicit MissedMessages(TakeLateness take_lateness = {})
+      : take_lateness_(std::move(take_lateness)) {}
 
   /// Returns how many of its service did not come up to this one. REQUIRES: it is of a service.
   std::uint64_t take(const Message& message);
-  /// As the node counts now what it cannot give out. So many of what did not come since the last time count as missed,
-  /// but are told by LostMessages. REQUIRES: the node receives nothing but these services.
+  /// As the node counts now what it cannot give out. So many of what did not come since the last
+  /// time count as missed, but are told by LostMessages. REQUIRES: the node receives nothing but
+  /// these services.
   void take_lost(const LostCounts& counts);
-  /// Sentences about what was not told yet, one a service and cause; none within NewsPace::kPeriodNs of the last ones.
+  /// Sentences about what was not told yet, one a service and cause; none within
+  /// NewsPace::kPeriodNs of the last ones.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns);
   /// As news(), at the end: whatever the time is.
   [[nodiscard]] std::vector<std::string> rest();
@@ -46,8 +49,8 @@ class MissedMessages {
     Count broken;   ///< while the connection to the hub was
     Count unknown;  ///< by all that happens elsewhere
   };
-  static void add_sentence(std::vector<std::string>& sentences, Count& count, const std::string& service,
-                           std::string_view why);
+  static void add_sentence(std::vector<std::string>& sentences, Count& count,
+                           const std::string& service, std::string_view why);
   void count(Service& service, std::uint64_t missed, const Message& message);
 
   const TakeLateness take_lateness_;

@@ -4,7 +4,8 @@
 
 namespace gimnet::tool {
 
-/// When to say on standard error what goes on happening. Times are those of steady_now_ns(). Thread safety: one thread.
+/// When to say on standard error what goes on happening. Times are those of steady_now_ns(). Thread
+/// safety: one thread.
 class NewsPace {
  public:
   /// How often it is said at most.

@@ -16,10 +16,10 @@ std::string json_of(const std::vector<NodeRecord>& nodes) {
 std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
   Table table({"ID", "NAME", "HUB", "STATE", "SERVICES", "SINCE", "PLACE", "DESCRIPTION"});
   for (const NodeRecord& node : nodes) {
-    table.add(
-        {node.node.text(), node.name.empty() ? "-" : node.name, node.hub_name, node.connected ? "connected" : "away",
-         std::to_string(node.services), std::to_string(node.joined_ms / 1000) + " s", node.place, node.description},
-        node.connected ? Tone::plain : Tone::warning);
+    table.add({node.node.text(), node.name.empty() ? "-" : node.name, node.hub_name,
+               node.connected ? "connected" : "away", std::to_string(node.services),
+               std::to_string(node.joined_ms / 1000) + " s", node.place, node.description},
+              node.connected ? Tone::plain : Tone::warning);
   }
   return table.text(paint);
 }

@@ -11,10 +11,25 @@
 
 namespace gimnet::tool {
 
-enum class Command : std::uint8_t { send, recv, pub, echo, hz, bw, ping, nodes, services, watch, status, ctl };
+enum class Command : std::uint8_t {
+  send,
+  recv,
+  pub,
+  echo,
+  hz,
+  bw,
+  ping,
+  nodes,
+  services,
+  watch,
+  status,
+  ctl
+};
 
 /// Are several names meant?
-[[nodiscard]] inline bool is_pattern(std::string_view word) { return word.find('*') != std::string_view::npos; }
+[[nodiscard]] inline bool is_pattern(std::string_view word) {
+  return word.find('*') != std::string_view::npos;
+}
 
 /// When to print colours: on a terminal, unless NO_COLOR says no.
 enum class Colour : std::uint8_t { automatic, always, never };

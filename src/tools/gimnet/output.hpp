@@ -7,7 +7,8 @@
 
 namespace gimnet::tool {
 
-/// Standard output, gathered. Thread safety: one thread. Errors: ok() is false once it could not be written.
+/// Standard output, gathered. Thread safety: one thread. Errors: ok() is false once it could not be
+/// written.
 class Output {
  public:
   explicit Output(int descriptor = 1) : descriptor_(descriptor) {}
@@ -20,8 +21,8 @@ class Output {
     write(std::string_view{reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
   void flush();
-  /// Writes what waits. False: it could not be written, and the words are printed. A reader that went away had enough:
-  /// that is no failure.
+  /// Writes what waits. False: it could not be written, and the words are printed. A reader that
+  /// went away had enough: that is no failure.
   [[nodiscard]] bool finish();
   [[nodiscard]] bool ok() const { return error_ == 0; }
   /// The errno.

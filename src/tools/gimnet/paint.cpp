@@ -27,10 +27,13 @@ std::string_view escape_of(Tone tone) {
   return {};
 }
 
-/// Bytes of what stands first, if it is a control character: C0, DEL, and in UTF-8 C1, ends of lines and paragraphs,
-/// and what turns the direction of writing, so that another text is seen than there is. 0: it is none.
+/// Bytes of what stands first, if it is a control character: C0, DEL, and in UTF-8 C1, ends of
+/// lines and paragraphs, and what turns the direction of writing, so that another text is seen than
+/// there is. 0: it is none.
 std::size_t control_size(std::string_view text) {
-  const auto byte = [text](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const auto byte = [text](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
+  };
   const unsigned first = byte(0);
   const unsigned second = byte(1);
   const unsigned third = byte(2);
@@ -38,7 +41,8 @@ std::size_t control_size(std::string_view text) {
   if (first == 0xC2 && second >= 0x80 && second <= 0x9F) return 2;
   if (first == 0xD8 && second == 0x9C) return 2;  // U+061C
   if (first != 0xE2) return 0;
-  const bool marks = second == 0x80 && ((third >= 0x8E && third <= 0x8F) || (third >= 0xA8 && third <= 0xAE));
+  const bool marks =
+      second == 0x80 && ((third >= 0x8E && third <= 0x8F) || (third >= 0xA8 && third <= 0xAE));
   const bool isolates = second == 0x81 && third >= 0xA6 && third <= 0xA9;
   return marks || isolates ? 3 : 0;
 }
@@ -47,7 +51,8 @@ std::size_t control_size(std::string_view text) {
 
 Paint Paint::of(Colour colour, int descriptor) {
   if (colour != Colour::automatic) return Paint(colour == Colour::always);
-  return Paint(::isatty(descriptor) == 1 && variable("NO_COLOR").empty() && variable("TERM") != "dumb");
+  return Paint(::isatty(descriptor) == 1 && variable("NO_COLOR").empty() &&
+               variable("TERM") != "dumb");
 }
 
 std::string Paint::operator()(std::string_view text, Tone tone) const {

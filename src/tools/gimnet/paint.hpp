@@ -15,7 +15,8 @@ enum class Tone : std::uint8_t { plain, heading, warning, bad };
 class Paint {
  public:
   explicit Paint(bool on = false) : on_(on) {}
-  /// As the option says; automatic: `descriptor` is a terminal that knows colours, and NO_COLOR is not set or empty.
+  /// As the option says; automatic: `descriptor` is a terminal that knows colours, and NO_COLOR is
+  /// not set or empty.
   [[nodiscard]] static Paint of(Colour colour, int descriptor);
 
   [[nodiscard]] bool on() const { return on_; }
@@ -25,8 +26,8 @@ class Paint {
   bool on_;
 };
 
-/// Text of others for people, a '.' for each control character: they would let it write over the terminal, or turn
-/// what is written.
+/// Text of others for people, a '.' for each control character: they would let it write over the
+/// terminal, or turn what is written.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace gimnet::tool

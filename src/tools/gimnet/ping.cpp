@@ -31,18 +31,21 @@ void print_json(Session& session, Peer peer, const Tally& tally) {
 
 void print_text(Session& session, const Tally& tally) {
   const RoundTrips::Summary us = tally.round_trips.summary_us();
-  session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) + " lost\n");
+  session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) +
+                         " lost\n");
   if (tally.round_trips.count() == 0) return;
-  session.output().write("round trip in us: min " + microseconds(us.min) + ", mean " + microseconds(us.mean) +
-                         ", p50 " + microseconds(us.p50) + ", p99 " + microseconds(us.p99) + ", p99.9 " +
-                         microseconds(us.p99_9) + ", max " + microseconds(us.max) + "\n");
+  session.output().write("round trip in us: min " + microseconds(us.min) + ", mean " +
+                         microseconds(us.mean) + ", p50 " + microseconds(us.p50) + ", p99 " +
+                         microseconds(us.p99) + ", p99.9 " + microseconds(us.p99_9) + ", max " +
+                         microseconds(us.max) + "\n");
 }
 
 /// Nothing: go on.
 std::optional<Failure> ping_once(Session& session, Peer peer, Tally& tally) {
   const Options& options = session.options();
   ++tally.sent;
-  const auto answer = session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
+  const auto answer =
+      session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
   if (answer) {
     tally.round_trips.add(*answer);
   } else if (session.stopped()) {
@@ -84,11 +87,12 @@ ExitCode run_ping(Session& session) {
   session.output().flush();
   if (failure) {
     static_cast<void>(session.fail(*failure));
-    return failure->status == Status::not_delivered ? ExitCode::not_found : exit_code_of(failure->status);
+    return failure->status == Status::not_delivered ? ExitCode::not_found
+                                                    : exit_code_of(failure->status);
   }
   if (tally.round_trips.count() == 0 && !session.stopped()) {
-    return session.fail(
-        {Status::timeout, options.target + " answered none of " + std::to_string(tally.sent) + " pings"});
+    return session.fail({Status::timeout, options.target + " answered none of " +
+                                              std::to_string(tally.sent) + " pings"});
   }
   return session.finish();
 }

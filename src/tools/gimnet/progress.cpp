@@ -35,7 +35,8 @@ void Progress::run() {
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      while (!stopping_ && steady_now_ns() < next_ns) static_cast<void>(changed_.wait_until(mutex_, next_ns));
+      while (!stopping_ && steady_now_ns() < next_ns)
+        static_cast<void>(changed_.wait_until(mutex_, next_ns));
       if (stopping_) break;
     }
     write("\r" + text_() + "\x1b[K");

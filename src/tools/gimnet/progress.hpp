@@ -8,8 +8,8 @@
 
 namespace gimnet::tool {
 
-/// A line at a terminal that tells how far long work is, renewed some times a second and taken away at the end. Not at
-/// a terminal: nothing. Work that is done at once shows none.
+/// A line at a terminal that tells how far long work is, renewed some times a second and taken away
+/// at the end. Not at a terminal: nothing. Work that is done at once shows none.
 class Progress {
  public:
   /// `text` is called on another thread until this goes. `descriptor`: of standard error.

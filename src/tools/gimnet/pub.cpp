@@ -18,16 +18,16 @@ namespace {
 
 /// How long the last lines may take to leave.
 constexpr Timeout kDrain{10'000};
-/// What a hub keeps of a retained service, unless its limit `retained_bytes` is another one, and its provider's
-/// library.
+/// What a hub keeps of a retained service, unless its limit `retained_bytes` is another one, and
+/// its provider's library.
 constexpr std::size_t kRetainedMax = std::size_t{1} << 20;
 /// How long it may take the library to say why, at the longest.
 constexpr std::int64_t kWhyNs = 1'000'000'000;
 /// How often the connection is looked at.
 constexpr std::int64_t kLookNs = 200'000'000;
 
-/// What goes on only while a hub is there: looks now and then, says what it sees, and waits where nothing stands, since
-/// publishing would wait without a word.
+/// What goes on only while a hub is there: looks now and then, says what it sees, and waits where
+/// nothing stands, since publishing would wait without a word.
 class Standing {
  public:
   Standing(Session& session, const Publisher& publisher)
@@ -98,13 +98,15 @@ Outcome<void> why_refused(Session& session, const Publisher& publisher, const Ou
   return sent;
 }
 
-Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing, UnheardLines& unheard) {
+Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing,
+                            UnheardLines& unheard) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
   LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return standing.goes_on(); });
   const Progress progress([&] {
-    return std::to_string(publisher.published()) + " published to " + std::to_string(publisher.subscribers());
+    return std::to_string(publisher.published()) + " published to " +
+           std::to_string(publisher.subscribers());
   });
   Retaining retaining(session.options());
   std::string_view line;
@@ -115,14 +117,16 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
         next_ns += period_ns;
         retaining.look_at(line);
         unheard.before_line(publisher.subscribers());
-        if (auto sent = publisher.publish(line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
+        if (auto sent = publisher.publish(
+                line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
             !sent) {
           return sent.is(Status::refused) ? why_refused(session, publisher, sent) : sent;
         }
         unheard.after_line(publisher.subscribers());
         break;
       case LineInput::State::failed:
-        return Failure{Status::system, std::string("cannot read standard input: ") + std::strerror(input.error())};
+        return Failure{Status::system,
+                       std::string("cannot read standard input: ") + std::strerror(input.error())};
       case LineInput::State::given_up:
         return standing.outcome();
       case LineInput::State::stopped:
@@ -132,11 +136,12 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
   }
 }
 
-Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publisher, Standing& standing) {
+Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publisher,
+                                   Standing& standing) {
   const std::size_t wanted = session.options().subscribers;
   if (publisher.subscribers() >= wanted) return {};
-  say("waiting for " + std::to_string(wanted) + (wanted == 1 ? " subscriber of " : " subscribers of ") +
-      session.options().target);
+  say("waiting for " + std::to_string(wanted) +
+      (wanted == 1 ? " subscriber of " : " subscribers of ") + session.options().target);
   while (true) {
     auto waited = publisher.wait_for_subscribers(wanted, Timeout{kLookNs / 1'000'000});
     if (waited || waited.failure().status != Status::timeout) return waited;
@@ -144,7 +149,8 @@ Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publ
   }
 }
 
-/// The service stands, and with it what is retained, until a signal comes or the hub wants this node no more.
+/// The service stands, and with it what is retained, until a signal comes or the hub wants this
+/// node no more.
 Outcome<void> stay(Session& session, Standing& standing) {
   session.output().flush();
   say("the input has ended; the service stays until Ctrl-C");
@@ -157,7 +163,9 @@ Outcome<void> stay(Session& session, Standing& standing) {
 void write_counts(Session& session, const Publisher& publisher) {
   if (!session.options().json) return;
   JsonWriter json;
-  json.begin_object().member("published", publisher.published()).member("subscribers", publisher.subscribers());
+  json.begin_object()
+      .member("published", publisher.published())
+      .member("subscribers", publisher.subscribers());
   session.output().write(json.end_object().str() + "\n");
 }
 

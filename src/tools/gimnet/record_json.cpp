@@ -2,7 +2,9 @@
 
 namespace gimnet::tool {
 
-const char* text_of(Direction direction) { return direction == Direction::accepts ? "accepts" : "provides"; }
+const char* text_of(Direction direction) {
+  return direction == Direction::accepts ? "accepts" : "provides";
+}
 std::string delivery_of(const ServiceRecord& service) {
   if (service.delivery == Delivery::sync) return "sync:" + std::to_string(service.window);
   return service.delivery == Delivery::latest ? "latest" : "stream";
@@ -10,7 +12,9 @@ std::string delivery_of(const ServiceRecord& service) {
 
 void write(JsonWriter& json, const NodeRecord& node) {
   json.begin_object().member("id", node.node.text()).member("name", node.name);
-  json.member("hub", node.hub_name).member("hub_id", node.hub_id).member("connected", node.connected);
+  json.member("hub", node.hub_name)
+      .member("hub_id", node.hub_id)
+      .member("connected", node.connected);
   json.member("description", node.description).member("place", node.place);
   json.member("joined_ms", node.joined_ms).member("services", node.services).end_object();
 }

@@ -15,7 +15,8 @@ ExitCode run_recv(Session& session) {
   how.name = options.name;
   how.message_bytes_max = options.bytes_max;
   if (const auto ending = session.join(how)) return *ending;
-  const Queue queue = session.node().queue(options.key, {kQueueMessages, AtFullQueue::stop_reading});
+  const Queue queue =
+      session.node().queue(options.key, {kQueueMessages, AtFullQueue::stop_reading});
   say("receiving as " + options.name + " (" + session.node().peer().text() + ")");
   return print_messages(session, [&](Timeout timeout) { return queue.receive(timeout); });
 }

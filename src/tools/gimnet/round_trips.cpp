@@ -17,7 +17,8 @@ RoundTrips::Summary RoundTrips::summary_us() const {
     return us(sorted[std::clamp<std::size_t>(rank, 1, sorted.size()) - 1]);
   };
   const std::int64_t sum = std::accumulate(sorted.begin(), sorted.end(), std::int64_t{0});
-  return {us(sorted.front()), us(sum) / count, percentile(0.5), percentile(0.99), percentile(0.999), us(sorted.back())};
+  return {us(sorted.front()), us(sum) / count,   percentile(0.5),
+          percentile(0.99),   percentile(0.999), us(sorted.back())};
 }
 
 }  // namespace gimnet::tool

@@ -22,8 +22,8 @@ class RoundTrips {
     double p99_9 = kNone;
     double max = kNone;
   };
-  /// kNone, which JSON writes as null, if there are none. A percentile is the smallest value that at least that part of
-  /// all does not exceed.
+  /// kNone, which JSON writes as null, if there are none. A percentile is the smallest value that
+  /// at least that part of all does not exceed.
   [[nodiscard]] Summary summary_us() const;
 
  private:

@@ -32,8 +32,10 @@ Outcome<void> check_readable(const std::string& path) {
 
 Outcome<void> send_one(const Sender& sender, BytesView message, More more) {
   auto sent = sender.send(message, kForever, more);
-  if (sent || sent.failure().status != Status::too_large || message.size() > kMessageBytesMax) return sent;
-  return Failure{Status::too_large, sent.failure().sentence + " (`gimnet recv` takes larger ones with --max-size)"};
+  if (sent || sent.failure().status != Status::too_large || message.size() > kMessageBytesMax)
+    return sent;
+  return Failure{Status::too_large,
+                 sent.failure().sentence + " (`gimnet recv` takes larger ones with --max-size)"};
 }
 
 Outcome<void> send_file(const Sender& sender, const std::string& path) {
@@ -41,8 +43,8 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
   if (!content) return content.failure();
   const std::int64_t begin_ns = steady_now_ns();
   const Progress progress([&] {
-    return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) + ": " +
-           std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
+    return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) +
+           ": " + std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
   });
   if (auto sent = send_one(sender, content->bytes(), More::no); !sent) return sent;
   return sender.settle();
@@ -51,8 +53,8 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
 /// What of the input was not sent.
 enum class Unsent : std::uint8_t { nothing, rest, line_and_rest };
 
-/// Waits for the fate of what was sent before a loss, or before a message that could not be sent, and answers with
-/// that.
+/// Waits for the fate of what was sent before a loss, or before a message that could not be sent,
+/// and answers with that.
 Outcome<void> settle_before(const Sender& sender, Outcome<void> unsent) {
   auto settled = sender.settle();
   if (!unsent && sender.counts().lost == 0) return unsent;
@@ -66,7 +68,8 @@ Outcome<void> send_lines(Session& session, const Sender& sender, Unsent& unsent)
   unsent = Unsent::rest;
   const Progress progress([&] {
     const SendCounts counts = sender.counts();
-    return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) + " acknowledged";
+    return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) +
+           " acknowledged";
   });
   std::string_view line;
   for (;;) {
@@ -107,20 +110,23 @@ Failure reason(const Session& session, const SendCounts& counts, Unsent unsent, 
   const std::string& target = session.options().target;
   if (counts.lost == 0) {
     if (unsent == Unsent::line_and_rest) {
-      failure.sentence += "; of " + std::to_string(counts.sent) + " messages before it " + acknowledged_words(counts) +
+      failure.sentence += "; of " + std::to_string(counts.sent) + " messages before it " +
+                          acknowledged_words(counts) +
                           " acknowledged, and nothing behind it was sent";
     }
     return failure;
   }
-  return {Status::not_delivered, std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
-                                     " messages were not acknowledged by " + target + ": " +
-                                     loss_words(counts, target) + "; " + acknowledged_words(counts) +
-                                     (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent")};
+  return {Status::not_delivered,
+          std::to_string(counts.lost) + " of " + std::to_string(counts.sent) +
+              " messages were not acknowledged by " + target + ": " + loss_words(counts, target) +
+              "; " + acknowledged_words(counts) +
+              (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent")};
 }
 
 /// It was the id of nobody: as a name that nobody has.
 bool nobody_there(const SendCounts& counts) {
-  const bool nobody = counts.loss_reason == LossReason::no_such_node || counts.loss_reason == LossReason::no_route;
+  const bool nobody =
+      counts.loss_reason == LossReason::no_such_node || counts.loss_reason == LossReason::no_route;
   return counts.acknowledged == 0 && nobody;
 }
 
@@ -128,7 +134,8 @@ bool nobody_there(const SendCounts& counts) {
 
 ExitCode run_send(Session& session) {
   const Options& options = session.options();
-  if (const auto readable = check_readable(options.file); !readable) return session.fail(readable.failure());
+  if (const auto readable = check_readable(options.file); !readable)
+    return session.fail(readable.failure());
   NodeOptions how;
   how.name = options.name;
   how.reconnect = false;  // a message whose fate is not known counts as lost
@@ -144,7 +151,8 @@ ExitCode run_send(Session& session) {
   const auto sender = session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
   Unsent unsent = Unsent::nothing;
-  auto sent = options.file.empty() ? send_lines(session, *sender, unsent) : send_file(*sender, options.file);
+  auto sent = options.file.empty() ? send_lines(session, *sender, unsent)
+                                   : send_file(*sender, options.file);
   if (sent && !session.stopped()) sent = sender->settle();
   const SendCounts counts = sender->counts();
   print(session, counts);

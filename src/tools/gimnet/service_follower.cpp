@@ -34,7 +34,8 @@ Outcome<void> ServiceFollower::open() {
     complete = event->change == Change::snapshot_ends;
     take(*event);
   }
-  // Whether the hub takes the terms shows at the first; as long as messages of it wait here, others may wait, too.
+  // Whether the hub takes the terms shows at the first; as long as messages of it wait here, others
+  // may wait, too.
   if (auto done = subscribe_next(kSubscribe); !done) return done;
   thread_ = std::thread([this] { run(); });
   return {};
@@ -60,7 +61,8 @@ Timeout ServiceFollower::patience() const {
   const MutexLock lock(mutex_);
   const bool wants = matching_.wanted() != nullptr;
   if (!wants && !matching_.remembers_too_many()) return kForever;
-  const std::int64_t left_ns = std::max<std::int64_t>((wants ? retry_ns_ : tidy_ns_) - steady_now_ns(), 0);
+  const std::int64_t left_ns =
+      std::max<std::int64_t>((wants ? retry_ns_ : tidy_ns_) - steady_now_ns(), 0);
   return Timeout{(left_ns + 999'999) / 1'000'000};
 }
 
@@ -83,14 +85,16 @@ Outcome<void> ServiceFollower::subscribe_next(Timeout timeout) {
     if (const std::string* wanted = matching_.wanted()) name = *wanted;
   }
   if (!name.empty()) {
-    auto subscription = node_.subscribe(name, {kQueueMessages, AtFullQueue::stop_reading}, timeout, pace_);
+    auto subscription =
+        node_.subscribe(name, {kQueueMessages, AtFullQueue::stop_reading}, timeout, pace_);
     if (!subscription) return subscription.failure();
     told_ = false;
     const MutexLock lock(mutex_);
     subscriptions_.insert_or_assign(name, std::move(*subscription));
     matching_.settle(name);
   }
-  if (steady_now_ns() >= tidy_ns_ && remembers_too_many() && !let_one_go()) tidy_ns_ = steady_now_ns() + kRetryNs;
+  if (steady_now_ns() >= tidy_ns_ && remembers_too_many() && !let_one_go())
+    tidy_ns_ = steady_now_ns() + kRetryNs;
   return {};
 }
 
@@ -121,8 +125,8 @@ void ServiceFollower::on_refusal(const Failure& failure) {
     return;
   }
   if (failure.status == Status::limit && let_one_go()) return;
-  const bool passes =
-      failure.status == Status::limit || failure.status == Status::timeout || failure.status == Status::not_connected;
+  const bool passes = failure.status == Status::limit || failure.status == Status::timeout ||
+                      failure.status == Status::not_connected;
   if (passes) {
     retry_ns_ = steady_now_ns() + kRetryNs;
     if (failure.status == Status::limit && !std::exchange(told_, true)) {
@@ -153,7 +157,8 @@ std::optional<Failure> ServiceFollower::failure() const {
 std::map<std::string, std::uint64_t> ServiceFollower::missed() const {
   const MutexLock lock(mutex_);
   std::map<std::string, std::uint64_t> counts;
-  for (const auto& [name, subscription] : subscriptions_) counts.emplace(name, subscription.missed());
+  for (const auto& [name, subscription] : subscriptions_)
+    counts.emplace(name, subscription.missed());
   return counts;
 }
 

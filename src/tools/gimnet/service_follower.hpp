@@ -21,9 +21,10 @@ inline constexpr std::size_t kQueueMessages = 4096;
 /// How long subscribing may take.
 inline constexpr Timeout kSubscribe{5'000};
 
-/// Subscribes to all services that match a pattern, to those that come later as soon as the hub tells of them. It has a
-/// thread of its own for that, since whoever waits for messages cannot wait for news, too. Says on standard error what
-/// it cannot subscribe to, and goes on. Memory: what MatchingServices remembers. Thread safety: one thread.
+/// Subscribes to all services that match a pattern, to those that come later as soon as the hub
+/// tells of them. It has a thread of its own for that, since whoever waits for messages cannot wait
+/// for news, too. Says on standard error what it cannot subscribe to, and goes on. Memory: what
+/// MatchingServices remembers. Thread safety: one thread.
 class ServiceFollower {
  public:
   /// `node` must outlive it, and is closed with it.
@@ -33,8 +34,8 @@ class ServiceFollower {
   ServiceFollower(const ServiceFollower&) = delete;
   ServiceFollower& operator=(const ServiceFollower&) = delete;
 
-  /// Learns which services are there, and subscribes to the first of them; to the others meanwhile. Errors: as
-  /// Node::watch() and Node::subscribe(). Once.
+  /// Learns which services are there, and subscribes to the first of them; to the others meanwhile.
+  /// Errors: as Node::watch() and Node::subscribe(). Once.
   [[nodiscard]] Outcome<void> open() GIMNET_EXCLUDES(mutex_);
   /// Is a service there?
   [[nodiscard]] bool any() const GIMNET_EXCLUDES(mutex_);
@@ -45,8 +46,8 @@ class ServiceFollower {
   [[nodiscard]] std::map<std::string, std::uint64_t> missed() const GIMNET_EXCLUDES(mutex_);
   /// As MatchingServices::take_lateness().
   [[nodiscard]] bool take_lateness(std::string_view name) GIMNET_EXCLUDES(mutex_);
-  /// As VanishedServices::news() and rest(); news() also of subscriptions that the hub did not take again after a
-  /// break.
+  /// As VanishedServices::news() and rest(); news() also of subscriptions that the hub did not take
+  /// again after a break.
   [[nodiscard]] std::vector<std::string> news(std::int64_t now_ns) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::vector<std::string> rest() GIMNET_EXCLUDES(mutex_);
 
@@ -62,7 +63,8 @@ class ServiceFollower {
   [[nodiscard]] Outcome<void> subscribe_next(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   void on_refusal(const Failure& failure) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool remembers_too_many() const GIMNET_EXCLUDES(mutex_);
-  /// Ends the subscription of whom has been gone for longest. False: nobody is, or its messages are still to be taken.
+  /// Ends the subscription of whom has been gone for longest. False: nobody is, or its messages are
+  /// still to be taken.
   [[nodiscard]] bool let_one_go() GIMNET_EXCLUDES(mutex_);
   /// About those that the hub did not take again and that were not told yet; "" if there are none.
   [[nodiscard]] std::string refusal_news() GIMNET_REQUIRES(mutex_);

@@ -12,7 +12,8 @@
 namespace gimnet::tool {
 namespace {
 
-/// Where nodes are, as their hubs see them. A node that came or went between the two listings has no place.
+/// Where nodes are, as their hubs see them. A node that came or went between the two listings has
+/// no place.
 class Places {
  public:
   explicit Places(const std::vector<NodeRecord>& nodes) {
@@ -34,10 +35,13 @@ std::string json_of(const std::vector<ServiceRecord>& services, const Places& pl
   return json.end_array().str() + "\n";
 }
 
-std::string table_of(const std::vector<ServiceRecord>& services, const Places& places, Paint paint) {
-  Table table({"NAME", "NODE", "HUB", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN", "SUBSCRIBERS", "METADATA"});
+std::string table_of(const std::vector<ServiceRecord>& services, const Places& places,
+                     Paint paint) {
+  Table table({"NAME", "NODE", "HUB", "PLACE", "TYPE", "DIRECTION", "DELIVERY", "RETAIN",
+               "SUBSCRIBERS", "METADATA"});
   for (const ServiceRecord& service : services) {
-    table.add({service.name, service.node.text(), service.hub_name, std::string(places.of(service.node)),
+    table.add({service.name, service.node.text(), service.hub_name,
+               std::string(places.of(service.node)),
                std::to_string(service.key.type) + "/" + std::to_string(service.key.instance),
                text_of(service.direction), delivery_of(service), service.retain ? "yes" : "no",
                std::to_string(service.subscribers), service.metadata});
@@ -60,7 +64,8 @@ ExitCode run_services(Session& session) {
   const Places places(nodes);
   session.output().write(session.options().json ? json_of(*services, places)
                                                 : table_of(*services, places, session.paint()));
-  if (services->empty() && !session.options().target.empty()) return session.fail_unmatched("service");
+  if (services->empty() && !session.options().target.empty())
+    return session.fail_unmatched("service");
   return session.finish();
 }
 

@@ -13,11 +13,13 @@
 namespace gimnet::tool {
 
 void say(const std::string& sentence) {
-  // What a hub or another node says may have anything in it; of that, only ends of lines are for the terminal.
+  // What a hub or another node says may have anything in it; of that, only ends of lines are for
+  // the terminal.
   std::string shown;
   for (std::size_t begin = 0; begin <= sentence.size();) {
     const std::size_t end = std::min(sentence.find('\n', begin), sentence.size());
-    shown += (begin == 0 ? "" : "\n") + printable(std::string_view(sentence).substr(begin, end - begin));
+    shown +=
+        (begin == 0 ? "" : "\n") + printable(std::string_view(sentence).substr(begin, end - begin));
     begin = end + 1;
   }
   std::fprintf(stderr, "gimnet: %s\n", shown.c_str());
@@ -30,7 +32,9 @@ NodeOptions Session::options_for(NodeOptions how) const {
   return how;
 }
 
-std::optional<ExitCode> Session::join(NodeOptions how) { return settle(Node::join(options_for(std::move(how)))); }
+std::optional<ExitCode> Session::join(NodeOptions how) {
+  return settle(Node::join(options_for(std::move(how))));
+}
 
 std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
   how = options_for(std::move(how));
@@ -45,9 +49,10 @@ std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
     if (failure.status == Status::no_hub || failure.status == Status::no_host) {
-      if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?')) failure.sentence += '.';
-      failure.sentence +=
-          advice(failure.status == Status::no_host ? "look at its name" : "start one there with `tcphub`");
+      if (!failure.sentence.ends_with('.') && !failure.sentence.ends_with('?'))
+        failure.sentence += '.';
+      failure.sentence += advice(
+          failure.status == Status::no_host ? "look at its name" : "start one there with `tcphub`");
     }
     const ExitCode code = fail(failure);
     // Whoever answers there lets nobody in, or is no hub.
@@ -61,12 +66,14 @@ std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
 
 std::optional<Peer> Session::find(std::string_view name) {
   auto peer = node_->find(name);
-  if (peer.is(Status::not_found) && is_listed(name)) peer = node_->find(name);  // it came in between
+  if (peer.is(Status::not_found) && is_listed(name))
+    peer = node_->find(name);  // it came in between
   if (peer) return *peer;
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
     failure.sentence = "there is no node '" + std::string(name) + "'";
-    failure.sentence += is_service(name) ? service_words(name) : id_words(name) + nearest_name("node", name);
+    failure.sentence +=
+        is_service(name) ? service_words(name) : id_words(name) + nearest_name("node", name);
   }
   code_ = fail(failure);
   return std::nullopt;
@@ -80,13 +87,16 @@ std::string Session::id_words(std::string_view name) {
 
 bool Session::is_listed(std::string_view name) {
   const auto nodes = node_->nodes("**");
-  return nodes && std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
+  return nodes &&
+         std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
 }
 
 bool Session::is_service(std::string_view name) {
   if (name.find('/') == std::string_view::npos) return false;
   const auto services = node_->services(name);
-  return services && std::ranges::any_of(*services, [&](const ServiceRecord& service) { return service.name == name; });
+  return services && std::ranges::any_of(*services, [&](const ServiceRecord& service) {
+           return service.name == name;
+         });
 }
 
 std::string Session::service_words(std::string_view name) {
@@ -145,7 +155,8 @@ ExitCode Session::fail(const Failure& failure) {
   if (stopped()) return exit_code_of_signal(stop_.signal());
   const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
-  const bool known = !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
+  const bool known =
+      !state.trouble.empty() && (state.ended || failure.status == Status::not_connected);
   say(known ? "lost the connection to the hub: " + state.trouble : failure.sentence);
   return exit_code_of(failure.status);
 }
@@ -157,13 +168,16 @@ ExitCode Session::finish() {
 
 ExitCode Session::finish_stream(const Bounds& bounds, std::uint64_t messages) {
   const ExitCode code = finish();
-  if (code != ExitCode::done || !output_.ok() || !bounds.late() || !bounds.missed(messages)) return code;
+  if (code != ExitCode::done || !output_.ok() || !bounds.late() || !bounds.missed(messages))
+    return code;
   const bool events = options_.command == Command::watch;
   const std::string one = events ? "an event" : "a message";
   const std::string many = std::to_string(options_.count) + (events ? " events" : " messages");
-  return fail({Status::timeout, "waited " + decimal(options_.seconds) + " s for " + (options_.count < 2 ? one : many) +
-                                    " of " + (options_.target.empty() ? "anybody" : options_.target) + ": " +
-                                    (messages == 0 ? "none" : "only " + std::to_string(messages)) + " came"});
+  return fail({Status::timeout, "waited " + decimal(options_.seconds) + " s for " +
+                                    (options_.count < 2 ? one : many) + " of " +
+                                    (options_.target.empty() ? "anybody" : options_.target) + ": " +
+                                    (messages == 0 ? "none" : "only " + std::to_string(messages)) +
+                                    " came"});
 }
 
 }  // namespace gimnet::tool

@@ -35,7 +35,8 @@ class Session {
 
   /// Joins as the options say. Errors: the code to end with; the words are printed.
   [[nodiscard]] std::optional<ExitCode> join(NodeOptions how);
-  /// Joins to look at the hub: at one that takes no nodes any more, as an administrator, where this user is one.
+  /// Joins to look at the hub: at one that takes no nodes any more, as an administrator, where this
+  /// user is one.
   [[nodiscard]] std::optional<ExitCode> join_to_look(NodeOptions how = {});
   /// The hub that was asked for, by --hub or GIMNET_HUB; "": the hub of this machine.
   [[nodiscard]] std::string hub() const;
@@ -48,10 +49,13 @@ class Session {
   /// No node or service (`kind`) matches the target: says so, with the nearest name.
   [[nodiscard]] ExitCode fail_unmatched(const std::string& kind);
 
-  /// Prints why something did not work, and gives the code to end with: the signal's, if there was one.
+  /// Prints why something did not work, and gives the code to end with: the signal's, if there was
+  /// one.
   [[nodiscard]] ExitCode fail(const Failure& failure);
   /// No connection will come any more: what to give to fail().
-  [[nodiscard]] static Failure gone() { return {Status::not_connected, "lost the connection to the hub"}; }
+  [[nodiscard]] static Failure gone() {
+    return {Status::not_connected, "lost the connection to the hub"};
+  }
   /// Ends well, unless the output could not be written or a signal came.
   [[nodiscard]] ExitCode finish();
   /// finish(), and timeout if time was up before there was what was asked for.

@@ -12,7 +12,8 @@ ExitCode run_status(Session& session) {
   const auto shards = session.node().hub_counters();
   if (!shards) return session.fail(shards.failure());
   const HubStatus status{*hub, *shards, *connections};
-  session.output().write(session.options().json ? json_of(status) : text_of(status, session.paint()));
+  session.output().write(session.options().json ? json_of(status)
+                                                : text_of(status, session.paint()));
   return session.finish();
 }
 

@@ -7,9 +7,10 @@
 
 namespace gimnet::tool {
 
-/// Ctrl-C, SIGTERM and the end of the terminal (SIGHUP, unless it was ignored before, as nohup does), turned into a
-/// request to stop: waits end, and the program can leave the hub in good order. A second Ctrl-C or SIGTERM ends it at
-/// once. One for a program, made before any other thread. Thread safety: any thread.
+/// Ctrl-C, SIGTERM and the end of the terminal (SIGHUP, unless it was ignored before, as nohup
+/// does), turned into a request to stop: waits end, and the program can leave the hub in good
+/// order. A second Ctrl-C or SIGTERM ends it at once. One for a program, made before any other
+/// thread. Thread safety: any thread.
 class StopSignal {
  public:
   StopSignal();

@@ -14,7 +14,8 @@ bool wants_less(const PaceOptions& pace) {
 
 Outcome<void> Subscriptions::open() {
   if (!is_pattern(word_)) {
-    auto subscription = node_.subscribe(word_, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
+    auto subscription =
+        node_.subscribe(word_, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
     if (!subscription) return subscription.failure();
     one_ = std::move(*subscription);
     return {};
@@ -24,10 +25,11 @@ Outcome<void> Subscriptions::open() {
   return !follower_->any() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
 }
 
-/// Whether the hub takes the pace, before there is a service to which it could say no: by a subscription that ends at
-/// once, of a service that nobody has.
+/// Whether the hub takes the pace, before there is a service to which it could say no: by a
+/// subscription that ends at once, of a service that nobody has.
 Outcome<void> Subscriptions::ask_terms() {
-  auto subscription = node_.subscribe("gimnet-echo/terms", {1, AtFullQueue::stop_reading}, kSubscribe, pace_);
+  auto subscription =
+      node_.subscribe("gimnet-echo/terms", {1, AtFullQueue::stop_reading}, kSubscribe, pace_);
   return subscription ? Outcome<void>{} : subscription.failure();
 }
 
@@ -37,9 +39,11 @@ Outcome<Message> Subscriptions::receive(Timeout timeout) {
     const std::int64_t now_ns = steady_now_ns();
     const Timeout left{std::max<std::int64_t>((end_ns - now_ns) / 1'000'000, 0)};
     auto message = node_.receive(std::min(timeout, left));
-    if (message && message->service().empty()) continue;  // sent to this node by somebody who guessed its id
+    if (message && message->service().empty())
+      continue;  // sent to this node by somebody who guessed its id
     if (!follower_ && !message && message.is(Status::timeout) && one_) {
-      if (one_->accepts()) return Failure{Status::not_found, word_ + " takes data and gives none; send to it"};
+      if (one_->accepts())
+        return Failure{Status::not_found, word_ + " takes data and gives none; send to it"};
       if (const auto stands = one_->standing(); !stands) return stands.failure();
     }
     if (!follower_) return message;
@@ -58,13 +62,17 @@ void Subscriptions::say_rest() {
 
 std::map<std::string, std::uint64_t> Subscriptions::missed() const {
   if (follower_) return follower_->missed();
-  return one_ ? std::map<std::string, std::uint64_t>{{word_, one_->missed()}} : std::map<std::string, std::uint64_t>{};
+  return one_ ? std::map<std::string, std::uint64_t>{{word_, one_->missed()}}
+              : std::map<std::string, std::uint64_t>{};
 }
 
-bool Subscriptions::take_lateness(std::string_view service) { return follower_ && follower_->take_lateness(service); }
+bool Subscriptions::take_lateness(std::string_view service) {
+  return follower_ && follower_->take_lateness(service);
+}
 
 std::string Subscriptions::waits_for() const {
-  if (follower_) return follower_->any() ? "" : "no service matches " + word_ + " yet; waiting for one";
+  if (follower_)
+    return follower_->any() ? "" : "no service matches " + word_ + " yet; waiting for one";
   return !one_ || one_->exists() ? "" : "nobody provides " + word_ + " yet; waiting for it";
 }
 

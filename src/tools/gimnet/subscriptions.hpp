@@ -14,21 +14,21 @@ namespace gimnet::tool {
 /// Not all messages are wanted, and the hub has to take the terms.
 [[nodiscard]] bool wants_less(const PaceOptions& pace);
 
-/// The services that a word of the command line names: one by its full name, which need not exist yet, or all that
-/// match a pattern, those that come later too. Thread safety: one thread.
+/// The services that a word of the command line names: one by its full name, which need not exist
+/// yet, or all that match a pattern, those that come later too. Thread safety: one thread.
 class Subscriptions {
  public:
   /// `node` must outlive it; with a pattern it is closed with it.
   Subscriptions(Node& node, std::string word, const PaceOptions& pace = {})
       : node_(node), word_(std::move(word)), pace_(pace) {}
 
-  /// Subscribes to what is there; of a pattern to the first, and to the others meanwhile. Errors: as Node::subscribe()
-  /// and Node::watch().
+  /// Subscribes to what is there; of a pattern to the first, and to the others meanwhile. Errors:
+  /// as Node::subscribe() and Node::watch().
   [[nodiscard]] Outcome<void> open();
-  /// The next message of any of them. Says on standard error, now and then, which services of a pattern came and went
-  /// without one. Errors: timeout, closed; not_found: the service came and accepts data; limit
-  /// and others: the hub did not take the subscription again after a break; for a pattern also refused: it
-  /// takes in no more services.
+  /// The next message of any of them. Says on standard error, now and then, which services of a
+  /// pattern came and went without one. Errors: timeout, closed; not_found: the service came and
+  /// accepts data; limit and others: the hub did not take the subscription again after a break; for
+  /// a pattern also refused: it takes in no more services.
   [[nodiscard]] Outcome<Message> receive(Timeout timeout);
   /// What receive() would still have said.
   void say_rest();

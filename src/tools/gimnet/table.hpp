@@ -8,7 +8,8 @@
 
 namespace gimnet::tool {
 
-/// Rows of text in columns as wide as they need. Control characters are shown as '.'. Thread safety: one thread.
+/// Rows of text in columns as wide as they need. Control characters are shown as '.'. Thread
+/// safety: one thread.
 class Table {
  public:
   explicit Table(std::vector<std::string> titles) { add(std::move(titles), Tone::heading); }

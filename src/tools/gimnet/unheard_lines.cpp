@@ -6,8 +6,10 @@ std::string UnheardLines::sentence(const std::string& service) const {
   if (unheard_ == 0) return {};
   const std::string all = std::to_string(lines_);
   std::string count = std::to_string(unheard_) + " of " + all + " lines went to nobody: ";
-  if (unheard_ == lines_) count = lines_ == 1 ? "the line went to nobody: " : "all " + all + " lines went to nobody: ";
-  return count + "nobody had subscribed to " + service + " then; --wait 1 holds the first until somebody has";
+  if (unheard_ == lines_)
+    count = lines_ == 1 ? "the line went to nobody: " : "all " + all + " lines went to nobody: ";
+  return count + "nobody had subscribed to " + service +
+         " then; --wait 1 holds the first until somebody has";
 }
 
 }  // namespace gimnet::tool

@@ -6,12 +6,12 @@
 
 namespace gimnet::tool {
 
-/// Lines that were published while nobody had subscribed: the library sends them to nobody, and only the publisher
-/// can say so. Thread safety: one thread.
+/// Lines that were published while nobody had subscribed: the library sends them to nobody, and
+/// only the publisher can say so. Thread safety: one thread.
 class UnheardLines {
  public:
-  /// How many have subscribed right before a line is published, and right behind. Of whom comes in between nobody knows
-  /// whether the line reaches it: that counts as heard.
+  /// How many have subscribed right before a line is published, and right behind. Of whom comes in
+  /// between nobody knows whether the line reaches it: that counts as heard.
   void before_line(std::size_t subscribers) { alone_ = subscribers == 0; }
   void after_line(std::size_t subscribers) {
     ++lines_;

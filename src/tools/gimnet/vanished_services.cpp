@@ -24,10 +24,12 @@ std::vector<std::string> VanishedServices::news(std::int64_t now_ns) {
   }
   if (count_ == 0 || !pace_.due(now_ns)) return {};
   const std::size_t others = std::exchange(count_, 0) - 1;
-  const std::string who =
-      others == 0 ? first_ : first_ + " and " + std::to_string(others) + (others == 1 ? " other" : " others");
+  const std::string who = others == 0 ? first_
+                                      : first_ + " and " + std::to_string(others) +
+                                            (others == 1 ? " other" : " others");
   return {who + " came and went, and nothing came of " + (others == 0 ? "it" : "them") +
-          ": what is published before this node has heard of a service and subscribed to it passes it by "
+          ": what is published before this node has heard of a service and subscribed to it passes "
+          "it by "
           "(`gimnet pub --wait 1` waits for that)"};
 }
 

@@ -12,8 +12,8 @@
 
 namespace gimnet::tool {
 
-/// Services that came and went before anything of them came, and when to say so. Times are those of steady_now_ns().
-/// Thread safety: one thread.
+/// Services that came and went before anything of them came, and when to say so. Times are those of
+/// steady_now_ns(). Thread safety: one thread.
 class VanishedServices {
  public:
   /// How long a message may still come behind the news that its service is gone.

@@ -11,7 +11,8 @@ namespace {
 
 /// There is nothing to print, and there may not be for long.
 void say_that_it_waits(const Options& options) {
-  say("nothing " + (options.target.empty() ? "is there" : "matches " + options.target) + " yet; waiting");
+  say("nothing " + (options.target.empty() ? "is there" : "matches " + options.target) +
+      " yet; waiting");
 }
 
 /// Prints what is to be seen. True: it was an event that the user asked for.
@@ -20,7 +21,8 @@ bool print(Session& session, ToolFilter& filter, const WatchEvent& event) {
   if (!options.all && filter.hides(event)) return false;
   if (options.changes && is_snapshot(event.change)) return false;
   const std::int64_t now_ns = wall_now_ns();
-  session.output().write(options.json ? json_line(event, now_ns) : text_line(event, now_ns, session.paint()));
+  session.output().write(options.json ? json_line(event, now_ns)
+                                      : text_line(event, now_ns, session.paint()));
   return event.node.has_value() || event.service.has_value();
 }
 
@@ -49,7 +51,8 @@ ExitCode run_watch(Session& session) {
       return session.fail(event.failure());
     }
     if (print(session, filter, *event)) ++events;
-    if (event->change == Change::snapshot_ends && events == 0 && !options.changes && !std::exchange(told, true)) {
+    if (event->change == Change::snapshot_ends && events == 0 && !options.changes &&
+        !std::exchange(told, true)) {
       say_that_it_waits(options);
     }
     if (event->change != Change::ended) continue;

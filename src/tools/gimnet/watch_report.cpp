@@ -30,13 +30,14 @@ std::string time_text(std::int64_t ns) {
   std::tm parts{};
   ::localtime_r(&seconds, &parts);
   std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "%02d:%02d:%02d.%03d", parts.tm_hour, parts.tm_min, parts.tm_sec,
-                static_cast<int>(ns / 1'000'000 % 1'000));
+  std::snprintf(text.data(), text.size(), "%02d:%02d:%02d.%03d", parts.tm_hour, parts.tm_min,
+                parts.tm_sec, static_cast<int>(ns / 1'000'000 % 1'000));
   return text.data();
 }
 
 std::string node_words(const NodeRecord& node, const std::string& former_name) {
-  std::string words = "node " + (node.name.empty() ? std::string("-") : node.name) + " " + node.node.text();
+  std::string words =
+      "node " + (node.name.empty() ? std::string("-") : node.name) + " " + node.node.text();
   if (!former_name.empty()) words += ", before " + former_name;
   if (!node.place.empty()) words += ", from " + node.place;
   if (!node.description.empty()) words += ", " + node.description;
@@ -49,11 +50,15 @@ std::string service_words(const ServiceRecord& service) {
   return printable(words);
 }
 
-// Of what is gone the hub tells only who it was (docs/protocol.md, section 8): nothing else is said here.
+// Of what is gone the hub tells only who it was (docs/protocol.md, section 8): nothing else is said
+// here.
 void write_node(JsonWriter& json, const WatchEvent& event) {
   const NodeRecord& node = *event.node;
   if (event.change != Change::left) return write(json, node);
-  json.begin_object().member("id", node.node.text()).member("name", node.name).member("hub_id", node.hub_id);
+  json.begin_object()
+      .member("id", node.node.text())
+      .member("name", node.name)
+      .member("hub_id", node.hub_id);
   json.end_object();
 }
 
@@ -66,7 +71,9 @@ void write_service(JsonWriter& json, const WatchEvent& event) {
 
 }  // namespace
 
-bool is_tool(const NodeRecord& node) { return node.name.empty() && node.description == kToolDescription; }
+bool is_tool(const NodeRecord& node) {
+  return node.name.empty() && node.description == kToolDescription;
+}
 
 bool ToolFilter::hides(const WatchEvent& event) {
   if (event.change == Change::snapshot_begins) hidden_.clear();
@@ -78,7 +85,8 @@ bool ToolFilter::hides(const WatchEvent& event) {
 }
 
 bool is_snapshot(Change change) {
-  return change == Change::snapshot_begins || change == Change::present || change == Change::snapshot_ends;
+  return change == Change::snapshot_begins || change == Change::present ||
+         change == Change::snapshot_ends;
 }
 
 std::string json_line(const WatchEvent& event, std::int64_t now_ns) {
@@ -99,7 +107,8 @@ std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint)
   std::string change(change_text(event.change));
   constexpr std::size_t kWidth = 10;
   change.append(change.size() < kWidth ? kWidth - change.size() : 0, ' ');
-  const std::string words = event.node ? node_words(*event.node, event.former_name) : service_words(*event.service);
+  const std::string words =
+      event.node ? node_words(*event.node, event.former_name) : service_words(*event.service);
   return paint(time_text(now_ns) + "  " + change + "  " + words, tone_of(event.change)) + "\n";
 }
 

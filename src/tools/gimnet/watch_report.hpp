@@ -12,8 +12,8 @@ namespace gimnet::tool {
 /// A look by this tool, which nobody looks for.
 [[nodiscard]] bool is_tool(const NodeRecord& node);
 
-/// Leaves out the comings and goings of this tool's own looks. Thread safety: one thread. Memory: an id for each that
-/// is there.
+/// Leaves out the comings and goings of this tool's own looks. Thread safety: one thread. Memory:
+/// an id for each that is there.
 class ToolFilter {
  public:
   /// Is the event of one of them?
@@ -29,6 +29,7 @@ class ToolFilter {
 /// An object and a newline. `now_ns`: wall_now_ns() when it came.
 [[nodiscard]] std::string json_line(const WatchEvent& event, std::int64_t now_ns);
 /// A line for people, in local time; "" for what they need not see.
-[[nodiscard]] std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint = Paint{});
+[[nodiscard]] std::string text_line(const WatchEvent& event, std::int64_t now_ns,
+                                    Paint paint = Paint{});
 
 }  // namespace gimnet::tool

@@ -83,7 +83,8 @@ TEST(AckBook, WhoBeginsTooManyStreamsLosesItsOwn) {
   const StreamName last{Peer{9}, {2, 3}};
   book.take(kSender, 7);
   book.take(last, 8);
-  for (std::uint32_t key = 0; key < 2 * AckBook::kStreamsMax; ++key) book.take({Peer{5}, {key, 0}}, 1);
+  for (std::uint32_t key = 0; key < 2 * AckBook::kStreamsMax; ++key)
+    book.take({Peer{5}, {key, 0}}, 1);
   EXPECT_EQ(book.size(), AckBook::kStreamsMax);
   EXPECT_EQ(book.acknowledge(kSender).sequence, 7u);
   EXPECT_EQ(book.acknowledge(last).sequence, 8u);

@@ -44,7 +44,8 @@ class Lost : public Conversation {
 
   void send_to_group(std::uint32_t group) {
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
-    const std::size_t size = proto::gimi::write_message_prefix({1, Operation::data, 0, 0}, std::nullopt, prefix);
+    const std::size_t size =
+        proto::gimi::write_message_prefix({1, Operation::data, 0, 0}, std::nullopt, prefix);
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::group;
     parts.header.dst = group;
@@ -110,8 +111,11 @@ TEST_P(Dismissed, WhatCameBeforeStillComes) {
   EXPECT_TRUE(queue.receive(kForever).is(Status::refused));
 }
 
-INSTANTIATE_TEST_SUITE_P(Core, Dismissed, testing::Values(GoodbyeCode::kicked, GoodbyeCode::replaced),
-                         [](const auto& code) { return std::string(proto::goodbye_name(code.param)); });
+INSTANTIATE_TEST_SUITE_P(Core, Dismissed,
+                         testing::Values(GoodbyeCode::kicked, GoodbyeCode::replaced),
+                         [](const auto& code) {
+                           return std::string(proto::goodbye_name(code.param));
+                         });
 
 TEST_F(WithoutReconnecting, ABreakIsTheEnd) {
   std::thread waiting([&] { EXPECT_TRUE(node_->receive().is(Status::not_connected)); });

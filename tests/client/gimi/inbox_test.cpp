@@ -75,7 +75,8 @@ TEST_F(InboxTest, AQueueThatNobodyReadsAnyMoreHoldsNobodyUp) {
   inbox_.close(queue);
   EXPECT_EQ(rooms_, 1);
   EXPECT_TRUE(inbox_.put(queue, second, nullptr));
-  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout)) << "what waited and what came is dropped";
+  EXPECT_TRUE(inbox_.receive_any(kNoWait).is(Status::timeout))
+      << "what waited and what came is dropped";
   inbox_.set(queue, options);
   Message third = make_message("x", 3);
   EXPECT_TRUE(inbox_.put(queue, third, nullptr));
@@ -130,7 +131,8 @@ TEST(Inbox, TellsWhatWasTakenOfAWindowWhicheverWayItWent) {
   Inbox inbox(
       2, 1000, [] {},
       [&](const TakenMessages& taken, bool more) {
-        told.push_back(std::to_string(taken.group) + "x" + std::to_string(taken.count) + (more ? "+" : ""));
+        told.push_back(std::to_string(taken.group) + "x" + std::to_string(taken.count) +
+                       (more ? "+" : ""));
       });
   MessageQueue& queue = inbox.add_queue({2, AtFullQueue::overwrite_oldest});
   const auto put = [&](std::uint32_t group) {

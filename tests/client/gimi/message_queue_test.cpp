@@ -29,7 +29,8 @@ TEST_F(MessageQueueTest, GivesTheOldestFirst) {
 }
 
 TEST_F(MessageQueueTest, OverwritesTheOldestWhenFull) {
-  for (std::uint32_t number = 1; number <= 10; ++number) queue_.push(make_message("x", number), number);
+  for (std::uint32_t number = 1; number <= 10; ++number)
+    queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.size(), 3u);
   EXPECT_EQ(queue_.received(), 10u);
   EXPECT_EQ(queue_.overwritten(), 7u);
@@ -38,16 +39,19 @@ TEST_F(MessageQueueTest, OverwritesTheOldestWhenFull) {
 
 TEST_F(MessageQueueTest, OfSizeOneHoldsTheNewest) {
   queue_.resize(1);
-  for (std::uint32_t number = 1; number <= 5; ++number) queue_.push(make_message("x", number), number);
+  for (std::uint32_t number = 1; number <= 5; ++number)
+    queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.pop()->sequence(), 5u);
 }
 
 TEST_F(MessageQueueTest, ChangesItsSizeWhileItRuns) {
-  for (std::uint32_t number = 1; number <= 3; ++number) queue_.push(make_message("x", number), number);
+  for (std::uint32_t number = 1; number <= 3; ++number)
+    queue_.push(make_message("x", number), number);
   queue_.resize(2);
   EXPECT_EQ(queue_.overwritten(), 1u);
   queue_.resize(4);
-  for (std::uint32_t number = 4; number <= 5; ++number) queue_.push(make_message("x", number), number);
+  for (std::uint32_t number = 4; number <= 5; ++number)
+    queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.size(), 4u);
   EXPECT_EQ(queue_.pop()->sequence(), 2u);
   queue_.resize(0);
@@ -71,7 +75,8 @@ TEST_F(MessageQueueTest, RefusesAtItsLimitsIfItIsToldTo) {
 
 TEST_F(MessageQueueTest, GivesTheNewestAndForgetsTheOthers) {
   EXPECT_FALSE(queue_.pop_newest());
-  for (std::uint32_t number = 1; number <= 3; ++number) queue_.push(make_message("x", number), number);
+  for (std::uint32_t number = 1; number <= 3; ++number)
+    queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.pop_newest()->sequence(), 3u);
   EXPECT_TRUE(queue_.empty());
 }
@@ -79,7 +84,8 @@ TEST_F(MessageQueueTest, GivesTheNewestAndForgetsTheOthers) {
 std::string taken_of(MessageQueue& queue) {
   std::string text;
   for (const TakenMessages& taken : queue.take_taken()) {
-    text += std::to_string(taken.group) + "/" + std::to_string(taken.epoch) + "x" + std::to_string(taken.count) + " ";
+    text += std::to_string(taken.group) + "/" + std::to_string(taken.epoch) + "x" +
+            std::to_string(taken.count) + " ";
   }
   return text;
 }

@@ -13,7 +13,8 @@ namespace {
 TEST(Peer, IsWrittenAndReadAsText) {
   EXPECT_EQ(Peer{(7u << 20) | 17}.text(), "7.17");
   EXPECT_EQ(Peer::parse("7.17"), (Peer{(7u << 20) | 17}));
-  for (const char* text : {"", "7", "7.", ".17", "7.17.1", "robot", "7.1048576", "4096.1", "-7.1", "7#17"}) {
+  for (const char* text :
+       {"", "7", "7.", ".17", "7.17.1", "robot", "7.1048576", "4096.1", "-7.1", "7#17"}) {
     EXPECT_FALSE(Peer::parse(text)) << text;
   }
 }

@@ -45,7 +45,8 @@ TEST_F(NodeTest, KeepsItsTokenWhileItLivesUnlessToldNotTo) {
     options.keep_token = keep;
     const auto node = Node::join(options);
     ASSERT_TRUE(node);
-    const bool kept = std::filesystem::exists(runtime.tokens()) && !std::filesystem::is_empty(runtime.tokens());
+    const bool kept =
+        std::filesystem::exists(runtime.tokens()) && !std::filesystem::is_empty(runtime.tokens());
     EXPECT_EQ(kept, keep);
   }
   EXPECT_TRUE(std::filesystem::is_empty(runtime.tokens())) << "gone with its node";
@@ -101,7 +102,8 @@ TEST_F(NodeTest, AcknowledgedMessagesArriveInOrder) {
   SendOptions options;
   options.window = 5;
   const Sender stream = sender.sender("B", options).or_throw();
-  for (int i = 0; i < 5000; ++i) stream.send(std::to_string(i), kForever, i % 7 != 0 ? More::yes : More::no).or_throw();
+  for (int i = 0; i < 5000; ++i)
+    stream.send(std::to_string(i), kForever, i % 7 != 0 ? More::yes : More::no).or_throw();
   stream.settle(kWait).or_throw();
   EXPECT_EQ(stream.counts().acknowledged, 5000u);
   for (int i = 0; i < 5000; ++i) ASSERT_EQ(queue.receive(kNoWait)->text(), std::to_string(i));
@@ -159,7 +161,8 @@ TEST_F(NodeTest, PingsAnyNode) {
 TEST_F(NodeTest, ListsNodesServicesAndCounters) {
   const Node robot = join("robot");
   const Node watcher = join();
-  const auto odometry = robot.advertise("odom", {Delivery::latest, {4, 2}, Lane::normal, true, "pose"}).or_throw();
+  const auto odometry =
+      robot.advertise("odom", {Delivery::latest, {4, 2}, Lane::normal, true, "pose"}).or_throw();
   AcceptOptions drive;
   drive.key = {5, 0};
   const Queue commands = robot.accept("drive", drive).or_throw();
@@ -177,7 +180,9 @@ TEST_F(NodeTest, ListsNodesServicesAndCounters) {
   EXPECT_TRUE(watcher.find("nobody").is(Status::not_found));
   EXPECT_EQ(watcher.hub().or_throw().shards, 2u);
   const auto counters = watcher.hub_counters().or_throw();
-  EXPECT_EQ(std::ranges::count_if(counters, [](const auto& of) { return of.shard != ShardCounts::kConductor; }), 2);
+  EXPECT_EQ(std::ranges::count_if(
+                counters, [](const auto& of) { return of.shard != ShardCounts::kConductor; }),
+            2);
   EXPECT_EQ(watcher.hub_connections().or_throw().size(), 2u);
   watcher.sender_to_service("robot/drive").or_throw().send("go").or_throw();
   EXPECT_EQ(commands.receive(kWait)->text(), "go");
@@ -195,7 +200,8 @@ TEST_F(NodeTest, ManyThreadsUseOneNode) {
     const MessageKey key{static_cast<std::uint32_t>(thread), 0};
     const Queue queue = receiver.queue(key, {kMessages, AtFullQueue::stop_reading});
     threads.emplace_back([&received, queue] {
-      for (std::uint32_t i = 1; i <= kMessages; ++i) received += queue.receive(kWait)->sequence() == i ? 1 : 0;
+      for (std::uint32_t i = 1; i <= kMessages; ++i)
+        received += queue.receive(kWait)->sequence() == i ? 1 : 0;
     });
     threads.emplace_back([&sender, &receiver, key] {
       SendOptions options;
@@ -216,7 +222,8 @@ TEST_F(NodeTest, ClosingAnswersEverybody) {
   const Subscription subscription = node.subscribe("other/odom").or_throw();
   const Sender stream = node.sender(node.peer()).or_throw();
   std::thread waiter([&] { EXPECT_TRUE(subscription.receive().is(Status::closed)); });
-  std::thread subscribers([&] { EXPECT_TRUE(publisher.wait_for_subscribers(1).is(Status::closed)); });
+  std::thread subscribers(
+      [&] { EXPECT_TRUE(publisher.wait_for_subscribers(1).is(Status::closed)); });
   node.close();
   waiter.join();
   subscribers.join();

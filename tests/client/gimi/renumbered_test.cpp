@@ -10,7 +10,8 @@
 #include "gimnet/gimi.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
-// Programs whose nodes are given other ids while they send: a hub of two shards, with one end on each.
+// Programs whose nodes are given other ids while they send: a hub of two shards, with one end on
+// each.
 
 namespace gimnet {
 namespace {
@@ -46,7 +47,8 @@ class Renumbered : public testing::Test {
   /// Refused as long as the node has not been heard of since the last time.
   void give_another_id(const Node& node) {
     const Peer wanted{kHub | next_++};
-    EXPECT_TRUE(eventually([&] { return administrator_.reassign(node.peer(), wanted).ok(); })) << wanted.text();
+    EXPECT_TRUE(eventually([&] { return administrator_.reassign(node.peer(), wanted).ok(); }))
+        << wanted.text();
     EXPECT_TRUE(eventually([&] { return node.peer() == wanted; }));
   }
 
@@ -72,8 +74,9 @@ class Renumbered : public testing::Test {
 
   const std::string folder_ = make_folder();
   // A machine that is busy elsewhere is no reason to give a message up.
-  HubProcess hub_{{"--listen", "unix:" + folder_ + "/hub", "--shards", "2", "--limit", "block_ms=600000", "--limit",
-                   "slow_consumer_ms=600000", "--limit", "grace_ms=600000"}};
+  HubProcess hub_{{"--listen", "unix:" + folder_ + "/hub", "--shards", "2", "--limit",
+                   "block_ms=600000", "--limit", "slow_consumer_ms=600000", "--limit",
+                   "grace_ms=600000"}};
   Node administrator_ = [this] {
     NodeOptions options;
     options.hub = "unix:" + folder_ + "/hub";
@@ -92,9 +95,11 @@ TEST_F(Renumbered, NothingThatIsSentToAServiceIsLost) {
   accepting.queue = kQueue;
   const Queue commands = robot.accept("drive", accepting).or_throw();
   const Sender drive = viewer.sender_to_service("robot/drive").or_throw();
-  std::jthread sending([&] { say_numbers([&](const std::string& text) { return drive.send(text, kWait); }); });
+  std::jthread sending(
+      [&] { say_numbers([&](const std::string& text) { return drive.send(text, kWait); }); });
   std::jthread taking([&] { take_numbers([&] { return commands.receive(kWait); }); });
-  for (std::uint32_t round = 0; round < kRounds; ++round) give_another_id(round % 3 == 2 ? viewer : robot);
+  for (std::uint32_t round = 0; round < kRounds; ++round)
+    give_another_id(round % 3 == 2 ? viewer : robot);
   ends_.store(true);
 }
 
@@ -104,9 +109,11 @@ TEST_F(Renumbered, NothingOfAStreamIsLost) {
   const Publisher odometry = robot.advertise("odom").or_throw();
   const Subscription subscription = viewer.subscribe("robot/odom", kQueue).or_throw();
   odometry.wait_for_subscribers(1, kWait).or_throw();
-  std::jthread sending([&] { say_numbers([&](const std::string& text) { return odometry.publish(text, kWait); }); });
+  std::jthread sending(
+      [&] { say_numbers([&](const std::string& text) { return odometry.publish(text, kWait); }); });
   std::jthread taking([&] { take_numbers([&] { return subscription.receive(kWait); }); });
-  for (std::uint32_t round = 0; round < kRounds; ++round) give_another_id(round % 2 == 0 ? viewer : robot);
+  for (std::uint32_t round = 0; round < kRounds; ++round)
+    give_another_id(round % 2 == 0 ? viewer : robot);
   ends_.store(true);
 }
 

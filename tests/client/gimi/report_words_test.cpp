@@ -43,7 +43,8 @@ TEST(ReportedLoss, IsWhatTheWireSays) {
     const auto reason = static_cast<std::uint32_t>(wire);
     EXPECT_EQ(reported_loss(reason, proto::drop_reason_name(wire)).reason, known);
   }
-  EXPECT_EQ(reported_loss(66, "of a later hub").reason, LossReason::none) << "none that this node knows by itself";
+  EXPECT_EQ(reported_loss(66, "of a later hub").reason, LossReason::none)
+      << "none that this node knows by itself";
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ using test::kKey;
 using test::kPeerId;
 using test::Operation;
 
-/// Two threads on one stream: a message comes to be held while another is still on its way to the network, because the
-/// hub paused its destination.
+/// Two threads on one stream: a message comes to be held while another is still on its way to the
+/// network, because the hub paused its destination.
 class HeldBehindAnother : public Conversation {
  protected:
   static constexpr proto::flow::Target kTarget{proto::Kind::unicast, proto::Lane::normal, kPeerId};
@@ -60,7 +60,8 @@ TEST_F(HeldBehindAnother, GoesWhenTheAckOvertakesTheEndOfSending) {
 
 TEST_F(HeldBehindAnother, GoesWhenTheOtherCannotBeSent) {
   bool held = false;
-  // Where this thread is so late that the other one gave up before, there is nothing to be held: once more.
+  // Where this thread is so late that the other one gave up before, there is nothing to be held:
+  // once more.
   for (Timeout patience{100}; !held; patience *= 2) {
     std::atomic<bool> over = false;
     std::thread sending([&] {
@@ -78,14 +79,15 @@ TEST_F(HeldBehindAnother, GoesWhenTheOtherCannotBeSent) {
   EXPECT_TRUE(stream_.settle());
 }
 
-/// While its way is paused it is tried again and again: at no moment has it gone, and a newer one cannot come before
-/// it.
+/// While its way is paused it is tried again and again: at no moment has it gone, and a newer one
+/// cannot come before it.
 TEST(SendStream, AMessageThatIsHeldIsHeldWhileItIsTried) {
   struct Keeper final : StreamKeeper {
     void watch(SendStream& /*stream*/) override {}
   } keeper;
   test::FakeHub hub;
-  nif::test::Connected connected = nif::test::connect_to(hub, nif::test::default_options(), nif::test::make_welcome());
+  nif::test::Connected connected =
+      nif::test::connect_to(hub, nif::test::default_options(), nif::test::make_welcome());
   Uplink uplink;
   uplink.open(connected.node.get());
   SendOptions options;

@@ -131,8 +131,10 @@ TEST_F(SendStreamTest, AReportOfAFragmentFreesItsMessage) {
     ASSERT_TRUE(lost);
     ASSERT_TRUE(lost->header.has(proto::kFlagFragment));
     report(proto::DropReason::timed_out, 1, *lost);
-    EXPECT_TRUE(stream.settle(Timeout{20'000}).is(Status::not_delivered)) << "and nobody asks for it";
-    EXPECT_EQ(stream.counts().loss, "the hub reports timed_out: it took nothing for as long as the hub waits");
+    EXPECT_TRUE(stream.settle(Timeout{20'000}).is(Status::not_delivered))
+        << "and nobody asks for it";
+    EXPECT_EQ(stream.counts().loss,
+              "the hub reports timed_out: it took nothing for as long as the hub waits");
   }
   EXPECT_EQ(stream.counts().lost, 2u);
 }
@@ -141,7 +143,8 @@ TEST_F(SendStreamTest, AReportThatNamesNoMessageIsTheReasonOfWhatTheReceiverMiss
   SendOptions options;
   options.key = kKey;
   options.window = 3;
-  options.age_max_ms = 60'000;  // stands before the fragment header in the bytes that a report repeats
+  options.age_max_ms =
+      60'000;  // stands before the fragment header in the bytes that a report repeats
   const Sender stream = node_->sender(Peer{kPeerId}, options).or_throw();
   stream.send(std::string(5'000, 'x')).or_throw();
   const auto lost = hub_.next_message();
@@ -182,7 +185,8 @@ TEST_F(SendStreamTest, EndsAtALossWhereTheCallerWantsThat) {
   EXPECT_TRUE(stream.settle().is(Status::not_delivered));
   const auto refused = stream.send("3");
   EXPECT_TRUE(refused.is(Status::not_delivered));
-  EXPECT_NE(refused.failure().sentence.find("queue_full"), std::string::npos) << refused.failure().sentence;
+  EXPECT_NE(refused.failure().sentence.find("queue_full"), std::string::npos)
+      << refused.failure().sentence;
   EXPECT_EQ(stream.counts().sent, 2u) << "nothing more is sent";
   EXPECT_EQ(stream.counts().acknowledged, 1u);
 }
@@ -224,7 +228,8 @@ TEST_F(SendStreamTest, AReportOfManyMakesItAskAtOnce) {
   EXPECT_EQ(stream.counts().loss, "the hub reports shard_full");
 }
 
-/// NIF asked on its own whether a receiver is still there, and the hub merged what it has to say of that with the loss.
+/// NIF asked on its own whether a receiver is still there, and the hub merged what it has to say of
+/// that with the loss.
 TEST_F(SendStreamTest, AReportThatNamesAnotherFrameMakesItAskAtOnce) {
   const Sender stream = sender(3);
   stream.send("1").or_throw();
@@ -260,14 +265,16 @@ class SettledDoubt : public Conversation {
     for (;;) {
       const Taken taken = next();
       if (HasFailure()) return 0;
-      if (taken.header.operation == Operation::ping && taken.header.sequence != ping_) return taken.header.sequence;
+      if (taken.header.operation == Operation::ping && taken.header.sequence != ping_)
+        return taken.header.sequence;
     }
   }
   /// The third one is lost, and nobody says why.
   void expect_no_reason() {
     acknowledge(1, 0, next_ping());
     EXPECT_TRUE(stream_.settle().is(Status::not_delivered));
-    EXPECT_EQ(stream_.counts().loss, "the receiver answered a later question, but did not get them");
+    EXPECT_EQ(stream_.counts().loss,
+              "the receiver answered a later question, but did not get them");
     EXPECT_EQ(stream_.counts().loss_reason, LossReason::not_received);
   }
 

@@ -64,7 +64,8 @@ TEST(SendWindow, BytesAreFreedHoweverAMessageEnds) {
 
 TEST(SendWindow, CountsNothingWhenUnsynchronized) {
   SendWindow window(0);
-  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence) EXPECT_EQ(window.open(1, 0), sequence);
+  for (std::uint32_t sequence = 1; sequence <= 1000; ++sequence)
+    EXPECT_EQ(window.open(1, 0), sequence);
   EXPECT_TRUE(window.has_room(1));
   EXPECT_TRUE(window.empty());
 }

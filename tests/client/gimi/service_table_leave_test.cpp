@@ -34,9 +34,10 @@ class LeftSubscriptions : public testing::Test {
     ns::SubscribeAnswer answer;
     answer.group = GroupId{kGroup};
     const proto::ControlHeader header{ns::Subscribe::kOperation, number};
-    connected_.hub.send_control(proto::Kind::ns, status == proto::Status::done
-                                                     ? proto::encode_answer(answer, number)
-                                                     : proto::encode_refusal(header, {status, "no"}));
+    connected_.hub.send_control(proto::Kind::ns,
+                                status == proto::Status::done
+                                    ? proto::encode_answer(answer, number)
+                                    : proto::encode_refusal(header, {status, "no"}));
   }
   ServiceTable::Subscribed subscribe(const std::string& name = kName) {
     ServiceTable::Subscribed made;
@@ -52,14 +53,16 @@ class LeftSubscriptions : public testing::Test {
     std::thread leaving([&] { table_.unsubscribe(std::move(service)); });
     std::uint16_t number = 0;
     ASSERT_TRUE(connected_.hub.next_request<ns::Unsubscribe>(number));
-    connected_.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::UnsubscribeAnswer{}, number));
+    connected_.hub.send_control(proto::Kind::ns,
+                                proto::encode_answer(ns::UnsubscribeAnswer{}, number));
     leaving.join();
   }
   void follow() {
-    static_cast<void>(table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
-      EXPECT_EQ(place.group, kGroup);
-      return Failure{Status::closed, "no stream is needed here"};
-    }));
+    static_cast<void>(
+        table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
+          EXPECT_EQ(place.group, kGroup);
+          return Failure{Status::closed, "no stream is needed here"};
+        }));
   }
 
   nif::test::FakeHub hub_;
@@ -89,7 +92,8 @@ TEST_F(LeftSubscriptions, AllAsLongAsThereIsAHandle) {
   EXPECT_EQ(table_.subscribed(kGroup).service, second);
   leave(std::move(second));
   EXPECT_EQ(table_.subscriptions(), 0u);
-  EXPECT_EQ(table_.subscribed(kGroup).place, ServiceTable::Place::unwanted) << "what is still on its way is no loss";
+  EXPECT_EQ(table_.subscribed(kGroup).place, ServiceTable::Place::unwanted)
+      << "what is still on its way is no loss";
 }
 
 TEST_F(LeftSubscriptions, NothingOfOneThatTheHubRefused) {

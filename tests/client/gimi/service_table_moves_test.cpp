@@ -12,8 +12,8 @@
 #include "proto/control/ns.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
-// Services that have other group ids after a break: a hub that lost its state gives them anew, in the order in which it
-// is asked, so that one has the former id of another.
+// Services that have other group ids after a break: a hub that lost its state gives them anew, in
+// the order in which it is asked, so that one has the former id of another.
 
 namespace gimnet::gimi {
 namespace {
@@ -62,7 +62,8 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     return *made;
   }
 
-  /// The connection breaks, and what the node declares again by Request gets those groups; 0: is refused.
+  /// The connection breaks, and what the node declares again by Request gets those groups; 0: is
+  /// refused.
   template <class Request>
   void come_back(const Groups& groups) {
     hub_.close();
@@ -116,13 +117,17 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
  private:
   static const std::string& name_of(const ns::Advertise& request) { return request.service; }
   static const std::string& name_of(const ns::Subscribe& request) { return request.name; }
-  static proto::Payload answer_to(const ns::Advertise& /*request*/, std::uint32_t group, std::uint16_t number) {
+  static proto::Payload answer_to(const ns::Advertise& /*request*/, std::uint32_t group,
+                                  std::uint16_t number) {
     if (group != 0) return proto::encode_answer(ns::AdvertiseAnswer{GroupId{group}, 1}, number);
-    return proto::encode_refusal({ns::Advertise::kOperation, number}, {proto::Status::limit, "no more"});
+    return proto::encode_refusal({ns::Advertise::kOperation, number},
+                                 {proto::Status::limit, "no more"});
   }
-  static proto::Payload answer_to(const ns::Subscribe& /*request*/, std::uint32_t group, std::uint16_t number) {
+  static proto::Payload answer_to(const ns::Subscribe& /*request*/, std::uint32_t group,
+                                  std::uint16_t number) {
     if (group == kRefused) {
-      return proto::encode_refusal({ns::Subscribe::kOperation, number}, {proto::Status::limit, "no more"});
+      return proto::encode_refusal({ns::Subscribe::kOperation, number},
+                                   {proto::Status::limit, "no more"});
     }
     ns::SubscribeAnswer answer;
     answer.group = GroupId{group};
@@ -140,7 +145,8 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
       ASSERT_TRUE(groups.contains(name)) << name;
       answers.emplace(name, answer_to(*request, groups.at(name), number));
     }
-    if (auto first = answers.extract(GetParam())) hub_.send_control(proto::Kind::ns, first.mapped());
+    if (auto first = answers.extract(GetParam()))
+      hub_.send_control(proto::Kind::ns, first.mapped());
     for (const auto& [name, payload] : answers) hub_.send_control(proto::Kind::ns, payload);
   }
 };
@@ -168,7 +174,8 @@ TEST_P(MovedOwnServices, SayWhyTheyAreNotThereAnyMore) {
   EXPECT_TRUE(odometry.standing());
   const auto stands = map.standing();
   ASSERT_TRUE(stands.is(Status::limit));
-  EXPECT_NE(stands.failure().sentence.find("robot/map: the hub did not take the service again"), std::string::npos);
+  EXPECT_NE(stands.failure().sentence.find("robot/map: the hub did not take the service again"),
+            std::string::npos);
   EXPECT_NE(stands.failure().sentence.find("no more"), std::string::npos);
   EXPECT_TRUE(map.publish("x", kForever).is(Status::refused));
   come_back<ns::Advertise>({{"odom", kFirst}, {"map", kSecond}});
@@ -181,7 +188,8 @@ TEST_P(MovedOwnServices, CountTheirOwnSubscribers) {
   const Publisher map = advertise("map", kSecond);
   come_back<ns::Advertise>({{"odom", kSecond}, {"map", kFirst}});
   ns::SubscriberJoined joined;
-  for (const auto& [group, count] : std::map<std::uint32_t, std::uint32_t>{{kFirst, 5}, {kSecond, 6}}) {
+  for (const auto& [group, count] :
+       std::map<std::uint32_t, std::uint32_t>{{kFirst, 5}, {kSecond, 6}}) {
     joined.group = GroupId{group};
     joined.subscribers = count;
     hub_.send_control(proto::Kind::ns, proto::encode(joined));
@@ -229,12 +237,14 @@ TEST_P(MovedOwnServices, KeepNobodyWaitingForLongerThanItWants) {
   hub_.close();
   hub_ = fake_.admit(nif::test::make_welcome());
   std::uint16_t declared = 0;
-  ASSERT_TRUE(hub_.next_request<ns::Advertise>(declared));  // until it is answered nobody knows where to send
+  ASSERT_TRUE(hub_.next_request<ns::Advertise>(
+      declared));  // until it is answered nobody knows where to send
   EXPECT_TRUE(odometry.publish("x", kNoWait).is(Status::timeout));
   EXPECT_TRUE(odometry.publish("x").is(Status::timeout)) << "nor for ever by itself";
   std::thread waiting([&] { odometry.publish("at last", kForever, More::no).or_throw(); });
   EXPECT_TRUE(odometry.publish("x", kNoWait).is(Status::timeout)) << "nor for the other thread";
-  hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 1}, declared));
+  hub_.send_control(proto::Kind::ns,
+                    proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 1}, declared));
   waiting.join();
   EXPECT_EQ(next().data, "at last");
   EXPECT_EQ(odometry.published(), 1u);
@@ -250,14 +260,16 @@ TEST_P(MovedOwnServices, AreWithdrawnWhileTheyMove) {
   std::thread leaving([&] { odometry.reset(); });
   std::uint16_t former = 0;
   ASSERT_TRUE(hub_.next_request<ns::Withdraw>(former));
-  hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kSecond}, 0}, declared));
+  hub_.send_control(proto::Kind::ns,
+                    proto::encode_answer(ns::AdvertiseAnswer{GroupId{kSecond}, 0}, declared));
   std::uint16_t now = 0;
   const auto request = hub_.next_request<ns::Withdraw>(now);
   ASSERT_TRUE(request);
   EXPECT_EQ(request->group, GroupId{kSecond});
   hub_.send_control(proto::Kind::ns, proto::encode_answer(ns::WithdrawAnswer{}, now));
   const proto::ControlHeader header{ns::Withdraw::kOperation, former};
-  hub_.send_control(proto::Kind::ns, proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
+  hub_.send_control(proto::Kind::ns,
+                    proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
   leaving.join();
 }
 
@@ -306,19 +318,24 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustAdvertised) {
   std::uint16_t number = 0;
   ASSERT_TRUE(connected.hub.next_request<ns::Advertise>(number));
   EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::not_yet);
-  EXPECT_EQ(table.on_own_service_moved("map", {kFirst, kSecond}), ServiceTable::Place::unknown) << "nobody asks for it";
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 0}, number));
+  EXPECT_EQ(table.on_own_service_moved("map", {kFirst, kSecond}), ServiceTable::Place::unknown)
+      << "nobody asks for it";
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(ns::AdvertiseAnswer{GroupId{kFirst}, 0}, number));
   asking.join();
-  EXPECT_EQ(table.on_own_service_moved("odom", {kSecond, 99}), ServiceTable::Place::unknown) << "of an earlier one";
+  EXPECT_EQ(table.on_own_service_moved("odom", {kSecond, 99}), ServiceTable::Place::unknown)
+      << "of an earlier one";
   EXPECT_EQ(table.on_own_service_moved("odom", {kFirst, kSecond}), ServiceTable::Place::found);
   EXPECT_EQ(odometry->group(), kSecond);
   connected.hub.close();
 }
 
-/// A program that has read a service goes on sending to it: the hub is asked once more, now without a pace.
+/// A program that has read a service goes on sending to it: the hub is asked once more, now without
+/// a pace.
 TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
   nif::test::FakeHub hub;
-  nif::test::Connected connected = nif::test::connect_to(hub, nif::test::default_options(), nif::test::make_welcome());
+  nif::test::Connected connected =
+      nif::test::connect_to(hub, nif::test::default_options(), nif::test::make_welcome());
   Uplink uplink;
   uplink.open(connected.node.get());
   Inbox inbox(1, 1 << 20, [] {});
@@ -342,21 +359,24 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
   nif_incoming moved{};
   moved.text = "robot/odom";
   moved.group = kSecond;
-  answer_one(kFirst, [&] { EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::not_yet); });
+  answer_one(kFirst,
+             [&] { EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::not_yet); });
   asking.join();
   EXPECT_EQ(table.on_service_moved(moved), ServiceTable::Place::found);
   EXPECT_EQ(table.subscribed(kSecond).place, ServiceTable::Place::unwanted);
   connected.hub.close();
 }
 
-/// As many groups as a hub tells of at a return: the one that was known, those between, the present one.
+/// As many groups as a hub tells of at a return: the one that was known, those between, the present
+/// one.
 TEST_P(MovedSubscriptions, TakeWhatWaitedOfFormerGroups) {
   const Subscription odometry = subscribe("robot/odom", kFirst);
   const Subscription map = subscribe("robot/map", kSecond);
   ns::ServiceMoved moved;
   moved.name = "robot/odom";
   moved.old_group = GroupId{kFirst};
-  for (std::uint32_t i = 0; i < ns::kGroupsBetweenMax; ++i) moved.between.emplace_back((7u << 20) | (100 + i));
+  for (std::uint32_t i = 0; i < ns::kGroupsBetweenMax; ++i)
+    moved.between.emplace_back((7u << 20) | (100 + i));
   moved.new_group = GroupId{(7u << 20) | 200};
   moved.again = true;
   hub_.send_control(proto::Kind::ns, proto::encode(moved));
@@ -377,8 +397,10 @@ TEST_P(MovedSubscriptions, TakeWhatWaitedOfFormerGroups) {
 
 INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedOwnServices, testing::Values("map", "odom"),
                          [](const auto& first) { return std::string(first.param) + "First"; });
-INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedSubscriptions, testing::Values("robot/map", "robot/odom"),
-                         [](const auto& first) { return std::string(first.param).substr(6) + "First"; });
+INSTANTIATE_TEST_SUITE_P(ServiceTable, MovedSubscriptions,
+                         testing::Values("robot/map", "robot/odom"), [](const auto& first) {
+                           return std::string(first.param).substr(6) + "First";
+                         });
 
 }  // namespace
 }  // namespace gimnet::gimi

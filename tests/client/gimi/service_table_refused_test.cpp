@@ -10,7 +10,8 @@
 #include "proto/control/ns.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What a program asks for by the name of a subscription that the hub did not take again after a break.
+// What a program asks for by the name of a subscription that the hub did not take again after a
+// break.
 
 namespace gimnet::gimi {
 namespace {
@@ -43,9 +44,10 @@ class RefusedSubscriptions : public testing::Test {
     ns::SubscribeAnswer answer;
     answer.group = GroupId{kGroup};
     const proto::ControlHeader header{ns::Subscribe::kOperation, number};
-    connected_.hub.send_control(proto::Kind::ns, status == proto::Status::done
-                                                     ? proto::encode_answer(answer, number)
-                                                     : proto::encode_refusal(header, {status, "still no"}));
+    connected_.hub.send_control(proto::Kind::ns,
+                                status == proto::Status::done
+                                    ? proto::encode_answer(answer, number)
+                                    : proto::encode_refusal(header, {status, "still no"}));
   }
   /// As NIF tells it after a break.
   void refuse() {
@@ -66,13 +68,15 @@ class RefusedSubscriptions : public testing::Test {
   Uplink uplink_;
   Inbox inbox_{1, 1 << 20, [] {}};
   std::vector<std::uint32_t> moves_;  ///< groups that streams were told
-  ServiceTable table_{uplink_, inbox_,
-                      [this](const std::string&, const ServicePlace& place) { moves_.push_back(place.group); }};
+  ServiceTable table_{uplink_, inbox_, [this](const std::string&, const ServicePlace& place) {
+                        moves_.push_back(place.group);
+                      }};
   ServiceTable::Subscribed first_;
 };
 
 TEST_F(RefusedSubscriptions, AreAskedForWithTheNextHandleAsTheyWere) {
-  std::thread asking([&] { EXPECT_EQ(table_.subscribe(kName, {}, {}, kForever).or_throw(), first_); });
+  std::thread asking(
+      [&] { EXPECT_EQ(table_.subscribe(kName, {}, {}, kForever).or_throw(), first_); });
   answer_subscribe(kWindow, proto::Status::done);
   asking.join();
   EXPECT_TRUE(first_->standing());
@@ -100,10 +104,11 @@ TEST_F(RefusedSubscriptions, AreNoOthersWhereTheHubRefusesThemAgain) {
 
 TEST_F(RefusedSubscriptions, AreAskedForWhereTheyAreToBeSentTo) {
   std::thread asking([&] {
-    static_cast<void>(table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
-      EXPECT_EQ(place.group, kGroup);
-      return Failure{Status::closed, "no stream is needed here"};
-    }));
+    static_cast<void>(
+        table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
+          EXPECT_EQ(place.group, kGroup);
+          return Failure{Status::closed, "no stream is needed here"};
+        }));
   });
   answer_subscribe(kWindow, proto::Status::done);
   asking.join();

@@ -72,7 +72,8 @@ TEST_F(Services, ASubscriptionSurvivesItsProvider) {
 
 TEST_F(Services, WhatWasPublishedBeforeLeavingStillComes) {
   const Node viewer = join();
-  const Subscription odometry = viewer.subscribe("robot/odom", {1000, AtFullQueue::overwrite_oldest}).or_throw();
+  const Subscription odometry =
+      viewer.subscribe("robot/odom", {1000, AtFullQueue::overwrite_oldest}).or_throw();
   {
     const Node robot = join("robot");
     const Publisher publisher = robot.advertise("odom").or_throw();
@@ -173,9 +174,11 @@ TEST_F(Services, OnlyWhatAcceptsCanBeSentTo) {
   const Node viewer = join();
   EXPECT_TRUE(viewer.sender_to_service("robot/odom").is(Status::not_found));
   EXPECT_TRUE(viewer.sender_to_service("robot/drive").is(Status::not_found)) << "not there yet";
-  EXPECT_TRUE(viewer.sender_to_service("robot/*").is(Status::not_found)) << "one service, not a pattern";
+  EXPECT_TRUE(viewer.sender_to_service("robot/*").is(Status::not_found))
+      << "one service, not a pattern";
   EXPECT_TRUE(viewer.sender_to_service("a//b").is(Status::bad_name));
-  EXPECT_TRUE(viewer.sender_to_service("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
+  EXPECT_TRUE(
+      viewer.sender_to_service("robot/odom", synchronized(kWindowMax + 1)).is(Status::not_found));
 }
 
 TEST_F(Services, ASenderFollowsAServiceThatGoesAndComesBack) {
@@ -204,7 +207,8 @@ TEST_F(Services, ASenderFollowsAServiceToItsNodesNewName) {
   drive.send("1").or_throw();
   drive.settle(kWait).or_throw();
   robot.take_name("forklift", kWait).or_throw();
-  EXPECT_TRUE(eventually([&] { return drive.send("?", kWait).is(Status::not_found); })) << "another service now";
+  EXPECT_TRUE(eventually([&] { return drive.send("?", kWait).is(Status::not_found); }))
+      << "another service now";
   EXPECT_TRUE(eventually([&] { return viewer.sender_to_service("forklift/drive").ok(); }));
   viewer.sender_to_service("forklift/drive").or_throw().send("2").or_throw();
   robot.take_name("robot", kWait).or_throw();
@@ -242,8 +246,10 @@ TEST_F(Services, OnlyWhatGivesDataCanBeSubscribed) {
   const Node late = join();
   const auto refused = late.subscribe("robot/drive");
   ASSERT_TRUE(refused.is(Status::not_found));
-  EXPECT_EQ(refused.failure().sentence, "cannot subscribe to 'robot/drive': it takes data and gives none; send to it");
-  EXPECT_TRUE(eventually([&] { return viewer.services("robot/drive").or_throw().at(0).subscribers == 1; }));
+  EXPECT_EQ(refused.failure().sentence,
+            "cannot subscribe to 'robot/drive': it takes data and gives none; send to it");
+  EXPECT_TRUE(
+      eventually([&] { return viewer.services("robot/drive").or_throw().at(0).subscribers == 1; }));
   // It may become one that provides.
   robot.reset();
   robot = join("robot");

@@ -59,7 +59,8 @@ class StreamTableTest : public Conversation {
     options.at_full = at_full;
     options.key = {9, 9};  // the service's own counts
     std::optional<Sender> made;
-    std::thread asking([&] { made.emplace(node_->sender_to_service(kService, options).or_throw()); });
+    std::thread asking(
+        [&] { made.emplace(node_->sender_to_service(kService, options).or_throw()); });
     serve();
     asking.join();
     return *made;
@@ -105,7 +106,8 @@ TEST_F(StreamTableTest, AnAckThatNamesTheGroupFreesAndOneToTheNodeDoesNot) {
   direct.send("to the node").or_throw();
   acknowledge(1, kAll, 0, kGroup);
   drive.settle().or_throw();
-  EXPECT_EQ(direct.counts().acknowledged, 0u) << "another stream, though key and receiver are the same";
+  EXPECT_EQ(direct.counts().acknowledged, 0u)
+      << "another stream, though key and receiver are the same";
   acknowledge(1, kAll);
   direct.settle().or_throw();
   EXPECT_EQ(drive.counts().acknowledged, 1u);
@@ -237,7 +239,8 @@ TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
   EXPECT_EQ(ack.header.operation, Operation::ack);
   EXPECT_EQ(ack.frame.kind, proto::Kind::unicast);
   EXPECT_EQ(ack.frame.dst, kPeerId);
-  const auto read = proto::gimi::decode_ack(std::as_bytes(std::span(ack.data.data(), ack.data.size())));
+  const auto read =
+      proto::gimi::decode_ack(std::as_bytes(std::span(ack.data.data(), ack.data.size())));
   ASSERT_TRUE(read);
   EXPECT_EQ(read->group, kGroup);
   EXPECT_EQ(node_->receive(kKey, kForever)->text(), "go");

@@ -71,7 +71,8 @@ TEST_F(WatchTableTest, AServiceFollowsTheNewNameOfItsNode) {
   EXPECT_EQ(told, (std::multiset<std::string>{"withdrawn robot/odom", "renamed forklift from robot",
                                               "advertised forklift/odom"}));
   new_name.wait_until_exists(kWait).or_throw();
-  // The provider learns the new group id a moment after everybody else; what it sends until then reaches nobody.
+  // The provider learns the new group id a moment after everybody else; what it sends until then
+  // reaches nobody.
   EXPECT_TRUE(eventually([&] {
     odometry.publish("under the new name", kForever).or_throw();
     return new_name.try_receive().has_value();
@@ -88,9 +89,11 @@ TEST_F(WatchTableTest, ANameThatIsHeldIsRefused) {
   const Node robot = join("robot");
   const auto taken = robot.take_name("viewer", kWait);
   EXPECT_TRUE(taken.is(Status::taken));
-  EXPECT_NE(taken.failure().sentence.find(viewer.peer().text()), std::string::npos) << taken.failure().sentence;
+  EXPECT_NE(taken.failure().sentence.find(viewer.peer().text()), std::string::npos)
+      << taken.failure().sentence;
   EXPECT_TRUE(robot.take_name("a//b", kWait).is(Status::bad_name));
-  EXPECT_TRUE(robot.take_name("7.1", kWait).is(Status::bad_name)) << "who sends there would reach somebody else";
+  EXPECT_TRUE(robot.take_name("7.1", kWait).is(Status::bad_name))
+      << "who sends there would reach somebody else";
   EXPECT_EQ(robot.state().name, "robot");
 }
 
@@ -100,7 +103,8 @@ TEST_F(WatchTableTest, SaysWhatIsWrong) {
   EXPECT_TRUE(viewer.watch("", {.nodes = false, .services = false}).is(Status::bad_argument));
 }
 
-/// A watch that is not read tells later all that it has to; it holds up neither messages nor the other watch.
+/// A watch that is not read tells later all that it has to; it holds up neither messages nor the
+/// other watch.
 TEST_F(WatchTableTest, OneThatIsNotReadHoldsUpNothingElse) {
   const Node viewer = join("viewer");
   const Watch idle = viewer.watch("**").or_throw();

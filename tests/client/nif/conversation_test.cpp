@@ -13,8 +13,9 @@
 #include "tests/client/nif/support/recorded_node.hpp"
 #include "tests/client/nif/support/recording.hpp"
 
-// Conversations with a hub of version 1, as they were recorded (tests/vectors/conversation): what that hub said to each
-// node is understood by the library of today, frame by frame, and what the library says is what was said then.
+// Conversations with a hub of version 1, as they were recorded (tests/vectors/conversation): what
+// that hub said to each node is understood by the library of today, frame by frame, and what the
+// library says is what was said then.
 
 namespace gimnet::nif::test {
 namespace {
@@ -47,13 +48,15 @@ const std::vector<Part>& parts() {
 
 class Conversation : public ::testing::TestWithParam<Part> {
  protected:
-  static void play(const std::vector<Connection>& connections, const nif_options& options, RecordedHub& hub) {
+  static void play(const std::vector<Connection>& connections, const nif_options& options,
+                   RecordedHub& hub) {
     nif_node* handle = nullptr;
     const nif_status connected = nif_connect(&options, &handle);
     const OpenNode node(handle);
     const Step& answer = connections[0][1];
     if (is_goodbye(answer)) {
-      EXPECT_EQ(proto::decode<proto::Goodbye>(answer.view().payload)->code, proto::GoodbyeCode::name_taken);
+      EXPECT_EQ(proto::decode<proto::Goodbye>(answer.view().payload)->code,
+                proto::GoodbyeCode::name_taken);
       EXPECT_EQ(connected, NIF_NAME_TAKEN);
       return;
     }

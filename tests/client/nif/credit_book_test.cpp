@@ -61,7 +61,8 @@ void subscribe(Connected& connected, std::uint32_t window) {
   std::thread asking([&] {
     const nif_pace pace{sizeof pace, window, 0, 0.0};
     nif_subscription got{};
-    EXPECT_EQ(nif_subscribe_paced(connected.node.get(), "peer/scan", &pace, &got, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(nif_subscribe_paced(connected.node.get(), "peer/scan", &pace, &got, NIF_FOREVER),
+              NIF_OK);
     EXPECT_EQ(got.window, window);
   });
   answer_subscribe(connected.hub, window);
@@ -103,8 +104,9 @@ TEST(CreditBook, GathersWhileMoreWaits) {
 
 /// A message comes before the answer to SUBSCRIBE, which has that window.
 void subscribe_late(Connected& connected, std::uint32_t window) {
-  std::thread asking(
-      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::thread asking([&] {
+    EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK);
+  });
   std::uint16_t number = 0;
   EXPECT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
   publish(connected.hub);
@@ -156,7 +158,8 @@ TEST(CreditBook, TheProgramMayCreditByItself) {
   publish(connected.hub);
   const nif_incoming in = take(connected.node.get());
   EXPECT_EQ(nif_credit(connected.node.get(), in.to, in.epoch + 1, 1, 0), NIF_OK) << "another epoch";
-  EXPECT_EQ(nif_credit(connected.node.get(), kGroup + 1, in.epoch, 1, 0), NIF_OK) << "another group";
+  EXPECT_EQ(nif_credit(connected.node.get(), kGroup + 1, in.epoch, 1, 0), NIF_OK)
+      << "another group";
   EXPECT_EQ(nif_credit(connected.node.get(), in.to, in.epoch, 1, 0), NIF_OK);
   EXPECT_EQ(credited(connected.hub), 1u);
 }
@@ -204,7 +207,8 @@ TEST(CreditBook, AResumedOneRepeatsItsTotals) {
   EXPECT_EQ(credited(connected.hub), 1u);
 }
 
-/// A service came back under kMovedGroup while the node was away: its first messages come before anything is declared.
+/// A service came back under kMovedGroup while the node was away: its first messages come before
+/// anything is declared.
 constexpr std::uint32_t kMovedGroup = kGroup + 1;
 
 FakeConnection come_back_resumed(FakeHub& hub) {
@@ -238,7 +242,8 @@ TEST(CreditBook, CountsWhatComesBeforeASubscriptionIsDeclaredAgain) {
       service.struct_size = sizeof service;
       service.name = name.c_str();
       std::uint32_t group = 0;
-      EXPECT_EQ(nif_advertise(connected.node.get(), &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+      EXPECT_EQ(nif_advertise(connected.node.get(), &service, &group, nullptr, NIF_FOREVER),
+                NIF_OK);
     });
     answer_advertise(i);
     asking.join();
@@ -265,8 +270,9 @@ TEST(CreditBook, CountsWhatComesBeforeASubscriptionIsDeclaredAgain) {
 TEST(CreditBook, CountsWhatComesBeforeASubscribeThatBrokeIsAskedAgain) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options("robot"), make_welcome(1 << 20));
-  std::thread asking(
-      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::thread asking([&] {
+    EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK);
+  });
   std::uint16_t number = 0;
   EXPECT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
   connected.hub.close();  // it has heard the SUBSCRIBE, and nobody its answer
@@ -325,11 +331,13 @@ void give(FakeConnection& hub, std::uint16_t number, std::uint32_t group) {
 void swap_groups(bool first_answers_first, std::uint32_t first_group, std::uint32_t second_group) {
   FakeHub hub;
   Connected connected = connect_to(hub, test::default_options(), make_welcome());
-  const std::array<std::pair<const char*, std::uint32_t>, 2> services{{{"peer/a", kGroup}, {"peer/b", kMovedGroup}}};
+  const std::array<std::pair<const char*, std::uint32_t>, 2> services{
+      {{"peer/a", kGroup}, {"peer/b", kMovedGroup}}};
   for (const auto& [name, group] : services) {
     const nif_pace pace{sizeof pace, 1, 0, 0.0};
     std::thread asking([&, asked = name] {
-      EXPECT_EQ(nif_subscribe_paced(connected.node.get(), asked, &pace, nullptr, NIF_FOREVER), NIF_OK);
+      EXPECT_EQ(nif_subscribe_paced(connected.node.get(), asked, &pace, nullptr, NIF_FOREVER),
+                NIF_OK);
     });
     give(connected.hub, subscribe_of(connected.hub, name), group);
     asking.join();

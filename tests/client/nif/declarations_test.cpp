@@ -9,8 +9,8 @@
 #include "gimnet/nif_names.h"
 #include "tests/client/nif/support/declaring.hpp"
 
-// Retained services and a hub that forgot their last message. The rest of it is in node_test.cpp and
-// nif_names_test.cpp.
+// Retained services and a hub that forgot their last message. The rest of it is in node_test.cpp
+// and nif_names_test.cpp.
 
 namespace gimnet::nif::test {
 namespace {
@@ -21,7 +21,8 @@ TEST(Declarations, GiveAHubThatForgotThemTheLastMessagesBeforeNewerOnes) {
     const std::string last(size, 'm');
     Connected connected = with_map(hub, last);
     come_back(hub, connected, false);
-    std::thread publishing([&] { EXPECT_EQ(publish(connected.node.get(), kGroup, "newer"), NIF_OK); });
+    std::thread publishing(
+        [&] { EXPECT_EQ(publish(connected.node.get(), kGroup, "newer"), NIF_OK); });
     answer_advertise(connected.hub, "map", kGroup);
     expect_published(connected.hub, kGroup, last);
     expect_published(connected.hub, kGroup, "newer");
@@ -109,15 +110,18 @@ TEST(Declarations, WithdrawAServiceThatMovesMeanwhile) {
   come_back(hub, connected, false);
   std::uint16_t number = 0;
   ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
-  std::thread withdrawing([&] { EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK); });
+  std::thread withdrawing(
+      [&] { EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK); });
   std::uint16_t withdrawn = 0;
   const auto request = connected.hub.next_request<proto::ns::Withdraw>(withdrawn);
   ASSERT_TRUE(request);
   EXPECT_EQ(request->group, GroupId{kGroup}) << "the hub has it as another one by now";
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{99}, 0}, number));
+  connected.hub.send_control(
+      proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{99}, 0}, number));
   answer_withdraw(connected.hub, 99, true);
-  connected.hub.send_control(proto::Kind::ns, proto::encode_refusal({proto::ns::Withdraw::kOperation, withdrawn},
-                                                                    {proto::Status::not_found, "no such service"}));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_refusal({proto::ns::Withdraw::kOperation, withdrawn},
+                                                   {proto::Status::not_found, "no such service"}));
   withdrawing.join();
   expect_nothing_declared(connected);
   come_back(hub, connected, false);
@@ -158,7 +162,8 @@ TEST(Declarations, ForgetAServiceThatEndedWhileAHubRefusedIt) {
   come_back(hub, connected, false);
   answer_advertise(connected.hub, "map", 0);
   EXPECT_EQ(wait_for_move(connected.node.get()), 0u);
-  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK) << "the hub has nothing to say";
+  EXPECT_EQ(nif_withdraw_service(connected.node.get(), "map", NIF_FOREVER), NIF_OK)
+      << "the hub has nothing to say";
   come_back(hub, connected, false);
   expect_nothing_declared(connected);
 }
@@ -176,7 +181,8 @@ TEST(Declarations, DoNotWithdrawAServiceThatIsAdvertisedAnew) {
   service.name = "map";
   service.message_type = 8;
   std::uint32_t group = 0;
-  EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, 0), NIF_NOT_CONNECTED) << "it ended all the same";
+  EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, 0), NIF_NOT_CONNECTED)
+      << "it ended all the same";
   come_back(hub, connected, false);
   answer_withdraw(connected.hub, kGroup, false);
   expect_nothing_declared(connected);
@@ -206,11 +212,13 @@ TEST(Declarations, WithdrawNothingBehindAServiceThatIsAdvertisedAnew) {
     const std::uint16_t number = proto::split_control(payload)->header.request;
     if (const auto request = proto::decode<proto::ns::Advertise>(payload)) {
       anew |= request->message_type == 8;
-      connected.hub.send_control(proto::Kind::ns,
-                                 proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
+      connected.hub.send_control(
+          proto::Kind::ns,
+          proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
     } else {
       EXPECT_FALSE(anew) << "the program's new service is gone";
-      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::WithdrawAnswer{}, number));
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::WithdrawAnswer{}, number));
     }
   }
   asking.join();
@@ -221,7 +229,8 @@ TEST(Declarations, WithdrawNothingBehindAServiceThatIsAdvertisedAnew) {
 Connected with_broken_subscription(FakeHub& hub) {
   Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
   nif_node* const node = connected.node.get();
-  std::thread asking([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::thread asking(
+      [node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
   answer_subscribe(connected.hub);
   asking.join();
   connected.hub.close();
@@ -272,8 +281,10 @@ TEST(Declarations, UnsubscribeWhatTheyJustSubscribeAgain) {
     const auto payload = frame->view().payload;
     ASSERT_TRUE(proto::decode<proto::ns::Unsubscribe>(payload));
     const std::uint16_t number = proto::split_control(payload)->header.request;
-    connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
-    answered = ++asked == 2;  // the program's, and the library's, which cannot know that the other one left
+    connected.hub.send_control(proto::Kind::ns,
+                               proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
+    answered = ++asked ==
+               2;  // the program's, and the library's, which cannot know that the other one left
   }
   settle(connected);
   come_back(hub, connected, false);
@@ -295,17 +306,20 @@ TEST(Declarations, SubscribeAgainByThePaceThatTheProgramWantedLast) {
       const auto request = connected.hub.next_request<proto::ns::Subscribe>(number);
       ASSERT_TRUE(request);
       EXPECT_EQ(request->window, refused ? 0u : 2u);
-      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
       settle(connected);
       std::thread asking([&] {
-        const nif_status status = nif_subscribe_paced(node, "peer/scan", &pace, nullptr, NIF_FOREVER);
+        const nif_status status =
+            nif_subscribe_paced(node, "peer/scan", &pace, nullptr, NIF_FOREVER);
         EXPECT_EQ(status, refused ? NIF_LIMIT : NIF_OK);
       });
       const auto asked = connected.hub.next_request<proto::ns::Subscribe>(number);
       EXPECT_TRUE(asked && asked->window == 2);
       const proto::ControlHeader header{proto::ns::Subscribe::kOperation, number};
-      connected.hub.send_control(proto::Kind::ns, refused ? proto::encode_refusal(header, {proto::Status::limit, "no"})
-                                                          : proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+      connected.hub.send_control(
+          proto::Kind::ns, refused ? proto::encode_refusal(header, {proto::Status::limit, "no"})
+                                   : proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
       asking.join();
       connected.hub.close();
     }
@@ -330,10 +344,12 @@ TEST(Declarations, UnsubscribeNothingBehindASubscriptionThatBeginsAnew) {
     const std::uint16_t number = proto::split_control(payload)->header.request;
     if (const auto request = proto::decode<proto::ns::Subscribe>(payload)) {
       anew |= request->window == 2;
-      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::SubscribeAnswer{}, number));
     } else {
       EXPECT_FALSE(anew) << "the program's new subscription is gone";
-      connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
+      connected.hub.send_control(proto::Kind::ns,
+                                 proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number));
     }
   }
   asking.join();
@@ -349,8 +365,9 @@ TEST(Declarations, GiveTheLastMessageOfAServiceThatIsAdvertisedOnceMoreMeanwhile
     std::uint16_t number = 0;
     ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(number));
     advertise(connected, "map", group, true);
-    connected.hub.send_control(proto::Kind::ns,
-                               proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number));
+    connected.hub.send_control(
+        proto::Kind::ns,
+        proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number));
     expect_published(connected.hub, group, "map");
   }
 }
@@ -380,8 +397,9 @@ TEST(Declarations, PutNothingBetweenTheFragmentsOfANewerMessage) {
     ASSERT_TRUE(frame);
     if (frame->header.kind == proto::Kind::ns) {
       const auto number = proto::split_control(frame->view().payload)->header.request;
-      connected.hub.send_control(proto::Kind::ns,
-                                 proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
+      connected.hub.send_control(
+          proto::Kind::ns,
+          proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{kGroup}, 0}, number));
       continue;
     }
     connected.hub.send(proto::flow::Confirm{++frames});

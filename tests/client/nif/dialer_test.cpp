@@ -14,7 +14,8 @@ namespace {
 
 TEST(Dialer, TriesAddressesInTurn) {
   FakeHub hub;
-  std::vector<Endpoint> endpoints{*parse_endpoint("unix:/nonexistent/socket"), *parse_endpoint(hub.url())};
+  std::vector<Endpoint> endpoints{*parse_endpoint("unix:/nonexistent/socket"),
+                                  *parse_endpoint(hub.url())};
   std::thread admitting([&hub] {
     FakeConnection connection = hub.admit(make_welcome());
     EXPECT_TRUE(connection.wait_closed());

@@ -64,7 +64,8 @@ TEST(Error, DropReasonsAreThoseOfTheWire) {
       {NIF_DROP_WRONG_SOURCE, proto::DropReason::wrong_source},
   };
   EXPECT_EQ(std::size(pairs) + 1, proto::kDropReasonCount) << "and none";
-  for (const auto& [known, wire] : pairs) EXPECT_EQ(static_cast<int>(known), static_cast<int>(wire));
+  for (const auto& [known, wire] : pairs)
+    EXPECT_EQ(static_cast<int>(known), static_cast<int>(wire));
 }
 
 }  // namespace

@@ -29,7 +29,8 @@ TEST(Handles, AClosedHandleNeverComesBack) {
 }
 
 TEST(Handles, RefusesWhatIsNoHandle) {
-  for (const std::uintptr_t value : {std::uintptr_t{0}, std::uintptr_t{8}, std::uintptr_t{16}, ~std::uintptr_t{0}}) {
+  for (const std::uintptr_t value :
+       {std::uintptr_t{0}, std::uintptr_t{8}, std::uintptr_t{16}, ~std::uintptr_t{0}}) {
     const NodeRef node = find_node(reinterpret_cast<const nif_node*>(value));
     EXPECT_FALSE(node);
     EXPECT_EQ(node.status(), NIF_CLOSED);
@@ -43,8 +44,8 @@ TEST(Handles, AChildIsToldThatTheHandleIsItsParents) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    const bool right =
-        nif_send_to(node, kPeerId, "", 0) == NIF_FORKED && nif_close(node) == NIF_OK && nif_close(node) == NIF_CLOSED;
+    const bool right = nif_send_to(node, kPeerId, "", 0) == NIF_FORKED &&
+                       nif_close(node) == NIF_OK && nif_close(node) == NIF_CLOSED;
     ::_exit(right ? 0 : 1);
   }
   int status = 0;
@@ -61,7 +62,8 @@ TEST(Handles, EveryCallRefusesWhatIsNoHandle) {
     closed = connected.node.get();
     connected.hub.close();
   }
-  for (nif_node* const node : {static_cast<nif_node*>(nullptr), closed, reinterpret_cast<nif_node*>(0x1234)}) {
+  for (nif_node* const node :
+       {static_cast<nif_node*>(nullptr), closed, reinterpret_cast<nif_node*>(0x1234)}) {
     for (const Call& call : kCalls) {
       EXPECT_EQ(call.sound(node), NIF_CLOSED) << call.name;
       if (call.unsound != nullptr) {
@@ -98,8 +100,9 @@ TEST(Handles, EveryCallOfAChildIsRefused) {
     int wrong = 0;
     for (const Call& call : kCalls) {
       const nif_status status = call.sound(node);
-      const bool says_so =
-          call.name == "nif_id" || call.name == "nif_event_fd" ? status == NIF_CLOSED : status == NIF_FORKED;
+      const bool says_so = call.name == "nif_id" || call.name == "nif_event_fd"
+                               ? status == NIF_CLOSED
+                               : status == NIF_FORKED;
       wrong += says_so ? 0 : 1;
     }
     ::_exit(wrong);
@@ -123,7 +126,8 @@ nif_verdict call_everything(void* user, const nif_incoming* in) {
   while (!state->ready.load()) std::this_thread::yield();
   for (const Call& call : kCalls) {
     const nif_status status = call.sound(state->node);
-    const bool right = call.waits ? status == NIF_IN_CALLBACK : status != NIF_IN_CALLBACK && status != NIF_CLOSED;
+    const bool right =
+        call.waits ? status == NIF_IN_CALLBACK : status != NIF_IN_CALLBACK && status != NIF_CLOSED;
     if (!right) state->wrong.emplace_back(call.name);
   }
   if (nif_close(state->node) != NIF_IN_CALLBACK) state->wrong.emplace_back("nif_close");

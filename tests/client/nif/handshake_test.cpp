@@ -17,7 +17,8 @@ std::vector<std::byte> answer(const proto::Payload& payload) {
   return bytes;
 }
 
-Handshake::State feed(Handshake& handshake, std::span<const std::byte> bytes, std::size_t step = SIZE_MAX) {
+Handshake::State feed(Handshake& handshake, std::span<const std::byte> bytes,
+                      std::size_t step = SIZE_MAX) {
   auto state = Handshake::State::need_more;
   while (state == Handshake::State::need_more && !bytes.empty()) {
     const std::size_t size = std::min(step, bytes.size());
@@ -49,7 +50,8 @@ TEST(Handshake, TakesWelcomeHoweverItIsSplitAndKeepsTheRest) {
 
 TEST(Handshake, TakesGoodbye) {
   Handshake handshake(false, 0);
-  ASSERT_EQ(feed(handshake, answer(proto::encode(proto::Goodbye{proto::GoodbyeCode::name_taken, "by 7.3"}))),
+  ASSERT_EQ(feed(handshake,
+                 answer(proto::encode(proto::Goodbye{proto::GoodbyeCode::name_taken, "by 7.3"}))),
             Handshake::State::goodbye);
   EXPECT_EQ(handshake.goodbye().sentence, "by 7.3");
   EXPECT_EQ(status_of(handshake.goodbye().code), NIF_NAME_TAKEN);
@@ -60,7 +62,8 @@ TEST(Handshake, RefusesOtherProtocolsAtTheFirstWrongByte) {
   EXPECT_EQ(feed(http, std::as_bytes(std::span(std::string_view("H")))), Handshake::State::failed);
   EXPECT_EQ(http.failure().status, NIF_PROTOCOL);
   Handshake version(false, 0);
-  EXPECT_EQ(feed(version, std::as_bytes(std::span(std::string_view("GIMnet\x02\x00", 8)))), Handshake::State::failed);
+  EXPECT_EQ(feed(version, std::as_bytes(std::span(std::string_view("GIMnet\x02\x00", 8)))),
+            Handshake::State::failed);
   EXPECT_EQ(version.failure().status, NIF_BAD_VERSION);
 }
 
@@ -72,9 +75,11 @@ TEST(Handshake, RefusesImpossibleWelcomes) {
     return welcome_with(welcome);
   };
   EXPECT_EQ(with([](auto& w) { w.node = NodeId{0}; }), Handshake::State::failed);
-  EXPECT_EQ(with([](auto& w) { w.node = NodeId{kHubNode}; }), Handshake::State::failed) << "the hub itself";
+  EXPECT_EQ(with([](auto& w) { w.node = NodeId{kHubNode}; }), Handshake::State::failed)
+      << "the hub itself";
   EXPECT_EQ(with([](auto& w) { w.node = NodeId{0xFFFFFFFF}; }), Handshake::State::failed);
-  EXPECT_EQ(with([](auto& w) { w.hub = HubId{8}; }), Handshake::State::failed) << "an id of another hub";
+  EXPECT_EQ(with([](auto& w) { w.hub = HubId{8}; }), Handshake::State::failed)
+      << "an id of another hub";
   EXPECT_EQ(with([](auto& w) { w.token.clear(); }), Handshake::State::failed);
   EXPECT_EQ(with([](auto& w) { w.frame_length_max = 16 * 1024 - 1; }), Handshake::State::failed);
   EXPECT_EQ(with([](auto& w) { w.frame_length_max = 16 * 1024; }), Handshake::State::welcome);

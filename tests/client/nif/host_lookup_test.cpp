@@ -19,7 +19,8 @@ Endpoint endpoint_of(const char* url) { return *parse_endpoint(url); }
 
 HostAddresses nothing_found(const std::string&, std::uint16_t) { return {"nobody knows it", {}}; }
 
-/// A name server that does not answer until it is told to. Outlives the test, as the searches may that wait for it.
+/// A name server that does not answer until it is told to. Outlives the test, as the searches may
+/// that wait for it.
 class SilentServer {
  public:
   SilentServer() : state_(std::make_shared<State>()) {}
@@ -84,13 +85,14 @@ TEST(HostLookup, GivesAllThatIsFound) {
 
 TEST(HostLookup, SaysWhyThereIsNone) {
   const WakeSignal cancel;
-  const auto found = find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, nothing_found);
+  const auto found =
+      find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, nothing_found);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().status, NIF_NO_HOST);
   EXPECT_EQ(found.error().sentence, "cannot find the host of tcp://robot.local:5: nobody knows it");
-  const auto failed =
-      find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel,
-                     [](const std::string&, std::uint16_t) -> HostAddresses { throw std::bad_alloc(); });
+  const auto failed = find_addresses(
+      endpoint_of("tcp://robot.local:5"), kNever, cancel,
+      [](const std::string&, std::uint16_t) -> HostAddresses { throw std::bad_alloc(); });
   ASSERT_FALSE(failed);
   EXPECT_NE(failed.error().sentence.find("out of memory"), std::string::npos);
 }
@@ -98,8 +100,8 @@ TEST(HostLookup, SaysWhyThereIsNone) {
 TEST(HostLookup, LeavesAtTheDeadlineWhereNobodyAnswers) {
   const SilentServer server;
   const WakeSignal cancel;
-  const auto found =
-      find_addresses(endpoint_of("tcp://robot.local:5"), steady_now_ns() + kNsPerMs, cancel, server.lookup());
+  const auto found = find_addresses(endpoint_of("tcp://robot.local:5"), steady_now_ns() + kNsPerMs,
+                                    cancel, server.lookup());
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().status, NIF_TIMEOUT);
 }
@@ -111,7 +113,8 @@ TEST(HostLookup, LeavesWhenItIsCancelled) {
     server.wait_until_asked(1);
     cancel.raise();
   });
-  const auto found = find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, server.lookup());
+  const auto found =
+      find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, server.lookup());
   closing.join();
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().status, NIF_CLOSED);
@@ -130,8 +133,11 @@ TEST(HostLookup, BeginsNoMoreThanSomeAtATime) {
   EXPECT_EQ(last.error().status, NIF_NO_HOST);
   EXPECT_NE(last.error().sentence.find("too many"), std::string::npos);
   server.answer();
-  const auto quick = [](const std::string&, std::uint16_t) { return HostAddresses{"", {HostAddress(16)}}; };
-  while (!find_addresses(endpoint_of("tcp://robot.local:5"), kNever, never, quick)) std::this_thread::yield();
+  const auto quick = [](const std::string&, std::uint16_t) {
+    return HostAddresses{"", {HostAddress(16)}};
+  };
+  while (!find_addresses(endpoint_of("tcp://robot.local:5"), kNever, never, quick))
+    std::this_thread::yield();
 }
 
 }  // namespace

@@ -14,8 +14,8 @@
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/recording_host.hpp"
 
-// A hub that sends what no hub may: the node takes nothing partial, keeps nothing, and lives. Whole classes of bytes in
-// memory, samples of each over a socket.
+// A hub that sends what no hub may: the node takes nothing partial, keeps nothing, and lives. Whole
+// classes of bytes in memory, samples of each over a socket.
 
 namespace gimnet::nif::test {
 namespace {
@@ -47,21 +47,25 @@ Bytes header_bytes(const proto::FrameHeader& header, std::size_t payload = 0) {
 }
 
 /// One value of a Bitestream, whatever it says of itself.
-void add_value(Bytes& stream, unsigned type, unsigned size_code, std::uint32_t key, std::uint32_t length,
-               std::size_t bytes) {
+void add_value(Bytes& stream, unsigned type, unsigned size_code, std::uint32_t key,
+               std::uint32_t length, std::size_t bytes) {
   stream.push_back(static_cast<std::byte>(type << 3 | size_code));
-  for (unsigned shift = 0; shift < 24; shift += 8) stream.push_back(static_cast<std::byte>(key >> shift));
+  for (unsigned shift = 0; shift < 24; shift += 8)
+    stream.push_back(static_cast<std::byte>(key >> shift));
   const unsigned size_bytes = 1u << std::min(size_code, 2u);
-  for (unsigned i = 0; i < size_bytes; ++i) stream.push_back(static_cast<std::byte>(length >> (8 * i)));
+  for (unsigned i = 0; i < size_bytes; ++i)
+    stream.push_back(static_cast<std::byte>(length >> (8 * i)));
   stream.resize(stream.size() + bytes, std::byte{1});
 }
 
 /// Bodies of control messages that lie about their sizes, types and depth.
 std::vector<Bytes> hostile_bodies() {
   std::vector<Bytes> bodies;
-  for (const std::uint32_t length : {0x2000'0000u, 0x4000'0000u, 0x7FFF'FFFFu, 0xFFFF'FFFFu, 9u, 0u}) {
+  for (const std::uint32_t length :
+       {0x2000'0000u, 0x4000'0000u, 0x7FFF'FFFFu, 0xFFFF'FFFFu, 9u, 0u}) {
     for (const unsigned type : {0u, 12u, 14u, 20u, 21u, 29u}) {  // "2^29 elements", with 8 bytes
-      for (const std::uint32_t key : {1u, 2u, 3u, 4u}) add_value(bodies.emplace_back(), type, 2, key, length, 8);
+      for (const std::uint32_t key : {1u, 2u, 3u, 4u})
+        add_value(bodies.emplace_back(), type, 2, key, length, 8);
     }
   }
   Bytes deep;
@@ -116,7 +120,8 @@ TEST(HostileHub, AfterACutTheNodeComesBackAndHasNothingOfIt) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   const std::size_t size = keyed_message().size();
-  for (const std::size_t cut : {std::size_t{1}, std::size_t{15}, std::size_t{16}, std::size_t{23}, size - 1}) {
+  for (const std::size_t cut :
+       {std::size_t{1}, std::size_t{15}, std::size_t{16}, std::size_t{23}, size - 1}) {
     for (const bool abruptly : {false, true}) {
       cut_connection(connected.hub, cut, abruptly);
       connected.hub = hub.admit(make_welcome());
@@ -141,13 +146,15 @@ TEST(HostileHub, FramesWithoutPayloadAreDeliveredEmptyOrEndTheConnection) {
     const Inbound::Verdict verdict = receiving.feed(header_bytes(header));
     const bool message = kind <= 4;
     const bool unknown = kind >= 8 && kind < 16;
-    EXPECT_EQ(verdict, message || unknown ? Inbound::Verdict::going : Inbound::Verdict::malformed) << kind;
+    EXPECT_EQ(verdict, message || unknown ? Inbound::Verdict::going : Inbound::Verdict::malformed)
+        << kind;
     EXPECT_EQ(receiving.host.items.size(), message ? 1u : 0u) << kind;
   }
 }
 
 TEST(HostileHub, NoHeaderMakesItTakeWhatIsNotThere) {
-  // Kinds, flags and lanes in all their combinations, in front of too few bytes for what they promise.
+  // Kinds, flags and lanes in all their combinations, in front of too few bytes for what they
+  // promise.
   for (unsigned kind = 0; kind < 20; ++kind) {
     for (unsigned flags = 0; flags < 256; ++flags) {
       for (const unsigned lane : {0u, 3u, 4u, 0xFFu}) {
@@ -176,7 +183,8 @@ TEST(HostileHub, TheWrongByteOrderOfAnyFieldCostsAtMostTheConnection) {
     Receiving receiving;
     const Inbound::Verdict verdict = receiving.feed(swapped);
     EXPECT_EQ(verdict, field == 0 ? Inbound::Verdict::malformed : Inbound::Verdict::going) << field;
-    EXPECT_EQ(receiving.host.items.size(), field == 8 ? 1u : 0u) << "to another node, or from whom the hub says";
+    EXPECT_EQ(receiving.host.items.size(), field == 8 ? 1u : 0u)
+        << "to another node, or from whom the hub says";
   }
 }
 
@@ -231,7 +239,8 @@ void answer_all(FakeConnection& hub, const std::vector<Bytes>& bodies) {
     const auto asked = proto::split_control(frame->view().payload);
     ASSERT_TRUE(asked);
     const auto operation = static_cast<std::uint16_t>(asked->header.operation | proto::kAnswerBit);
-    hub.send_control(frame->header.kind, control(operation, asked->header.request, bodies[i % bodies.size()]));
+    hub.send_control(frame->header.kind,
+                     control(operation, asked->header.request, bodies[i % bodies.size()]));
   }
 }
 
@@ -241,7 +250,8 @@ TEST(HostileHub, AnswersThatLieFailTheCallAndNothingElse) {
   nif_node* const node = connected.node.get();
   const std::vector<Bytes> bodies = hostile_bodies();
   std::thread answering([&] { answer_all(connected.hub, bodies); });
-  // Four calls a round, and a number of bodies that is no multiple of four: each call gets them all.
+  // Four calls a round, and a number of bodies that is no multiple of four: each call gets them
+  // all.
   ASSERT_EQ(bodies.size() % 2, 1u);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     // Whatever such an answer may be taken for, it is not more than it holds.
@@ -271,8 +281,9 @@ TEST(HostileHub, AnswersNobodyAskedForAreSkipped) {
   Connected connected = connect_to(hub, default_options(), make_welcome());
   for (unsigned request = 0; request < 1000; ++request) {
     const auto operation = static_cast<std::uint16_t>((request % 40) | proto::kAnswerBit);
-    connected.hub.send_control(request % 2 == 0 ? proto::Kind::ns : proto::Kind::ctrl,
-                               control(operation, static_cast<std::uint16_t>(request), Bytes(8, std::byte{1})));
+    connected.hub.send_control(
+        request % 2 == 0 ? proto::Kind::ns : proto::Kind::ctrl,
+        control(operation, static_cast<std::uint16_t>(request), Bytes(8, std::byte{1})));
   }
   connected.hub.send_unicast(kPeerId, kOwnId, "still here");
   nif_incoming in{};

@@ -33,7 +33,8 @@ TEST(HubClock, IgnoresWhatWasNotAskedAndRepeats) {
 
 TEST(HubClock, StandsImpossibleTimes) {
   HubClock clock;
-  for (const std::int64_t now : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
+  for (const std::int64_t now :
+       {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
     const auto ping = clock.ping(0, -2);
     clock.on_pong({ping.sequence, 0, now}, 1);
   }

@@ -34,7 +34,8 @@ TEST(Inbound, GivesOutMessagesHoweverTheBytesAreSplit) {
   for (std::size_t step = 1; step <= bytes.size(); ++step) {
     Receiving receiving;
     ASSERT_EQ(receiving.feed(bytes, step), Inbound::Verdict::going);
-    ASSERT_EQ(receiving.host.texts(), (std::vector<std::string>{"", "a", "hello", "keyed"})) << step;
+    ASSERT_EQ(receiving.host.texts(), (std::vector<std::string>{"", "a", "hello", "keyed"}))
+        << step;
     EXPECT_EQ(receiving.host.items[3].key, 99u);
     EXPECT_EQ(receiving.host.items[3].to, 42u);
     EXPECT_EQ(receiving.inbound.taken(), 4u);
@@ -94,7 +95,8 @@ TEST(Inbound, EndsOnWhatAHubMayNotSend) {
 }
 
 TEST(Inbound, EndsAtEveryLengthOverTheLargestFrame) {
-  for (const std::uint32_t length : {65'537u, 1u << 20, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
+  for (const std::uint32_t length :
+       {65'537u, 1u << 20, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
     Receiving receiving;
     std::vector<std::byte> bytes(proto::kHeaderSize);
     proto::FrameHeader header;
@@ -145,13 +147,15 @@ TEST(Inbound, OpensTheWindowOfALargeMessage) {
   Receiving receiving;
   const std::uint32_t total = 4u << 20;
   const std::string piece = pattern(32 * 1024);
-  for (std::uint32_t offset = 0; offset < total; offset += static_cast<std::uint32_t>(piece.size())) {
+  for (std::uint32_t offset = 0; offset < total;
+       offset += static_cast<std::uint32_t>(piece.size())) {
     std::vector<std::byte> bytes;
     add_frame(bytes, fragment(9, offset, total), piece);
     ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
     if (offset + piece.size() >= proto::kWindowDefault) {
       ASSERT_FALSE(receiving.host.taken_sent.empty());
-      EXPECT_GT(receiving.host.taken_sent.back().allowed, offset) << "the sender never stands still";
+      EXPECT_GT(receiving.host.taken_sent.back().allowed, offset)
+          << "the sender never stands still";
     }
   }
   EXPECT_EQ(receiving.host.taken_sent.back().taken, total);
@@ -178,7 +182,8 @@ TEST(Inbound, AnnouncesSkippedFramesAndCountsThem) {
   EXPECT_EQ(receiving.inbound.taken(), 5u);
   ASSERT_EQ(receiving.host.items.size(), 2u);
   EXPECT_EQ(receiving.host.items[0].count, 5u);
-  EXPECT_EQ(receiving.host.items[0].reason, static_cast<std::uint32_t>(proto::DropReason::queue_full));
+  EXPECT_EQ(receiving.host.items[0].reason,
+            static_cast<std::uint32_t>(proto::DropReason::queue_full));
   EXPECT_EQ(receiving.host.items[1].count, NIF_COUNT_UNKNOWN);
   std::vector<std::byte> impossible;
   add_flow(impossible, proto::flow::Skip{proto::DropReason::none, UINT64_MAX - 1});
@@ -188,7 +193,8 @@ TEST(Inbound, AnnouncesSkippedFramesAndCountsThem) {
 TEST(Inbound, LooksAtNothingBehindGoodbye) {
   Receiving receiving;
   std::vector<std::byte> bytes;
-  add_control(bytes, proto::Kind::link, proto::encode(proto::Goodbye{proto::GoodbyeCode::kicked, "out"}));
+  add_control(bytes, proto::Kind::link,
+              proto::encode(proto::Goodbye{proto::GoodbyeCode::kicked, "out"}));
   add_frame(bytes, from_peer(), "late");
   EXPECT_EQ(receiving.feed(bytes), Inbound::Verdict::goodbye);
   EXPECT_EQ(receiving.inbound.goodbye().sentence, "out");
@@ -248,7 +254,8 @@ TEST(Inbound, ReportsSayWhatBecameOfWhichFrame) {
   std::array<std::byte, proto::kReportSizeMax> payload;
   const std::size_t size = proto::encode_report(report, payload);
   std::vector<std::byte> bytes;
-  add_frame(bytes, from_peer(proto::Kind::report), {reinterpret_cast<const char*>(payload.data()), size});
+  add_frame(bytes, from_peer(proto::Kind::report),
+            {reinterpret_cast<const char*>(payload.data()), size});
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
   ASSERT_EQ(receiving.host.items.size(), 1u);
   EXPECT_EQ(receiving.host.items[0].type, static_cast<std::uint32_t>(NIF_REPORT));
@@ -269,7 +276,8 @@ TEST(Inbound, AReportDoesNotCountTheQuestionOfTheLibrary) {
   std::array<std::byte, proto::kReportSizeMax> payload;
   const std::size_t size = proto::encode_report(report, payload);
   std::vector<std::byte> bytes;
-  add_frame(bytes, from_peer(proto::Kind::report), {reinterpret_cast<const char*>(payload.data()), size});
+  add_frame(bytes, from_peer(proto::Kind::report),
+            {reinterpret_cast<const char*>(payload.data()), size});
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
   ASSERT_EQ(receiving.host.items.size(), 1u);
   EXPECT_EQ(receiving.host.items[0].count, 2u);
@@ -288,7 +296,8 @@ TEST(Inbound, AReportOfAFragmentSaysWhichMessageItWas) {
   std::array<std::byte, proto::kReportSizeMax> payload;
   const std::size_t size = proto::encode_report(report, payload);
   std::vector<std::byte> bytes;
-  add_frame(bytes, from_peer(proto::Kind::report), {reinterpret_cast<const char*>(payload.data()), size});
+  add_frame(bytes, from_peer(proto::Kind::report),
+            {reinterpret_cast<const char*>(payload.data()), size});
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
   ReportedMessages::Start start{};
   start[0] = std::byte{9};
@@ -359,7 +368,8 @@ TEST(Inbound, TakesWhatWaitedUnderEachOfItsLastIds) {
     receiving.inbound.begin(session);
   }
   ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  EXPECT_EQ(receiving.inbound.counts().ignored, 2u + 3u) << "16 are remembered: the last of these four, no other";
+  EXPECT_EQ(receiving.inbound.counts().ignored, 2u + 3u)
+      << "16 are remembered: the last of these four, no other";
 }
 
 TEST(Inbound, ConfirmationIsDueAfterAQuarterOfTheHubsBuffer) {

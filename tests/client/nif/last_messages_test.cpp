@@ -10,8 +10,9 @@ namespace {
 constexpr std::uint32_t kGroup = 11;
 
 void keep(LastMessages& messages, const std::string& payload, std::uint32_t group = kGroup) {
-  const nif_bytes parts[] = {{payload.data(), payload.size() / 2},
-                             {payload.data() + payload.size() / 2, payload.size() - payload.size() / 2}};
+  const nif_bytes parts[] = {
+      {payload.data(), payload.size() / 2},
+      {payload.data() + payload.size() / 2, payload.size() - payload.size() / 2}};
   nif_outgoing outgoing = NIF_OUTGOING_INIT;
   outgoing.kind = NIF_GROUP;
   outgoing.to = group;
@@ -29,7 +30,8 @@ void keep(LastMessages& messages, const std::string& payload, std::uint32_t grou
 std::string text_of(const LastMessages& messages, const std::string& service = "map") {
   const LastMessage* const last = messages.find(service);
   return last == nullptr ? "nothing"
-                         : std::string(reinterpret_cast<const char*>(last->payload.data()), last->payload.size());
+                         : std::string(reinterpret_cast<const char*>(last->payload.data()),
+                                       last->payload.size());
 }
 
 TEST(LastMessages, KeepsTheLastOfEachRetainedServiceWhole) {

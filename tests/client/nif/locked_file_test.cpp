@@ -16,7 +16,9 @@ namespace {
 
 using State = LockedFile::State;
 
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span{text}); }
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span{text});
+}
 
 std::string content_of(const LockedFile& file) {
   std::array<std::byte, 16> memory{};

@@ -12,8 +12,8 @@ constexpr std::uint32_t kSender = (7u << 20) | 3;
 constexpr std::uint32_t kPiece = 32 * 1024;
 constexpr std::uint32_t kLarge = 8u << 20;
 
-proto::FrameView piece(std::uint32_t message, std::uint32_t offset, std::uint32_t total, std::string_view payload,
-                       proto::Kind kind = proto::Kind::unicast) {
+proto::FrameView piece(std::uint32_t message, std::uint32_t offset, std::uint32_t total,
+                       std::string_view payload, proto::Kind kind = proto::Kind::unicast) {
   proto::FrameView view;
   view.header.src = kSender;
   view.header.kind = kind;
@@ -52,7 +52,8 @@ TEST(MessageAssembler, TheWindowIsNarrowWhereMessagesComeSlowly) {
     EXPECT_LE(taken.allowed - taken.taken, proto::kWindowDefault);
     if (taken.taken < kLarge / 2) continue;
     EXPECT_LE(taken.allowed - taken.taken, 400u * 1024) << taken.taken;
-    EXPECT_TRUE(taken.allowed == kLarge || taken.allowed - taken.taken >= kPiece) << "the next piece may come";
+    EXPECT_TRUE(taken.allowed == kLarge || taken.allowed - taken.taken >= kPiece)
+        << "the next piece may come";
   }
   EXPECT_EQ(told.back().taken, kLarge);
 }
@@ -99,7 +100,8 @@ TEST(MessageAssembler, ClearingTellsTheSendersOfLargeMessages) {
 }
 
 TEST(MessageAssembler, WindowsOfHostileSendersAreBounded) {
-  MessageAssembler assembler({.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20, .streams_max = 8});
+  MessageAssembler assembler(
+      {.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20, .streams_max = 8});
   for (std::uint32_t message = 1; message < 1000; ++message) {
     static_cast<void>(assembler.take(piece(message, 0, kLarge, "x"), 1));
   }

@@ -20,7 +20,8 @@ std::string numbered(std::size_t number) {
   return payload + std::string(kPayload - payload.size(), 'x');
 }
 
-/// A node with a service whose messages stand in its own queue, because the hub reads nothing, at a hub that then goes.
+/// A node with a service whose messages stand in its own queue, because the hub reads nothing, at a
+/// hub that then goes.
 struct Interrupted {
   Interrupted() : connected(connect_to(hub, default_options("robot"), make_welcome(kResumeBytes))) {
     advertise(connected, "odom", kGroup, false);
@@ -73,7 +74,8 @@ TEST(MovedGroups, WhatIsSentMeanwhileGoesToTheNewGroup) {
   for (const std::string& payload : {std::string("small"), std::string(100'000, 'l')}) {
     connected.hub.close();
     while (info_of(connected.node.get()).connected != 0) std::this_thread::yield();
-    std::thread publishing([&] { EXPECT_EQ(publish(connected.node.get(), kGroup, payload), NIF_OK); });
+    std::thread publishing(
+        [&] { EXPECT_EQ(publish(connected.node.get(), kGroup, payload), NIF_OK); });
     come_back(hub, connected, false);
     answer_advertise(connected.hub, "odom", kNewGroup);
     expect_published(connected.hub, kNewGroup, payload);
@@ -89,7 +91,8 @@ TEST(MovedGroups, WhatIsSentToARefusedServiceIsRefused) {
   advertise(connected, "odom", kGroup, false);
   connected.hub.close();
   while (info_of(connected.node.get()).connected != 0) std::this_thread::yield();
-  std::thread publishing([&] { EXPECT_EQ(publish(connected.node.get(), kGroup, "x"), NIF_REFUSED); });
+  std::thread publishing(
+      [&] { EXPECT_EQ(publish(connected.node.get(), kGroup, "x"), NIF_REFUSED); });
   come_back(hub, connected, false);
   answer_advertise(connected.hub, "odom", 0);
   publishing.join();
@@ -109,7 +112,8 @@ TEST(MovedGroups, ARefusedServiceAsksForItsFormerGroupAgain) {
   come_back(hub, connected, false);
   answer_advertise(connected.hub, "odom", 0);
   nif_incoming in{};
-  while (nif_receive(connected.node.get(), &in, NIF_FOREVER) == NIF_OK && in.type != NIF_OWN_SERVICE_MOVED) {
+  while (nif_receive(connected.node.get(), &in, NIF_FOREVER) == NIF_OK &&
+         in.type != NIF_OWN_SERVICE_MOVED) {
     nif_release(&in);
   }
   EXPECT_EQ(in.group, 0u);
@@ -126,16 +130,18 @@ TEST(MovedGroups, ARefusedServiceAsksForItsFormerGroupAgain) {
 TEST(MovedGroups, ARefusedSubscriptionIsToldOnceWithItsReasonAndThatItStandsAgain) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options("robot"), make_welcome(kResumeBytes));
-  std::thread asking(
-      [&] { EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::thread asking([&] {
+    EXPECT_EQ(nif_subscribe(connected.node.get(), "peer/scan", nullptr, NIF_FOREVER), NIF_OK);
+  });
   answer_subscribe(connected.hub);
   asking.join();
   for (int i = 0; i < 2; ++i) {
     come_back(hub, connected, false);
     std::uint16_t number = 0;
     ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(number));
-    connected.hub.send_control(proto::Kind::ns, proto::encode_refusal({proto::ns::Subscribe::kOperation, number},
-                                                                      {proto::Status::limit, "no more"}));
+    connected.hub.send_control(proto::Kind::ns,
+                               proto::encode_refusal({proto::ns::Subscribe::kOperation, number},
+                                                     {proto::Status::limit, "no more"}));
   }
   come_back(hub, connected, false);
   answer_subscribe(connected.hub);
@@ -152,7 +158,8 @@ TEST(MovedGroups, ARefusedSubscriptionIsToldOnceWithItsReasonAndThatItStandsAgai
       EXPECT_EQ(in.group, 0u);
       const bool refused = told == 1;  // then the hub took it again, and there is no provider
       EXPECT_EQ(in.reason, static_cast<std::uint32_t>(refused ? NIF_LIMIT : NIF_OK));
-      EXPECT_EQ(std::string(static_cast<const char*>(in.payload), in.size), refused ? "no more" : "");
+      EXPECT_EQ(std::string(static_cast<const char*>(in.payload), in.size),
+                refused ? "no more" : "");
     }
     nif_release(&in);
   }

@@ -7,7 +7,8 @@
 
 #include "gimnet/nif.h"
 
-/* gimnet/nif.h, "Versions": programs keep arrays of these, so they never change while NIF_VERSION_MAJOR is the same. */
+/* gimnet/nif.h, "Versions": programs keep arrays of these, so they never change while
+ * NIF_VERSION_MAJOR is the same. */
 #if UINTPTR_MAX == UINT64_MAX
 _Static_assert(sizeof(nif_bytes) == 16, "nif_bytes");
 _Static_assert(sizeof(nif_incoming) == 128, "nif_incoming");
@@ -43,7 +44,10 @@ int nif_c_talk(const char* url, uint32_t peer) {
   if (nif_get_info(node, &info) != NIF_OK || strcmp(info.name, "robot") != 0) return failed("info");
   if (send_parts(node, peer) != 0) return 1;
   if (nif_receive(node, &in, NIF_FOREVER) != NIF_OK) return failed("receive");
-  result = in.type == NIF_MESSAGE && in.from == peer && in.size == 2 && memcmp(in.payload, "hi", 2) == 0 ? 0 : 2;
+  result =
+      in.type == NIF_MESSAGE && in.from == peer && in.size == 2 && memcmp(in.payload, "hi", 2) == 0
+          ? 0
+          : 2;
   nif_release(&in);
   if (nif_receive(node, &in, 0) != NIF_TIMEOUT) return 3;
   if (nif_close(node) != NIF_OK) return failed("close");

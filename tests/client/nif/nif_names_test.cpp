@@ -44,11 +44,13 @@ TEST(NifNames, ResolvesOnceAndRemembers) {
         const auto request = connected.hub.next_request<ns::Resolve>(number);
         ASSERT_TRUE(request);
         EXPECT_EQ(request->name, "robot/base");
-        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
+        connected.hub.send_control(
+            proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
       });
 }
 
-// Whichever of the two the library knows first, the break or the answer, the next connection has the service.
+// Whichever of the two the library knows first, the break or the answer, the next connection has
+// the service.
 TEST(NifNames, AServiceThatIsAnsweredAtABreakIsDeclaredBehindIt) {
   for (int round = 0; round < 50; ++round) {
     FakeHub hub;
@@ -98,8 +100,9 @@ TEST(NifNames, TellsWhatTheHubSays) {
         const auto request = connected.hub.next_message();
         ASSERT_TRUE(request);
         const auto header = proto::split_control(request->view().payload)->header;
-        connected.hub.send_control(proto::Kind::ns,
-                                   proto::encode_refusal(header, {proto::Status::not_found, "no node has that name"}));
+        connected.hub.send_control(
+            proto::Kind::ns,
+            proto::encode_refusal(header, {proto::Status::not_found, "no node has that name"}));
       });
 }
 
@@ -154,16 +157,19 @@ TEST(NifNames, TakesStructuresOfOlderAndNewerPrograms) {
         ASSERT_TRUE(advertised);
         EXPECT_EQ(advertised->service, "odom");
         EXPECT_EQ(advertised->window, 0u) << "that is none of its members";
-        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{9}, 0}, number));
+        connected.hub.send_control(
+            proto::Kind::ns, proto::encode_answer(ns::AdvertiseAnswer{GroupId{9}, 0}, number));
         const auto subscribed = connected.hub.next_request<ns::Subscribe>(number);
         ASSERT_TRUE(subscribed);
         EXPECT_EQ(subscribed->depth, 3u);
         EXPECT_EQ(subscribed->rate_hz, 0.0) << "that is none of its members";
-        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
+        connected.hub.send_control(proto::Kind::ns,
+                                   proto::encode_answer(ns::SubscribeAnswer{}, number));
       });
   service.known.struct_size = sizeof service;
   service.known.name = "two/parts";
-  EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, 0), NIF_BAD_NAME) << "it asks for nothing there";
+  EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, 0), NIF_BAD_NAME)
+      << "it asks for nothing there";
   service.more = 1;
   EXPECT_EQ(nif_advertise(node, &service.known, &group, nullptr, 0), NIF_BAD_ARGUMENT);
   pace.struct_size = 0;
@@ -176,8 +182,10 @@ TEST(NifNames, RequestsHaveALargestContent) {
   nif_node* const node = connected.node.get();
   const std::string content(NIF_REQUEST_BYTES_MAX + 1, 'x');
   nif_reply* reply = nullptr;
-  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX, &reply, 0), NIF_TIMEOUT);
-  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX + 1, &reply, 0), NIF_BAD_ARGUMENT);
+  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX, &reply, 0),
+            NIF_TIMEOUT);
+  EXPECT_EQ(nif_request(node, NIF_NS, 1, content.data(), NIF_REQUEST_BYTES_MAX + 1, &reply, 0),
+            NIF_BAD_ARGUMENT);
 }
 
 TEST(NifNames, ListsAllPages) {
@@ -207,7 +215,8 @@ TEST(NifNames, ListsAllPages) {
           answer.nodes.resize(1);
           answer.nodes[0].node = NodeId{++id};
           answer.nodes[0].name = "robot/" + std::to_string(id);
-          if (more && id == 1) answer.nodes.clear();  // the hub looked at many, and none of them fits
+          if (more && id == 1)
+            answer.nodes.clear();  // the hub looked at many, and none of them fits
           answer.next = NodeId{id};
           connected.hub.send_control(proto::Kind::ns, proto::encode_answer(answer, number));
         }
@@ -247,7 +256,8 @@ TEST(NifNames, GivesRawAnswersOut) {
         nif_reply* reply = nullptr;
         EXPECT_EQ(nif_request(node, NIF_CTRL, 0x8001, nullptr, 0, &reply, 0), NIF_BAD_ARGUMENT);
         EXPECT_EQ(nif_request(node, 16, 1, nullptr, 0, &reply, 0), NIF_BAD_ARGUMENT);
-        ASSERT_EQ(nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, NIF_FOREVER), NIF_OK);
+        ASSERT_EQ(nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, NIF_FOREVER),
+                  NIF_OK);
         EXPECT_EQ(reply->status, 0);
         EXPECT_GT(reply->size, 0u);
         nif_free_reply(reply);
@@ -256,7 +266,8 @@ TEST(NifNames, GivesRawAnswersOut) {
       [&] {
         std::uint16_t number = 0;
         ASSERT_TRUE(connected.hub.next_request<proto::ctrl::HubInfo>(number));
-        connected.hub.send_control(proto::Kind::ctrl, proto::encode_answer(proto::ctrl::HubInfoAnswer{}, number));
+        connected.hub.send_control(proto::Kind::ctrl,
+                                   proto::encode_answer(proto::ctrl::HubInfoAnswer{}, number));
       });
 }
 
@@ -275,7 +286,8 @@ TEST(NifNames, AsksAgainAfterABreak) {
         connected.hub.close();
         connected.hub = hub.admit(make_welcome());
         while (connected.hub.next_request<ns::Subscribe>(number)) {
-          connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::SubscribeAnswer{}, number));
+          connected.hub.send_control(proto::Kind::ns,
+                                     proto::encode_answer(ns::SubscribeAnswer{}, number));
         }
         connected.hub.close();
       });
@@ -284,13 +296,15 @@ TEST(NifNames, AsksAgainAfterABreak) {
 TEST(NifNames, IgnoresAnswersToNothing) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, 55));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, 55));
   std::uint32_t id = 0;
   EXPECT_EQ(nif_resolve(connected.node.get(), "late", &id, 1), NIF_TIMEOUT);
   std::uint16_t number = 0;
   ASSERT_TRUE(connected.hub.next_request<ns::Resolve>(number));
   connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WithdrawAnswer{}, number));
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, number));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(ns::ResolveAnswer{NodeId{1}}, number));
   connected.hub.send_unicast(kPeerId, kOwnId, "still there");
   nif_incoming in;
   ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);

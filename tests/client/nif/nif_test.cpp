@@ -149,7 +149,8 @@ TEST(Nif, ManyThreadsSendAndReceiveOnOneHandle) {
     ASSERT_TRUE(frame);
     const std::string text = frame->payload();
     const auto thread = static_cast<std::size_t>(text[0] - '0');
-    EXPECT_EQ(text, std::to_string(thread) + ":" + std::to_string(next[thread]++)) << "order within a thread";
+    EXPECT_EQ(text, std::to_string(thread) + ":" + std::to_string(next[thread]++))
+        << "order within a thread";
     connected.hub.send_unicast(kPeerId, kOwnId, text);
   }
   for (auto& thread : threads) thread.join();
@@ -248,7 +249,8 @@ TEST(Nif, WhatACallbackRefusesStaysInOrder) {
   options.callback = hesitate;
   options.user = &state;
   Connected connected = connect_to(hub, options, make_welcome());
-  for (std::uint32_t i = 0; i < kMessages; ++i) connected.hub.send_unicast(kPeerId, kOwnId, std::to_string(i));
+  for (std::uint32_t i = 0; i < kMessages; ++i)
+    connected.hub.send_unicast(kPeerId, kOwnId, std::to_string(i));
   while (state.taken.load() < kMessages) {
     EXPECT_EQ(nif_deliver(connected.node.get()), NIF_OK);
     std::this_thread::yield();

@@ -66,8 +66,10 @@ TEST(NifWatch, TakesANameAndSaysWhetherItIsProvisional) {
         ASSERT_TRUE(request);
         EXPECT_EQ(request->name, "forklift");
         connected.hub.send_control(
-            proto::Kind::ns, proto::encode_answer(ns::RegisterNameAnswer{"forklift", true, {std::byte{1}}}, number));
-        connected.hub.send_control(proto::Kind::ns, proto::encode(ns::NameLost{"forklift", NodeId{kPeerId}, "late"}));
+            proto::Kind::ns,
+            proto::encode_answer(ns::RegisterNameAnswer{"forklift", true, {std::byte{1}}}, number));
+        connected.hub.send_control(
+            proto::Kind::ns, proto::encode(ns::NameLost{"forklift", NodeId{kPeerId}, "late"}));
       });
 }
 
@@ -97,7 +99,8 @@ TEST(NifWatch, DeliversWhatIsToldAndAcknowledgesIt) {
         ASSERT_TRUE(request);
         EXPECT_EQ(request->pattern, "hall/*");
         EXPECT_EQ(request->subjects, ns::kWatchNodes);
-        connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WatchAnswer{true}, number));
+        connected.hub.send_control(proto::Kind::ns,
+                                   proto::encode_answer(ns::WatchAnswer{true}, number));
         ns::WatchEvents events;
         events.watch = request->watch;
         events.epoch = 5;
@@ -135,7 +138,8 @@ void expect_watched(nif_node* node) {
   nif_release(&in);
 }
 
-// The hub counts each WATCH_TAKEN until it has answered it, and closes whoever has more unanswered than 64.
+// The hub counts each WATCH_TAKEN until it has answered it, and closes whoever has more unanswered
+// than 64.
 TEST(NifWatch, WhatItTookCountsAmongTheRequestsThatTheHubHasNotAnswered) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
@@ -145,7 +149,8 @@ TEST(NifWatch, WhatItTookCountsAmongTheRequestsThatTheHubHasNotAnswered) {
   converse([&] { ASSERT_EQ(nif_watch(node, nullptr, NIF_WATCH_ALL, &watch, NIF_FOREVER), NIF_OK); },
            [&] {
              ASSERT_TRUE(connected.hub.next_request<ns::Watch>(number));
-             connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::WatchAnswer{true}, number));
+             connected.hub.send_control(proto::Kind::ns,
+                                        proto::encode_answer(ns::WatchAnswer{true}, number));
            });
   for (std::size_t i = 0; i < proto::kOpenRequestsMax; ++i) {
     std::uint32_t id = 0;
@@ -156,7 +161,8 @@ TEST(NifWatch, WhatItTookCountsAmongTheRequestsThatTheHubHasNotAnswered) {
     connected.hub.send_control(proto::Kind::ns, proto::encode(change_behind(watch, version)));
     expect_watched(node);
   }
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(ns::ResolveAnswer{NodeId{kPeerId}}, number));
   const auto taken = connected.hub.next_request<ns::WatchTaken>(number);
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->watch, watch);

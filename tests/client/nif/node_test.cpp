@@ -32,9 +32,12 @@ nif_incoming expect(nif_node* node, nif_incoming_type type) {
 
 TEST(Node, TellsWhyAHubRefuses) {
   const std::pair<proto::GoodbyeCode, nif_status> cases[] = {
-      {proto::GoodbyeCode::name_taken, NIF_NAME_TAKEN},   {proto::GoodbyeCode::bad_name, NIF_BAD_NAME},
-      {proto::GoodbyeCode::bad_version, NIF_BAD_VERSION}, {proto::GoodbyeCode::hub_full, NIF_HUB_FULL},
-      {proto::GoodbyeCode::draining, NIF_REFUSED},        {static_cast<proto::GoodbyeCode>(999), NIF_REFUSED}};
+      {proto::GoodbyeCode::name_taken, NIF_NAME_TAKEN},
+      {proto::GoodbyeCode::bad_name, NIF_BAD_NAME},
+      {proto::GoodbyeCode::bad_version, NIF_BAD_VERSION},
+      {proto::GoodbyeCode::hub_full, NIF_HUB_FULL},
+      {proto::GoodbyeCode::draining, NIF_REFUSED},
+      {static_cast<proto::GoodbyeCode>(999), NIF_REFUSED}};
   for (const auto& [code, status] : cases) {
     FakeHub hub;
     std::thread refusing([&hub, refusal = code] {
@@ -69,7 +72,8 @@ TEST(Node, TellsThatNobodyIsThere) {
 }
 
 TEST(Node, TellsThatAPeerIsNoHub) {
-  for (const char* const answer : {"HTTP/1.1 400 Bad Request\r\n\r\n", "GIMnet\x02\x00 other version"}) {
+  for (const char* const answer :
+       {"HTTP/1.1 400 Bad Request\r\n\r\n", "GIMnet\x02\x00 other version"}) {
     FakeHub hub;
     std::thread answering([&] {
       FakeConnection connection = hub.accept();
@@ -140,7 +144,8 @@ TEST(Node, ResumesInBothDirectionsWithoutLossOrRepeat) {
   }
   sending.join();
   EXPECT_EQ(expect(node, NIF_CONNECTED).flags, NIF_CONNECTED_RESUMED | NIF_CONNECTED_SAME_ID);
-  while (counters_of(node).frames_resent < 2) std::this_thread::yield();  // counted behind the write
+  while (counters_of(node).frames_resent < 2)
+    std::this_thread::yield();  // counted behind the write
   EXPECT_EQ(counters_of(node).frames_resent, 2u);
 }
 
@@ -264,9 +269,11 @@ TEST(Node, DoesNotComeBackWhenItWasKicked) {
   EXPECT_EQ(last.reason, static_cast<std::uint32_t>(proto::GoodbyeCode::kicked));
   nif_incoming in;
   EXPECT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_REFUSED);
-  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos) << nif_error_text();
+  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos)
+      << nif_error_text();
   EXPECT_EQ(nif_send_to(node, kPeerId, "", 0), NIF_REFUSED);
-  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos) << nif_error_text();
+  EXPECT_NE(std::string(nif_error_text()).find("it stands in the way"), std::string::npos)
+      << nif_error_text();
   std::uint32_t id = 0;
   EXPECT_EQ(nif_resolve(node, "other", &id, NIF_FOREVER), NIF_REFUSED);
   EXPECT_EQ(info_of(node).ended, 1);
@@ -334,7 +341,9 @@ TEST(Node, DeclaresServicesAndSubscriptionsAgain) {
     ASSERT_TRUE(advertise);
     EXPECT_EQ(advertise->service, "odom");
     EXPECT_EQ(advertise->former_group.value(), own_group == 11 ? 0u : 11u);
-    to.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{own_group}, 0}, number));
+    to.send_control(
+        proto::Kind::ns,
+        proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{own_group}, 0}, number));
     const auto subscribe = to.next_request<proto::ns::Subscribe>(number);
     ASSERT_TRUE(subscribe);
     EXPECT_EQ(subscribe->name, "peer/scan");
@@ -374,7 +383,9 @@ TEST(Node, MeasuresTheHubsClock) {
   connected.hub.send(proto::flow::Pong{ping->sequence, ping->sent_ns, wall_now_ns() + kHourNs});
   while (info_of(connected.node.get()).keep_alive_seen == 0) std::this_thread::yield();
   const auto second = connected.hub.next_flow<proto::flow::Ping>();
-  if (second) connected.hub.send(proto::flow::Pong{second->sequence, second->sent_ns, wall_now_ns() + kHourNs});
+  if (second)
+    connected.hub.send(
+        proto::flow::Pong{second->sequence, second->sent_ns, wall_now_ns() + kHourNs});
   pinging.join();
 }
 

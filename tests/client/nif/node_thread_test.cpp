@@ -9,7 +9,8 @@
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/recording_host.hpp"
 
-// What the library's thread does by itself: keep-alive, silence, a full receive queue, a hub that misbehaves.
+// What the library's thread does by itself: keep-alive, silence, a full receive queue, a hub that
+// misbehaves.
 
 namespace gimnet::nif::test {
 namespace {
@@ -69,7 +70,8 @@ TEST(NodeThread, StopsReadingWhenTheProgramDoesNotTakeAndKeepsAlive) {
   Connected connected = connect_to(hub, options, welcome);
   constexpr int kMessages = 1000;
   std::thread sending([&] {
-    for (int i = 0; i < kMessages; ++i) connected.hub.send_unicast(kPeerId, kOwnId, std::string(4000, 'x'));
+    for (int i = 0; i < kMessages; ++i)
+      connected.hub.send_unicast(kPeerId, kOwnId, std::string(4000, 'x'));
   });
   while (counters_of(connected.node.get()).read_stops == 0) std::this_thread::yield();
   const std::size_t slack = 256 * 1024;  // what one read may bring
@@ -127,12 +129,15 @@ TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
     EXPECT_EQ(nif_advertise(node, &service, &group, nullptr, NIF_FOREVER), NIF_OK);
   });
   ASSERT_TRUE(connected.hub.next_request<proto::ns::Advertise>(advertised));
-  connected.hub.send_control(proto::Kind::ns,
-                             proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{11}, 0}, advertised));
+  connected.hub.send_control(
+      proto::Kind::ns,
+      proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{11}, 0}, advertised));
   declaring.join();
-  std::thread subscribing([node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
+  std::thread subscribing(
+      [node] { EXPECT_EQ(nif_subscribe(node, "peer/scan", nullptr, NIF_FOREVER), NIF_OK); });
   ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(subscribed));
-  connected.hub.send_control(proto::Kind::ns, proto::encode_answer(proto::ns::SubscribeAnswer{}, subscribed));
+  connected.hub.send_control(proto::Kind::ns,
+                             proto::encode_answer(proto::ns::SubscribeAnswer{}, subscribed));
   subscribing.join();
   connected.hub.close();
   connected.hub = hub.admit(make_welcome());
@@ -140,15 +145,16 @@ TEST(NodeThread, TellsEventsAndMessagesInTheOrderInWhichTheyCame) {
   ASSERT_TRUE(connected.hub.next_request<proto::ns::Subscribe>(subscribed));
   std::vector<std::byte> bytes;
   add_message(bytes, "1");
-  add_control(bytes, proto::Kind::ns, proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{12}, 0}, advertised));
+  add_control(bytes, proto::Kind::ns,
+              proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{12}, 0}, advertised));
   add_message(bytes, "2");
   proto::ns::SubscribeAnswer answer;
   answer.group = GroupId{22};
   add_control(bytes, proto::Kind::ns, proto::encode_answer(answer, subscribed));
   add_message(bytes, "3");
   connected.hub.send(bytes);
-  for (const auto type : {NIF_DISCONNECTED, NIF_CONNECTED, NIF_MESSAGE, NIF_OWN_SERVICE_MOVED, NIF_SUBSCRIBER_JOINED,
-                          NIF_MESSAGE, NIF_SERVICE_MOVED, NIF_MESSAGE}) {
+  for (const auto type : {NIF_DISCONNECTED, NIF_CONNECTED, NIF_MESSAGE, NIF_OWN_SERVICE_MOVED,
+                          NIF_SUBSCRIBER_JOINED, NIF_MESSAGE, NIF_SERVICE_MOVED, NIF_MESSAGE}) {
     nif_incoming in;
     ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
     EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));
@@ -187,7 +193,8 @@ Connected connect_with(FakeHub& hub, const Add& add) {
   return {OpenNode(node), std::move(connection), {}};
 }
 
-void expect_event(nif_node* node, nif_incoming_type type, proto::GoodbyeCode reason = {}, bool for_good = false) {
+void expect_event(nif_node* node, nif_incoming_type type, proto::GoodbyeCode reason = {},
+                  bool for_good = false) {
   nif_incoming in{};
   ASSERT_EQ(nif_receive(node, &in, NIF_FOREVER), NIF_OK);
   EXPECT_EQ(in.type, static_cast<std::uint32_t>(type));
@@ -211,7 +218,8 @@ TEST(NodeThread, WhatFollowsWelcomeAtOnceIsNotLost) {
 
 TEST(NodeThread, AGoodbyeBehindTheFirstWelcomeIsAGoodbye) {
   FakeHub hub;
-  Connected connected = connect_with(hub, [](auto& bytes) { add_goodbye(bytes, proto::GoodbyeCode::kicked); });
+  Connected connected =
+      connect_with(hub, [](auto& bytes) { add_goodbye(bytes, proto::GoodbyeCode::kicked); });
   nif_node* const node = connected.node.get();
   expect_event(node, NIF_MESSAGE);
   expect_event(node, NIF_DISCONNECTED, proto::GoodbyeCode::kicked, true);

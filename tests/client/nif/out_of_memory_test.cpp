@@ -1,5 +1,5 @@
-// Memory runs out at each step of a send, one after another: what comes next finds a sending half in order, or a
-// connection that ended.
+// Memory runs out at each step of a send, one after another: what comes next finds a sending half
+// in order, or a connection that ended.
 
 #include <gtest/gtest.h>
 
@@ -100,7 +100,8 @@ class OutOfMemory : public testing::TestWithParam<Sort> {
     }
   }
 
-  /// Messages before that which fails, so that it meets every place in the blocks of memory of the queues.
+  /// Messages before that which fails, so that it meets every place in the blocks of memory of the
+  /// queues.
   void warm_up(int messages) {
     line_.emplace(Line::session_of(true));
     frames_ = 0;
@@ -152,19 +153,21 @@ TEST_P(OutOfMemory, LeavesASendingHalfThatGoesOn) {
   for (int before = 0; before <= kBeforeMax && !HasFailure(); ++before) {
     t_refused = true;
     for (std::int64_t allocation = 0; t_refused && !HasFailure(); ++allocation) {
-      SCOPED_TRACE(testing::Message() << before << " messages before, allocation " << allocation << " fails");
+      SCOPED_TRACE(testing::Message()
+                   << before << " messages before, allocation " << allocation << " fails");
       warm_up(before);
       fail_at(allocation);
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Outbound, OutOfMemory,
-                         testing::Values(Sort{"small", 10}, Sort{"held", 10, NIF_POLICY_DEFAULT, NIF_FLAG_MORE},
-                                         Sort{"latest", 10, NIF_LATEST, NIF_FLAG_KEYED | NIF_FLAG_MORE},
-                                         Sort{"fragments", 100'000},
-                                         Sort{"reported", 100'000, NIF_POLICY_DEFAULT, NIF_FLAG_REPORT}),
-                         [](const auto& sort) { return sort.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Outbound, OutOfMemory,
+    testing::Values(Sort{"small", 10}, Sort{"held", 10, NIF_POLICY_DEFAULT, NIF_FLAG_MORE},
+                    Sort{"latest", 10, NIF_LATEST, NIF_FLAG_KEYED | NIF_FLAG_MORE},
+                    Sort{"fragments", 100'000},
+                    Sort{"reported", 100'000, NIF_POLICY_DEFAULT, NIF_FLAG_REPORT}),
+    [](const auto& sort) { return sort.param.name; });
 
 }  // namespace
 }  // namespace gimnet::nif::test

@@ -17,8 +17,8 @@
 namespace gimnet::nif::test {
 namespace {
 
-nif_status send(nif_node* node, std::uint32_t to, std::string_view payload, std::int32_t timeout_ms = NIF_FOREVER,
-                std::uint8_t lane = NIF_NORMAL) {
+nif_status send(nif_node* node, std::uint32_t to, std::string_view payload,
+                std::int32_t timeout_ms = NIF_FOREVER, std::uint8_t lane = NIF_NORMAL) {
   const nif_bytes part = {payload.data(), payload.size()};
   nif_outgoing message = NIF_OUTGOING_INIT;
   message.to = to;
@@ -51,7 +51,8 @@ TEST(OutboundSend, APauseHoldsItsDestinationAndNothingElse) {
   EXPECT_EQ(send(node, kSlow, "other lane", 0, NIF_REAL_TIME), NIF_OK);
   std::thread waiting([node] { EXPECT_EQ(send(node, kSlow, "held"), NIF_OK); });
   // Lanes may overtake each other.
-  const std::set<std::string> both{connected.hub.next_message()->payload(), connected.hub.next_message()->payload()};
+  const std::set<std::string> both{connected.hub.next_message()->payload(),
+                                   connected.hub.next_message()->payload()};
   EXPECT_EQ(both, (std::set<std::string>{"fast", "other lane"}));
   EXPECT_EQ(send(node, kFast, "still fast", 0), NIF_OK);
   EXPECT_EQ(connected.hub.next_message()->payload(), "still fast");
@@ -81,8 +82,8 @@ TEST(OutboundSend, ReceivesAndKeepsAliveWhileASendWaits) {
 TEST(OutboundSend, EverySizeArrivesWhole) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
-  for (const std::size_t size : {0u, 1u, 15u, 16u, 17u, 4'095u, 4'096u, 4'097u, 8'191u, 8'192u, 8'193u, 32'767u,
-                                 32'768u, 32'769u, 65'519u, 65'537u, 200'000u}) {
+  for (const std::size_t size : {0u, 1u, 15u, 16u, 17u, 4'095u, 4'096u, 4'097u, 8'191u, 8'192u,
+                                 8'193u, 32'767u, 32'768u, 32'769u, 65'519u, 65'537u, 200'000u}) {
     const std::string payload = pattern(size);
     std::thread sending([&] { EXPECT_EQ(send(connected.node.get(), kPeerId, payload), NIF_OK); });
     std::string received;
@@ -114,7 +115,8 @@ TEST(OutboundSend, ALargeMessageWaitsForItsWindowAndHoldsUpNobody) {
   std::thread sending([&] { EXPECT_EQ(send(node, kSlow, payload), NIF_OK); });
   std::string received;
   proto::ReceiveWindow window(1, static_cast<std::uint32_t>(payload.size()));
-  while (received.size() < proto::kWindowDefault) received += connected.hub.next_message()->payload();
+  while (received.size() < proto::kWindowDefault)
+    received += connected.hub.next_message()->payload();
   EXPECT_EQ(received.size(), proto::kWindowDefault) << "not a byte more before the first TAKEN";
   EXPECT_EQ(send(node, kFast, "quick"), NIF_OK);
   EXPECT_EQ(send(node, kSlow, "another in the same stream", 0), NIF_TIMEOUT);
@@ -166,7 +168,8 @@ TEST(OutboundSend, GivesUpWhatTheReceiverRefuses) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   const std::string payload = pattern(2u << 20);
-  std::thread sending([&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_TOO_LARGE); });
+  std::thread sending(
+      [&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_TOO_LARGE); });
   read_window(connected);
   send_taken(connected, {1, 0, 0});
   sending.join();
@@ -177,7 +180,8 @@ TEST(OutboundSend, GivesUpWhatTheReceiverLost) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   const std::string payload = pattern(3u << 20);
-  std::thread sending([&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED); });
+  std::thread sending(
+      [&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED); });
   read_window(connected);
   send_taken(connected, {1, 1000, 1u << 20});
   send_taken(connected, {1, 0, 0});
@@ -188,14 +192,16 @@ TEST(OutboundSend, AsksAfterAReceiverThatIsSilentAndBelievesTheReport) {
   FakeHub hub;
   Connected connected = connect_to(hub, default_options(), make_welcome());
   const std::string payload = pattern(2u << 20);
-  std::thread sending([&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED); });
+  std::thread sending(
+      [&] { EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED); });
   read_window(connected);
   const auto probe = connected.hub.next_message();
   ASSERT_TRUE(probe);
   EXPECT_EQ(probe->header.kind, proto::Kind::taken);
   EXPECT_TRUE(probe->header.has(proto::kFlagReport));
   std::array<std::byte, proto::kReportSizeMax> report;
-  const std::size_t size = proto::encode_report({proto::DropReason::no_such_node, 1, probe->header, {}}, report);
+  const std::size_t size =
+      proto::encode_report({proto::DropReason::no_such_node, 1, probe->header, {}}, report);
   proto::FrameParts parts;
   parts.header.kind = proto::Kind::report;
   parts.header.src = kHubNode;
@@ -203,11 +209,13 @@ TEST(OutboundSend, AsksAfterAReceiverThatIsSilentAndBelievesTheReport) {
   connected.hub.send(parts, {reinterpret_cast<const char*>(report.data()), size});
   sending.join();
   nif_incoming in;
-  EXPECT_EQ(nif_receive(connected.node.get(), &in, 0), NIF_TIMEOUT) << "nobody asked for this report";
+  EXPECT_EQ(nif_receive(connected.node.get(), &in, 0), NIF_TIMEOUT)
+      << "nobody asked for this report";
 }
 
 /// What the hub says of that frame, or of the same piece of another message.
-void report(FakeConnection& hub, proto::DropReason reason, const Frame& frame, std::uint32_t number_offset = 0) {
+void report(FakeConnection& hub, proto::DropReason reason, const Frame& frame,
+            std::uint32_t number_offset = 0) {
   std::vector<std::byte> following(frame.bytes.begin() + proto::kHeaderSize, frame.bytes.end());
   store_le(following.data(), load_le<std::uint32_t>(following.data()) + number_offset);
   std::array<std::byte, proto::kReportSizeMax> payload;
@@ -225,7 +233,8 @@ TEST(OutboundSend, AReportEndsTheLargeMessageThatItIsAbout) {
   const std::string payload = pattern(3u << 20);
   std::thread sending([&] {
     EXPECT_EQ(send(connected.node.get(), kSlow, payload), NIF_NOT_DELIVERED);
-    EXPECT_NE(std::string(nif_error_text()).find("queue_full"), std::string::npos) << nif_error_text();
+    EXPECT_NE(std::string(nif_error_text()).find("queue_full"), std::string::npos)
+        << nif_error_text();
   });
   std::optional<Frame> frame;
   for (std::size_t size = 0; size < proto::kWindowDefault; size += frame->payload().size()) {
@@ -266,7 +275,8 @@ bool program_gets_late_report(bool wanted, std::uint32_t age_ms_max, bool other_
   sending.join();
   report(connected.hub, proto::DropReason::queue_full, *frame);
   settle(connected);
-  settle(connected);  // what one read brings is handed out when all of it is taken, behind the first PONG
+  settle(connected);  // what one read brings is handed out when all of it is taken, behind the
+                      // first PONG
   nif_incoming in{};
   const bool came = nif_receive(connected.node.get(), &in, 0) == NIF_OK;
   EXPECT_TRUE(!came || in.type == NIF_REPORT);
@@ -280,7 +290,8 @@ TEST(OutboundSend, ALateReportIsForProgramsThatAskedForReports) {
   // An extension stands where the number of the message would.
   EXPECT_FALSE(program_gets_late_report(false, 60'000));
   EXPECT_TRUE(program_gets_late_report(true, 60'000));
-  EXPECT_TRUE(program_gets_late_report(false, 0, true)) << "it may stand for others: a hub merges those of one reason";
+  EXPECT_TRUE(program_gets_late_report(false, 0, true))
+      << "it may stand for others: a hub merges those of one reason";
 }
 
 TEST(OutboundSend, AHubThatDoesNotReadFillsTheQueueAndTimesOut) {
@@ -289,12 +300,14 @@ TEST(OutboundSend, AHubThatDoesNotReadFillsTheQueueAndTimesOut) {
   options.send_queue_bytes = 64 * 1024;
   Connected connected = connect_to(hub, options, make_welcome());
   const std::string payload = pattern(8'000);
-  // Which send is the first to wait is the kernel's matter: it may take more while the queue stands full.
+  // Which send is the first to wait is the kernel's matter: it may take more while the queue stands
+  // full.
   int sent = 0;
   nif_status status = NIF_OK;
   while ((status = send(connected.node.get(), kPeerId, payload, 1)) == NIF_OK) ++sent;
   EXPECT_EQ(status, NIF_TIMEOUT);
-  EXPECT_LE(counters_of(connected.node.get()).send_queue_bytes, 64u * 1024 + 64) << "a PING may wait, too";
+  EXPECT_LE(counters_of(connected.node.get()).send_queue_bytes, 64u * 1024 + 64)
+      << "a PING may wait, too";
   for (int i = 0; i < sent; ++i) ASSERT_TRUE(connected.hub.next_message()) << i << " of " << sent;
 }
 
@@ -312,7 +325,9 @@ TEST(OutboundSend, DrainWaitsForWritingAndConfirmation) {
 }
 
 /// The keep-alive of these hubs is an hour, so a PING is the question of a nif_drain().
-std::optional<proto::flow::Ping> next_question(FakeConnection& hub) { return hub.next_flow<proto::flow::Ping>(); }
+std::optional<proto::flow::Ping> next_question(FakeConnection& hub) {
+  return hub.next_flow<proto::flow::Ping>();
+}
 
 TEST(OutboundSend, DrainAsksForAConfirmAndAgainWhereThatWasNotAll) {
   FakeHub hub;
@@ -330,7 +345,8 @@ TEST(OutboundSend, DrainAsksForAConfirmAndAgainWhereThatWasNotAll) {
   std::thread draining([&] { EXPECT_EQ(nif_drain(node, NIF_FOREVER), NIF_OK); });
   const auto second = connected.hub.next();
   ASSERT_TRUE(second);
-  EXPECT_EQ(second->header.kind, proto::Kind::unicast) << "asked once, however often nif_drain() is called";
+  EXPECT_EQ(second->header.kind, proto::Kind::unicast)
+      << "asked once, however often nif_drain() is called";
   connected.hub.send(proto::flow::Confirm{1});
   EXPECT_TRUE(next_question(connected.hub)) << "the answer was not about all that was sent";
   connected.hub.send(proto::flow::Confirm{2});
@@ -386,8 +402,10 @@ TEST(OutboundSend, DrainTellsOnceThatFramesHadLeftTheResumeBuffer) {
   welcome.resumed = true;
   connected.hub = hub.admit(welcome);
   while (info_of(node).reconnects == 0) std::this_thread::yield();
-  EXPECT_EQ(nif_drain(node, 0), NIF_NOT_CONNECTED) << "the hub never had them, for all that this end knows";
-  for (auto i = counters_of(node).frames_let_go; i < kMessages; ++i) ASSERT_TRUE(connected.hub.next_message());
+  EXPECT_EQ(nif_drain(node, 0), NIF_NOT_CONNECTED)
+      << "the hub never had them, for all that this end knows";
+  for (auto i = counters_of(node).frames_let_go; i < kMessages; ++i)
+    ASSERT_TRUE(connected.hub.next_message());
   connected.hub.send(proto::flow::Confirm{kMessages});
   EXPECT_EQ(nif_drain(node, NIF_FOREVER), NIF_OK);
 }

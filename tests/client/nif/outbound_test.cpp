@@ -39,11 +39,14 @@ TEST(Outbound, KeepsNoReportFromAProgramThatAskedForOne) {
   ASSERT_FALSE(outgoing.read(message));
   EXPECT_EQ(outbound.send(outgoing, 0), NIF_NOT_CONNECTED);
   EXPECT_FALSE(outbound.on_report(report_of(proto::Kind::unicast, 1)));
-  EXPECT_FALSE(outbound.on_report(report_of(proto::Kind::taken, 2))) << "merged with one of the program's messages";
-  EXPECT_TRUE(outbound.on_report(report_of(proto::Kind::taken, 1))) << "the library's own question alone";
+  EXPECT_FALSE(outbound.on_report(report_of(proto::Kind::taken, 2)))
+      << "merged with one of the program's messages";
+  EXPECT_TRUE(outbound.on_report(report_of(proto::Kind::taken, 1)))
+      << "the library's own question alone";
 }
 
-/// Sends until the last message is left to the library's thread, which was woken: all within one moment.
+/// Sends until the last message is left to the library's thread, which was woken: all within one
+/// moment.
 std::vector<std::string> send_burst(Line& line) {
   const OwnClock standing([now_ns = steady_now_ns()] { return now_ns; });
   line.attach(Line::session_of(false));
@@ -70,7 +73,8 @@ TEST(Outbound, WhatWasLeftToTheLibrarysThreadIsWrittenBeforeACallback) {
   line.outbound.end_callbacks();
 }
 
-/// The library's thread gathers a burst that somebody else has written already, and ends without a write of its own.
+/// The library's thread gathers a burst that somebody else has written already, and ends without a
+/// write of its own.
 TEST(Outbound, DrainHearsOfAWriterThatHadNothingToWrite) {
   Line line;
   Outbound& outbound = line.outbound;
@@ -91,7 +95,8 @@ TEST(Outbound, DrainHearsOfAWriterThatHadNothingToWrite) {
   }
   ASSERT_TRUE(draining.joinable()) << "nothing was gathered";
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (outbound.waiting() != 0 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+  while (outbound.waiting() != 0 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::yield();
   EXPECT_EQ(outbound.waiting(), 0u) << "nobody told it";
   outbound.end({NIF_CLOSED, "the test is over"});
   draining.join();

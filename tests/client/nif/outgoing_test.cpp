@@ -108,7 +108,8 @@ TEST(Outgoing, RefusesMoreThanAGibibyteWithoutTouchingIt) {
 
 TEST(Outgoing, GathersAnyPieceOfAnyParts) {
   const std::string text = "abcdefghij";
-  const nif_bytes parts[4] = {{text.data(), 3}, {nullptr, 0}, {text.data() + 3, 1}, {text.data() + 4, 6}};
+  const nif_bytes parts[4] = {
+      {text.data(), 3}, {nullptr, 0}, {text.data() + 3, 1}, {text.data() + 4, 6}};
   nif_outgoing message = message_to(1);
   message.parts = parts;
   message.part_count = 4;

@@ -19,8 +19,9 @@ void put_group(SendQueue& queue, std::uint8_t lane, std::uint32_t group, std::st
   header.lane = lane;
   header.dst = group;
   const auto frame = frame_of(header, payload);
-  const auto memory = replaceable ? queue.append_latest(lane, frame.size(), latest_stream_of(header, std::nullopt))
-                                  : queue.append(lane, frame.size());
+  const auto memory =
+      replaceable ? queue.append_latest(lane, frame.size(), latest_stream_of(header, std::nullopt))
+                  : queue.append(lane, frame.size());
   std::memcpy(memory.data(), frame.data(), frame.size());
 }
 

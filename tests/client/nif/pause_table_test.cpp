@@ -24,7 +24,8 @@ TEST(PauseTable, PausesOneKindLaneAndDestination) {
 
 TEST(PauseTable, AHubThatPausesMoreThanThereIsIsNotObeyedFurther) {
   PauseTable table;
-  for (std::uint32_t dst = 0; dst <= PauseTable::kPausesMax; ++dst) table.pause({Kind::unicast, Lane::normal, dst});
+  for (std::uint32_t dst = 0; dst <= PauseTable::kPausesMax; ++dst)
+    table.pause({Kind::unicast, Lane::normal, dst});
   EXPECT_EQ(table.size(), PauseTable::kPausesMax);
   EXPECT_TRUE(table.is_paused(stream_code(Kind::unicast, 1, PauseTable::kPausesMax - 1)));
   EXPECT_FALSE(table.is_paused(stream_code(Kind::unicast, 1, PauseTable::kPausesMax)));

@@ -16,7 +16,8 @@ constexpr std::uint64_t kKey = 0x0706050403020100;
 /// A message that begins with its number, and the REPORT about a fragment of it.
 class Sent {
  public:
-  explicit Sent(std::uint32_t number, bool keyed = true) : text_(std::to_string(number) + std::string(5'000, '.')) {
+  explicit Sent(std::uint32_t number, bool keyed = true)
+      : text_(std::to_string(number) + std::string(5'000, '.')) {
     part_ = {text_.data(), text_.size()};
     message_.to = kPeerId;
     message_.parts = &part_;
@@ -26,7 +27,8 @@ class Sent {
     message_.key = kKey;
     EXPECT_FALSE(outgoing.read(message_));
     frame_.resize(proto::prefix_size(outgoing.parts()) + proto::kFragmentHeaderSize + 100);
-    outgoing.write_frame(frame_, kOwnId, proto::FragmentHeader{number, 300, outgoing.size()}, 300, 100, true);
+    outgoing.write_frame(frame_, kOwnId, proto::FragmentHeader{number, 300, outgoing.size()}, 300,
+                         100, true);
     report.reason = proto::DropReason::queue_full;
     report.count = 1;
     report.header = proto::load_header(frame_.data());
@@ -81,7 +83,8 @@ TEST(ReportedMessages, CountsThoseThatItRemembersAndNotTheirNumbers) {
     Sent sent(1 + 1024 * i);
     messages.remember(1 + 1024 * i, sent.outgoing);
   }
-  EXPECT_TRUE(messages.find(Sent(1).report)) << "between them were others that asked for no reports";
+  EXPECT_TRUE(messages.find(Sent(1).report))
+      << "between them were others that asked for no reports";
   EXPECT_TRUE(messages.find(Sent(1025).report));
 }
 
@@ -95,13 +98,18 @@ TEST(ReportedMessages, NeedsAFragmentHeaderAtItsPlace) {
     return messages.find(report).has_value();
   };
   EXPECT_TRUE(with([](proto::Report&) {}));
-  EXPECT_FALSE(with([](proto::Report& r) { r.header.flags &= static_cast<std::uint8_t>(~proto::kFlagFragment); }));
+  EXPECT_FALSE(with([](proto::Report& r) {
+    r.header.flags &= static_cast<std::uint8_t>(~proto::kFlagFragment);
+  }));
   EXPECT_FALSE(with([](proto::Report& r) { r.header.flags |= proto::kFlagExt; }));
   EXPECT_FALSE(with([](proto::Report& r) { r.header.kind = proto::Kind::list; }));
-  EXPECT_FALSE(with([](proto::Report& r) { r.header.kind = proto::Kind::service; })) << "sent as something else";
+  EXPECT_FALSE(with([](proto::Report& r) { r.header.kind = proto::Kind::service; }))
+      << "sent as something else";
   EXPECT_FALSE(with([](proto::Report& r) { r.header.dst = kOwnId; })) << "sent to somebody else";
-  EXPECT_FALSE(with([](proto::Report& r) { r.following = r.following.first(proto::kFragmentHeaderSize - 1); }));
-  EXPECT_TRUE(with([](proto::Report& r) { r.following = r.following.first(proto::kFragmentHeaderSize); }));
+  EXPECT_FALSE(with(
+      [](proto::Report& r) { r.following = r.following.first(proto::kFragmentHeaderSize - 1); }));
+  EXPECT_TRUE(
+      with([](proto::Report& r) { r.following = r.following.first(proto::kFragmentHeaderSize); }));
 }
 
 }  // namespace

@@ -42,18 +42,21 @@ TEST(SendQueue, ShortWritesLoseNothingAtAnyCut) {
     put(queue, NIF_NORMAL, "one");
     put(queue, NIF_BULK, "two");
     put_control(queue, "zero");
-    EXPECT_EQ(payloads(write_all(queue, cut)), (std::vector<std::string>{"zero", "one", "two"})) << cut;
+    EXPECT_EQ(payloads(write_all(queue, cut)), (std::vector<std::string>{"zero", "one", "two"}))
+        << cut;
   }
 }
 
 TEST(SendQueue, UrgentFramesOvertakeWhatAShortWriteLeft) {
   SendQueue queue({});
   for (int i = 0; i < 4; ++i) put(queue, NIF_BULK, "bulk" + std::to_string(i));
-  std::vector<std::byte> written = write_once(queue, 25);  // one frame has 21 bytes: the second is begun
+  std::vector<std::byte> written =
+      write_once(queue, 25);  // one frame has 21 bytes: the second is begun
   put(queue, NIF_REAL_TIME, "now");
   put_control(queue, "control");
   append(written, write_all(queue));
-  EXPECT_EQ(payloads(written), (std::vector<std::string>{"bulk0", "bulk1", "control", "now", "bulk2", "bulk3"}));
+  EXPECT_EQ(payloads(written),
+            (std::vector<std::string>{"bulk0", "bulk1", "control", "now", "bulk2", "bulk3"}));
 }
 
 TEST(SendQueue, AWaitingLaneGetsASixteenth) {
@@ -199,7 +202,8 @@ TEST(SendQueue, ANewEpochKeepsWhatWaitsUnderTheNewId) {
   EXPECT_FALSE(queue.confirm(2)) << "counts begin at 0";
 }
 
-/// Resumed, and broken again before what the hub had missed was written once more; then the hub has forgotten it all.
+/// Resumed, and broken again before what the hub had missed was written once more; then the hub has
+/// forgotten it all.
 TEST(SendQueue, ANewEpochAfterAResumeKeepsTheOrderOfEachLane) {
   SendQueue queue({});
   queue.set_resume(true);

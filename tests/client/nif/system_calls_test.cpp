@@ -15,8 +15,8 @@
 #include "client/nif/outbound.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// What sending costs in system calls, as the kernel counts them: one for a small message by itself, one for many that
-// had to wait. None of this depends on how fast anything is.
+// What sending costs in system calls, as the kernel counts them: one for a small message by itself,
+// one for many that had to wait. None of this depends on how fast anything is.
 
 namespace gimnet::nif::test {
 namespace {
@@ -60,7 +60,8 @@ class SystemCalls : public ::testing::Test {
     Outgoing outgoing;
     ok_ = !outgoing.read(message) && outbound_.send(outgoing, 0) == NIF_OK && ok_;
   }
-  /// One that takes memory for those that follow, and what the library's thread does where it was woken.
+  /// One that takes memory for those that follow, and what the library's thread does where it was
+  /// woken.
   void send_first() {
     send();
     outbound_.write_pending(false);
@@ -68,7 +69,8 @@ class SystemCalls : public ::testing::Test {
   /// Until the kernel takes no more.
   void fill() {
     const std::array<std::byte, 4096> bytes{};
-    while (::send(socket_.descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) > 0) {
+    while (::send(socket_.descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >
+           0) {
     }
   }
   /// Takes all that came; returns how many bytes.
@@ -114,7 +116,8 @@ TEST_F(SystemCalls, NoneForWhatFollowsAFullSocket) {
     for (int i = 0; i < kMessages; ++i) send();
   };
   GIMNET_COUNT_OR_SKIP(calls, [this] { fill(); }, send_all);
-  EXPECT_THAT(calls, ElementsAre(SYS_sendto, SYS_write)) << "the try that fails, and the library's thread is told";
+  EXPECT_THAT(calls, ElementsAre(SYS_sendto, SYS_write))
+      << "the try that fails, and the library's thread is told";
   EXPECT_TRUE(ok_);
   static_cast<void>(empty());
   // As the library's thread does when the kernel has room again.
@@ -157,7 +160,8 @@ TEST(SystemCallsOfNif, OneForASmallMessage) {
   };
   GIMNET_COUNT_OR_SKIP(all, send_one, send_one);
   EXPECT_EQ(status, NIF_OK) << nif_error_text();
-  // The library's thread may look whether there is something to do at this very moment, and this one wait for its lock.
+  // The library's thread may look whether there is something to do at this very moment, and this
+  // one wait for its lock.
   Calls calls = all;
   std::erase(calls, SYS_futex);
   EXPECT_THAT(calls, ElementsAre(SYS_sendto));

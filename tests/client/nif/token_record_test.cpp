@@ -65,7 +65,8 @@ TEST(TokenRecord, FileNamesAreReadableAndSafe) {
 TEST(TokenRecord, FileNamesDifferByAddressAndByName) {
   std::set<std::string> names;
   for (const char* const address : {"tcp://h:1", "tcp://h:12", "unix:/a", ""}) {
-    for (const char* const name : {"n", "2n", "a/b", "a_b", ""}) names.insert(token_file_name(address, name));
+    for (const char* const name : {"n", "2n", "a/b", "a_b", ""})
+      names.insert(token_file_name(address, name));
   }
   EXPECT_EQ(names.size(), 20u);
 }

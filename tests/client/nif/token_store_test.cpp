@@ -15,7 +15,9 @@ namespace {
 constexpr const char* kHub = "tcp://127.0.0.1:7450";
 constexpr const char* kOtherHub = "unix:/run/hub";
 
-std::vector<std::byte> token(int value) { return std::vector<std::byte>(56, static_cast<std::byte>(value)); }
+std::vector<std::byte> token(int value) {
+  return std::vector<std::byte>(56, static_cast<std::byte>(value));
+}
 
 std::size_t files_in(const std::string& path) {
   std::size_t files = 0;
@@ -130,7 +132,8 @@ TEST(TokenStore, AFileWithSomethingElseInItIsNoToken) {
   again.release();
   const auto record = write_token_record({kHub, "lifter", token(4)});
   std::ofstream(path, std::ios::binary)
-      .write(reinterpret_cast<const char*>(record->data()), static_cast<std::streamsize>(record->size()));
+      .write(reinterpret_cast<const char*>(record->data()),
+             static_cast<std::streamsize>(record->size()));
   EXPECT_TRUE(TokenStore("robot", true).find(kHub).empty());
 }
 

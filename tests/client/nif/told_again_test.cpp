@@ -8,8 +8,8 @@
 #include "proto/control/ns.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
-// Through the whole library, with a hub that a test plays: what a program is told after a break of services that moved
-// meanwhile, and of subscribers that came.
+// Through the whole library, with a hub that a test plays: what a program is told after a break of
+// services that moved meanwhile, and of subscribers that came.
 
 namespace gimnet::nif {
 namespace {
@@ -27,10 +27,13 @@ constexpr std::uint32_t kPresent = (7u << 20) | 7;
 
 class ToldAgain : public ::testing::Test {
  protected:
-  ToldAgain() : connected_(connect_to(hub_, test::default_options("robot"), make_welcome(1 << 20))) {
+  ToldAgain()
+      : connected_(connect_to(hub_, test::default_options("robot"), make_welcome(1 << 20))) {
     const nif_pace pace{sizeof pace, 2, 0, 0.0};
     std::thread asking([&] {
-      EXPECT_EQ(nif_subscribe_paced(connected_.node.get(), "peer/scan", &pace, nullptr, NIF_FOREVER), NIF_OK);
+      EXPECT_EQ(
+          nif_subscribe_paced(connected_.node.get(), "peer/scan", &pace, nullptr, NIF_FOREVER),
+          NIF_OK);
     });
     answer_subscribe(kKnown);
     asking.join();
@@ -51,7 +54,8 @@ class ToldAgain : public ::testing::Test {
     EXPECT_EQ(next().type, NIF_DISCONNECTED);
     EXPECT_EQ(next().type, NIF_CONNECTED);
   }
-  void tell(std::uint32_t old_group, std::uint32_t new_group, bool again, std::vector<GroupId> between = {}) {
+  void tell(std::uint32_t old_group, std::uint32_t new_group, bool again,
+            std::vector<GroupId> between = {}) {
     ns::ServiceMoved event;
     event.name = "peer/scan";
     event.old_group = GroupId{old_group};
@@ -124,7 +128,8 @@ TEST_F(ToldAgain, IsNothingToWhoKnowsIt) {
   expect_message(kPresent);
   std::uint64_t last = credited(kPresent);
   if (last == 3) last = credited(kPresent);  // repeated after WELCOME
-  EXPECT_EQ(last, 4u) << "what was counted since the event came first was forgotten: the window would be shut";
+  EXPECT_EQ(last, 4u)
+      << "what was counted since the event came first was forgotten: the window would be shut";
 }
 
 TEST_F(ToldAgain, OfAServiceThatIsGone) {
@@ -152,8 +157,9 @@ TEST_F(ToldAgain, HowManySubscribersThereAre) {
     std::uint16_t number = 0;
     const auto request = connected_.hub.next_request<ns::Advertise>(number);
     ASSERT_TRUE(request);
-    connected_.hub.send_control(proto::Kind::ns,
-                                proto::encode_answer(ns::AdvertiseAnswer{GroupId{kPresent}, subscribers}, number));
+    connected_.hub.send_control(
+        proto::Kind::ns,
+        proto::encode_answer(ns::AdvertiseAnswer{GroupId{kPresent}, subscribers}, number));
   };
   for (const nif_direction direction : {NIF_PROVIDES, NIF_ACCEPTS}) {
     std::thread asking([&] {
@@ -162,7 +168,8 @@ TEST_F(ToldAgain, HowManySubscribersThereAre) {
       service.name = "odom";
       service.direction = static_cast<std::uint8_t>(direction);
       std::uint32_t group = 0;
-      EXPECT_EQ(nif_advertise(connected_.node.get(), &service, &group, nullptr, NIF_FOREVER), NIF_OK);
+      EXPECT_EQ(nif_advertise(connected_.node.get(), &service, &group, nullptr, NIF_FOREVER),
+                NIF_OK);
     });
     answer_advertise(0);
     asking.join();

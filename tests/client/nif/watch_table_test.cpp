@@ -10,7 +10,8 @@ namespace {
 
 namespace ns = proto::ns;
 
-ns::WatchEvents events(std::uint32_t watch, std::uint64_t after, std::uint64_t version, ns::ChangeKind kind) {
+ns::WatchEvents events(std::uint32_t watch, std::uint64_t after, std::uint64_t version,
+                       ns::ChangeKind kind) {
   ns::WatchEvents made;
   made.watch = watch;
   made.hub = HubId{7};
@@ -45,18 +46,21 @@ TEST_F(WatchTableTest, GivesEachWatchANumberOfItsOwn) {
 
 TEST_F(WatchTableTest, TakesASnapshotAndWhatFollowsWithoutAGap) {
   const std::uint32_t number = watches_.add("", ns::kWatchAll, false).watch;
-  EXPECT_FALSE(watches_.on_events(events(number, 3, 4, ns::ChangeKind::joined))) << "it has not begun";
+  EXPECT_FALSE(watches_.on_events(events(number, 3, 4, ns::ChangeKind::joined)))
+      << "it has not begun";
   EXPECT_TRUE(watches_.on_events(events(number, 9, 9, ns::ChangeKind::begin)));
   EXPECT_TRUE(watches_.on_events(events(number, 9, 12, ns::ChangeKind::joined)));
   EXPECT_TRUE(watches_.on_events(events(number, 12, 13, ns::ChangeKind::left)));
-  EXPECT_FALSE(watches_.on_events(events(number + 1, 13, 14, ns::ChangeKind::left))) << "of no watch";
+  EXPECT_FALSE(watches_.on_events(events(number + 1, 13, 14, ns::ChangeKind::left)))
+      << "of no watch";
 }
 
 TEST_F(WatchTableTest, BeginsAnewBehindAGap) {
   const std::uint32_t number = watches_.add("", ns::kWatchAll, false).watch;
   ASSERT_TRUE(watches_.on_events(events(number, 9, 9, ns::ChangeKind::begin)));
   EXPECT_FALSE(watches_.on_events(events(number, 11, 12, ns::ChangeKind::joined)));
-  EXPECT_FALSE(watches_.on_events(events(number, 12, 13, ns::ChangeKind::joined))) << "until there is a snapshot";
+  EXPECT_FALSE(watches_.on_events(events(number, 12, 13, ns::ChangeKind::joined)))
+      << "until there is a snapshot";
   EXPECT_TRUE(watches_.on_events(events(number, 13, 13, ns::ChangeKind::begin)));
 }
 

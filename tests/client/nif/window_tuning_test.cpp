@@ -18,18 +18,24 @@ constexpr std::int64_t kSecond = 1'000 * kMs;
 constexpr double kSlow = 8e6 / 8;     // 8 Mbit/s
 constexpr double kGigabit = 1e9 / 8;  // 1 Gbit/s
 
-/// A sender that always has more, a way of a given rate and length with a queue without end, and a receiver that tunes
-/// its window, by a clock of their own.
+/// A sender that always has more, a way of a given rate and length with a queue without end, and a
+/// receiver that tunes its window, by a clock of their own.
 class Path {
  public:
-  Path(double bytes_per_s, std::int64_t round_trip_ns, std::uint32_t total = proto::kMessageBytesMax)
-      : rate_(bytes_per_s), round_trip_ns_(round_trip_ns), total_(total), sender_(1, total), receiver_(1, total) {}
+  Path(double bytes_per_s, std::int64_t round_trip_ns,
+       std::uint32_t total = proto::kMessageBytesMax)
+      : rate_(bytes_per_s),
+        round_trip_ns_(round_trip_ns),
+        total_(total),
+        sender_(1, total),
+        receiver_(1, total) {}
 
   void set_rate(double bytes_per_s) { rate_ = bytes_per_s; }
   /// The receiver looks only so often for what has come.
   void set_nap(std::int64_t nap_ns) { nap_ns_ = nap_ns; }
 
-  /// Lets fragments arrive until that long has passed, or all came. Returns how many bytes those were.
+  /// Lets fragments arrive until that long has passed, or all came. Returns how many bytes those
+  /// were.
   std::uint32_t run(std::int64_t ns) {
     const std::int64_t end_ns = now_ns_ + ns;
     const std::uint32_t before = taken_;
@@ -71,8 +77,9 @@ class Path {
       hear();
       return;
     }
-    const std::int64_t through_ns = std::max(through_ns_, queue_.front().ready_ns) +
-                                    static_cast<std::int64_t>(static_cast<double>(queue_.front().size) / rate_ * 1e9);
+    const std::int64_t through_ns =
+        std::max(through_ns_, queue_.front().ready_ns) +
+        static_cast<std::int64_t>(static_cast<double>(queue_.front().size) / rate_ * 1e9);
     const std::int64_t arrival_ns = (through_ns + nap_ns_ - 1) / nap_ns_ * nap_ns_;
     if (!told_.empty() && told_.front().at_ns <= arrival_ns) return hear();
     through_ns_ = through_ns;
@@ -112,7 +119,9 @@ class Path {
   std::uint32_t least_allowed_ = UINT32_MAX;
 };
 
-TEST(WindowTuning, BeginsWithTheProtocolsFirstWindow) { EXPECT_EQ(WindowTuning().window(), proto::kWindowDefault); }
+TEST(WindowTuning, BeginsWithTheProtocolsFirstWindow) {
+  EXPECT_EQ(WindowTuning().window(), proto::kWindowDefault);
+}
 
 TEST(WindowTuning, OnASlowPathLittleIsUnderWay) {
   Path path(kSlow, 2 * kMs);
@@ -144,7 +153,8 @@ TEST(WindowTuning, FollowsAPathThatBecomesSlow) {
   ASSERT_EQ(path.window(), WindowTuning::kWindowMax);
   path.set_rate(kSlow);
   path.run(9 * kSecond);
-  EXPECT_LE(path.window(), proto::kWindowDefault * 2) << "what was allowed before took so long to come";
+  EXPECT_LE(path.window(), proto::kWindowDefault * 2)
+      << "what was allowed before took so long to come";
   path.run(8 * kSecond);
   static_cast<void>(path.most_under_way());
   path.run(10 * kSecond);
@@ -176,8 +186,8 @@ TEST(WindowTuning, KeepsAPathOfAboutItsLoopBusy) {
   }
 }
 
-/// Of all paths: never wider than allowed, never so narrow that a fragment has no room, and a slow one has no long
-/// queue.
+/// Of all paths: never wider than allowed, never so narrow that a fragment has no room, and a slow
+/// one has no long queue.
 TEST(WindowTuning, StaysWithinItsBoundsOnEveryPath) {
   for (double rate = 1e4; rate < 2e9; rate *= 4) {
     for (const std::int64_t round_trip_ms : {0, 1, 30, 180, 220, 700, 2'000}) {
@@ -188,7 +198,8 @@ TEST(WindowTuning, StaysWithinItsBoundsOnEveryPath) {
       EXPECT_GE(path.window(), WindowTuning::kWindowMin);
       EXPECT_LE(path.most_under_way(), WindowTuning::kWindowMax + WindowTuning::kWindowMax / 4);
       const double loop_s = static_cast<double>(std::max<std::int64_t>(round_trip_ms, 200)) / 1e3;
-      const double most = std::max(rate * loop_s * 1.6, static_cast<double>(WindowTuning::kWindowMin));
+      const double most =
+          std::max(rate * loop_s * 1.6, static_cast<double>(WindowTuning::kWindowMin));
       if (rate < 1e5) continue;  // the first window took all the time
       static_cast<void>(path.run(60 * kSecond));
       EXPECT_LE(path.under_way(), most) << rate << ' ' << round_trip_ms;

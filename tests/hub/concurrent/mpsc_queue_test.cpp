@@ -67,8 +67,8 @@ TEST(MpscQueue, MovesItems) {
   EXPECT_EQ(value, 5);
 }
 
-// Provable: every item of every producer is taken once, and those of one producer in the order pushed, whatever the
-// threads do.
+// Provable: every item of every producer is taken once, and those of one producer in the order
+// pushed, whatever the threads do.
 TEST(MpscQueue, KeepsEachProducersOrderUnderThreads) {
   constexpr std::size_t kProducers = 3;
   constexpr std::uint64_t kItems = 50'000;
@@ -82,7 +82,8 @@ TEST(MpscQueue, KeepsEachProducersOrderUnderThreads) {
   std::uint64_t next[kProducers] = {};
   std::uint64_t taken = 0;
   while (taken < kProducers * kItems) {
-    taken += queue.drain(1'000, [&](const Item& item) { ASSERT_EQ(item.number, next[item.producer]++); });
+    taken += queue.drain(1'000,
+                         [&](const Item& item) { ASSERT_EQ(item.number, next[item.producer]++); });
   }
   for (std::thread& producer : producers) producer.join();
   EXPECT_TRUE(queue.empty());

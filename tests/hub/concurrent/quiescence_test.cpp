@@ -36,8 +36,8 @@ TEST(Quiescence, AReaderThatEnteredAfterwardsDoesNotMatter) {
   EXPECT_FALSE(quiescence.passed(next));
 }
 
-// Provable: what the writer frees after passed() is not looked at by a reader any more. A freed value is poisoned
-// first, so a reader that still looks sees the poison (and a sanitizer the race).
+// Provable: what the writer frees after passed() is not looked at by a reader any more. A freed
+// value is poisoned first, so a reader that still looks sees the poison (and a sanitizer the race).
 TEST(Quiescence, NothingIsFreedUnderAReader) {
   constexpr int kSwaps = 2'000;
   constexpr std::uint64_t kPoison = 0xDEAD;

@@ -38,8 +38,9 @@ TEST(Waker, AnAwakenedThreadIsNotWokenAgain) {
   EXPECT_FALSE(waker.wake());
 }
 
-// Provable: an item published before wake() is seen by a sleeper that looked after prepare_to_sleep(), or the sleeper's
-// descriptor becomes readable. So no item is left lying with both threads at rest.
+// Provable: an item published before wake() is seen by a sleeper that looked after
+// prepare_to_sleep(), or the sleeper's descriptor becomes readable. So no item is left lying with
+// both threads at rest.
 TEST(Waker, NoItemIsLeftBehindASleepingThread) {
   constexpr int kItems = 20'000;
   Waker waker;

@@ -26,7 +26,9 @@ constexpr milliseconds kForEver{600'000};
 
 class ConfigTextTest : public ::testing::Test {
  protected:
-  [[nodiscard]] ConfigText read(milliseconds patience = {}) const { return read_config_text(path_, patience); }
+  [[nodiscard]] ConfigText read(milliseconds patience = {}) const {
+    return read_config_text(path_, patience);
+  }
   void make_pipe() const { ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0); }
   /// An end to write into that needs no reader yet.
   [[nodiscard]] int writer() const { return ::open(path_.c_str(), O_RDWR | O_CLOEXEC); }
@@ -45,13 +47,17 @@ TEST_F(ConfigTextTest, ARegularFileIsReadWhole) {
   EXPECT_EQ(read().text.size(), kConfigBytesMax + 1) << "one more shows that it is too long";
 }
 
-TEST_F(ConfigTextTest, NoFileIsReadAsAnEmptyOne) { EXPECT_EQ(read_config_text("/dev/null", {}).error, ""); }
+TEST_F(ConfigTextTest, NoFileIsReadAsAnEmptyOne) {
+  EXPECT_EQ(read_config_text("/dev/null", {}).error, "");
+}
 
 TEST_F(ConfigTextTest, WhatIsNoFileIsNamed) {
   EXPECT_THAT(read().error, StartsWith("No such file or directory; give"));
-  EXPECT_THAT(read_config_text(folder_.path(""), kForEver).error, StartsWith("it is a folder; give"));
+  EXPECT_THAT(read_config_text(folder_.path(""), kForEver).error,
+              StartsWith("it is a folder; give"));
   for (const char* device : {"/dev/zero", "/dev/ptmx"}) {
-    EXPECT_THAT(read_config_text(device, kForEver).error, StartsWith("it is a device; give")) << device;
+    EXPECT_THAT(read_config_text(device, kForEver).error, StartsWith("it is a device; give"))
+        << device;
   }
   const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
@@ -91,7 +97,8 @@ TEST_F(ConfigTextTest, APipeOfAShellThatIsDoneIsRead) {
   ::close(ends[1]);
   const std::string path = "/dev/fd/" + std::to_string(ends[0]);
   EXPECT_EQ(read_config_text(path, kForEver).text, "a = 1");
-  EXPECT_THAT(read_config_text(path, kForEver).error, StartsWith("this pipe is empty")) << "by the first reading";
+  EXPECT_THAT(read_config_text(path, kForEver).error, StartsWith("this pipe is empty"))
+      << "by the first reading";
   ::close(ends[0]);
 }
 
@@ -112,11 +119,13 @@ TEST_F(ConfigTextTest, AnEndlessPipeIsBounded) {
 
 TEST_F(ConfigTextTest, NobodyIsWaitedForWithoutABound) {
   make_pipe();
-  EXPECT_THAT(read(milliseconds{1}).error, StartsWith("nobody wrote into this pipe within 1 ms; write"));
+  EXPECT_THAT(read(milliseconds{1}).error,
+              StartsWith("nobody wrote into this pipe within 1 ms; write"));
   const int end = writer();
   EXPECT_THAT(read(milliseconds{1}).error, StartsWith("this pipe did not end within 1 ms; write"));
   ASSERT_EQ(::write(end, "shards = 1\n", 11), 11);
-  EXPECT_THAT(read(milliseconds{1}).error, StartsWith("this pipe did not end within 1 ms; write")) << "part of a file";
+  EXPECT_THAT(read(milliseconds{1}).error, StartsWith("this pipe did not end within 1 ms; write"))
+      << "part of a file";
   ::close(end);
 }
 

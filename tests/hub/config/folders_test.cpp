@@ -57,8 +57,9 @@ TEST(Folders, AFolderThatNothingCanBePutIntoIsRefused) {
   EXPECT_EQ(prepare_private_folder(folder.path("run")), "");
   for (const mode_t mode : {0500u, 0600u, 0000u}) {
     ASSERT_EQ(::chmod(folder.path("run").c_str(), mode), 0);
-    EXPECT_THAT(prepare_private_folder(folder.path("run")),
-                AllOf(HasSubstr("Permission denied"), HasSubstr("chmod 700 " + folder.path("run"))));
+    EXPECT_THAT(
+        prepare_private_folder(folder.path("run")),
+        AllOf(HasSubstr("Permission denied"), HasSubstr("chmod 700 " + folder.path("run"))));
   }
   ASSERT_EQ(::chmod(folder.path("run").c_str(), 0700), 0);
   if (root) {
@@ -94,7 +95,8 @@ TEST(Folders, AStateFolderIsCreatedOrUsed) {
   EXPECT_EQ(mode_of(folder.path("state")), 0700u);
   EXPECT_EQ(prepare_state_folder(folder.path("state")), "");
   std::ofstream(folder.path("file")) << "x";
-  EXPECT_THAT(prepare_state_folder(folder.path("file")), AllOf(HasSubstr("not a folder"), HasSubstr("--state-dir")));
+  EXPECT_THAT(prepare_state_folder(folder.path("file")),
+              AllOf(HasSubstr("not a folder"), HasSubstr("--state-dir")));
 }
 
 TEST(Folders, AnotherUsersStateFolderIsRefused) {
@@ -102,26 +104,34 @@ TEST(Folders, AnotherUsersStateFolderIsRefused) {
   const TestFolder folder;
   ASSERT_EQ(prepare_state_folder(folder.path("state")), "");
   ASSERT_EQ(::chown(folder.path("state").c_str(), 12'345, 12'345), 0);
-  EXPECT_THAT(prepare_state_folder(folder.path("state")), AllOf(HasSubstr("another user"), HasSubstr("--state-dir")));
+  EXPECT_THAT(prepare_state_folder(folder.path("state")),
+              AllOf(HasSubstr("another user"), HasSubstr("--state-dir")));
 }
 
 TEST(Folders, AStateFolderThatCannotBeMadeIsToldWithTheRemedy) {
   const TestFolder folder;
   std::ofstream(folder.path("file")) << "x";
-  const auto fault = [&](const std::string& name) { return prepare_state_folder(folder.path(name)); };
+  const auto fault = [&](const std::string& name) {
+    return prepare_state_folder(folder.path(name));
+  };
   EXPECT_EQ(fault("none/state"), "cannot create the folder " + folder.path("none/state") +
                                      ": No such file or directory; make " + folder.path("none") +
                                      " first, or name another place with --state-dir");
-  EXPECT_THAT(fault("file/state"),
-              HasSubstr("; a part of " + folder.path("file") + " is no folder: name another place"));
-  EXPECT_THAT(fault(std::string(256, 'n')), HasSubstr("; name another place with --state-dir, with a shorter path"));
-  EXPECT_THAT(prepare_state_folder("/proc/state"), HasSubstr(": No such file or directory; name another place"));
+  EXPECT_THAT(fault("file/state"), HasSubstr("; a part of " + folder.path("file") +
+                                             " is no folder: name another place"));
+  EXPECT_THAT(fault(std::string(256, 'n')),
+              HasSubstr("; name another place with --state-dir, with a shorter path"));
+  EXPECT_THAT(prepare_state_folder("/proc/state"),
+              HasSubstr(": No such file or directory; name another place"));
   ASSERT_EQ(::symlink(folder.path("nowhere").c_str(), folder.path("dangling").c_str()), 0);
-  EXPECT_EQ(fault("dangling"), "cannot use the folder " + folder.path("dangling") +
-                                   ": it is a link to something that does not exist; make that folder, or name another "
-                                   "place with --state-dir");
+  EXPECT_EQ(
+      fault("dangling"),
+      "cannot use the folder " + folder.path("dangling") +
+          ": it is a link to something that does not exist; make that folder, or name another "
+          "place with --state-dir");
   ASSERT_EQ(::symlink("round", folder.path("round").c_str()), 0);
-  EXPECT_THAT(fault("round"), AllOf(HasSubstr("it is a link, and Too many levels"), HasSubstr("; remove it, or name")));
+  EXPECT_THAT(fault("round"), AllOf(HasSubstr("it is a link, and Too many levels"),
+                                    HasSubstr("; remove it, or name")));
 }
 
 TEST(Folders, AStateFolderWhereNothingMayBeMadeIsToldWithTheRemedy) {

@@ -17,7 +17,8 @@ std::variant<CommandLine, CommandLineEnding> parse(std::vector<const char*> argu
                                                    std::vector<const char*> environment = {}) {
   arguments.insert(arguments.begin(), "tcphub");
   environment.push_back(nullptr);
-  return parse_command_line(static_cast<int>(arguments.size()), arguments.data(), environment.data());
+  return parse_command_line(static_cast<int>(arguments.size()), arguments.data(),
+                            environment.data());
 }
 
 HubOptions options(const std::vector<const char*>& arguments) {
@@ -78,12 +79,16 @@ TEST(Options, ReadsEverything) {
   EXPECT_EQ(read.log_level, LogLevel::debug);
 }
 
-TEST(Options, UnderstandsEqualsSigns) { EXPECT_EQ(options({"--hub-id=9", "--limit=nodes=5"}).limits.nodes, 5u); }
+TEST(Options, UnderstandsEqualsSigns) {
+  EXPECT_EQ(options({"--hub-id=9", "--limit=nodes=5"}).limits.nodes, 5u);
+}
 
 TEST(Options, AnOpenAddressNeedsTheWord) {
-  EXPECT_EQ(error({"--listen", "tcp://0.0.0.0:7450"}),
-            "tcphub: cannot listen on tcp://0.0.0.0:7450: other machines could reach it, and nothing that is sent is "
-            "encrypted; where all of them are trusted give --insecure, otherwise listen on 127.0.0.1\n");
+  EXPECT_EQ(
+      error({"--listen", "tcp://0.0.0.0:7450"}),
+      "tcphub: cannot listen on tcp://0.0.0.0:7450: other machines could reach it, and nothing "
+      "that is sent is "
+      "encrypted; where all of them are trusted give --insecure, otherwise listen on 127.0.0.1\n");
   EXPECT_EQ(options({"--listen", "tcp://0.0.0.0:7450", "--insecure"}).listen.size(), 1u);
   EXPECT_EQ(options({"--insecure", "--listen", "tcp://[::]:7450"}).listen.size(), 1u);
 }
@@ -99,7 +104,8 @@ TEST(Options, RangesAreKept) {
 }
 
 TEST(Options, ErrorsSayWhatWasMeant) {
-  EXPECT_THAT(error({"--lisen", "tcp://127.0.0.1:1"}), AllOf(HasSubstr("'--lisen'"), HasSubstr("--listen?")));
+  EXPECT_THAT(error({"--lisen", "tcp://127.0.0.1:1"}),
+              AllOf(HasSubstr("'--lisen'"), HasSubstr("--listen?")));
   EXPECT_THAT(error({"--limit", "nods=1"}), HasSubstr("did you mean nodes?"));
   EXPECT_EQ(error({"--limit", "nodes=2", "--limit", "watches=2", "--limit", "nodes=2"}),
             "tcphub: --limit nodes is given twice: give it once\n");
@@ -107,25 +113,33 @@ TEST(Options, ErrorsSayWhatWasMeant) {
   EXPECT_THAT(error({"--log-level", "inof"}), HasSubstr("did you mean info?"));
   EXPECT_THAT(error({"robot"}), HasSubstr("'robot'"));
   EXPECT_THAT(error({"--hub-name", "my hub"}), HasSubstr("--hub-name"));
-  EXPECT_THAT(error({"--listen", "tcp://127.0.0.1:1", "--listen", "tcp://127.0.0.1:1"}), HasSubstr("twice"));
+  EXPECT_THAT(error({"--listen", "tcp://127.0.0.1:1", "--listen", "tcp://127.0.0.1:1"}),
+              HasSubstr("twice"));
 }
 
 TEST(Options, WhatFollowsTwoDashesIsNoOption) {
   EXPECT_TRUE(options({"--spin", "--"}).spin);
-  EXPECT_EQ(error({"--", "--spin"}), "tcphub: there is no argument '--spin' behind -- (tcphub --help shows all)\n");
-  EXPECT_EQ(error({"--", "--"}), "tcphub: there is no argument '--' behind -- (tcphub --help shows all)\n");
+  EXPECT_EQ(error({"--", "--spin"}),
+            "tcphub: there is no argument '--spin' behind -- (tcphub --help shows all)\n");
+  EXPECT_EQ(error({"--", "--"}),
+            "tcphub: there is no argument '--' behind -- (tcphub --help shows all)\n");
   EXPECT_THAT(error({"spni", "--"}), HasSubstr("there is no argument 'spni'"));
 }
 
 TEST(Options, SaysWhatAnOptionTakes) {
   EXPECT_EQ(error({"--shards"}),
-            "tcphub: --shards needs a value: threads that carry data, 1 to 16; tcphub --help shows what there is\n");
-  for (const char* name :
-       {"--listen", "--hub-id", "--hub-name", "--state-dir", "--limit", "--placement", "--log-level", "--config"}) {
-    EXPECT_THAT(error({"--spin", name}), HasSubstr(std::string("tcphub: ") + name + " needs a value: ")) << name;
-    EXPECT_THAT(error({name, "--spin"}), HasSubstr(std::string(name) + " needs a value, and '--spin' looks like"));
+            "tcphub: --shards needs a value: threads that carry data, 1 to 16; tcphub --help shows "
+            "what there is\n");
+  for (const char* name : {"--listen", "--hub-id", "--hub-name", "--state-dir", "--limit",
+                           "--placement", "--log-level", "--config"}) {
+    EXPECT_THAT(error({"--spin", name}),
+                HasSubstr(std::string("tcphub: ") + name + " needs a value: "))
+        << name;
+    EXPECT_THAT(error({name, "--spin"}),
+                HasSubstr(std::string(name) + " needs a value, and '--spin' looks like"));
   }
-  EXPECT_THAT(error({"--shards", "1", "--shards", "2"}), HasSubstr("--shards is given 2 times: give it once"));
+  EXPECT_THAT(error({"--shards", "1", "--shards", "2"}),
+              HasSubstr("--shards is given 2 times: give it once"));
 }
 
 TEST(Options, NumbersAreDecimal) {
@@ -150,7 +164,8 @@ TEST(Options, HelpAndVersionEndWell) {
   EXPECT_THAT(ending({"--version"}).text, HasSubstr("tcphub "));
   const CommandLineEnding limits = ending({"--help-limits"});
   EXPECT_EQ(limits.exit_code, 0);
-  for (const LimitInfo& limit : limit_table()) EXPECT_THAT(limits.text, HasSubstr(std::string{limit.name}));
+  for (const LimitInfo& limit : limit_table())
+    EXPECT_THAT(limits.text, HasSubstr(std::string{limit.name}));
 }
 
 TEST(Options, FlagsAreStrongerThanTheEnvironment) {
@@ -166,8 +181,9 @@ TEST(Options, AFlagMaySayFalseAndIsStrongerThanAFile) {
   std::ofstream(path) << "insecure = true\nspin = true\nlisten = 'tcp://0.0.0.0:0'\n";
   EXPECT_TRUE(options({"--config", path.c_str()}).insecure);
   EXPECT_EQ(ending({"--check-config", "--config", path.c_str(), "--insecure=false"}).exit_code, 2);
-  const auto parsed = parse({"--config", path.c_str(), "--insecure=false", "--spin=false", "--listen", "unix:/s"},
-                            {"TCPHUB_INSECURE=true"});
+  const auto parsed =
+      parse({"--config", path.c_str(), "--insecure=false", "--spin=false", "--listen", "unix:/s"},
+            {"TCPHUB_INSECURE=true"});
   const auto& line = std::get<CommandLine>(parsed);
   EXPECT_FALSE(line.configuration.options.insecure);
   EXPECT_FALSE(line.configuration.options.spin);
@@ -178,14 +194,16 @@ TEST(Options, AFlagMaySayFalseAndIsStrongerThanAFile) {
 }
 
 TEST(Options, EveryFlagIsTrueOrFalse) {
-  for (const std::string flag :
-       {"--insecure", "--spin", "--help", "--help-limits", "--check-config", "--print-config", "--version"}) {
+  for (const std::string flag : {"--insecure", "--spin", "--help", "--help-limits",
+                                 "--check-config", "--print-config", "--version"}) {
     for (const std::string value : {"", "2", "no", "False"}) {
       const std::string word = flag + "=" + value;
-      EXPECT_EQ(error({word.c_str()}), "tcphub: " + flag + " cannot be '" + value + "': write " + flag + " alone, " +
-                                           flag + "=true or " + flag + "=false\n");
+      EXPECT_EQ(error({word.c_str()}), "tcphub: " + flag + " cannot be '" + value + "': write " +
+                                           flag + " alone, " + flag + "=true or " + flag +
+                                           "=false\n");
     }
-    EXPECT_EQ(options({(flag + "=false").c_str()}).shards, default_shards()) << flag << " asks for nothing";
+    EXPECT_EQ(options({(flag + "=false").c_str()}).shards, default_shards())
+        << flag << " asks for nothing";
   }
   EXPECT_EQ(ending({"--help=true"}).exit_code, 0);
   EXPECT_THAT(ending({"-h"}).text, HasSubstr("--listen"));
@@ -197,8 +215,10 @@ TEST(Options, AnEmptyValueIsNotTheNextWord) {
 }
 
 TEST(Options, AnEmptyPlaceIsNotTheDefaultOne) {
-  EXPECT_EQ(error({"--config", ""}), "tcphub: --config is empty: give it the path of a TOML file, or leave it out\n");
-  EXPECT_EQ(error({"--state-dir", ""}), "tcphub: --state-dir is empty: give it a folder, or leave it out\n");
+  EXPECT_EQ(error({"--config", ""}),
+            "tcphub: --config is empty: give it the path of a TOML file, or leave it out\n");
+  EXPECT_EQ(error({"--state-dir", ""}),
+            "tcphub: --state-dir is empty: give it a folder, or leave it out\n");
 }
 
 TEST(Options, ChecksTheConfigurationAndEnds) {
@@ -210,7 +230,8 @@ TEST(Options, ChecksTheConfigurationAndEnds) {
   std::ofstream(path) << "shards = 99\nhub_id = 'x'\n";
   const CommandLineEnding wrong = ending({"--check-config", "--config", path.c_str()});
   EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_EQ(wrong.text, path + ":1:10: shards cannot be '99': give a whole number from 1 to 16\n" + path +
+  EXPECT_EQ(wrong.text, path + ":1:10: shards cannot be '99': give a whole number from 1 to 16\n" +
+                            path +
                             ":2:10: hub_id is a whole number, not a text: write hub_id = 1\n");
 }
 
@@ -218,7 +239,8 @@ TEST(Options, WarnsOfLimitsThatDoNotFitTogether) {
   const std::vector<const char*> arguments{"--limit", "watch_event_bytes=64k"};
   const auto parsed = parse(arguments);
   ASSERT_EQ(std::get<CommandLine>(parsed).warnings.size(), 1u);
-  EXPECT_THAT(std::get<CommandLine>(parsed).warnings[0], ::testing::StartsWith("the watches of one node may have 25"));
+  EXPECT_THAT(std::get<CommandLine>(parsed).warnings[0],
+              ::testing::StartsWith("the watches of one node may have 25"));
   const CommandLineEnding checked = ending({"--limit", "watch_event_bytes=64k", "--check-config"});
   EXPECT_EQ(checked.exit_code, 0);
   EXPECT_THAT(checked.text, ::testing::StartsWith("warning: the watches of one node may have 25"));
@@ -227,7 +249,8 @@ TEST(Options, WarnsOfLimitsThatDoNotFitTogether) {
 TEST(Options, PrintsTheConfigurationAndEnds) {
   const CommandLineEnding printed = ending({"--print-config", "--hub-id", "9"});
   EXPECT_EQ(printed.exit_code, 0);
-  EXPECT_THAT(printed.text, AllOf(HasSubstr("hub_id = 9  # flag --hub-id\n"), HasSubstr("[limits]\n")));
+  EXPECT_THAT(printed.text,
+              AllOf(HasSubstr("hub_id = 9  # flag --hub-id\n"), HasSubstr("[limits]\n")));
 }
 
 }  // namespace

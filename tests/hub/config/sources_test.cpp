@@ -26,7 +26,9 @@ using ::testing::SizeIs;
 
 class SourcesTest : public ::testing::Test {
  protected:
-  void write(const std::string& name, const std::string& text) { std::ofstream(folder_.path(name)) << text; }
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_.path(name)) << text;
+  }
   void make_conf_d() { ASSERT_EQ(::mkdir(folder_.path("conf.d").c_str(), 0700), 0); }
   ReadConfiguration read() { return read_configuration(sources_); }
   void environment(std::vector<const char*> variables) {
@@ -41,7 +43,8 @@ class SourcesTest : public ::testing::Test {
 
 TEST_F(SourcesTest, AStrongerSourceWinsOverAWeakerOne) {
   make_conf_d();
-  write("hub.toml", "shards = 1\nhub_id = 1\nhub_name = 'file'\nplacement = 'hint'\n[limits]\nnodes = 1\n");
+  write("hub.toml",
+        "shards = 1\nhub_id = 1\nhub_name = 'file'\nplacement = 'hint'\n[limits]\nnodes = 1\n");
   write("conf.d/1.toml", "shards = 2\nhub_id = 2\nhub_name = 'first'\n");
   write("conf.d/2.toml", "shards = 3\nhub_id = 3\n");
   environment({"TCPHUB_SHARDS=4", "TCPHUB_HUB_ID=4", "PATH=x"});
@@ -58,8 +61,8 @@ TEST_F(SourcesTest, AStrongerSourceWinsOverAWeakerOne) {
   EXPECT_EQ(all.configuration.options.name, "first");
   EXPECT_EQ(all.configuration.options.placement, Placement::hint);
   EXPECT_EQ(all.configuration.options.limits.nodes, 1u);
-  EXPECT_THAT(all.files,
-              ElementsAre(folder_.path("hub.toml"), folder_.path("conf.d/1.toml"), folder_.path("conf.d/2.toml")));
+  EXPECT_THAT(all.files, ElementsAre(folder_.path("hub.toml"), folder_.path("conf.d/1.toml"),
+                                     folder_.path("conf.d/2.toml")));
   const auto& origins = all.configuration.origins;
   EXPECT_EQ(origins.at("shards"), "flag --shards");
   EXPECT_EQ(origins.at("hub_id"), "environment TCPHUB_HUB_ID");
@@ -75,9 +78,10 @@ TEST_F(SourcesTest, WhatIsOverruledHasToBeRightAllTheSame) {
 
 TEST_F(SourcesTest, EveryKeyHasAVariable) {
   write("hub.toml", "");
-  environment({"TCPHUB_LISTEN=unix:/a, unix:/b", "TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=7", "TCPHUB_HUB_NAME=hall",
-               "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint", "TCPHUB_SPIN=true", "TCPHUB_INSECURE=true",
-               "TCPHUB_LOG_LEVEL=debug", "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
+  environment({"TCPHUB_LISTEN=unix:/a, unix:/b", "TCPHUB_SHARDS=2", "TCPHUB_HUB_ID=7",
+               "TCPHUB_HUB_NAME=hall", "TCPHUB_STATE_DIR=/d", "TCPHUB_PLACEMENT=hint",
+               "TCPHUB_SPIN=true", "TCPHUB_INSECURE=true", "TCPHUB_LOG_LEVEL=debug",
+               "TCPHUB_LIMITS_BUDGET_BYTES=64M"});
   EXPECT_THAT(warnings_, IsEmpty());
   const ReadConfiguration all = read();
   EXPECT_THAT(all.faults, IsEmpty());
@@ -92,10 +96,13 @@ TEST_F(SourcesTest, AWrongVariableIsNamed) {
   write("hub.toml", "");
   environment({"TCPHUB_SHARDS=0", "TCPHUB_SHARD=2"});
   ASSERT_THAT(warnings_, SizeIs(1));
-  EXPECT_THAT(warnings_[0], HasSubstr("TCPHUB_SHARD is no key of the configuration; did you mean TCPHUB_SHARDS?"));
+  EXPECT_THAT(
+      warnings_[0],
+      HasSubstr("TCPHUB_SHARD is no key of the configuration; did you mean TCPHUB_SHARDS?"));
   const ReadConfiguration all = read();
   ASSERT_THAT(all.faults, SizeIs(1));
-  EXPECT_EQ(all.faults[0].line(), "tcphub: TCPHUB_SHARDS cannot be '0': give a whole number from 1 to 16");
+  EXPECT_EQ(all.faults[0].line(),
+            "tcphub: TCPHUB_SHARDS cannot be '0': give a whole number from 1 to 16");
 }
 
 TEST_F(SourcesTest, AWrongLimitOfTheEnvironmentNamesItsVariable) {
@@ -103,14 +110,16 @@ TEST_F(SourcesTest, AWrongLimitOfTheEnvironmentNamesItsVariable) {
   environment({"TCPHUB_LIMITS_NODES=x"});
   const ReadConfiguration all = read();
   ASSERT_THAT(all.faults, SizeIs(1));
-  EXPECT_THAT(all.faults[0].line(), HasSubstr("tcphub: TCPHUB_LIMITS_NODES: limit nodes cannot be 'x': "));
+  EXPECT_THAT(all.faults[0].line(),
+              HasSubstr("tcphub: TCPHUB_LIMITS_NODES: limit nodes cannot be 'x': "));
 }
 
 TEST_F(SourcesTest, EveryFaultIsToldUnlessSoManyAreEnough) {
   constexpr std::size_t kLines = 500;
   make_conf_d();
   std::string text;
-  for (std::size_t i = 0; i < kLines; ++i) text += "unknown_" + std::to_string(i) + " = 1\nno TOML\n";
+  for (std::size_t i = 0; i < kLines; ++i)
+    text += "unknown_" + std::to_string(i) + " = 1\nno TOML\n";
   write("hub.toml", text);
   write("conf.d/a.toml", text);
   const ReadConfiguration all = read();
@@ -119,7 +128,8 @@ TEST_F(SourcesTest, EveryFaultIsToldUnlessSoManyAreEnough) {
   for (std::size_t line = 1; line <= 2 * kLines; ++line) {
     EXPECT_THAT(all.faults[line - 1].place, HasSubstr("hub.toml:" + std::to_string(line) + ":"));
   }
-  EXPECT_FALSE(read_configuration(sources_, {.faults_max = 4 * kLines}).more_faults) << "at the limit";
+  EXPECT_FALSE(read_configuration(sources_, {.faults_max = 4 * kLines}).more_faults)
+      << "at the limit";
   for (const std::size_t most : {std::size_t{0}, std::size_t{7}, 3 * kLines, 4 * kLines - 1}) {
     const ReadConfiguration some = read_configuration(sources_, {.faults_max = most});
     EXPECT_THAT(some.faults, SizeIs(most));
@@ -155,13 +165,15 @@ TEST_F(SourcesTest, AVariableThatIsEmptyIsNoPlace) {
   environment({"TCPHUB_STATE_DIR=", "TCPHUB_CONFIG="});
   std::vector<std::string> lines;
   for (const Fault& fault : read().faults) lines.push_back(fault.line());
-  EXPECT_THAT(lines, ElementsAre("tcphub: TCPHUB_CONFIG is empty: give it a TOML file's path, or unset it",
-                                 "tcphub: TCPHUB_STATE_DIR is empty: give it a folder, or leave it out"));
+  EXPECT_THAT(lines,
+              ElementsAre("tcphub: TCPHUB_CONFIG is empty: give it a TOML file's path, or unset it",
+                          "tcphub: TCPHUB_STATE_DIR is empty: give it a folder, or leave it out"));
 }
 
 TEST_F(SourcesTest, AFileThatIsNamedHasToBeThere) {
   ASSERT_THAT(read().faults, SizeIs(1));
-  EXPECT_THAT(read().faults[0].line(), HasSubstr("hub.toml: cannot read this file: No such file or directory"));
+  EXPECT_THAT(read().faults[0].line(),
+              HasSubstr("hub.toml: cannot read this file: No such file or directory"));
   ASSERT_EQ(::mkdir(folder_.path("hub.toml").c_str(), 0700), 0);
   EXPECT_THAT(read().faults[0].line(), HasSubstr("it is a folder"));
 }
@@ -171,9 +183,9 @@ TEST_F(SourcesTest, AFileInThePlaceOfTheFolderIsTold) {
   write("conf.d", "hub_id = 8\n");
   const ReadConfiguration configuration = read();
   ASSERT_THAT(configuration.faults, SizeIs(1));
-  EXPECT_EQ(configuration.faults[0].line(),
-            folder_.path("conf.d") +
-                ": this is not a folder, of which the *.toml would be read; make it one, or give it another name");
+  EXPECT_EQ(configuration.faults[0].line(), folder_.path("conf.d") +
+                                                ": this is not a folder, of which the *.toml would "
+                                                "be read; make it one, or give it another name");
 }
 
 TEST_F(SourcesTest, WithoutDescriptorsNothingIsReadAndThatIsSaid) {
@@ -199,7 +211,8 @@ TEST_F(SourcesTest, WithoutDescriptorsNothingIsReadAndThatIsSaid) {
 TEST_F(SourcesTest, TheUsersFileIsFoundAndNoneIsNeeded) {
   sources_.file.clear();
   ::setenv("XDG_CONFIG_HOME", folder_.path("").c_str(), 1);
-  EXPECT_THAT(default_config_files(), ElementsAre(folder_.path("/gimnet/tcphub.toml"), "/etc/gimnet/tcphub.toml"));
+  EXPECT_THAT(default_config_files(),
+              ElementsAre(folder_.path("/gimnet/tcphub.toml"), "/etc/gimnet/tcphub.toml"));
   EXPECT_THAT(read().faults, IsEmpty());
   ASSERT_EQ(::mkdir(folder_.path("gimnet").c_str(), 0700), 0);
   write("gimnet/tcphub.toml", "hub_id = 9\n");
@@ -247,7 +260,9 @@ TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
   ASSERT_GE(writer, 0);
   ASSERT_EQ(::write(writer, "hub_id = 9\n", 11), 11);
   ReadConfiguration started;
-  std::thread reader([&] { started = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}}); });
+  std::thread reader([&] {
+    started = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
+  });
   int queued = 1;
   while (queued != 0) ASSERT_EQ(::ioctl(writer, FIONREAD, &queued), 0);
   ::close(writer);
@@ -258,22 +273,26 @@ TEST_F(SourcesTest, APipeIsReadAtTheStartAndNeverInPlaceOfAPart) {
   write("hub.toml", "");
   make_conf_d();
   ASSERT_EQ(::mkfifo(folder_.path("conf.d/a.toml").c_str(), 0600), 0);
-  const ReadConfiguration part = read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
+  const ReadConfiguration part =
+      read_configuration(sources_, {.pipe_patience = std::chrono::seconds{600}});
   ASSERT_THAT(part.faults, SizeIs(1));
-  EXPECT_THAT(part.faults[0].line(), HasSubstr("conf.d/a.toml: cannot read this file: it is a pipe"));
+  EXPECT_THAT(part.faults[0].line(),
+              HasSubstr("conf.d/a.toml: cannot read this file: it is a pipe"));
 }
 
 TEST_F(SourcesTest, FaultsComeInTheOrderOfTheFile) {
   write("hub.toml", "shards = 99\nx =\nhub_id = 0\n");
   std::vector<std::string> lines;
-  for (const Fault& fault : read().faults) lines.push_back(fault.line().substr(folder_.path("hub.toml").size(), 3));
+  for (const Fault& fault : read().faults)
+    lines.push_back(fault.line().substr(folder_.path("hub.toml").size(), 3));
   EXPECT_THAT(lines, ElementsAre(":1:", ":2:", ":3:"));
 }
 
 TEST_F(SourcesTest, OnlySoManyFilesAreRead) {
   make_conf_d();
   write("hub.toml", "");
-  for (std::size_t i = 0; i < kConfigFilesMax; ++i) write("conf.d/" + std::to_string(i) + ".toml", "");
+  for (std::size_t i = 0; i < kConfigFilesMax; ++i)
+    write("conf.d/" + std::to_string(i) + ".toml", "");
   write("conf.d/readme", "no TOML");
   EXPECT_THAT(read().faults, IsEmpty());
   EXPECT_THAT(read().files, SizeIs(kConfigFilesMax + 1));

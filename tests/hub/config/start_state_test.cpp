@@ -28,7 +28,8 @@ class StartStateTest : public ::testing::Test {
     ::unsetenv("XDG_STATE_HOME");
     set_log_level(LogLevel::info);
   }
-  static StateWish wish(const std::string& folder = "", const std::string& address = "tcp://127.0.0.1:7450") {
+  static StateWish wish(const std::string& folder = "",
+                        const std::string& address = "tcp://127.0.0.1:7450") {
     return {folder, HubId{1}, *parse_listen_url(address), std::chrono::milliseconds{1'000}};
   }
 
@@ -36,9 +37,11 @@ class StartStateTest : public ::testing::Test {
 };
 
 TEST_F(StartStateTest, FoldersAreNamedAfterHubAndAddress) {
-  EXPECT_EQ(state_folder_name(HubId{1}, *parse_listen_url("tcp://127.0.0.1:7450")), "hub-1-tcp-127.0.0.1-7450");
+  EXPECT_EQ(state_folder_name(HubId{1}, *parse_listen_url("tcp://127.0.0.1:7450")),
+            "hub-1-tcp-127.0.0.1-7450");
   EXPECT_EQ(state_folder_name(HubId{7}, *parse_listen_url("tcp://[::1]:1")), "hub-7-tcp-__1-1");
-  EXPECT_EQ(state_folder_name(HubId{7}, *parse_listen_url("unix:/run/hub+sock")), "hub-7-unix-run-hub_sock");
+  EXPECT_EQ(state_folder_name(HubId{7}, *parse_listen_url("unix:/run/hub+sock")),
+            "hub-7-unix-run-hub_sock");
   EXPECT_EQ(state_folder_name(HubId{7}, *parse_listen_url("tcp://127.0.0.1:0")), "");
 }
 

@@ -92,13 +92,15 @@ int leave_no_trace_where_no_file_may_grow(const std::string& path) {
   {
     const auto folder = StateFolder::open(path);
     if (!folder) return 2;
-    if ((*folder)->write(some_state()).find("(write): File too large") == std::string::npos) return 3;
+    if ((*folder)->write(some_state()).find("(write): File too large") == std::string::npos)
+      return 3;
   }
   return std::filesystem::is_empty(path) ? 0 : 4;
 }
 
 TEST_F(StateFolderTest, APartOfAStateIsNotLeftBehind) {
-  EXPECT_EXIT(::_exit(leave_no_trace_where_no_file_may_grow(path())), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(::_exit(leave_no_trace_where_no_file_may_grow(path())), testing::ExitedWithCode(0),
+              "");
 }
 
 TEST_F(StateFolderTest, WhereNothingWasKeptTheNextOneIsTheFirst) {
@@ -113,7 +115,8 @@ TEST_F(StateFolderTest, WhereNothingWasKeptTheNextOneIsTheFirst) {
   EXPECT_TRUE(std::filesystem::exists(file("lock"))) << "and stays so";
 }
 
-/// It was left by a hub that could not lock it, or is of one that ended between another one's looking and locking.
+/// It was left by a hub that could not lock it, or is of one that ended between another one's
+/// looking and locking.
 TEST_F(StateFolderTest, ALockThatNobodyHadIsNoSignOfAHub) {
   ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
   std::ofstream(file("lock")).close();
@@ -160,8 +163,10 @@ TEST_F(StateFolderTest, FilesThatOthersMayReadOrThatAreNoneAreRefused) {
   EXPECT_THAT(read_fault(), HasSubstr("chmod 600"));
   ASSERT_EQ(::unlink(file("state").c_str()), 0);
   ASSERT_EQ(::symlink("/etc/passwd", file("state").c_str()), 0);
-  EXPECT_EQ(read_fault(), "cannot read " + file("state") +
-                              ": it is a link, and links are not followed; put a file in its place, or remove it");
+  EXPECT_EQ(
+      read_fault(),
+      "cannot read " + file("state") +
+          ": it is a link, and links are not followed; put a file in its place, or remove it");
   ASSERT_EQ(::unlink(file("state").c_str()), 0);
   ASSERT_EQ(::mkfifo(file("state").c_str(), 0600), 0);
   EXPECT_THAT(read_fault(), HasSubstr("not a file"));
@@ -181,8 +186,10 @@ TEST_F(StateFolderTest, ALinkIsNotWrittenThrough) {
 TEST_F(StateFolderTest, ALinkOrAFolderIsNoLock) {
   ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
   ASSERT_EQ(::symlink(folder_.path("elsewhere").c_str(), file("lock").c_str()), 0);
-  EXPECT_EQ(read_fault(), "cannot use " + file("lock") +
-                              ": it is a link, and links are not followed; put a file in its place, or remove it");
+  EXPECT_EQ(
+      read_fault(),
+      "cannot use " + file("lock") +
+          ": it is a link, and links are not followed; put a file in its place, or remove it");
   EXPECT_FALSE(std::filesystem::exists(folder_.path("elsewhere")));
   ASSERT_EQ(::unlink(file("lock").c_str()), 0);
   ASSERT_EQ(::mkdir(file("lock").c_str(), 0700), 0);
@@ -201,7 +208,8 @@ TEST_F(StateFolderTest, WhatCannotBeWrittenLeavesWhatWasThere) {
   ASSERT_TRUE(folder);
   ASSERT_EQ(::mkdir(file("state.new").c_str(), 0700), 0);  // in the way, whoever runs the test
   const std::string error = (*folder)->write(some_state(9));
-  EXPECT_EQ(error, "cannot write the hub's state: " + file("state.new") + " is in the way: it is a folder; remove it");
+  EXPECT_EQ(error, "cannot write the hub's state: " + file("state.new") +
+                       " is in the way: it is a folder; remove it");
   EXPECT_EQ((*(*folder)->read())->boot, 3u);
 }
 

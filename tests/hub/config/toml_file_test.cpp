@@ -40,10 +40,12 @@ TEST(TomlFile, KnowsWhereEveryKeyAndValueStands) {
 }
 
 TEST(TomlFile, TellsTheKindsApart) {
-  const TomlFile file = read_toml("a = 1\nb = 'x'\nc = true\nd = 1.5\ne = 1979-05-27\nf = ['x', 2]\n[g]\n", "f");
+  const TomlFile file =
+      read_toml("a = 1\nb = 'x'\nc = true\nd = 1.5\ne = 1979-05-27\nf = ['x', 2]\n[g]\n", "f");
   ASSERT_THAT(file.keys, SizeIs(7));
   using Kind = Value::Kind;
-  const Kind kinds[] = {Kind::integer, Kind::text, Kind::boolean, Kind::fraction, Kind::time, Kind::list, Kind::table};
+  const Kind kinds[] = {Kind::integer, Kind::text, Kind::boolean, Kind::fraction,
+                        Kind::time,    Kind::list, Kind::table};
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(file.keys[i].value.kind, kinds[i]) << i;
   ASSERT_THAT(file.keys[5].value.items, SizeIs(2));
   EXPECT_EQ(file.keys[5].value.items[0].text, "x");
@@ -57,14 +59,15 @@ TEST(TomlFile, EveryWayToWriteALimitIsTheSameKey) {
 }
 
 TEST(TomlFile, TellsEverySyntaxErrorAtItsPlaceAndReadsTheRest) {
-  const TomlFile file = read_toml("shards = \nhub_id = 3\nbad line\n= 4\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+  const TomlFile file =
+      read_toml("shards = \nhub_id = 3\nbad line\n= 4\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
   EXPECT_THAT(places(file), ElementsAre("f:1:10", "f:3:5", "f:4:1", "f:6:10"));
   EXPECT_THAT(keys(file), ElementsAre("hub_id", "limits.grace_ms"));
 }
 
 TEST(TomlFile, TellsWhereTextIsNoUtf8AndReadsTheRest) {
-  const TomlFile file =
-      read_toml("\xe4 = 1\nshards = \n# Gr\xc3\xb6\xdf\x65\n[limits]\nnodes = 3\nx = '\xff\xff'\n", "f");
+  const TomlFile file = read_toml(
+      "\xe4 = 1\nshards = \n# Gr\xc3\xb6\xdf\x65\n[limits]\nnodes = 3\nx = '\xff\xff'\n", "f");
   EXPECT_THAT(places(file), UnorderedElementsAre("f:1:1", "f:2:10", "f:3:6", "f:6:6"));
   EXPECT_THAT(file.faults[0].sentence, HasSubstr("not UTF-8"));
   EXPECT_THAT(keys(file), Contains("limits.nodes"));
@@ -84,7 +87,8 @@ TEST(TomlFile, LettersThatAKeyCannotHave) {
       "gr\xc3\xb6\xc3\x9f"
       "e = 3\nshards = \xc3\xb6\nhub_id = 3\xc3\xa9\nhub_name = 'x'\n",
       "f");
-  EXPECT_THAT(places(file), ElementsAre(StartsWith("f:1:"), StartsWith("f:2:"), StartsWith("f:3:")));
+  EXPECT_THAT(places(file),
+              ElementsAre(StartsWith("f:1:"), StartsWith("f:2:"), StartsWith("f:3:")));
   EXPECT_THAT(keys(file), ElementsAre("hub_name"));
 }
 
@@ -105,21 +109,25 @@ TEST(TomlFile, AnErrorInALongerValueCostsThatValueAlone) {
 
 TEST(TomlFile, ANumberThatIsTooLargeIsToldWhereItStands) {
   const TomlFile file = read_toml(
-      "[limits]\na = 9223372036854775807\nb =  9223372036854775808 # c\n\"\u00e4\" = -99999999999999999999\n"
+      "[limits]\na = 9223372036854775807\nb =  9223372036854775808 # c\n\"\u00e4\" = "
+      "-99999999999999999999\n"
       "c = 0xffff_ffff_ffff_ffff_f\nd = [1, 99999999999999999999]\ne = 2\n",
       "f");
   EXPECT_THAT(places(file), ElementsAre("f:3:6", "f:4:7", "f:5:5", "f:6:9"));
   EXPECT_EQ(file.faults[1].sentence,
-            "no key can be '-99999999999999999999': it does not fit in 64 bits; give a number that is nearer to 0");
+            "no key can be '-99999999999999999999': it does not fit in 64 bits; give a number that "
+            "is nearer to 0");
   EXPECT_THAT(keys(file), ElementsAre("limits.a", "limits.e"));
 }
 
 TEST(TomlFile, AListThatIsNotClosedHidesNothing) {
-  for (const std::string list :
-       {"listen = [", "listen = [ 'a'", "listen = [\n  'a',", "listen = [[", "listen = [\n\n# x\n"}) {
-    const TomlFile file = read_toml(list + "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+  for (const std::string list : {"listen = [", "listen = [ 'a'", "listen = [\n  'a',",
+                                 "listen = [[", "listen = [\n\n# x\n"}) {
+    const TomlFile file =
+        read_toml(list + "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
     ASSERT_THAT(file.faults, SizeIs(2)) << list;
-    EXPECT_EQ(file.faults[0].line(), "f:1:1: this is not TOML: the list that begins here is not closed; end it with ]");
+    EXPECT_EQ(file.faults[0].line(),
+              "f:1:1: this is not TOML: the list that begins here is not closed; end it with ]");
     EXPECT_THAT(file.faults[1].place, HasSubstr(":10")) << "the value of nodes";
     EXPECT_THAT(keys(file), ElementsAre("shards", "limits.grace_ms")) << list;
   }
@@ -130,14 +138,18 @@ TEST(TomlFile, AListThatIsNotClosedHidesNothing) {
 
 TEST(TomlFile, ATextThatIsNotClosedIsToldWhereItBeginsAndHidesNothing) {
   for (const std::string quotes : {"\"\"\"", "'''"}) {
-    for (const std::string content : {"", "a", "a\nb", "a\n# b\n\n[ c\nd = \n", "\n]\n", "a'b\"c"}) {
-      const TomlFile file = read_toml(
-          "hub_id = 1\nhub_name = " + quotes + content + "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n", "f");
+    for (const std::string content :
+         {"", "a", "a\nb", "a\n# b\n\n[ c\nd = \n", "\n]\n", "a'b\"c"}) {
+      const TomlFile file = read_toml("hub_id = 1\nhub_name = " + quotes + content +
+                                          "\nshards = 2\n[limits]\nnodes = 1x\ngrace_ms = 5\n",
+                                      "f");
       ASSERT_THAT(file.faults, SizeIs(2)) << quotes << content;
       EXPECT_EQ(file.faults[0].line(),
-                "f:2:12: this is not TOML: the text that begins here is not closed; end it with its three quotes");
+                "f:2:12: this is not TOML: the text that begins here is not closed; end it with "
+                "its three quotes");
       EXPECT_THAT(file.faults[1].place, HasSubstr(":10")) << "the value of nodes";
-      EXPECT_THAT(keys(file), ElementsAre("hub_id", "shards", "limits.grace_ms")) << quotes << content;
+      EXPECT_THAT(keys(file), ElementsAre("hub_id", "shards", "limits.grace_ms"))
+          << quotes << content;
     }
   }
   const TomlFile last = read_toml("shards = 2\n\"\u00e4\" = [1, '''", "f");
@@ -146,8 +158,9 @@ TEST(TomlFile, ATextThatIsNotClosedIsToldWhereItBeginsAndHidesNothing) {
 }
 
 TEST(TomlFile, ATextThatIsClosedIsNotTakenForAnOpenOne) {
-  for (const std::string closed : {"\"\"\"\"\"\"", "\"\"\"a\\\"\"\"\"", "\"\"\"a\"\"\"\"\"", "'''a\\'''", "'''a''''",
-                                   "\"a '''\" # '''", "'\"\"\"'", "\"\\\"\" # \"\"\""}) {
+  for (const std::string closed :
+       {"\"\"\"\"\"\"", "\"\"\"a\\\"\"\"\"", "\"\"\"a\"\"\"\"\"", "'''a\\'''", "'''a''''",
+        "\"a '''\" # '''", "'\"\"\"'", "\"\\\"\" # \"\"\""}) {
     const TomlFile file = read_toml("hub_name = " + closed + "\nlisten = [", "f");
     EXPECT_THAT(places(file), ElementsAre("f:2:1")) << closed;
     EXPECT_THAT(keys(file), ElementsAre("hub_name")) << closed;
@@ -167,7 +180,8 @@ TEST(TomlFile, OfAnUnknownTableItsNameIsEnough) {
 TEST(TomlFile, EveryFaultOfALongFileIsTold) {
   constexpr std::size_t kLines = 3'000;
   std::string text = "[limits]\n";
-  for (std::size_t i = 0; i < kLines; ++i) text += "bad line\nkey_" + std::to_string(i) + " = 1\nkey_0 = 2\n";
+  for (std::size_t i = 0; i < kLines; ++i)
+    text += "bad line\nkey_" + std::to_string(i) + " = 1\nkey_0 = 2\n";
   const TomlFile file = read_toml(text, "f");
   ASSERT_THAT(file.faults, SizeIs(2 * kLines));
   EXPECT_THAT(file.keys, SizeIs(kLines));
@@ -183,9 +197,11 @@ TEST(TomlFile, EveryFaultOfALongFileIsTold) {
 // Parts are read one by one, and mean what they would in one.
 TEST(TomlFile, AfterAnErrorItIsStillTheSameTable) {
   const auto rest = [](const std::string& text) { return keys(read_toml(text, "f")); };
-  EXPECT_THAT(rest("a = 1\nbad\nb = 2\n[limits]\nc = 3\nbad\nd = 4\n[limits.e]\nf = 5\nbad\ng = 6\n"),
-              ElementsAre("a", "b", "limits.c", "limits.d", "limits.e"));
-  EXPECT_THAT(rest("[x]\na = 1\nbad\nb = 2\n[x.y]\nbad\n[limits]\nc = 3\n"), ElementsAre("x", "limits.c"));
+  EXPECT_THAT(
+      rest("a = 1\nbad\nb = 2\n[limits]\nc = 3\nbad\nd = 4\n[limits.e]\nf = 5\nbad\ng = 6\n"),
+      ElementsAre("a", "b", "limits.c", "limits.d", "limits.e"));
+  EXPECT_THAT(rest("[x]\na = 1\nbad\nb = 2\n[x.y]\nbad\n[limits]\nc = 3\n"),
+              ElementsAre("x", "limits.c"));
   EXPECT_THAT(rest("[[x]]\na = 1\nbad\nb = 2\n[[x]]\nc = 3\nbad\nd = 4\n"), ElementsAre("x"));
   EXPECT_THAT(rest("limits.a = 1\nbad\nlimits.b = 2\n"), ElementsAre("limits.a", "limits.b"));
   EXPECT_THAT(rest("[limits]\r\na = 1\r\nbad\r\nb = 2\r\n"), ElementsAre("limits.a", "limits.b"));
@@ -200,8 +216,10 @@ TEST(TomlFile, AfterAnErrorWhatIsGivenTwiceIsToldAsBeforeIt) {
     return file.faults.back().line();
   };
   EXPECT_EQ(twice("a = 1\n", " a = 2\n"), "f:3:2: 'a' is given twice; leave one of them out");
-  EXPECT_EQ(twice("[limits]\na = 1\n", "a = 2\n"), "f:4:1: 'a' is given twice; leave one of them out");
-  EXPECT_EQ(twice("[limits]\na = 1\n", "[limits]\nb = 2\n"), "f:4:1: 'limits' is given twice; leave one of them out");
+  EXPECT_EQ(twice("[limits]\na = 1\n", "a = 2\n"),
+            "f:4:1: 'a' is given twice; leave one of them out");
+  EXPECT_EQ(twice("[limits]\na = 1\n", "[limits]\nb = 2\n"),
+            "f:4:1: 'limits' is given twice; leave one of them out");
   EXPECT_EQ(twice("a = 1\n", "[a]\n"), "f:3:1: 'a' is given twice; leave one of them out");
   EXPECT_EQ(twice("[a]\n[b]\n", "[a]\n"), "f:4:1: 'a' is given twice; leave one of them out");
 }
@@ -229,10 +247,14 @@ TEST(TomlFile, AKeyOfMorePartsThanAnyHasIsNotLookedAt) {
   };
   EXPECT_THAT(read_toml(chain(64) + " = 1\n", "f").faults, IsEmpty());
   EXPECT_THAT(read_toml("[" + chain(64) + "]\n", "f").faults, IsEmpty());
-  EXPECT_THAT(read_toml("x = [" + std::string(999, ' ') + "'" + chain(999) + "']\n# " + chain(999) + " =", "f").faults,
-              IsEmpty());
+  EXPECT_THAT(
+      read_toml("x = [" + std::string(999, ' ') + "'" + chain(999) + "']\n# " + chain(999) + " =",
+                "f")
+          .faults,
+      IsEmpty());
   for (const std::size_t dots : {std::size_t{65}, kConfigBytesMax / 2 - 100}) {
-    for (const std::string& line : {chain(dots) + " = 1", "[" + chain(dots) + "]", "x = {" + chain(dots) + "=1}"}) {
+    for (const std::string& line :
+         {chain(dots) + " = 1", "[" + chain(dots) + "]", "x = {" + chain(dots) + "=1}"}) {
       const TomlFile file = read_toml("\n " + line + "\nshards = 1\n", "f");
       ASSERT_THAT(places(file), ElementsAre("f:2:2")) << dots;
       EXPECT_THAT(file.faults[0].sentence, HasSubstr("no key has so many parts"));

@@ -28,8 +28,9 @@ class AcceptorTest : public ::testing::Test {
   std::unique_ptr<Acceptor> acceptor(const std::string& url) {
     auto listener = Listener::open(*parse_listen_url(url));
     EXPECT_TRUE(listener);
-    return std::make_unique<Acceptor>(std::move(*listener), limits_, refusals_, reserve_,
-                                      [this](const Stranger& newcomer) { return make_room_(newcomer); });
+    return std::make_unique<Acceptor>(
+        std::move(*listener), limits_, refusals_, reserve_,
+        [this](const Stranger& newcomer) { return make_room_(newcomer); });
   }
   int socket(int family) {
     open_.push_back(::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -40,17 +41,20 @@ class AcceptorTest : public ::testing::Test {
       sockaddr_un address{};
       address.sun_family = AF_UNIX;
       std::strncpy(address.sun_path, url.path.c_str(), sizeof address.sun_path - 1);
-      ASSERT_EQ(::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+      ASSERT_EQ(::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address),
+                0);
       return;
     }
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(url.port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    ASSERT_EQ(::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    ASSERT_EQ(::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address),
+              0);
   }
   Acceptor::After accept(Acceptor& acceptor) {
-    return acceptor.accept_some([this](Stranger stranger) { strangers_.push_back(std::move(stranger)); });
+    return acceptor.accept_some(
+        [this](Stranger stranger) { strangers_.push_back(std::move(stranger)); });
   }
 
   static Limits limits() {
@@ -84,7 +88,8 @@ TEST_F(AcceptorTest, KnowsUnixPeersByTheKernelsWord) {
   accept(*door);
   ASSERT_EQ(strangers_.size(), 1u);
   EXPECT_EQ(strangers_[0].peer.transport, "unix");
-  EXPECT_EQ(strangers_[0].peer.address, "pid " + std::to_string(::getpid()) + " uid " + std::to_string(::getuid()));
+  EXPECT_EQ(strangers_[0].peer.address,
+            "pid " + std::to_string(::getpid()) + " uid " + std::to_string(::getuid()));
   EXPECT_TRUE(strangers_[0].may_administer);
 }
 
@@ -132,9 +137,10 @@ std::optional<proto::Goodbye> goodbye_and_end(int client) {
   const ssize_t size = ::recv(client, answer, sizeof answer, 0);
   constexpr std::size_t kBefore = proto::kOpeningSize + proto::kHeaderSize;
   std::byte nothing{};
-  if (size < static_cast<ssize_t>(kBefore) || ::recv(client, &nothing, 1, 0) != 0) return std::nullopt;
-  const auto goodbye =
-      proto::decode<proto::Goodbye>(std::span{answer, static_cast<std::size_t>(size)}.subspan(kBefore));
+  if (size < static_cast<ssize_t>(kBefore) || ::recv(client, &nothing, 1, 0) != 0)
+    return std::nullopt;
+  const auto goodbye = proto::decode<proto::Goodbye>(
+      std::span{answer, static_cast<std::size_t>(size)}.subspan(kBefore));
   return goodbye ? std::optional{*goodbye} : std::nullopt;
 }
 

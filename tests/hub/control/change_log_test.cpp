@@ -41,8 +41,10 @@ class ChangeLog : public ::testing::Test {
 TEST_F(ChangeLog, SaysWhoCameAndWent) {
   const Session& robot = join("robot");
   const std::string who = "debug node 7." + std::to_string(robot.index) + " 'robot' ";
-  EXPECT_THAT(line_of(NodeNoted{ChangeKind::joined, robot.index, {}, {}}), HasSubstr(who + "has joined\n"));
-  EXPECT_THAT(line_of(NodeNoted{ChangeKind::away, robot.index, {}, {}}), HasSubstr(who + "is away"));
+  EXPECT_THAT(line_of(NodeNoted{ChangeKind::joined, robot.index, {}, {}}),
+              HasSubstr(who + "has joined\n"));
+  EXPECT_THAT(line_of(NodeNoted{ChangeKind::away, robot.index, {}, {}}),
+              HasSubstr(who + "is away"));
   EXPECT_THAT(line_of(NodeNoted{ChangeKind::renamed, robot.index, {}, "cam"}),
               HasSubstr(who + "has another name, before 'cam'\n"));
   EXPECT_THAT(line_of(NodeNoted{ChangeKind::left, 999, "gone", {}}),
@@ -51,8 +53,9 @@ TEST_F(ChangeLog, SaysWhoCameAndWent) {
 
 TEST_F(ChangeLog, SaysWhoHasAnotherId) {
   const Session& robot = join("robot");
-  EXPECT_THAT(line_of(RenumberDue{robot.place, 5, robot.index, {}}),
-              HasSubstr("node 7.5 'robot' has another id, 7." + std::to_string(robot.index) + "\n"));
+  EXPECT_THAT(
+      line_of(RenumberDue{robot.place, 5, robot.index, {}}),
+      HasSubstr("node 7.5 'robot' has another id, 7." + std::to_string(robot.index) + "\n"));
 }
 
 TEST_F(ChangeLog, SaysWhichServiceWent) {

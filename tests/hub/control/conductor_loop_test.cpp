@@ -31,16 +31,18 @@ TEST(ConductorLoop, ANameThatWasGivenBackIsFreeHoweverMuchWasToldBefore) {
   const TestConductor::Node former = hub.join("robot");
   ControlInbox inbox(2);
   // Of a session that is not there any more.
-  for (int i = 0; i < 50'000; ++i) inbox.push({ShardIndex{0}, HeardEvent{SessionRef{ConnectionSlot{500}, 9}, 1, {}}});
-  inbox.push(
-      {former.shard, DetachedEvent{former.session, former.attachment, former.id, true, proto::GoodbyeCode::done, ""}});
+  for (int i = 0; i < 50'000; ++i)
+    inbox.push({ShardIndex{0}, HeardEvent{SessionRef{ConnectionSlot{500}, 9}, 1, {}}});
+  inbox.push({former.shard, DetachedEvent{former.session, former.attachment, former.id, true,
+                                          proto::GoodbyeCode::done, ""}});
   std::vector<std::unique_ptr<Listener>> listeners;
   listeners.push_back(std::move(*Listener::open(*parse_listen_url("tcp://127.0.0.1:0"))));
   const int client = dial(static_cast<std::uint16_t>(listeners[0]->url().port));
   proto::Hello hello;
   hello.name = "robot";
   const std::vector<std::byte> bytes = opening_and(hello);
-  ASSERT_EQ(::send(client, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  ASSERT_EQ(::send(client, bytes.data(), bytes.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(bytes.size()));
   bool admitted = false;
   hub.shards.on_send = [&](const ShardCommand& command) {
     if (std::holds_alternative<AttachCommand>(command)) {
@@ -48,7 +50,8 @@ TEST(ConductorLoop, ANameThatWasGivenBackIsFreeHoweverMuchWasToldBefore) {
       ::raise(SIGTERM);
     }
     if (std::holds_alternative<DrainCommand>(command)) {
-      for (const ShardIndex shard : {ShardIndex{0}, ShardIndex{1}}) inbox.push({shard, DrainedEvent{}});
+      for (const ShardIndex shard : {ShardIndex{0}, ShardIndex{1}})
+        inbox.push({shard, DrainedEvent{}});
     }
   };
   ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals}, std::move(listeners));

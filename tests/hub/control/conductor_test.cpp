@@ -57,7 +57,8 @@ TEST_F(ConductorTest, PassesOnWhatHelloSaidOfResume) {
 TEST_F(ConductorTest, PublishesANodeBeforeItsWelcomeCanLeave) {
   bool published_at_attach = false;
   shards.on_send = [&](const ShardCommand& command) {
-    if (std::holds_alternative<AttachCommand>(command)) published_at_attach = nodes.find(1).exists();
+    if (std::holds_alternative<AttachCommand>(command))
+      published_at_attach = nodes.find(1).exists();
   };
   const Node robot = join("robot");
   EXPECT_TRUE(published_at_attach);
@@ -68,7 +69,8 @@ TEST_F(ConductorTest, UnpublishesBeforeItReleases) {
   const Node robot = join("robot");
   bool published_at_release = true;
   shards.on_send = [&](const ShardCommand& command) {
-    if (std::holds_alternative<ReleaseCommand>(command)) published_at_release = nodes.find(1).exists();
+    if (std::holds_alternative<ReleaseCommand>(command))
+      published_at_release = nodes.find(1).exists();
   };
   detach(robot, true, GoodbyeCode::done);
   ASSERT_EQ(shards.all<ReleaseCommand>().size(), 1u);
@@ -199,7 +201,8 @@ TEST_F(ConductorTest, SubscribersHearOfANewGroupBeforeItsProviderMaySend) {
   const Node viewer = join("viewer");
   ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"}));
   shards.sent.clear();
-  const auto group = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom", .message_type = 5});
+  const auto group =
+      ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom", .message_type = 5});
   ASSERT_TRUE(group);
   EXPECT_EQ(group->subscribers, 1u);
   ASSERT_EQ(shards.sent.size(), 2u);  // the event, then the answer
@@ -209,7 +212,8 @@ TEST_F(ConductorTest, SubscribersHearOfANewGroupBeforeItsProviderMaySend) {
   EXPECT_EQ(moved[0].old_group, GroupId{});
   EXPECT_EQ(moved[0].new_group, group->group);
   EXPECT_EQ(moved[0].message_type, 5u);
-  EXPECT_EQ(std::get<SendControlCommand>(shards.sent[0].command).session.generation, viewer.session.generation);
+  EXPECT_EQ(std::get<SendControlCommand>(shards.sent[0].command).session.generation,
+            viewer.session.generation);
 }
 
 TEST_F(ConductorTest, WhoIsAwayIsSentNoEvents) {
@@ -252,7 +256,8 @@ TEST_F(ConductorTest, ThousandsComeAndGoAndNothingStays) {
   for (int i = 0; i < 5'000; ++i) {
     const Node node = join("node-" + std::to_string(i));
     ASSERT_TRUE(ask<ns::AdvertiseAnswer>(node, ns::Advertise{.service = "s"}));
-    ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"node-" + std::to_string(i + 1) + "/s"}));
+    ASSERT_TRUE(
+        ask<ns::SubscribeAnswer>(node, ns::Subscribe{"node-" + std::to_string(i + 1) + "/s"}));
     detach(node, i % 2 == 0, GoodbyeCode::done);
     now += 1ms;
     conductor.tick(now);
@@ -266,7 +271,8 @@ TEST_F(ConductorTest, ThousandsComeAndGoAndNothingStays) {
 
 class RestartedConductorTest : public ::testing::Test, protected TestConductor {
  protected:
-  RestartedConductorTest() : TestConductor(Placement::spread, {{}, {1, IndexPool::kBlock}, {1, IndexPool::kBlock}}) {
+  RestartedConductorTest()
+      : TestConductor(Placement::spread, {{}, {1, IndexPool::kBlock}, {1, IndexPool::kBlock}}) {
     set_log_level(LogLevel::off);
   }
   ~RestartedConductorTest() override { set_log_level(LogLevel::info); }
@@ -305,7 +311,9 @@ TEST_F(RestartedConductorTest, GoesOnWithinItsBlockWhileStateCannotBeKeptAndTrie
 
 class SecondStartTest : public ::testing::Test, protected TestConductor {
  protected:
-  SecondStartTest() : TestConductor(Placement::spread, second_start()) { set_log_level(LogLevel::off); }
+  SecondStartTest() : TestConductor(Placement::spread, second_start()) {
+    set_log_level(LogLevel::off);
+  }
   ~SecondStartTest() override { set_log_level(LogLevel::info); }
   static HubStart second_start() {
     HubStart start{{}, {4'097, IndexPool::kBlock}, {4'097, IndexPool::kBlock}};
@@ -316,15 +324,18 @@ class SecondStartTest : public ::testing::Test, protected TestConductor {
 };
 
 TEST_F(SecondStartTest, NodesThatAreNotBackAreAwayForAGraceTime) {
-  const std::chrono::milliseconds end = facts().started + std::chrono::milliseconds{limits.grace_ms};
-  EXPECT_TRUE(nodes.may_return(4'096) && nodes.may_return(900'000)) << "wherever REASSIGN had put them";
+  const std::chrono::milliseconds end =
+      facts().started + std::chrono::milliseconds{limits.grace_ms};
+  EXPECT_TRUE(nodes.may_return(4'096) && nodes.may_return(900'000))
+      << "wherever REASSIGN had put them";
   EXPECT_FALSE(nodes.may_return(4'000)) << "nobody had it";
   EXPECT_EQ(index_of(join("Z").id), 4'097u);
   EXPECT_EQ(conductor.next_deadline(), end);
   conductor.tick(end - 1ms);
   EXPECT_TRUE(nodes.may_return(4'096));
   conductor.tick(end);
-  for (const std::uint32_t index : {4'096u, 900'000u}) EXPECT_FALSE(nodes.may_return(index)) << index;
+  for (const std::uint32_t index : {4'096u, 900'000u})
+    EXPECT_FALSE(nodes.may_return(index)) << index;
   EXPECT_EQ(conductor.next_deadline(), std::nullopt);
 }
 
@@ -343,10 +354,12 @@ TEST_F(ConductorTest, ClosesWhoAsksTooOftenForWhatIsOfNoUse) {
   limits.oddities_per_s = 10;
   const Node robot = join("robot");
   const auto ask_odd = [&] {
-    EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "**/"}).error().status, proto::Status::bad_request);
+    EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "**/"}).error().status,
+              proto::Status::bad_request);
   };
   const auto nobody = [&] {
-    EXPECT_EQ(ask<ns::ResolveAnswer>(robot, ns::Resolve{"nobody"}).error().status, proto::Status::not_found);
+    EXPECT_EQ(ask<ns::ResolveAnswer>(robot, ns::Resolve{"nobody"}).error().status,
+              proto::Status::not_found);
   };
   for (int i = 0; i < 3; ++i) ask_odd();
   for (int i = 0; i < 100; ++i) nobody();
@@ -369,7 +382,8 @@ TEST_F(ConductorTest, ClosesWhoAsksTooOftenForWhatIsOfNoUse) {
 
 TEST_F(ConductorTest, TheDefaultsLetAThousandOdditiesPassAndNotOneMore) {
   const Node robot = join("robot");
-  for (int i = 0; i < 1'000; ++i) send_frame(robot, proto::Kind::ctrl, proto::encode_refusal({999, 7}, {}));
+  for (int i = 0; i < 1'000; ++i)
+    send_frame(robot, proto::Kind::ctrl, proto::encode_refusal({999, 7}, {}));
   EXPECT_TRUE(shards.all<CloseCommand>().empty());
   send_frame(robot, proto::Kind::ctrl, proto::encode_refusal({999, 7}, {}));
   EXPECT_EQ(shards.all<CloseCommand>().size(), 1u);

@@ -8,7 +8,8 @@
 #include "proto/control/ns.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
-// The order of what the conductor publishes and tells is part of its meaning: who hears of an id may use it at once.
+// The order of what the conductor publishes and tells is part of its meaning: who hears of an id
+// may use it at once.
 
 namespace gimnet::hub {
 namespace {
@@ -25,7 +26,9 @@ class EffectRunnerTest : public ::testing::Test, protected TestConductor {
   template <class Event>
   static std::optional<Event> event_in(const ShardCommand& command) {
     const auto* sent = std::get_if<SendControlCommand>(&command);
-    if (sent == nullptr || proto::split_control(payload_of(*sent))->header.operation != Event::kOperation) return {};
+    if (sent == nullptr ||
+        proto::split_control(payload_of(*sent))->header.operation != Event::kOperation)
+      return {};
     return *proto::decode<Event>(payload_of(*sent));
   }
 };
@@ -47,7 +50,8 @@ TEST_F(EffectRunnerTest, AProviderHearsOfAnIdOnceTheOneWhoGetsItWasToldToComeBac
       EXPECT_TRUE(nodes.find(index_of(viewer.id)).is_renumbered());
       order.emplace_back("renumber");
     }
-    if (const auto joined = event_in<ns::SubscriberJoined>(command); joined && joined->node == wanted) {
+    if (const auto joined = event_in<ns::SubscriberJoined>(command);
+        joined && joined->node == wanted) {
       order.emplace_back("joined");
     }
   };

@@ -36,7 +36,8 @@ TEST_F(GroupEndingsTest, AGroupIsOverWhenEveryOtherShardHasAnswered) {
   EXPECT_FALSE(endings_.contains(5));
 }
 
-// A fence says nothing of what was handed over behind it; and there is never more than one in the mailboxes.
+// A fence says nothing of what was handed over behind it; and there is never more than one in the
+// mailboxes.
 TEST_F(GroupEndingsTest, WhatEndsMeanwhileSharesTheNextFence) {
   endings_.begin(5, kProviders);
   for (const std::uint32_t group : {6u, 7u, 8u}) endings_.begin(group, kProviders);

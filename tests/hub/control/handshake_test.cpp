@@ -27,7 +27,9 @@ Verdict feed(Handshake& handshake, std::span<const std::byte> bytes) {
   return handshake.took(bytes.size());
 }
 
-Verdict feed(Handshake& handshake, std::string_view text) { return feed(handshake, std::as_bytes(std::span{text})); }
+Verdict feed(Handshake& handshake, std::string_view text) {
+  return feed(handshake, std::as_bytes(std::span{text}));
+}
 
 TEST(Handshake, ReadsAHelloInOnePiece) {
   const Limits limits;
@@ -50,7 +52,8 @@ TEST(Handshake, ReadsAHelloByteByByte) {
 TEST(Handshake, TheFirstImpossibleByteEndsIt) {
   const Limits limits;
   const std::vector<std::byte> bytes = opening_and(robot());
-  // The opening, and all of the header but length and lane, can only be what they are; the minor version may differ.
+  // The opening, and all of the header but length and lane, can only be what they are; the minor
+  // version may differ.
   for (std::size_t i = 0; i < proto::kOpeningSize + proto::kHeaderSize; ++i) {
     const std::size_t in_header = i - proto::kOpeningSize;
     if (i == 7 || (i >= 8 && in_header < 4)) continue;
@@ -64,7 +67,8 @@ TEST(Handshake, TheFirstImpossibleByteEndsIt) {
 
 TEST(Handshake, OtherProtocolsAreGarbage) {
   const Limits limits;
-  for (const std::string_view text : {"GET / HTTP/1.1\r\n\r\n", "GET", "\x16\x03\x01", "gimnet", "GIMneT"}) {
+  for (const std::string_view text :
+       {"GET / HTTP/1.1\r\n\r\n", "GET", "\x16\x03\x01", "gimnet", "GIMneT"}) {
     Handshake handshake(limits);
     EXPECT_EQ(feed(handshake, text), Verdict::garbage);
   }
@@ -120,7 +124,8 @@ TEST(Handshake, WhatIsNoHelloIsRefused) {
   const Limits limits;
   for (const std::vector<std::byte>& payload :
        {std::vector<std::byte>{}, std::vector<std::byte>(3), proto::encode(proto::Goodbye{}),
-        std::vector<std::byte>{std::byte{1}, std::byte{0}, std::byte{0}, std::byte{0}, std::byte{0xff}}}) {
+        std::vector<std::byte>{std::byte{1}, std::byte{0}, std::byte{0}, std::byte{0},
+                               std::byte{0xff}}}) {
     std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
     const std::vector<std::byte> frame = link_frame(payload);
     bytes.insert(bytes.end(), frame.begin(), frame.end());
@@ -138,15 +143,16 @@ TEST(Handshake, ReservedLaneBitsAreRefused) {
   EXPECT_EQ(feed(handshake, bytes), Verdict::refused);
 }
 
-/// Every sequence of up to five of the things that a peer may say first: one of them alone is a HELLO.
+/// Every sequence of up to five of the things that a peer may say first: one of them alone is a
+/// HELLO.
 TEST(Handshake, OnlyTheOpeningAndThenHelloComeToAnEnd) {
   using Bytes = std::vector<std::byte>;
   const Bytes hello = link_frame(proto::encode(robot()));
   const Bytes opening(proto::kOpening.begin(), proto::kOpening.end());
   Bytes request = link_frame(proto::encode(proto::Goodbye{}));
   request[12] = static_cast<std::byte>(proto::Kind::ns);
-  const std::vector<Bytes> words{opening, hello, link_frame(proto::encode(proto::Goodbye{})), request,
-                                 link_frame(proto::encode(proto::Welcome{}))};
+  const std::vector<Bytes> words{opening, hello, link_frame(proto::encode(proto::Goodbye{})),
+                                 request, link_frame(proto::encode(proto::Welcome{}))};
   constexpr std::size_t kLength = 5;
   std::size_t sequences = 0;
   for (std::size_t number = 0; number < 5 * 5 * 5 * 5 * 5; ++number) {
@@ -154,7 +160,8 @@ TEST(Handshake, OnlyTheOpeningAndThenHelloComeToAnEnd) {
     Handshake handshake(limits);
     Verdict verdict = Verdict::more;
     std::vector<std::size_t> said;
-    for (std::size_t i = 0, rest = number; i < kLength && verdict == Verdict::more; ++i, rest /= words.size()) {
+    for (std::size_t i = 0, rest = number; i < kLength && verdict == Verdict::more;
+         ++i, rest /= words.size()) {
       said.push_back(rest % words.size());
       verdict = feed(handshake, words[said.back()]);
       ++sequences;

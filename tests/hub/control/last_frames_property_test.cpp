@@ -1,5 +1,5 @@
-// What a provider sent before it ended its service reaches the subscribers on every shard, however late one of them is:
-// the conductor and two shards, in any order of their turns that a seed says.
+// What a provider sent before it ended its service reaches the subscribers on every shard, however
+// late one of them is: the conductor and two shards, in any order of their turns that a seed says.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,8 @@ enum class End { withdraw, rename, goodbye, other_terms };
 
 class World final : private ShardProxy {
  public:
-  explicit World(std::uint32_t seed) : random_(seed), retain_(seed % 2 == 1), stopped_(seed % 3 == 0) {}
+  explicit World(std::uint32_t seed)
+      : random_(seed), retain_(seed % 2 == 1), stopped_(seed % 3 == 0) {}
 
   void begin() {
     for (FakeNode* each : {&near_, &far_}) ask(*each, ns::Subscribe{.name = "robot/odom"});
@@ -144,10 +145,10 @@ class World final : private ShardProxy {
   Limits limits_;
   ShardCounters counters_[2];
   const ShardCounters* readable_[2] = {&counters_[0], &counters_[1]};
-  Conductor conductor_{
-      facts(), Placement::spread, limits_,
-      Conductor::Wiring{
-          .shards = *this, .tables = {rig_.nodes(), rig_.groups(), rig_.quiescence()}, .counters = readable_}};
+  Conductor conductor_{facts(), Placement::spread, limits_,
+                       Conductor::Wiring{.shards = *this,
+                                         .tables = {rig_.nodes(), rig_.groups(), rig_.quiescence()},
+                                         .counters = readable_}};
   std::uint16_t requests_ = 0;
   FakeNode joined_;
   FakeNode& robot_ = join("robot", 0);
@@ -164,7 +165,8 @@ class LastFrames : public ::testing::TestWithParam<End> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Ends, LastFrames,
-                         ::testing::Values(End::withdraw, End::rename, End::goodbye, End::other_terms));
+                         ::testing::Values(End::withdraw, End::rename, End::goodbye,
+                                           End::other_terms));
 
 TEST_P(LastFrames, ReachSubscribersOnEveryShard) {
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
@@ -181,7 +183,8 @@ TEST_P(LastFrames, ReachSubscribersOnEveryShard) {
     EXPECT_EQ(world.rig().groups().find(world.group()), nullptr) << "it ends at last";
     EXPECT_EQ(world.rig().state(0).retained.groups(), 0u);
     if (GetParam() == End::goodbye) continue;
-    world.rig().send(world.robot(), HubRig::group(world.group()), "too late", {.kind = Kind::group});
+    world.rig().send(world.robot(), HubRig::group(world.group()), "too late",
+                     {.kind = Kind::group});
     world.settle();
     EXPECT_EQ(world.rig().dropped(DropReason::no_such_group), 1u);
   }

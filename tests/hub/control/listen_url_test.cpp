@@ -9,8 +9,8 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(ListenUrl, ReadsWhatItWrites) {
-  for (const char* text : {"tcp://127.0.0.1:7450", "tcp://0.0.0.0:0", "tcp://[::1]:65535", "tcp://[::]:1",
-                           "unix:/run/tcphub.sock", "unix:/tmp/a"}) {
+  for (const char* text : {"tcp://127.0.0.1:7450", "tcp://0.0.0.0:0", "tcp://[::1]:65535",
+                           "tcp://[::]:1", "unix:/run/tcphub.sock", "unix:/tmp/a"}) {
     const Result<ListenUrl> url = parse_listen_url(text);
     ASSERT_TRUE(url) << text << ": " << url.error().sentence;
     EXPECT_EQ(url->text(), text);
@@ -34,9 +34,10 @@ TEST(ListenUrl, KnowsWhatOnlyThisMachineReaches) {
 
 TEST(ListenUrl, RefusesTheRestWithASentence) {
   for (const char* text :
-       {"", "7450", "127.0.0.1:7450", "http://127.0.0.1:1", "tcp://127.0.0.1", "tcp://127.0.0.1:", "tcp://127.0.0.1:x",
-        "tcp://127.0.0.1:65536", "tcp://127.0.0.1:-1", "tcp://:1", "tcp://robot.local:1", "tcp://::1:1", "tcp://[::1]",
-        "tcp://[127.0.0.1]:1", "tcp://127.0.0.1:1/x", "unix:", "unix:relative", "unix:/with space"}) {
+       {"", "7450", "127.0.0.1:7450", "http://127.0.0.1:1", "tcp://127.0.0.1",
+        "tcp://127.0.0.1:", "tcp://127.0.0.1:x", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:-1",
+        "tcp://:1", "tcp://robot.local:1", "tcp://::1:1", "tcp://[::1]", "tcp://[127.0.0.1]:1",
+        "tcp://127.0.0.1:1/x", "unix:", "unix:relative", "unix:/with space"}) {
     const Result<ListenUrl> url = parse_listen_url(text);
     ASSERT_FALSE(url) << text;
     EXPECT_THAT(url.error().sentence, HasSubstr("cannot listen on " + std::string{text}));
@@ -45,11 +46,12 @@ TEST(ListenUrl, RefusesTheRestWithASentence) {
 
 TEST(ListenUrl, StrangeBytesAreRefusedAndNotRepeated) {
   using namespace std::string_literals;
-  for (const std::string& text : {"unix:/a\nb"s, "unix:/a\x7f"s, "unix:/a\0"s, "tcp:/\n"s, "tcp://127.0.0.1\0:1"s,
-                                  "tcp://\x1b[2J:1"s, "tcp://[::1\0]:1"s}) {
+  for (const std::string& text : {"unix:/a\nb"s, "unix:/a\x7f"s, "unix:/a\0"s, "tcp:/\n"s,
+                                  "tcp://127.0.0.1\0:1"s, "tcp://\x1b[2J:1"s, "tcp://[::1\0]:1"s}) {
     const Result<ListenUrl> url = parse_listen_url(text);
     ASSERT_FALSE(url) << text;
-    for (const char c : url.error().sentence) EXPECT_TRUE(c >= ' ' && c <= '~') << url.error().sentence;
+    for (const char c : url.error().sentence)
+      EXPECT_TRUE(c >= ' ' && c <= '~') << url.error().sentence;
   }
 }
 

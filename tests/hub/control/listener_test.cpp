@@ -42,9 +42,10 @@ TEST(Listener, ABusyPortIsNamedWithItsOwner) {
   ASSERT_TRUE(first);
   const auto second = Listener::open((*first)->url());
   ASSERT_FALSE(second);
-  EXPECT_THAT(second.error().sentence,
-              AllOf(HasSubstr((*first)->url().text()), HasSubstr("in use by"),
-                    HasSubstr("(process " + std::to_string(::getpid()) + ")"), HasSubstr("another port")));
+  EXPECT_THAT(
+      second.error().sentence,
+      AllOf(HasSubstr((*first)->url().text()), HasSubstr("in use by"),
+            HasSubstr("(process " + std::to_string(::getpid()) + ")"), HasSubstr("another port")));
 }
 
 TEST(Listener, AnAddressThatIsGivenTwiceIsNotBlamedOnAnotherProcess) {
@@ -55,7 +56,8 @@ TEST(Listener, AnAddressThatIsGivenTwiceIsNotBlamedOnAnotherProcess) {
     const ListenUrl again = url(other + ":" + std::to_string(bound.port));
     const auto second = Listener::open(again, others);
     EXPECT_EQ(second ? "" : second.error().sentence,
-              "cannot listen on " + again.text() + ": the address is given twice: this hub listens there already, as " +
+              "cannot listen on " + again.text() +
+                  ": the address is given twice: this hub listens there already, as " +
                   bound.text() + "; leave one of the two out");
   };
   twice("tcp://127.0.0.1", "tcp://127.0.0.1");
@@ -85,8 +87,9 @@ TEST(Listener, ASocketFileThatIsGivenTwiceIsNotBlamedOnAnotherProcess) {
   for (const std::string other : {"s", "/s", "link/s"}) {
     const auto second = Listener::open(url("unix:" + folder.path(other)), others);
     ASSERT_FALSE(second) << other;
-    EXPECT_THAT(second.error().sentence, AllOf(HasSubstr("unix:" + folder.path(other) + ": the address is given twice"),
-                                               HasSubstr("as unix:" + folder.path("s") + ";")));
+    EXPECT_THAT(second.error().sentence,
+                AllOf(HasSubstr("unix:" + folder.path(other) + ": the address is given twice"),
+                      HasSubstr("as unix:" + folder.path("s") + ";")));
   }
   EXPECT_TRUE(Listener::open(url("unix:" + folder.path("t")), others));
 }
@@ -108,11 +111,13 @@ TEST(Listener, APlaceThatThisUserMayNotWriteToIsToldWithTheRemedy) {
   }
   ASSERT_EQ(::chmod(folder.path("").c_str(), 0700), 0);
   ASSERT_FALSE(made);
-  EXPECT_EQ(made.error().sentence, "cannot listen on unix:" + folder.path("s") +
-                                       ": Permission denied; run tcphub as a user that may write to " +
-                                       fs::path(folder.path("s")).parent_path().string() + ", or choose another path");
+  EXPECT_EQ(made.error().sentence,
+            "cannot listen on unix:" + folder.path("s") +
+                ": Permission denied; run tcphub as a user that may write to " +
+                fs::path(folder.path("s")).parent_path().string() + ", or choose another path");
   ASSERT_FALSE(taken);
-  EXPECT_THAT(taken.error().sentence, HasSubstr("end the process that listens on it, remove it if none does"));
+  EXPECT_THAT(taken.error().sentence,
+              HasSubstr("end the process that listens on it, remove it if none does"));
 }
 
 TEST(Listener, APortWithALingeringConnectionCanBeBoundAgain) {
@@ -180,7 +185,8 @@ TEST(Listener, LeavesASocketFileToWhichThisUserMayNotConnect) {
   ASSERT_TRUE(live);
   auto dead = Listener::open(url("unix:" + folder.path("dead-too")));
   ASSERT_TRUE(dead);
-  fs::rename(folder.path("dead-too"), folder.path("dead"));  // a listener that ends leaves it alone there
+  fs::rename(folder.path("dead-too"),
+             folder.path("dead"));  // a listener that ends leaves it alone there
   *dead = nullptr;
   for (const char* name : {"live", "dead"}) {
     ASSERT_EQ(::chmod(folder.path(name).c_str(), root ? 0700 : 0), 0);
@@ -197,7 +203,8 @@ TEST(Listener, LeavesASocketFileToWhichThisUserMayNotConnect) {
     ASSERT_FALSE(taken) << name;
     EXPECT_EQ(taken.error().sentence,
               "cannot listen on unix:" + folder.path(name) +
-                  ": there is a socket to which this user may not connect, as that of another user; end the process "
+                  ": there is a socket to which this user may not connect, as that of another "
+                  "user; end the process "
                   "that listens on it, remove it if none does, or choose another path");
     EXPECT_TRUE(fs::is_socket(folder.path(name)));
   }
@@ -226,7 +233,8 @@ TEST(Listener, AMissingFolderIsNamed) {
   const TestFolder folder;
   const auto listener = Listener::open(url("unix:" + folder.path("none/s")));
   ASSERT_FALSE(listener);
-  EXPECT_THAT(listener.error().sentence, AllOf(HasSubstr(folder.path("none")), HasSubstr("does not exist")));
+  EXPECT_THAT(listener.error().sentence,
+              AllOf(HasSubstr(folder.path("none")), HasSubstr("does not exist")));
 }
 
 }  // namespace

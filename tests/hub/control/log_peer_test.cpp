@@ -26,7 +26,8 @@ TEST(RemoteAddress, IsThatOfAnotherMachine) {
 }
 
 TEST(RemoteAddress, IsNoneForThisMachinesOwn) {
-  for (const char* address : {"127.0.0.1:5000", "127.255.0.9:5000", "[::1]:5000", "[::ffff:127.0.0.1]:5000"}) {
+  for (const char* address :
+       {"127.0.0.1:5000", "127.255.0.9:5000", "[::1]:5000", "[::ffff:127.0.0.1]:5000"}) {
     EXPECT_EQ(remote_address("tcp", address), "") << address;
   }
   EXPECT_EQ(remote_address("unix", "pid 77 uid 1000"), "");

@@ -24,7 +24,8 @@ TEST(PortOwner, IsSilentAboutAPortThatNobodyListensOn) {
 }
 
 TEST(ProcessText, GivesNameAndNumber) {
-  EXPECT_THAT(process_text(::getpid()), ::testing::EndsWith(" (process " + std::to_string(::getpid()) + ")"));
+  EXPECT_THAT(process_text(::getpid()),
+              ::testing::EndsWith(" (process " + std::to_string(::getpid()) + ")"));
   EXPECT_EQ(process_text(0), "process 0");
 }
 

@@ -35,7 +35,8 @@ TEST_F(TablePublisherTest, PublishesWhereANodeLivesAndThatItLeft) {
   Session& robot = join("robot");
   const std::uint32_t index = robot.index;
   publisher_.publish_node(index, membership_);
-  EXPECT_EQ(nodes_.find(index), (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
+  EXPECT_EQ(nodes_.find(index),
+            (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
   membership_.connection_ended(robot, {true, proto::GoodbyeCode::done, ""}, 0ms, effects_);
   publisher_.publish_node(index, membership_);
   EXPECT_FALSE(nodes_.find(index).exists());
@@ -49,7 +50,8 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   publisher_.publish_group(1, membership_);
   ASSERT_NE(groups_.find(1), nullptr);
   EXPECT_EQ(groups_.find(1)->provider, make_id<NodeId>(HubId{7}, robot.index));
-  EXPECT_EQ(groups_.find(1)->provider_place, (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
+  EXPECT_EQ(groups_.find(1)->provider_place,
+            (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
   ASSERT_EQ(groups_.find(1)->by_shard.size(), 2u);
   subscribe(viewer, "robot/odom");
   publisher_.publish_group(1, membership_);
@@ -166,7 +168,8 @@ TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {
   publisher_.publish_group(1, membership_);
   publisher_.collect();
   EXPECT_EQ(publisher_.garbage(), 1u);
-  EXPECT_EQ(seen->provider, make_id<NodeId>(HubId{7}, robot.index));  // still there, as a sanitizer would tell
+  EXPECT_EQ(seen->provider,
+            make_id<NodeId>(HubId{7}, robot.index));  // still there, as a sanitizer would tell
   quiescence_.enter(0);
   publisher_.collect();
   EXPECT_EQ(publisher_.garbage(), 0u);

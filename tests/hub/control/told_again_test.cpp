@@ -9,8 +9,9 @@
 #include "proto/control/ns.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
-// What a node is told at its return of services that moved while it was away, or whose event was lost with its
-// connection: with the command that lets WELCOME out, so that it stands before all that waits for the node.
+// What a node is told at its return of services that moved while it was away, or whose event was
+// lost with its connection: with the command that lets WELCOME out, so that it stands before all
+// that waits for the node.
 
 namespace gimnet::hub {
 namespace {
@@ -44,7 +45,8 @@ class ToldAgainTest : public ::testing::Test {
     while (!frames.empty()) {
       const proto::FrameHeader header = proto::load_header(frames.data());
       EXPECT_EQ(header.dst, viewer_.id.value());
-      const auto event = proto::decode<ns::ServiceMoved>(frames.subspan(proto::kHeaderSize, header.length));
+      const auto event =
+          proto::decode<ns::ServiceMoved>(frames.subspan(proto::kHeaderSize, header.length));
       EXPECT_TRUE(event);
       if (event) events.push_back(*event);
       frames = frames.subspan(header.frame_size());
@@ -53,11 +55,13 @@ class ToldAgainTest : public ::testing::Test {
   }
   std::uint64_t last_move() const {
     std::uint64_t move = 0;
-    for (const auto* command : hub_.shards.all<SendControlCommand>()) move = std::max(move, command->move);
+    for (const auto* command : hub_.shards.all<SendControlCommand>())
+      move = std::max(move, command->move);
     return move;
   }
   void read(std::uint64_t move, std::uint32_t attachment) {
-    hub_.conductor.on_event({viewer_.shard, MovesReadEvent{viewer_.session, attachment, viewer_.id, move}}, hub_.now);
+    hub_.conductor.on_event(
+        {viewer_.shard, MovesReadEvent{viewer_.session, attachment, viewer_.id, move}}, hub_.now);
   }
 
   TestConductor hub_;

@@ -87,7 +87,8 @@ TEST_F(WaitingRoomTest, WhoWaitsNoMoreHasNoPlaceOfItsAddress) {
 }
 
 TEST_F(WaitingRoomTest, ManyOfOneAddressWhoSayHelloAtOnceAllGetIn) {
-  for (int i = 0; i < 300; ++i) enter_from("10.0.0.1").send(opening_and(hello("robot-" + std::to_string(i))));
+  for (int i = 0; i < 300; ++i)
+    enter_from("10.0.0.1").send(opening_and(hello("robot-" + std::to_string(i))));
   serve();
   EXPECT_EQ(admitted_.size(), 300u);
   EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 0u);
@@ -96,7 +97,8 @@ TEST_F(WaitingRoomTest, ManyOfOneAddressWhoSayHelloAtOnceAllGetIn) {
 TEST_F(WaitingRoomTest, ARobotsProgramsWhoseConnectionsAreThereBeforeTheyRunAllGetIn) {
   std::vector<Peer*> programs;
   for (int i = 0; i < 100; ++i) programs.push_back(&enter_from("10.0.0.1"));
-  for (std::size_t i = 0; i < programs.size(); ++i) programs[i]->send(opening_and(hello("p-" + std::to_string(i))));
+  for (std::size_t i = 0; i < programs.size(); ++i)
+    programs[i]->send(opening_and(hello("p-" + std::to_string(i))));
   serve();
   EXPECT_EQ(admitted_.size(), 100u);
   EXPECT_EQ(refusals_.of(GoodbyeCode::hello_timeout), 0u);
@@ -106,7 +108,8 @@ TEST_F(WaitingRoomTest, ThisMachinesOwnConnectionsAreNotCountedByAddress) {
   limits_.handshakes_per_address = 1;
   for (int i = 0; i < 20; ++i) {
     enter();
-    for (const char* address : {"127.0.0.1", "127.9.9.9", "[::1]", "[::ffff:127.0.0.1]"}) enter_from(address);
+    for (const char* address : {"127.0.0.1", "127.9.9.9", "[::1]", "[::ffff:127.0.0.1]"})
+      enter_from(address);
   }
   EXPECT_EQ(room_.waiting(), 100u);
 }

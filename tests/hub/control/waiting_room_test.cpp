@@ -38,7 +38,8 @@ TEST_F(WaitingRoomTest, WhoIsRefusedIsToldWhy) {
   EXPECT_EQ(room_.leaving(), 0u);
 }
 
-// A refusal makes room among those who leave: never by removing one whose own event is in the same batch.
+// A refusal makes room among those who leave: never by removing one whose own event is in the same
+// batch.
 TEST_F(WaitingRoomTest, WhoLeavesAndTalksInTheBatchOfARefusalIsServedOnce) {
   limits_.handshakes = 1;
   Peer& first = enter();
@@ -111,7 +112,8 @@ TEST_F(WaitingRoomTest, WhoIsAdmittedOrLeavesByItselfIsNoRefusal) {
 TEST_F(WaitingRoomTest, CountsWhoEndsInTheMiddleOfOpeningOrHello) {
   const std::vector<std::byte> bytes = opening_and(hello("robot"));
   std::uint64_t ended = 0;
-  for (const std::size_t size : {std::size_t{1}, proto::kOpeningSize, proto::kOpeningSize + 1, bytes.size() - 1}) {
+  for (const std::size_t size :
+       {std::size_t{1}, proto::kOpeningSize, proto::kOpeningSize + 1, bytes.size() - 1}) {
     Peer& peer = enter();
     peer.send(std::span{bytes}.first(size));
     serve();
@@ -195,7 +197,8 @@ TEST_F(WaitingRoomTest, WhoHangsUpIsForgotten) {
   EXPECT_EQ(room_.waiting() + room_.leaving(), 0u);
 }
 
-// Many robots behind one address translator come back at once: none is sent away whose HELLO is there.
+// Many robots behind one address translator come back at once: none is sent away whose HELLO is
+// there.
 TEST_F(WaitingRoomTest, WhoIsSeenOffIsReadUntilItLeavesOrItsTimeIsOver) {
   peers_.push_back(std::make_unique<Peer>(limits_));
   Peer& patient = *peers_.back();

@@ -38,7 +38,8 @@ TEST_F(BufferPoolTest, AReferenceKeepsTheBuffer) {
 }
 
 TEST_F(BufferPoolTest, ChunksAreAtLeastAsLargeAsAskedFor) {
-  for (const std::uint32_t bytes : {1u, 1'024u, 1'025u, 4'096u, 4'097u, 16'384u, 16'385u, 100'000u}) {
+  for (const std::uint32_t bytes :
+       {1u, 1'024u, 1'025u, 4'096u, 4'097u, 16'384u, 16'385u, 100'000u}) {
     const BufferRef chunk = pool.take_chunk(bytes);
     EXPECT_GE(chunk->capacity, bytes);
     EXPECT_EQ(chunk->kind, BufferKind::chunk);
@@ -47,7 +48,8 @@ TEST_F(BufferPoolTest, ChunksAreAtLeastAsLargeAsAskedFor) {
 
 // What the allocator rounds up, the budget would not know of.
 TEST_F(BufferPoolTest, ASharedChunkIsAsMuchMemoryAsTheAllocatorGives) {
-  for (const std::uint32_t bytes : {1u, 256 - kBufferRoom, 1'024 - kBufferRoom, 4'096 - kBufferRoom}) {
+  for (const std::uint32_t bytes :
+       {1u, 256 - kBufferRoom, 1'024 - kBufferRoom, 4'096 - kBufferRoom}) {
     const BufferRef chunk = pool.take_chunk(bytes);
     EXPECT_TRUE(std::has_single_bit(kBufferRoom + chunk->capacity)) << bytes;
   }

@@ -21,7 +21,8 @@ TEST(RingQueue, KeepsOrderAndNumbersWhileItGrows) {
   }
   EXPECT_EQ(queue.first_number(), popped);
   EXPECT_EQ(queue.size(), 1'000 - popped);
-  for (std::uint64_t number = popped; number < 1'000; ++number) EXPECT_EQ(queue.at(number), static_cast<int>(number));
+  for (std::uint64_t number = popped; number < 1'000; ++number)
+    EXPECT_EQ(queue.at(number), static_cast<int>(number));
   EXPECT_EQ(queue.back(), 999);
 }
 

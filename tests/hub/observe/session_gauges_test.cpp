@@ -8,8 +8,8 @@ namespace {
 constexpr std::size_t kSlots = 4;
 
 std::uint64_t total(const SessionCounts& counts) {
-  return counts.queued_bytes + counts.accepted + counts.received_bytes + counts.delivered + counts.sent_bytes +
-         counts.dropped;
+  return counts.queued_bytes + counts.accepted + counts.received_bytes + counts.delivered +
+         counts.sent_bytes + counts.dropped;
 }
 
 TEST(SessionGauges, TellWhatASessionCameTo) {

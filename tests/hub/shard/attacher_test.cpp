@@ -107,7 +107,8 @@ TEST(Attacher, IgnoresWhatAFencedConnectionStillSends) {
 
 std::vector<std::string> numbered(std::size_t count) {
   std::vector<std::string> texts;
-  for (std::size_t i = 0; i < count; ++i) texts.push_back("frame " + std::to_string(i) + std::string(i * 7 % 40, '.'));
+  for (std::size_t i = 0; i < count; ++i)
+    texts.push_back("frame " + std::to_string(i) + std::string(i * 7 % 40, '.'));
   return texts;
 }
 
@@ -205,7 +206,8 @@ TEST(Attacher, BeginsAnewForACountThatCannotBe) {
 }
 
 /// `count` frames that may be let go, 1 KiB each.
-std::uint64_t flood(HubRig& rig, FakeNode& from, const FakeNode& to, std::uint64_t first, std::uint64_t count) {
+std::uint64_t flood(HubRig& rig, FakeNode& from, const FakeNode& to, std::uint64_t first,
+                    std::uint64_t count) {
   for (std::uint64_t i = first; i < first + count; ++i) {
     std::string text = std::to_string(i);
     text.resize(1024 - proto::kHeaderSize, ' ');
@@ -319,7 +321,8 @@ TEST(Attacher, ABrokenTransportIsToldToTheConductor) {
 /// A pipe whose descriptor no poller takes: epoll refuses regular files.
 class UnpollableTransport final : public Transport {
  public:
-  explicit UnpollableTransport(std::unique_ptr<Transport> pipe) : pipe_(std::move(pipe)), file_(std::tmpfile()) {}
+  explicit UnpollableTransport(std::unique_ptr<Transport> pipe)
+      : pipe_(std::move(pipe)), file_(std::tmpfile()) {}
   ~UnpollableTransport() override { std::fclose(file_); }
   UnpollableTransport(const UnpollableTransport&) = delete;
   UnpollableTransport& operator=(const UnpollableTransport&) = delete;

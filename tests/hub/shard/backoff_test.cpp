@@ -42,7 +42,8 @@ TEST(Backoff, ForgivesOneFailureAmongSuccesses) {
   backoff.succeeded();
   EXPECT_THAT(pauses_of_failures(backoff, 8), ElementsAre(0, 0, 1, 3, 7, 15, 31, 63));
   backoff.succeeded();
-  EXPECT_THAT(pauses_of_failures(backoff, 3), ElementsAre(0, 0, 1)) << "a success forgets all failures";
+  EXPECT_THAT(pauses_of_failures(backoff, 3), ElementsAre(0, 0, 1))
+      << "a success forgets all failures";
 }
 
 }  // namespace

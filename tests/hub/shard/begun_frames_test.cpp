@@ -39,7 +39,8 @@ TEST(Reader, WhoBeganAFrameLongestAgoMakesRoomForABegunFrame) {
     rig.write(node, std::span(bytes).first(4000));
     rig.pass_ms(100, false);
     rig.settle();
-    for (std::size_t j = 0; j <= i; ++j) EXPECT_EQ(nodes[j]->goodbye.has_value(), i - j >= 3) << j << " of " << i;
+    for (std::size_t j = 0; j <= i; ++j)
+      EXPECT_EQ(nodes[j]->goodbye.has_value(), i - j >= 3) << j << " of " << i;
   }
 }
 

@@ -52,7 +52,8 @@ TEST(Closer, CountsWhomTheConductorCannotRead) {
 TEST(Closer, CountsWhoEndsInTheMiddleOfAFrame) {
   HubRig rig;
   std::uint64_t ended = 0;
-  for (const std::size_t size : {std::size_t{1}, proto::kHeaderSize - 1, proto::kHeaderSize, std::size_t{4'000}}) {
+  for (const std::size_t size :
+       {std::size_t{1}, proto::kHeaderSize - 1, proto::kHeaderSize, std::size_t{4'000}}) {
     for (const bool reset : {false, true}) {
       FakeNode& a = rig.join(0);
       const auto frame = HubRig::frame(a, a.id.value(), std::string(5'000, 'x'));
@@ -149,7 +150,8 @@ TEST(Closer, TellsSendersWhatAResumeBufferLost) {
     HubRig rig;
     FakeNode& a = rig.join(0);
     FakeNode& b = rig.join(0, {.resume = true});
-    for (int i = 0; i < 3; ++i) rig.send(a, b.id.value(), "written, not confirmed", {.flags = proto::kFlagReport});
+    for (int i = 0; i < 3; ++i)
+      rig.send(a, b.id.value(), "written, not confirmed", {.flags = proto::kFlagReport});
     rig.settle();
     if (comes_back_anew) {
       rig.rejoin(b, {.resume = true, .epoch = 78});  // another life, which took nothing
@@ -165,7 +167,8 @@ TEST(Closer, TellsSendersWhatAResumeBufferLost) {
   }
 }
 
-// What its shard kept for its services is found by the id that it has now, not by the one under which it sent it.
+// What its shard kept for its services is found by the id that it has now, not by the one under
+// which it sent it.
 TEST(Closer, ARenumberedProvidersLastMessagesGoWithIt) {
   HubRig rig;
   FakeNode& provider = rig.join(0, {.resume = true});
@@ -182,7 +185,8 @@ TEST(Closer, ARenumberedProvidersLastMessagesGoWithIt) {
   EXPECT_EQ(rig.state(0).pool.pinned_bytes(), 0u);
 }
 
-// The slot goes to another session; a frame that waited or still comes for the old one is not for it.
+// The slot goes to another session; a frame that waited or still comes for the old one is not for
+// it.
 TEST(Closer, ASlotIsReusedWithoutItsPast) {
   HubRig rig(2);
   FakeNode& a = rig.join(1);
@@ -247,7 +251,8 @@ TEST(Closer, LooksAtNothingBehindAGoodbye) {
     bytes.insert(bytes.end(), frame.begin(), frame.end());
   };
   const auto payload = proto::encode(proto::Goodbye{GoodbyeCode::done, ""});
-  add(HubRig::frame(a, 0, std::string(reinterpret_cast<const char*>(payload.data()), payload.size()),
+  add(HubRig::frame(a, 0,
+                    std::string(reinterpret_cast<const char*>(payload.data()), payload.size()),
                     {.kind = proto::Kind::link}));
   for (int i = 0; i < 1'000; ++i) add(HubRig::frame(a, b.id.value(), "behind"));
   rig.write(a, bytes);

@@ -1,5 +1,6 @@
-// Random operations on two shards, from a seed, against what must hold for any of them: a frame reaches only whom it
-// names, at most once, and in the order sent within its stream and lane; the ledger is exact after every turn.
+// Random operations on two shards, from a seed, against what must hold for any of them: a frame
+// reaches only whom it names, at most once, and in the order sent within its stream and lane; the
+// ledger is exact after every turn.
 
 #include <gtest/gtest.h>
 
@@ -78,7 +79,8 @@ class World {
     EXPECT_EQ(rig_.ledger().queued, 0u);
     std::uint64_t got = 0;
     for (const auto& [node, count] : got_) got += count;
-    // What was handed to the kernel and lost with a connection that broke counts as delivered without resume.
+    // What was handed to the kernel and lost with a connection that broke counts as delivered
+    // without resume.
     EXPECT_GE(rig_.ledger().delivered, got);
   }
 
@@ -172,7 +174,8 @@ class World {
   void cut(std::size_t index) {
     FakeNode& node = *nodes_[index];
     if (!connected(node) || below(4) != 0) return;
-    // The fake node comes back with the count of what it read: bytes that it leaves in the pipe are lost with it.
+    // The fake node comes back with the count of what it read: bytes that it leaves in the pipe are
+    // lost with it.
     node.pipe.reset_after(below(400));
   }
 
@@ -221,8 +224,9 @@ class World {
     } else {
       EXPECT_EQ(named, self) << "delivered to another node than addressed";
     }
-    std::uint64_t& last = last_[{node.id.value(), from, static_cast<std::uint64_t>(frame.header.kind),
-                                 frame.header.flags & 3u, frame.header.lane}];
+    std::uint64_t& last =
+        last_[{node.id.value(), from, static_cast<std::uint64_t>(frame.header.kind),
+               frame.header.flags & 3u, frame.header.lane}];
     EXPECT_GT(sequence, last) << "out of order, or twice";
     last = sequence;
   }

@@ -15,14 +15,16 @@ using testing::FakeNode;
 using testing::HubRig;
 using ::testing::SizeIs;
 
-constexpr std::uint8_t kLatestKeyed = static_cast<std::uint8_t>(proto::Policy::latest) | proto::kFlagKeyed;
+constexpr std::uint8_t kLatestKeyed =
+    static_cast<std::uint8_t>(proto::Policy::latest) | proto::kFlagKeyed;
 
 TEST(Flusher, WritesManyFramesInOneCall) {
   HubRig rig;
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0);
   const std::uint64_t calls = b.pipe.send_calls();
-  for (int i = 0; i < 50; ++i) rig.send(a, b.id.value(), std::to_string(i), {.lane = static_cast<std::uint8_t>(i % 4)});
+  for (int i = 0; i < 50; ++i)
+    rig.send(a, b.id.value(), std::to_string(i), {.lane = static_cast<std::uint8_t>(i % 4)});
   rig.settle();
   EXPECT_THAT(b.frames, SizeIs(50));
   EXPECT_EQ(b.pipe.send_calls() - calls, 1u);
@@ -47,7 +49,8 @@ TEST(Flusher, TheNextOneThatWaitsTakesNoNewMemoryToBeWatched) {
   for (int i = 0; i < 3; ++i) {
     FakeNode& waiting = rig.join(0);
     waiting.pipe.set_room(1'000);
-    for (int message = 0; message < 3; ++message) rig.send(a, waiting.id.value(), std::string(1'000, 'x'));
+    for (int message = 0; message < 3; ++message)
+      rig.send(a, waiting.id.value(), std::string(1'000, 'x'));
     rig.settle_without_reading();
     const std::unique_ptr<Progress>& progress = rig.connection(waiting)->progress;
     ASSERT_TRUE(progress);
@@ -77,7 +80,8 @@ TEST(Flusher, ClosesASlowConsumerAndTellsIt) {
   EXPECT_EQ(rig.dropped(DropReason::link_lost), 20u);
 }
 
-// It keeps alive, and of all that it was sent a part of one frame waits, which is in no lane any more.
+// It keeps alive, and of all that it was sent a part of one frame waits, which is in no lane any
+// more.
 TEST(Flusher, ClosesAConsumerThatTookAPartOfOneFrame) {
   for (const std::uint8_t policy : {std::uint8_t{0}, std::uint8_t{2}}) {
     HubRig rig;
@@ -100,7 +104,8 @@ TEST(Flusher, KeepsAConsumerThatTakesJustEnough) {
     FakeNode& a = rig.join(0);
     FakeNode& slow = rig.join(0);
     slow.pipe.set_room(1'000);
-    for (int i = 0; i < 50; ++i) rig.send(a, slow.id.value(), std::string(1'000, 'x'), {.flags = 2});
+    for (int i = 0; i < 50; ++i)
+      rig.send(a, slow.id.value(), std::string(1'000, 'x'), {.flags = 2});
     for (int second = 0; second < 25; ++second) {
       slow.read(bytes_per_s);
       rig.pass_ms(1'000);
@@ -195,7 +200,8 @@ TEST(Flusher, ByteByByteIsProgressForBlock) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
 }
 
-/// A node that asked for what it did not confirm to be kept, of which there is room for four messages.
+/// A node that asked for what it did not confirm to be kept, of which there is room for four
+/// messages.
 class FlusherOfAResumer : public ::testing::Test {
  protected:
   static Limits small() {
@@ -212,7 +218,8 @@ class FlusherOfAResumer : public ::testing::Test {
   FakeNode& b = rig.join(0, {.resume = true});
 };
 
-// A node that reads, says PING and never confirms what it asked to be kept: nothing waits for it for ever.
+// A node that reads, says PING and never confirms what it asked to be kept: nothing waits for it
+// for ever.
 TEST_F(FlusherOfAResumer, TimesOutANodeThatNeverConfirms) {
   send(20);
   rig.settle();
@@ -241,7 +248,8 @@ TEST_F(FlusherOfAResumer, AConfirmIsProgressThoughItMakesNoRoomYet) {
   send(4);
   rig.send(a, b.id.value(), std::string(4'000, 'y'));
   rig.settle();
-  ASSERT_THAT(b.frames, SizeIs(4)) << "the last one has no room in the resume buffer before all are confirmed";
+  ASSERT_THAT(b.frames, SizeIs(4))
+      << "the last one has no room in the resume buffer before all are confirmed";
   for (std::uint64_t confirmed = 1; confirmed <= 3; ++confirmed) {
     rig.pass_ms(3'000);
     rig.send_flow(b, proto::flow::Confirm{confirmed});

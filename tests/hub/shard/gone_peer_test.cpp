@@ -17,8 +17,8 @@
 #include "tests/hub/shard/support/hub_rig.hpp"
 #include "tests/hub/transport/support/connected_sockets.hpp"
 
-// A peer that is gone, behind a real socket: what it had sent is with the kernel, writing to it fails, and the kernel
-// tells of its end whether it is asked or not. Time is the rig's.
+// A peer that is gone, behind a real socket: what it had sent is with the kernel, writing to it
+// fails, and the kernel tells of its end whether it is asked or not. Time is the rig's.
 
 namespace gimnet::hub {
 namespace {
@@ -121,7 +121,8 @@ class GonePeer : public ::testing::TestWithParam<Family> {
     ASSERT_EQ(rig_.sum(&ShardCounters::held_reads), 1u);
     for (int i = 0; i < 16; ++i) send(to);
   }
-  /// The same, so that it is read no more in the middle of a frame; what it sends last is half a frame, too.
+  /// The same, so that it is read no more in the middle of a frame; what it sends last is half a
+  /// frame, too.
   void fill_in_the_middle(FakeNode& to) {
     std::vector<std::byte> bytes =
         HubRig::frame(sender_, to.id.value(), std::string(kFrameBytes - proto::kHeaderSize, 'x'));
@@ -319,7 +320,8 @@ TEST_P(GonePeer, BrokeNoFrameWhereItsTimeIsOverInTheMiddleOfOne) {
   EXPECT_EQ(rig_.sum(&ShardCounters::unfinished_frames), 0u);
 }
 
-/// Only a Unix socket tells that its far end takes nothing any more and goes on sending: TCP has no word for it.
+/// Only a Unix socket tells that its far end takes nothing any more and goes on sending: TCP has no
+/// word for it.
 class GoneUnixPeer : public GonePeer {};
 INSTANTIATE_TEST_SUITE_P(Unix, GoneUnixPeer, ::testing::Values(Family::unix_socket));
 

@@ -1,5 +1,6 @@
-// Large messages of several senders to one slow receiver, in one lane, from a seed: each stream arrives whole and in
-// order, and what is sent while a message is under way goes before the rest of it.
+// Large messages of several senders to one slow receiver, in one lane, from a seed: each stream
+// arrives whole and in order, and what is sent while a message is under way goes before the rest of
+// it.
 
 #include <gtest/gtest.h>
 
@@ -50,7 +51,8 @@ using MessageId = std::pair<std::uint32_t, std::uint32_t>;  // sender, number
 
 class World {
  public:
-  World(std::uint32_t seed, bool small_queues) : random_(seed), rig_(2, limits(small_queues)), roomy_(!small_queues) {
+  World(std::uint32_t seed, bool small_queues)
+      : random_(seed), rig_(2, limits(small_queues)), roomy_(!small_queues) {
     receiver_ = &rig_.join(0);
     receiver_->pipe.set_room(2'000);
     const std::size_t senders = 2 + below(4);
@@ -70,7 +72,8 @@ class World {
     rig_.settle();
     take_frames();
     EXPECT_EQ(rig_.ledger().dropped, 0u);
-    for (const Stream& stream : streams_) EXPECT_TRUE(stream.under_way.empty()) << stream.under_way.size();
+    for (const Stream& stream : streams_)
+      EXPECT_TRUE(stream.under_way.empty()) << stream.under_way.size();
     if (roomy_) {
       EXPECT_GT(arrived_before_, 0) << "nothing small ever waited behind something large";
     }
@@ -109,14 +112,16 @@ class World {
     std::uint32_t size = static_cast<std::uint32_t>(8 + below(8'000));
     if (stream.total - stream.offset < size + 8) size = std::max(stream.total - stream.offset, 8u);
     stream.total = std::max(stream.total, stream.offset + size);
-    send(stream, fragment_of({stream.message, stream.offset, stream.total}, payload_of(ticket, size)),
+    send(stream,
+         fragment_of({stream.message, stream.offset, stream.total}, payload_of(ticket, size)),
          proto::kFlagFragment);
     stream.offset += size;
     if (stream.offset == stream.total) stream.total = 0;
   }
 
   void send(Stream& stream, const std::string& body, std::uint8_t flags) {
-    rig_.send(*stream.from, receiver_->id.value(), body, {.kind = stream.kind, .flags = flags, .lane = kLane});
+    rig_.send(*stream.from, receiver_->id.value(), body,
+              {.kind = stream.kind, .flags = flags, .lane = kLane});
   }
 
   void read(std::size_t bytes) {
@@ -133,26 +138,30 @@ class World {
   void check(const GotFrame& frame) {
     const bool fragment = frame.header.has(proto::kFlagFragment);
     std::uint64_t ticket = 0;
-    std::memcpy(&ticket, frame.body.data() + (fragment ? proto::kFragmentHeaderSize : 0), sizeof ticket);
+    std::memcpy(&ticket, frame.body.data() + (fragment ? proto::kFragmentHeaderSize : 0),
+                sizeof ticket);
     Stream& stream = stream_of(frame);
     ASSERT_FALSE(stream.under_way.empty());
     EXPECT_EQ(stream.under_way.front(), ticket) << "out of order, twice, or with a gap";
     stream.under_way.pop_front();
     waiting_.erase(ticket);
     if (!fragment) return;
-    const MessageId message{frame.header.src, proto::load_fragment_header(frame.body.data()).message};
+    const MessageId message{frame.header.src,
+                            proto::load_fragment_header(frame.body.data()).message};
     begun_.insert(message);
     for (const auto& [waiting, begun_before] : waiting_) {
       if (waiting > ticket || !begun_before.contains(message)) continue;
       ++passed_wrongly_;
-      EXPECT_EQ(passed_wrongly_, 0) << "frame " << ticket << " of a message under way went before frame " << waiting;
+      EXPECT_EQ(passed_wrongly_, 0)
+          << "frame " << ticket << " of a message under way went before frame " << waiting;
     }
     arrived_before_ += waiting_.empty() ? 0 : 1;
   }
 
   Stream& stream_of(const GotFrame& frame) {
     for (Stream& stream : streams_) {
-      if (stream.from->id.value() == frame.header.src && stream.kind == frame.header.kind) return stream;
+      if (stream.from->id.value() == frame.header.src && stream.kind == frame.header.kind)
+        return stream;
     }
     ADD_FAILURE() << "from nobody";
     return streams_.front();
@@ -164,8 +173,9 @@ class World {
   FakeNode* receiver_ = nullptr;
   std::vector<Stream> streams_;
   std::uint64_t ticket_ = 0;
-  std::set<MessageId> begun_;                             ///< of which a fragment arrived
-  std::map<std::uint64_t, std::set<MessageId>> waiting_;  ///< small frames, and what was begun when they were sent
+  std::set<MessageId> begun_;  ///< of which a fragment arrived
+  std::map<std::uint64_t, std::set<MessageId>>
+      waiting_;  ///< small frames, and what was begun when they were sent
   int arrived_before_ = 0;
   int passed_wrongly_ = 0;
 };
@@ -217,8 +227,8 @@ TEST(LargeMessage, ASmallFrameWaitsForNoMoreThanTheQueueHolds) {
       }
       reader.frames.clear();
     }
-    EXPECT_LE(before,
-              limits.lane1_bytes + limits.reserve_bytes + 2 * limits.turn_bytes + kRoom + limits.mailbox_bytes * shard);
+    EXPECT_LE(before, limits.lane1_bytes + limits.reserve_bytes + 2 * limits.turn_bytes + kRoom +
+                          limits.mailbox_bytes * shard);
     EXPECT_TRUE(came);
     EXPECT_EQ(rig.ledger().dropped, 0u);
   }

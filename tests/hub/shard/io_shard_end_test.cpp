@@ -29,7 +29,9 @@ TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
   }
   rig.send(a, b.id.value(), "in the mailbox");
   rig.turn_shard(0);
-  const auto pinned = [&] { return rig.state(0).pool.pinned_bytes() + rig.state(1).pool.pinned_bytes(); };
+  const auto pinned = [&] {
+    return rig.state(0).pool.pinned_bytes() + rig.state(1).pool.pinned_bytes();
+  };
   ASSERT_GT(pinned(), 0u);
   ASSERT_GT(rig.ledger().queued, 0u);
   rig.let_go();
@@ -40,7 +42,8 @@ TEST(IoShard, EndsWithMailUnderWayAndWithFramesOfAnotherShardWaiting) {
   }
 }
 
-// What a turn knows of a run keeps that run's buffer, here another shard's, only until the turn is over.
+// What a turn knows of a run keeps that run's buffer, here another shard's, only until the turn is
+// over.
 TEST(IoShard, KeepsNoBufferForTheNextTurnThatNobodyWaitsFor) {
   Limits limits;
   limits.lane1_bytes = 4'000;

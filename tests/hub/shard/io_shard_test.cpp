@@ -53,7 +53,8 @@ TEST(IoShard, BroadcastReachesEverybodyButItsSender) {
   rig.send(a, 0xFFFFFFFF, "every hub", {.kind = Kind::broadcast});
   rig.send(a, 8u << 20 | kEveryIndex, "another hub", {.kind = Kind::broadcast});
   rig.settle();
-  for (const FakeNode* node : {&b, &c, &d}) EXPECT_THAT(node->texts(), ElementsAre("own hub", "every hub"));
+  for (const FakeNode* node : {&b, &c, &d})
+    EXPECT_THAT(node->texts(), ElementsAre("own hub", "every hub"));
   EXPECT_THAT(a.frames, IsEmpty());
   EXPECT_EQ(rig.ledger().delivered, 6u);
   EXPECT_EQ(rig.dropped(DropReason::no_route), 1u);
@@ -82,7 +83,8 @@ TEST(IoShard, GroupReachesSubscribersOnAllShards) {
   rig.send(other, HubRig::group(5), "not the provider", {.kind = Kind::group});
   rig.send(provider, HubRig::group(6), "no such group", {.kind = Kind::group});
   rig.settle();
-  for (const FakeNode* member : members) EXPECT_THAT(member->texts(), ElementsAre("small", std::string(5'000, 'L')));
+  for (const FakeNode* member : members)
+    EXPECT_THAT(member->texts(), ElementsAre("small", std::string(5'000, 'L')));
   EXPECT_THAT(other.frames, IsEmpty());
   EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
   EXPECT_EQ(rig.dropped(DropReason::no_such_group), 1u);
@@ -118,7 +120,8 @@ TEST(IoShard, ListReachesEachOfItsNodesOnceAndWithoutTheIds) {
   FakeNode& c = rig.join(1);
   FakeNode& d = rig.join(1);
   const std::uint32_t nobody = 7u << 20 | 900;
-  rig.send(a, 4, list_payload({b.id.value(), c.id.value(), d.id.value(), nobody}, "to three"), {.kind = Kind::list});
+  rig.send(a, 4, list_payload({b.id.value(), c.id.value(), d.id.value(), nobody}, "to three"),
+           {.kind = Kind::list});
   rig.send(a, 1, list_payload({c.id.value()}, "to one far away"), {.kind = Kind::list});
   rig.send(a, 1, list_payload({b.id.value()}, ""), {.kind = Kind::list});
   rig.settle();
@@ -179,7 +182,8 @@ TEST(IoShard, SmallFramesBesideALargeOneArrive) {
   EXPECT_EQ(rig.dropped(DropReason::too_large), 1u);
 }
 
-// The receiving shard is busy with 256 other commands: the session's frames come after its AttachCommand all the same.
+// The receiving shard is busy with 256 other commands: the session's frames come after its
+// AttachCommand all the same.
 TEST(IoShard, FramesFromAnotherShardFindASessionWhoseAttachWaits) {
   HubRig rig(2);
   FakeNode& a = rig.join(0);
@@ -199,7 +203,8 @@ TEST(IoShard, FramesFromAnotherShardFindASessionWhoseAttachWaits) {
   EXPECT_EQ(rig.ledger().delivered, 1u);
 }
 
-// Small frames that alternate between shards fill the mailbox by entries; those with BLOCK are never dropped for it.
+// Small frames that alternate between shards fill the mailbox by entries; those with BLOCK are
+// never dropped for it.
 TEST(IoShard, ABurstThatFillsTheMailboxLosesNothingSentWithBlock) {
   Limits limits;
   limits.mailbox_entries = 64;
@@ -265,8 +270,9 @@ TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
   EXPECT_TRUE(rig.ledger().exact());
 }
 
-// The conductor publishes the group, then sends the pace: a shard may see the one in the middle of a turn, without the
-// other. Nothing is lost when one that gets everything wants a rate, and none comes late when it does not any more.
+// The conductor publishes the group, then sends the pace: a shard may see the one in the middle of
+// a turn, without the other. Nothing is lost when one that gets everything wants a rate, and none
+// comes late when it does not any more.
 TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
   HubRig rig(2);
   FakeNode& provider = rig.join(0);
@@ -281,7 +287,8 @@ TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
   const auto say_part = [&](std::uint32_t offset, const std::string& part) {
     std::string fragment(proto::kFragmentHeaderSize, '\0');
     proto::store_fragment_header(reinterpret_cast<std::byte*>(fragment.data()), {1, offset, 4});
-    rig.send(provider, HubRig::group(5), fragment + part, {.kind = Kind::group, .flags = proto::kFlagFragment});
+    rig.send(provider, HubRig::group(5), fragment + part,
+             {.kind = Kind::group, .flags = proto::kFlagFragment});
     rig.settle();
   };
   rig.publish_paced_group(5, provider.id, {&viewer}, false, true);
@@ -297,7 +304,8 @@ TEST(IoShard, ASubscriberThatChangesItsTermsMissesNothingInBetween) {
   rig.now_ms += 1'000;
   rig.pace(viewer, 5, {});
   say("behind them");
-  EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced", "held 1", "held 2", "held 3", "behind them"));
+  EXPECT_THAT(viewer.texts(), ElementsAre("plain", "published", "paced", "held 1", "held 2",
+                                          "held 3", "behind them"));
   EXPECT_EQ(rig.ledger().dropped, 0u);
   // Who has only just subscribed gets nothing before its shard knows how much.
   FakeNode& other = rig.join(1);
@@ -343,8 +351,8 @@ TEST(IoShard, EveryIdThatANodeHadCountsAsItsOwnUpToTheLimit) {
     rig.rejoin(b, {.resume = true});
     return b.welcome && b.welcome->resumed;
   };
-  // What it would send again under the first of one id too many is given up, instead of refused at each return. From
-  // then on it has as many again.
+  // What it would send again under the first of one id too many is given up, instead of refused at
+  // each return. From then on it has as many again.
   for (int round = 0; round < 3; ++round) {
     std::vector<std::uint32_t> former;
     for (std::size_t i = 0; i < kFormerNodesMax; ++i) {

@@ -228,7 +228,8 @@ TEST(Keeper, DrainsAnEmptyShard) {
   EXPECT_TRUE(drained(rig));
 }
 
-// The command comes to each shard in its own time: what another one has taken until then is still written.
+// The command comes to each shard in its own time: what another one has taken until then is still
+// written.
 TEST(Keeper, ClosesNobodyBeforeAllShardsDrain) {
   HubRig rig(2);
   FakeNode& a = rig.join(1);
@@ -262,7 +263,8 @@ TEST(Keeper, IsNotDrainedBeforeAllShardsDrain) {
   rig.command(1, DrainCommand{10'000});
   rig.settle();
   std::size_t told = 0;
-  for (const ShardEvent& event : rig.take_events()) told += std::holds_alternative<DrainedEvent>(event.what) ? 1 : 0;
+  for (const ShardEvent& event : rig.take_events())
+    told += std::holds_alternative<DrainedEvent>(event.what) ? 1 : 0;
   EXPECT_EQ(told, 3u);
 }
 
@@ -286,7 +288,8 @@ TEST(Keeper, DrainsANodeThatHasToConfirm) {
   EXPECT_EQ(rig.dropped(DropReason::link_lost), 0u);
 }
 
-// Such a node is read for its CONFIRM while others are closed already: what it sends meanwhile stays its own.
+// Such a node is read for its CONFIRM while others are closed already: what it sends meanwhile
+// stays its own.
 TEST(Keeper, TakesNoDataOfANodeThatHasToConfirmAtTheEnd) {
   for (const std::size_t shard : {0u, 1u}) {
     Limits limits;
@@ -302,13 +305,15 @@ TEST(Keeper, TakesNoDataOfANodeThatHasToConfirmAtTheEnd) {
     for (const std::size_t each : {0u, 1u}) rig.command(each, DrainCommand{60'000});
     rig.turn();
     const std::uint64_t accepted = rig.ledger().accepted;
-    for (const char* text : {"behind", "the last word"}) rig.send(confirmer, receiver.id.value(), text);
+    for (const char* text : {"behind", "the last word"})
+      rig.send(confirmer, receiver.id.value(), text);
     rig.send_flow(confirmer, proto::flow::Skip{DropReason::replaced, 3});
     rig.send_flow(confirmer, proto::flow::Ping{});
     rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
     for (int i = 0; i < 10 && !confirmer.pipe.transport_gone(); ++i) {
       rig.settle();
-      if (!confirmer.pipe.transport_gone()) rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
+      if (!confirmer.pipe.transport_gone())
+        rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
     }
     EXPECT_THAT(confirmer.frames, SizeIs(6)) << "its CONFIRMs were read";
     EXPECT_TRUE(confirmer.goodbye);

@@ -1,7 +1,7 @@
-// Random operations on a paced group of a provider and its subscribers on two shards, from a seed, against a model of
-// what each subscriber counted: it has never more messages uncredited than its window, gets them in order and once, not
-// more often than its rate, a retained one first; and when everything is credited, every window is whole again,
-// whatever was lost on the way.
+// Random operations on a paced group of a provider and its subscribers on two shards, from a seed,
+// against a model of what each subscriber counted: it has never more messages uncredited than its
+// window, gets them in order and once, not more often than its rate, a retained one first; and when
+// everything is credited, every window is whole again, whatever was lost on the way.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,10 @@ constexpr std::uint32_t kPieceBytes = 700;
 class World {
  public:
   explicit World(std::uint32_t seed)
-      : random_(seed), rig_(2, limits(seed)), retain_(seed % 2 == 1), lanes_(seed % 4 == 0 ? 2 : 1) {
+      : random_(seed),
+        rig_(2, limits(seed)),
+        retain_(seed % 2 == 1),
+        lanes_(seed % 4 == 0 ? 2 : 1) {
     provider_ = &rig_.join(0, {.resume = true});
     for (std::size_t i = 0; i < kSubscribers; ++i) {
       CountingSubscriber& each = subscribers_[i];
@@ -60,7 +63,8 @@ class World {
         return come_back(one);
       case 5:
       case 6:
-        return credit(one, below(3) == 0 ? one.ended : one.credited + below(1 + one.ended - one.credited));
+        return credit(
+            one, below(3) == 0 ? one.ended : one.credited + below(1 + one.ended - one.credited));
       case 7:
         return rig_.pass_ms(below(150));
       case 8:
@@ -81,7 +85,8 @@ class World {
     }
   }
 
-  /// Everybody is there and credits what it got: each has its whole window, and gets the newest message.
+  /// Everybody is there and credits what it got: each has its whole window, and gets the newest
+  /// message.
   void finish() {
     while (!pieces_.empty()) write_piece();
     for (CountingSubscriber& each : subscribers_) {
@@ -94,13 +99,15 @@ class World {
     settle();
     const std::uint64_t newest = publish_whole();
     settle();
-    for (CountingSubscriber& each : subscribers_) EXPECT_EQ(each.last[1], newest) << "window " << each.terms.window;
+    for (CountingSubscriber& each : subscribers_)
+      EXPECT_EQ(each.last[1], newest) << "window " << each.terms.window;
     for (CountingSubscriber& each : subscribers_) {
       if (each.terms.interval_us != 0 || each.terms.window == 0) continue;
       const std::uint64_t before = each.ended;
       for (std::uint32_t i = 0; i < each.terms.window + 1; ++i) publish_whole();
       settle_without_credit();
-      EXPECT_EQ(each.ended - before, each.terms.window) << "a window leaked, or lets through too many";
+      EXPECT_EQ(each.ended - before, each.terms.window)
+          << "a window leaked, or lets through too many";
       settle();
     }
     EXPECT_EQ(rig_.ledger().queued, 0u);
@@ -172,7 +179,8 @@ class World {
     each.known = true;
     publish_members();
     rig_.pace(*each.node, group_, each.terms, retain_);
-    // What its own shard has not handed over yet may come before the last message that this shard routed.
+    // What its own shard has not handed over yet may come before the last message that this shard
+    // routed.
     if (begins) each.repeats_up_to = sequence_;
     if (begins && retain_ && std::exchange(each.fresh, false)) each.first_at_least = last_routed_;
     if (!each.resume && begins) rig_.turn_shard(each.node->shard.value());
@@ -183,7 +191,8 @@ class World {
     each.subscribed = false;
     each.first_at_least = 0;
     publish_members();
-    rig_.command(each.node->shard.value(), EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}, false});
+    rig_.command(each.node->shard.value(),
+                 EndPaceCommand{each.node->session, GroupId{HubRig::group(group_)}, false});
   }
 
   // ---- the provider
@@ -195,7 +204,8 @@ class World {
 
   /// Fills the subscribers' queues, where the oldest goes.
   void make_noise() {
-    const FrameSpec spec{.kind = Kind::broadcast, .lane = static_cast<std::uint8_t>(1 + below(lanes_))};
+    const FrameSpec spec{.kind = Kind::broadcast,
+                         .lane = static_cast<std::uint8_t>(1 + below(lanes_))};
     rig_.send(*noise_, 0xFFFFFFFF, std::string(below(6'000), 'n'), spec);
     ++noise_frames_;
   }
@@ -203,7 +213,8 @@ class World {
   void publish() {
     if (!connected(*provider_)) return;
     if (pieces_.empty())
-      cut_message(below(4) == 0 ? below(6'000) : below(60), static_cast<std::uint8_t>(1 + below(lanes_)));
+      cut_message(below(4) == 0 ? below(6'000) : below(60),
+                  static_cast<std::uint8_t>(1 + below(lanes_)));
     write_piece();
   }
 
@@ -243,7 +254,8 @@ class World {
     pieces_.pop_front();
     rig_.turn_shard(0);
     // A shard that waits for room in the mailbox of the other one does not read the provider.
-    for (; !ends_.empty() && ends_.front().first + noise_frames_ <= rig_.ledger().accepted; ends_.pop_front()) {
+    for (; !ends_.empty() && ends_.front().first + noise_frames_ <= rig_.ledger().accepted;
+         ends_.pop_front()) {
       last_routed_ = ends_.front().second;
     }
   }
@@ -282,7 +294,8 @@ class World {
     take_frames(each);
     // What was said on the broken connection may be lost.
     credit(each, each.credited);
-    if (each.resume && connected(node)) rig_.send_flow(node, proto::flow::Confirm{node.data_frames});
+    if (each.resume && connected(node))
+      rig_.send_flow(node, proto::flow::Confirm{node.data_frames});
   }
 
   void credit(CountingSubscriber& each, std::uint64_t total) {
@@ -349,8 +362,9 @@ class World {
   std::uint32_t group_ = 0;
   std::uint64_t sequence_ = 0;
   std::uint64_t last_routed_ = 0;
-  std::uint64_t written_ = 0;                                 ///< frames of the provider
-  std::deque<std::pair<std::uint64_t, std::uint64_t>> ends_;  ///< of them, those that end a message, with its sequence
+  std::uint64_t written_ = 0;  ///< frames of the provider
+  std::deque<std::pair<std::uint64_t, std::uint64_t>>
+      ends_;  ///< of them, those that end a message, with its sequence
 };
 
 class Pace : public ::testing::TestWithParam<std::uint32_t> {};

@@ -72,7 +72,8 @@ TEST(Reader, CarriesTheLargestFrameAndRefusesOneByteMore) {
 }
 
 TEST(Reader, ClosesForALengthThatClaimsFourGiB) {
-  for (const std::uint32_t length : {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
+  for (const std::uint32_t length :
+       {65'537u, 0x7FFF'FFFFu, 0x8000'0000u, 0xFFFF'FFF0u, 0xFFFF'FFFFu}) {
     HubRig rig;
     FakeNode& a = rig.join(0);
     FakeNode& b = rig.join(0);
@@ -151,7 +152,10 @@ TEST(Reader, AnswersEachMalformedFrameWithGoodbye) {
       {"fragment that wraps", {.flags = 8}, 1, fragment(0xFFFFFFFF, 10, "abc")},
       {"FLOW of unknown operation", {.kind = Kind::flow}, 0, std::string(24, '\x63')},
       {"FLOW too short", {.kind = Kind::flow}, 0, "\x01"},
-      {"FLOW for somebody else", {.kind = Kind::flow}, 1, std::string("\x01\0\0\0", 4) + std::string(12, '\0')},
+      {"FLOW for somebody else",
+       {.kind = Kind::flow},
+       1,
+       std::string("\x01\0\0\0", 4) + std::string(12, '\0')},
       {"LINK for somebody else", {.kind = Kind::link}, 1, "junk"},
       {"LINK that is no GOODBYE", {.kind = Kind::link}, 0, "junk"},
   };
@@ -217,8 +221,10 @@ TEST(Reader, TellsTheConductorOfAGoodbye) {
   FakeNode& a = rig.join(0);
   rig.write(a, HubRig::frame(a, 0,
                              [] {
-                               const auto payload = proto::encode(proto::Goodbye{GoodbyeCode::done, "bye"});
-                               return std::string(reinterpret_cast<const char*>(payload.data()), payload.size());
+                               const auto payload =
+                                   proto::encode(proto::Goodbye{GoodbyeCode::done, "bye"});
+                               return std::string(reinterpret_cast<const char*>(payload.data()),
+                                                  payload.size());
                              }(),
                              {.kind = Kind::link, .src = 0}));
   rig.settle();
@@ -289,7 +295,8 @@ TEST(Reader, FillsInTraceAndCarriesWhatItDoesNotKnow) {
   FakeNode& b = rig.join(0);
   std::byte memory[128];
   proto::ExtensionWriter writer(memory);
-  ASSERT_TRUE(writer.add(static_cast<proto::ExtensionType>(200), std::as_bytes(std::span("unknown", 7))));
+  ASSERT_TRUE(
+      writer.add(static_cast<proto::ExtensionType>(200), std::as_bytes(std::span("unknown", 7))));
   ASSERT_TRUE(writer.add_trace(2));
   proto::FrameParts parts;
   parts.header.dst = b.id.value();
@@ -314,9 +321,11 @@ TEST(Reader, FillsInTraceAndCarriesWhatItDoesNotKnow) {
   EXPECT_EQ(static_cast<char>(frame->extensions[2]), 'u');
 }
 
-std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t total, std::size_t size) {
+std::string fragment(std::uint32_t message, std::uint32_t offset, std::uint32_t total,
+                     std::size_t size) {
   std::string bytes(proto::kFragmentHeaderSize + size, 'x');
-  proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()), {message, offset, total});
+  proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()),
+                               {message, offset, total});
   return bytes;
 }
 

@@ -87,7 +87,9 @@ TEST_F(ReadyGuessTest, WrongGuessesBecomeRare) {
 
 TEST_F(ReadyGuessTest, NobodyIsPreferredBeforeAnother) { EXPECT_FALSE(ever_guesses(kTwo, kSmall)); }
 
-TEST_F(ReadyGuessTest, NothingIsGuessedAfterAWaitInWhichNobodyWasReady) { EXPECT_FALSE(ever_guesses({}, 0)); }
+TEST_F(ReadyGuessTest, NothingIsGuessedAfterAWaitInWhichNobodyWasReady) {
+  EXPECT_FALSE(ever_guesses({}, 0));
+}
 
 TEST_F(ReadyGuessTest, LargeReadsAreWorthAWait) {
   EXPECT_FALSE(ever_guesses(kOne, ReadyGuess::kReceivedMax + 1));

@@ -7,8 +7,9 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What goes to and from a service while its provider is given another id: the conductor publishes the new id, that the
-// former one is nobody's, and the group, and in between commands the provider's shard. Turns come between any two.
+// What goes to and from a service while its provider is given another id: the conductor publishes
+// the new id, that the former one is nobody's, and the group, and in between commands the
+// provider's shard. Turns come between any two.
 
 namespace gimnet::hub {
 namespace {
@@ -25,9 +26,12 @@ using testing::JoinSpec;
 
 constexpr JoinSpec kResume{.resume = true};
 
-NodePlace place_of(const FakeNode& node) { return {node.shard, node.session.slot, node.session.generation}; }
+NodePlace place_of(const FakeNode& node) {
+  return {node.shard, node.session.slot, node.session.generation};
+}
 
-// The tables say so first, then its shard hears of it; frames under the former id are on their way all the time.
+// The tables say so first, then its shard hears of it; frames under the former id are on their way
+// all the time.
 TEST(RenumberedProvider, AllItsFramesAreDelivered) {
   constexpr FrameSpec kGroup{.kind = Kind::group};
   HubRig rig(2);
@@ -60,7 +64,8 @@ TEST(RenumberedProvider, AllItsFramesAreDelivered) {
   EXPECT_EQ(rig.dropped(DropReason::not_allowed), 1u);
 }
 
-/// A service that accepts data, whose provider is given the id 400 step by step, and who sends to it after each.
+/// A service that accepts data, whose provider is given the id 400 step by step, and who sends to
+/// it after each.
 class RenumberedReceiver {
  public:
   explicit RenumberedReceiver(Policy policy)
@@ -72,7 +77,8 @@ class RenumberedReceiver {
   void step(const std::string& name, const std::function<void()>& happens) {
     happens();
     said.push_back(name);
-    for (FakeNode* sender : {&near, &far}) rig.send(*sender, HubRig::group(5), said.back(), service_);
+    for (FakeNode* sender : {&near, &far})
+      rig.send(*sender, HubRig::group(5), said.back(), service_);
     rig.turn_shard(0);
     rig.turn_shard(1);
   }
@@ -97,9 +103,11 @@ TEST(RenumberedProvider, GetsAllThatIsSentToItsService) {
     const auto renumbered = make_id<NodeId>(rig.hub(), 400);
     world.step("before", [] {});
     world.step("the new id is published", [&] { rig.nodes().publish(400, place_of(provider)); });
-    world.step("the former id is nobody's", [&] { rig.nodes().publish(index_of(former), NodePlace::renumbered()); });
-    world.step("the shard hears of it",
-               [&] { rig.command(0, RenumberCommand{provider.session, renumbered, "another id"}); });
+    world.step("the former id is nobody's",
+               [&] { rig.nodes().publish(index_of(former), NodePlace::renumbered()); });
+    world.step("the shard hears of it", [&] {
+      rig.command(0, RenumberCommand{provider.session, renumbered, "another id"});
+    });
     world.step("the group is published", [&] { rig.publish_group(5, renumbered, {}, true); });
     provider.read();
     ASSERT_TRUE(provider.goodbye);

@@ -38,8 +38,8 @@ TEST(ShardState, TheShardsKeepNoMoreBegunFramesTogetherThanOneAlone) {
       rig.write(*node, std::span(bytes).first(4000));
     }
     rig.settle();
-    const auto closed =
-        std::count_if(nodes.begin(), nodes.end(), [](testing::FakeNode* node) { return !!node->goodbye; });
+    const auto closed = std::count_if(nodes.begin(), nodes.end(),
+                                      [](testing::FakeNode* node) { return !!node->goodbye; });
     EXPECT_EQ(closed, 9) << shards << " shards";
   }
 }

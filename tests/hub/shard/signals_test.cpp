@@ -97,7 +97,8 @@ TEST_P(SignalsAcross, ManySendersToOneThatDoesNotReadLoseNothing) {
   constexpr int kFrames = 200;
   const std::string payload(1024 - proto::kHeaderSize, 'x');
   for (FakeNode* sender : senders) {
-    for (int i = 0; i < kFrames; ++i) rig.send(*sender, b.id.value(), std::to_string(i) + ' ' + payload);
+    for (int i = 0; i < kFrames; ++i)
+      rig.send(*sender, b.id.value(), std::to_string(i) + ' ' + payload);
   }
   rig.settle_without_reading();
   EXPECT_EQ(rig.ledger().dropped, 0u);
@@ -107,7 +108,8 @@ TEST_P(SignalsAcross, ManySendersToOneThatDoesNotReadLoseNothing) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
   EXPECT_THAT(b.frames, SizeIs(30 * kFrames));
   std::map<std::uint32_t, int> next;
-  for (const testing::GotFrame& frame : b.frames) EXPECT_EQ(std::stoi(frame.text()), next[frame.header.src]++);
+  for (const testing::GotFrame& frame : b.frames)
+    EXPECT_EQ(std::stoi(frame.text()), next[frame.header.src]++);
   for (const FakeNode* sender : senders) EXPECT_EQ(rig.connection(*sender)->holds, 0u);
 }
 
@@ -168,7 +170,8 @@ TEST(Signals, WhoIsNotReadHasToTakeWhatItIsSent) {
   HubRig rig(1, limits);
   FakeNode& a = rig.join(0);
   Signals& signals = rig.state(0).signals;
-  EXPECT_EQ(a.pipe.unacknowledged_limit(), 0u) << "who is read and does not take LATEST messages may stay";
+  EXPECT_EQ(a.pipe.unacknowledged_limit(), 0u)
+      << "who is read and does not take LATEST messages may stay";
   signals.apply_hold(a.id, true);
   EXPECT_EQ(a.pipe.unacknowledged_limit(), 1'234u);
   signals.apply_hold(a.id, true);
@@ -197,8 +200,9 @@ TEST(Signals, TwoNodesThatFloodEachOtherDoNotStandStill) {
   EXPECT_EQ(rig.ledger().dropped, 0u);
 }
 
-// A peer that was told PAUSE and cannot be told RESUME starts anew: a connection begins with nothing paused.
-// One for each of its recipients that is full, and lane: more than 16 bits can count.
+// A peer that was told PAUSE and cannot be told RESUME starts anew: a connection begins with
+// nothing paused. One for each of its recipients that is full, and lane: more than 16 bits can
+// count.
 TEST(Signals, CountsHoldsOfManyRecipients) {
   HubRig rig;
   FakeNode& a = rig.join(0);
@@ -244,7 +248,8 @@ TEST(Signals, AHeldNodeThatMustConfirmIsRead) {
   rig.send_flow(confirmer, proto::flow::Confirm{confirmer.data_frames});
   rig.settle();
   EXPECT_EQ(confirmer.frames.size(), 8u);
-  EXPECT_FALSE(rig.connection(confirmer)->armed.read) << "with nothing left to write it is held as any other";
+  EXPECT_FALSE(rig.connection(confirmer)->armed.read)
+      << "with nothing left to write it is held as any other";
 }
 
 TEST(Signals, WhoSendsToAServiceThatOnlyProvidesIsTold) {
@@ -253,7 +258,8 @@ TEST(Signals, WhoSendsToAServiceThatOnlyProvidesIsTold) {
     FakeNode& provider = rig.join(shard);
     FakeNode& client = rig.join(0);
     rig.publish_group(5, provider.id, {&client});
-    rig.send(client, HubRig::group(5), "request", {.kind = proto::Kind::service, .flags = proto::kFlagReport});
+    rig.send(client, HubRig::group(5), "request",
+             {.kind = proto::Kind::service, .flags = proto::kFlagReport});
     rig.settle();
     rig.pass_ms(100);
     client.read();

@@ -5,7 +5,8 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What a shard judges by the clock after it stood still itself: stopped, starved, or busy with others.
+// What a shard judges by the clock after it stood still itself: stopped, starved, or busy with
+// others.
 
 namespace gimnet::hub {
 namespace {
@@ -18,7 +19,8 @@ using ::testing::SizeIs;
 
 constexpr auto kDrop = static_cast<std::uint8_t>(proto::Policy::drop);
 
-/// A turn in which the poller tells nothing: a wait that a signal ended, or others were ready in such numbers.
+/// A turn in which the poller tells nothing: a wait that a signal ended, or others were ready in
+/// such numbers.
 void turn_without_ready(HubRig& rig) { rig.shard(0).turn({}, rig.now_ms); }
 
 TEST(StalledShard, LooksForWhatIsUnreadBeforeItCallsANodeSilent) {
@@ -88,7 +90,8 @@ TEST(StalledShard, ASlowNodeHasItsTimeAgainWhereTheHubStoodStill) {
   rig.pass_ms(8'500);
   EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 0u);
   rig.pass_ms(1'000);
-  EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 1u) << "it has been slow for its whole time before others";
+  EXPECT_EQ(rig.sum(&ShardCounters::slow_consumers), 1u)
+      << "it has been slow for its whole time before others";
 }
 
 TEST(StalledShard, ABlockingMessageHasItsTimeAgainWhereTheHubStoodStill) {

@@ -21,9 +21,10 @@
 #include "tests/hub/shard/support/hub_rig.hpp"
 #include "tests/hub/transport/support/connected_sockets.hpp"
 
-// What a shard's turn costs in system calls, as the kernel counts them: one wait, one read of each connection that has
-// something, one write of each that gets something, whatever the number of frames. Instructions, which
-// perf/instructions counts, do not show what the kernel does. None of this depends on how fast anything is.
+// What a shard's turn costs in system calls, as the kernel counts them: one wait, one read of each
+// connection that has something, one write of each that gets something, whatever the number of
+// frames. Instructions, which perf/instructions counts, do not show what the kernel does. None of
+// this depends on how fast anything is.
 
 namespace gimnet::hub {
 namespace {
@@ -34,7 +35,8 @@ using ::testing::ElementsAre;
 using testing::FakeNode;
 using testing::HubRig;
 
-/// A shard and nodes behind sockets. All but the sockets' far ends belongs to the thread whose calls are counted.
+/// A shard and nodes behind sockets. All but the sockets' far ends belongs to the thread whose
+/// calls are counted.
 class TurnSystemCalls : public ::testing::TestWithParam<Family> {
  protected:
   ~TurnSystemCalls() override {
@@ -77,11 +79,12 @@ class TurnSystemCalls : public ::testing::TestWithParam<Family> {
   }
 
   /// Frames to as many of the others, in turns.
-  [[nodiscard]] std::vector<std::byte> frames_to(std::uint32_t recipients, std::uint32_t count) const {
+  [[nodiscard]] std::vector<std::byte> frames_to(std::uint32_t recipients,
+                                                 std::uint32_t count) const {
     std::vector<std::byte> bytes;
     for (std::uint32_t i = 0; i < count; ++i) {
-      const auto frame =
-          HubRig::frame(nodes_.front(), nodes_[1 + i % recipients].id.value(), std::string("sixteen bytes!!!"));
+      const auto frame = HubRig::frame(nodes_.front(), nodes_[1 + i % recipients].id.value(),
+                                       std::string("sixteen bytes!!!"));
       bytes.insert(bytes.end(), frame.begin(), frame.end());
     }
     return bytes;
@@ -105,7 +108,8 @@ class TurnSystemCalls : public ::testing::TestWithParam<Family> {
   std::vector<int> far_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Families, TurnSystemCalls, ::testing::Values(Family::unix_socket, Family::tcp));
+INSTANTIATE_TEST_SUITE_P(Families, TurnSystemCalls,
+                         ::testing::Values(Family::unix_socket, Family::tcp));
 
 /// GTEST_SKIP() leaves the function that it stands in.
 #define GIMNET_COUNT_OR_SKIP(calls, before)                                                \
@@ -161,7 +165,8 @@ TEST_P(TurnSystemCalls, OneWriteForEachMemberOfAGroup) {
     rig_.publish_group(1, nodes_.front().id, members);
     std::vector<std::byte> bytes;
     for (std::uint32_t i = 0; i < kFrames; ++i) {
-      const auto frame = HubRig::frame(nodes_.front(), HubRig::group(1), "to all", {.kind = proto::Kind::group});
+      const auto frame =
+          HubRig::frame(nodes_.front(), HubRig::group(1), "to all", {.kind = proto::Kind::group});
       bytes.insert(bytes.end(), frame.begin(), frame.end());
     }
     send(bytes);

@@ -3,7 +3,8 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What a node is told at its return, before all that waits for it, and how the conductor learns that it was read.
+// What a node is told at its return, before all that waits for it, and how the conductor learns
+// that it was read.
 
 namespace gimnet::hub {
 namespace {
@@ -19,7 +20,8 @@ using ::testing::SizeIs;
 constexpr std::uint32_t kGroup = 5;
 
 std::vector<std::byte> event_for(const FakeNode& node, std::size_t bytes = 8) {
-  return HubRig::frame(node, node.id.value(), std::string(bytes, 'e'), {.kind = Kind::ns, .src = 7u << 20});
+  return HubRig::frame(node, node.id.value(), std::string(bytes, 'e'),
+                       {.kind = Kind::ns, .src = 7u << 20});
 }
 
 /// The moves that the conductor was told to be read, with the number of the connection.
@@ -67,7 +69,8 @@ TEST(ToldAgain, StandsBeforeWhatIsSentAgainAndWhatWaits) {
   rig.settle();
   ASSERT_TRUE(subscriber.welcome->resumed);
   EXPECT_THAT(subscriber.texts(), ElementsAre("lost on the way", "while away"));
-  EXPECT_THAT(subscriber.kinds, ElementsAre(Kind::link, Kind::ns, Kind::flow, Kind::group, Kind::group));
+  EXPECT_THAT(subscriber.kinds,
+              ElementsAre(Kind::link, Kind::ns, Kind::flow, Kind::group, Kind::group));
   EXPECT_THAT(read_moves(rig), IsEmpty());
   pong(rig, subscriber, last_ping(subscriber));
   EXPECT_THAT(read_moves(rig), ElementsAre(std::pair{9u, 2u}));
@@ -113,7 +116,8 @@ TEST(ToldAgain, OnePingIsUnderWayHoweverMuchIsTold) {
   pong(rig, node, first + 1);
   EXPECT_THAT(read_moves(rig), IsEmpty()) << "that answers another PING";
   pong(rig, node, first);
-  EXPECT_THAT(read_moves(rig), ElementsAre(std::pair{1u, 1u})) << "no more than what stood before the PING";
+  EXPECT_THAT(read_moves(rig), ElementsAre(std::pair{1u, 1u}))
+      << "no more than what stood before the PING";
   ASSERT_THAT(node.flow_of<proto::flow::Ping>(), SizeIs(2));
   pong(rig, node, first);
   EXPECT_THAT(read_moves(rig), IsEmpty());

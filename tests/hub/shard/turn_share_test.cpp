@@ -8,8 +8,8 @@
 
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// No peer keeps a shard's turn to itself: of frames to many each turn hands on a share, and the rest goes on behind the
-// others in the next.
+// No peer keeps a shard's turn to itself: of frames to many each turn hands on a share, and the
+// rest goes on behind the others in the next.
 
 namespace gimnet::hub {
 namespace {
@@ -85,14 +85,16 @@ TEST(TurnShare, OneFrameIsHandedOnHoweverManyItIsFor) {
 TEST(TurnShare, NeighbouringFramesWithOneHeaderAreOne) {
   HubRig rig(1, with_share(1));
   Crowd crowd(rig, 6);
-  for (int i = 0; i < 50; ++i) rig.send(*crowd.all[0], kEverybody, "like the others", {.kind = Kind::broadcast});
+  for (int i = 0; i < 50; ++i)
+    rig.send(*crowd.all[0], kEverybody, "like the others", {.kind = Kind::broadcast});
   EXPECT_EQ(crowd.turn(), 50u);
 }
 
 TEST(TurnShare, FramesToOneHaveNone) {
   HubRig rig(1, with_share(1));
   Crowd crowd(rig, 6);
-  for (std::size_t i = 0; i < 50; ++i) rig.send(*crowd.all[0], crowd.all[1 + i % 5]->id.value(), "x");
+  for (std::size_t i = 0; i < 50; ++i)
+    rig.send(*crowd.all[0], crowd.all[1 + i % 5]->id.value(), "x");
   EXPECT_EQ(crowd.turn(), 50u);
 }
 
@@ -121,7 +123,8 @@ TEST(TurnShare, GroupsAndListsHaveIt) {
   HubRig rig(1, with_share(5));
   Crowd crowd(rig, 6);
   FakeNode& a = *crowd.all[0];
-  rig.publish_group(5, a.id, {crowd.all[1], crowd.all[2], crowd.all[3], crowd.all[4], crowd.all[5]});
+  rig.publish_group(5, a.id,
+                    {crowd.all[1], crowd.all[2], crowd.all[3], crowd.all[4], crowd.all[5]});
   std::string ids;
   for (std::size_t i = 1; i < 6; ++i) {
     const std::uint32_t id = crowd.all[i]->id.value();
@@ -133,7 +136,8 @@ TEST(TurnShare, GroupsAndListsHaveIt) {
   }
   for (const std::uint64_t frames : {1u, 1u, 1u, 1u, 0u}) EXPECT_EQ(crowd.turn(), frames);
   rig.settle();
-  for (std::size_t i = 1; i < 6; ++i) EXPECT_THAT(crowd.all[i]->texts(), ElementsAre("g", "l", "g", "l"));
+  for (std::size_t i = 1; i < 6; ++i)
+    EXPECT_THAT(crowd.all[i]->texts(), ElementsAre("g", "l", "g", "l"));
 }
 
 TEST(TurnShare, NothingIsReadBeforeTheRestIsRouted) {
@@ -246,8 +250,8 @@ TEST(TurnShare, WhileManyRestsAreKeptLittleIsRead) {
   std::vector<std::byte> flood;
   for (std::size_t i = 0; i < 20'000; ++i) {
     const std::uint8_t flags = i % 2 == 0 ? 0 : proto::kFlagReport;
-    const auto frame =
-        HubRig::frame(*crowd.all[0], kEverybody, "", {.kind = Kind::broadcast, .flags = flags, .src = 0});
+    const auto frame = HubRig::frame(*crowd.all[0], kEverybody, "",
+                                     {.kind = Kind::broadcast, .flags = flags, .src = 0});
     flood.insert(flood.end(), frame.begin(), frame.end());
   }
   for (FakeNode* node : crowd.all) {
@@ -276,7 +280,9 @@ TEST(TurnShare, WhileManyRestsAreKeptLittleIsRead) {
 TEST(TurnShare, AnyStreamArrivesWhole) {
   for (std::uint32_t seed = 0; seed < 30; ++seed) {
     std::mt19937 random(seed);
-    const auto below = [&](std::uint32_t end) { return static_cast<std::uint32_t>(random() % end); };
+    const auto below = [&](std::uint32_t end) {
+      return static_cast<std::uint32_t>(random() % end);
+    };
     HubRig rig(2, with_share(1 + below(20)));
     FakeNode& watcher = rig.join(below(2));
     std::vector<FakeNode*> senders;
@@ -285,14 +291,17 @@ TEST(TurnShare, AnyStreamArrivesWhole) {
     std::vector<std::size_t> done(senders.size());
     std::map<std::uint32_t, std::vector<std::string>> sent;
     for (std::size_t i = 0; i < senders.size(); ++i) {
-      rig.publish_group(static_cast<std::uint32_t>(10 + i), senders[i]->id, {&watcher, senders[(i + 1) % 4]});
+      rig.publish_group(static_cast<std::uint32_t>(10 + i), senders[i]->id,
+                        {&watcher, senders[(i + 1) % 4]});
       for (int frame = 0; frame < 120; ++frame) {
         std::string text = std::to_string(frame) + " ";
-        text.resize(text.size() + (below(8) == 0 ? below(60'000) : below(300)), static_cast<char>('a' + below(26)));
+        text.resize(text.size() + (below(8) == 0 ? below(60'000) : below(300)),
+                    static_cast<char>('a' + below(26)));
         sent[senders[i]->id.value()].push_back(text);
         const std::uint8_t flags = below(2) == 0 ? 0 : proto::kFlagReport;
-        const auto bytes = HubRig::frame(*senders[i], HubRig::group(static_cast<std::uint32_t>(10 + i)), text,
-                                         {.kind = Kind::group, .flags = flags});
+        const auto bytes =
+            HubRig::frame(*senders[i], HubRig::group(static_cast<std::uint32_t>(10 + i)), text,
+                          {.kind = Kind::group, .flags = flags});
         streams[i].insert(streams[i].end(), bytes.begin(), bytes.end());
       }
     }

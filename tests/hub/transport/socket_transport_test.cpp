@@ -34,7 +34,9 @@ std::unique_ptr<Ends> connect(Family family, const Limits& limits) {
   ends->far = sockets.far;
   return ends;
 }
-std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) { return connect(Family::unix_socket, limits); }
+std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) {
+  return connect(Family::unix_socket, limits);
+}
 std::unique_ptr<Ends> tcp_ends(const Limits& limits = {}) { return connect(Family::tcp, limits); }
 
 iovec piece(std::string_view text) { return {const_cast<char*>(text.data()), text.size()}; }
@@ -93,7 +95,8 @@ TEST(SocketTransport, TellsAnOrderlyEndFromABrokenOne) {
   ASSERT_EQ(::setsockopt(broken->far, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once), 0);
   ::close(std::exchange(broken->far, -1));
   EXPECT_EQ(broken->near->receive(room).status, IoStatus::failed);
-  // The kernel tells that once, perhaps to who reads twice and only looks at the first; it stays an end.
+  // The kernel tells that once, perhaps to who reads twice and only looks at the first; it stays an
+  // end.
   EXPECT_NE(broken->near->receive(room).status, IoStatus::would_block);
 }
 
@@ -116,7 +119,8 @@ TEST(SocketTransport, SetsItsOptions) {
   Limits limits;
   limits.socket_send_bytes = 128 * 1'024;
   const auto ends = tcp_ends(limits);
-  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF), 2 * 128 * 1'024);  // as kernels report it
+  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF),
+            2 * 128 * 1'024);  // as kernels report it
   EXPECT_NE(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NODELAY), 0);
 }
 
@@ -130,10 +134,12 @@ TEST(SocketTransport, LimitsWhatWaitsUnsentOnTcp) {
 
 TEST(SocketTransport, LimitsHowLongWhatWasSentIsNotAcknowledged) {
   const auto ends = tcp_ends();
-  EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), 0) << "the system's own";
+  EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), 0)
+      << "the system's own";
   for (const std::uint32_t ms : {100u, 15'000u, 3'600'000u, 0u}) {
     ends->near->limit_unacknowledged(ms);
-    EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), static_cast<int>(ms));
+    EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT),
+              static_cast<int>(ms));
   }
   unix_ends()->near->limit_unacknowledged(1'000);
 }

@@ -16,7 +16,8 @@ namespace {
 constexpr std::size_t kPayloadBytes = 1024;
 constexpr std::chrono::seconds kPatience{30};
 
-/// Two clients and, in this thread's place, the subject between them, which passes nothing on until it is let.
+/// Two clients and, in this thread's place, the subject between them, which passes nothing on until
+/// it is let.
 class FloodTest : public testing::Test {
  protected:
   FloodTest() {
@@ -25,7 +26,8 @@ class FloodTest : public testing::Test {
     to_ = ::accept(listener_, nullptr, nullptr);
     engine_.client(1).inbox.expect(0, kPayloadBytes);
     std::vector<Publisher> publishers;
-    publishers.emplace_back(engine_.wire(), engine_.client(0), std::vector{Target{.recipients = {&engine_.client(1)}}},
+    publishers.emplace_back(engine_.wire(), engine_.client(0),
+                            std::vector{Target{.recipients = {&engine_.client(1)}}},
                             MessageShape{.payload_bytes = kPayloadBytes}, Writing::batched);
     flood_.emplace(engine_, std::move(publishers), 1);
   }
@@ -46,7 +48,8 @@ class FloodTest : public testing::Test {
       std::array<char, 65536> buffer;
       for (ssize_t size; (size = ::recv(from, buffer.data(), buffer.size(), 0)) > 0;) {
         for (ssize_t sent = 0; sent < size;) {
-          const ssize_t taken = ::send(to, buffer.data() + sent, static_cast<std::size_t>(size - sent), MSG_NOSIGNAL);
+          const ssize_t taken =
+              ::send(to, buffer.data() + sent, static_cast<std::size_t>(size - sent), MSG_NOSIGNAL);
           if (taken < 0) return;
           sent += taken;
         }
@@ -58,7 +61,8 @@ class FloodTest : public testing::Test {
   void lose_patience() {
     engine_.set_patience(std::chrono::milliseconds(10));
     const auto deadline = Clock::now() + kPatience;
-    while (flood_->missing() == 0 && Clock::now() < deadline) flood_->run_for(std::chrono::milliseconds(20));
+    while (flood_->missing() == 0 && Clock::now() < deadline)
+      flood_->run_for(std::chrono::milliseconds(20));
     engine_.set_patience(kPatience);
   }
 

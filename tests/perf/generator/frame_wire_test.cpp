@@ -74,7 +74,8 @@ TEST_F(FrameWireTest, PublishesWholeMessagesOnly) {
   const Client receiver(1, sockets[1]);
   Publisher publisher(wire_, sender, {unicast_}, {.payload_bytes = 1000}, Writing::batched);
   EXPECT_EQ(publisher.messages_a_write(), 65536u / 1016u);
-  EXPECT_EQ(publisher.publish(publisher.messages_a_write() - 1), 0u) << "more than the window lets through";
+  EXPECT_EQ(publisher.publish(publisher.messages_a_write() - 1), 0u)
+      << "more than the window lets through";
   EXPECT_EQ(publisher.publish(publisher.messages_a_write()), publisher.messages_a_write());
   sender.paused.push_back({});
   EXPECT_EQ(publisher.publish(UINT64_MAX), 0u) << "paused";

@@ -11,7 +11,8 @@ constexpr StreamId kStream = 3;
 constexpr std::size_t kBytes = 64;
 constexpr std::uint32_t kNumber = 9;
 
-std::vector<std::byte> message(std::uint64_t sequence, StreamId stream = kStream, std::size_t size = kBytes) {
+std::vector<std::byte> message(std::uint64_t sequence, StreamId stream = kStream,
+                               std::size_t size = kBytes) {
   const auto pattern = pattern_payload(size);
   std::vector<std::byte> payload(pattern.begin(), pattern.end());
   store_u64(payload.data(), make_stamp(stream, sequence));
@@ -27,7 +28,8 @@ Inbox inbox_for(std::size_t size) {
 TEST(Inbox, CountsWhatArrivesInOrder) {
   for (const std::size_t size : {std::size_t{16}, std::size_t{17}, kBytes, std::size_t{65536}}) {
     Inbox inbox = inbox_for(size);
-    for (std::uint64_t sequence = 0; sequence < 3; ++sequence) inbox.on_message(message(sequence, kStream, size));
+    for (std::uint64_t sequence = 0; sequence < 3; ++sequence)
+      inbox.on_message(message(sequence, kStream, size));
     EXPECT_EQ(inbox.delivered(), 3u);
     EXPECT_EQ(inbox.lost(), 0u);
     EXPECT_EQ(inbox.wrong(), 0u);

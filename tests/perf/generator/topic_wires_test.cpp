@@ -11,8 +11,8 @@
 #include "generator/topic.hpp"
 #include "generator/zmtp_wire.hpp"
 
-// The wires of the other hubs: every byte that they write is what the protocol's own document says, and what those hubs
-// send is read however it is split.
+// The wires of the other hubs: every byte that they write is what the protocol's own document says,
+// and what those hubs send is read however it is split.
 
 namespace gimnet::perf {
 namespace {
@@ -52,9 +52,12 @@ class Peer {
   const int other_;
 };
 
-std::size_t give(Wire& wire, Client& client, const std::string& text) { return wire.take(client, as_bytes(text)); }
+std::size_t give(Wire& wire, Client& client, const std::string& text) {
+  return wire.take(client, as_bytes(text));
+}
 
-/// What the wire makes of a message of 16 bytes; the stamp is that of the first message of stream 5.
+/// What the wire makes of a message of 16 bytes; the stamp is that of the first message of
+/// stream 5.
 std::string published(Wire& wire, const Target& target) {
   const Client from{9, ::socket(AF_UNIX, SOCK_STREAM, 0)};
   MessageBlock block;
@@ -69,7 +72,9 @@ std::string payload() {
   return text;
 }
 
-Target to(const Client& client) { return {.kind = Target::Kind::unicast, .recipients = {&client}, .stream = 5}; }
+Target to(const Client& client) {
+  return {.kind = Target::Kind::unicast, .recipients = {&client}, .stream = 5};
+}
 const Target& to_group() {
   static const Target target{.kind = Target::Kind::group, .recipients = {}, .stream = 5};
   return target;
@@ -94,9 +99,11 @@ TEST(NatsWire, JoinsPublishesAndReads) {
   NatsWire wire;
   Peer peer(3);
   wire.open(peer.client);
-  EXPECT_EQ(peer.written(),
-            "CONNECT {\"verbose\":false,\"pedantic\":false,\"tls_required\":false,\"name\":\"\",\"lang\":\"raw\","
-            "\"version\":\"1\",\"protocol\":1}\r\nSUB n3 1\r\nPING\r\n");
+  EXPECT_EQ(
+      peer.written(),
+      "CONNECT "
+      "{\"verbose\":false,\"pedantic\":false,\"tls_required\":false,\"name\":\"\",\"lang\":\"raw\","
+      "\"version\":\"1\",\"protocol\":1}\r\nSUB n3 1\r\nPING\r\n");
   EXPECT_EQ(give(wire, peer.client, "INFO {\"max_payload\":1048576}\r\nPO"), 30u);
   EXPECT_FALSE(peer.client.is_joined);
   EXPECT_EQ(give(wire, peer.client, "PONG\r\n"), 6u);
@@ -176,9 +183,12 @@ TEST(RespWire, JoinsPublishesAndReads) {
   EXPECT_EQ(peer.written(), "*2\r\n$9\r\nSUBSCRIBE\r\n$1\r\ng\r\n");
   give(wire, peer.client, ">3\r\n$9\r\nsubscribe\r\n$1\r\ng\r\n:2\r\n:1\r\n");
   EXPECT_TRUE(peer.client.is_in_group);
-  EXPECT_EQ(published(wire, to(peer.client)), "*3\r\n$7\r\nPUBLISH\r\n$2\r\nn3\r\n$16\r\n" + payload() + "\r\n");
-  EXPECT_EQ(published(wire, to_group()), "*3\r\n$7\r\nPUBLISH\r\n$1\r\ng\r\n$16\r\n" + payload() + "\r\n");
-  expect_read_however_split(wire, peer.client, ">3\r\n$7\r\nmessage\r\n$2\r\nn3\r\n$16\r\n" + payload() + "\r\n");
+  EXPECT_EQ(published(wire, to(peer.client)),
+            "*3\r\n$7\r\nPUBLISH\r\n$2\r\nn3\r\n$16\r\n" + payload() + "\r\n");
+  EXPECT_EQ(published(wire, to_group()),
+            "*3\r\n$7\r\nPUBLISH\r\n$1\r\ng\r\n$16\r\n" + payload() + "\r\n");
+  expect_read_however_split(wire, peer.client,
+                            ">3\r\n$7\r\nmessage\r\n$2\r\nn3\r\n$16\r\n" + payload() + "\r\n");
 }
 
 std::string zmtp_greeting(const std::string& socket_type) {
@@ -250,7 +260,8 @@ TEST(Publisher, WritesOnItsPublishingSide) {
   Peer peer(0);
   Peer side(0);
   peer.client.set_publishing_side(side.client);
-  Publisher publisher(wire, peer.client, {to(peer.client)}, {.payload_bytes = 16}, Writing::unbatched);
+  Publisher publisher(wire, peer.client, {to(peer.client)}, {.payload_bytes = 16},
+                      Writing::unbatched);
   EXPECT_EQ(publisher.publish(1), 1u);
   EXPECT_EQ(peer.written(), "");
   EXPECT_EQ(side.written(), "PUB n0 16\r\n" + payload() + "\r\n");

@@ -15,8 +15,9 @@ static int failures = 0;
     }                                                                           \
   } while (0)
 
-static const unsigned char kExample[] = {0x60, 0x03, 0x00, 0x00, 0x05, 0x72, 0x6f, 0x62, 0x6f, 0x74, 0x5c,
-                                         0x01, 0x76, 0x08, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xe0, 0x3f};
+static const unsigned char kExample[] = {0x60, 0x03, 0x00, 0x00, 0x05, 0x72, 0x6f, 0x62,
+                                         0x6f, 0x74, 0x5c, 0x01, 0x76, 0x08, 0x00, 0x00,
+                                         0x00, 0x00, 0x00, 0x00, 0xe0, 0x3f};
 
 static void writes_the_example_of_the_document(void) {
   unsigned char memory[sizeof kExample];
@@ -116,7 +117,8 @@ static void reads_everything_else(const bitestream_reader* reader) {
   bitestream_value element;
   int32_t sample = 0;
   EXPECT(bitestream_count(&value) == 3);
-  EXPECT(bitestream_element(&value, 2, &element) && bitestream_get_i32(&element, &sample) && sample == 300);
+  EXPECT(bitestream_element(&value, 2, &element) && bitestream_get_i32(&element, &sample) &&
+         sample == 300);
   EXPECT(!bitestream_element(&value, 3, &element));
   value = find(reader, 14);
   bitestream_reader nested;

@@ -21,7 +21,8 @@ TEST(BitestreamFormat, ValuesOfAFixedSizeHaveExactlyIt) {
 }
 
 TEST(BitestreamFormat, KnowsItsTypes) {
-  for (const unsigned type : {15u, 16u, 28u, 30u, 31u, 32u}) EXPECT_FALSE(is_known_type(type)) << type;
+  for (const unsigned type : {15u, 16u, 28u, 30u, 31u, 32u})
+    EXPECT_FALSE(is_known_type(type)) << type;
   for (unsigned type = 0; type <= 14; ++type) EXPECT_TRUE(is_known_type(type)) << type;
   for (unsigned type = 17; type <= 27; ++type) EXPECT_TRUE(is_known_type(type)) << type;
   EXPECT_TRUE(is_known_type(29));

@@ -68,8 +68,10 @@ TEST(BitestreamReader, ReadsEveryArray) {
   }
   EXPECT_EQ(reader.find(16)->element(0)->as_bool(), true);
   EXPECT_EQ(reader.find(16)->element(1)->as_bool(), false);
-  for (std::uint32_t key = 17; key <= 20; ++key) EXPECT_EQ(reader.find(key)->element(1)->as<int>(), 2);
-  for (std::uint32_t key = 21; key <= 24; ++key) EXPECT_EQ(reader.find(key)->element(0)->as<int>(), -1);
+  for (std::uint32_t key = 17; key <= 20; ++key)
+    EXPECT_EQ(reader.find(key)->element(1)->as<int>(), 2);
+  for (std::uint32_t key = 21; key <= 24; ++key)
+    EXPECT_EQ(reader.find(key)->element(0)->as<int>(), -1);
   EXPECT_EQ(reader.find(25)->element(1)->as<double>(), -2.0);
   EXPECT_EQ(reader.find(26)->element(0)->as<float>(), 0.5f);
   EXPECT_EQ(reader.find(27)->element(1)->as_time(), 1);
@@ -220,17 +222,19 @@ TEST(BitestreamReader, TakesALengthFieldOfEverySize) {
 }
 
 TEST(BitestreamReader, RefusesEveryCutOfEveryVector) {
-  for (const std::string name :
-       {"bitestream/example", "bitestream/every_type", "bitestream/length_fields", "bitestream/long_text"}) {
+  for (const std::string name : {"bitestream/example", "bitestream/every_type",
+                                 "bitestream/length_fields", "bitestream/long_text"}) {
     const auto bytes = load_vector(name);
     std::vector<std::size_t> ends{0};
     Reader whole(bytes);
     while (const auto value = whole.next()) {
-      ends.push_back(static_cast<std::size_t>(value->bytes().data() - bytes.data()) + value->bytes().size());
+      ends.push_back(static_cast<std::size_t>(value->bytes().data() - bytes.data()) +
+                     value->bytes().size());
     }
     for (std::size_t size = 0; size < bytes.size(); ++size) {
       const bool between_values = std::find(ends.begin(), ends.end(), size) != ends.end();
-      EXPECT_EQ(is_valid(std::span<const std::byte>(bytes).first(size)), between_values) << name << " at " << size;
+      EXPECT_EQ(is_valid(std::span<const std::byte>(bytes).first(size)), between_values)
+          << name << " at " << size;
     }
   }
 }

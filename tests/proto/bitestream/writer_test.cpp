@@ -86,7 +86,8 @@ TEST(BitestreamWriter, WritesIntoTheCallersMemory) {
     Writer writer{std::span(memory).first(room)};
     writer.put_text(3, "robot");
     writer.put_f64("v", 0.5);
-    EXPECT_EQ(writer.finish(), room == expected.size() ? BITESTREAM_OK : BITESTREAM_NO_ROOM) << room;
+    EXPECT_EQ(writer.finish(), room == expected.size() ? BITESTREAM_OK : BITESTREAM_NO_ROOM)
+        << room;
     for (std::size_t i = room; i < memory.size(); ++i) EXPECT_EQ(memory[i], std::byte{0xEE});
   }
 }

@@ -41,13 +41,19 @@ TEST(CtrlMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ctrl/hub_info", 1, HubInfo{});
   expect_answer("ctrl/hub_info_answer", 1, HubInfoAnswer{HubId{7}, "lab", "0.1.0", 2, 60000, 3, 1});
   expect_request("ctrl/statistics", 2, Statistics{});
-  expect_answer("ctrl/statistics_answer", 2,
-                StatisticsAnswer{{{0, {{"accepted", 10}, {"delivered", 9}}}, {1, {{"accepted", 0}}}}});
-  expect_request("ctrl/connections", 3, Connections{NodeId{0x00700010}, 2});
   expect_answer(
-      "ctrl/connections_answer", 3,
-      ConnectionsAnswer{
-          {{NodeId{0x00700011}, "robot", 1, "tcp", "127.0.0.1:40000", true, {4096, 100, 1200, 10, 160, 3}}}, false});
+      "ctrl/statistics_answer", 2,
+      StatisticsAnswer{{{0, {{"accepted", 10}, {"delivered", 9}}}, {1, {{"accepted", 0}}}}});
+  expect_request("ctrl/connections", 3, Connections{NodeId{0x00700010}, 2});
+  expect_answer("ctrl/connections_answer", 3,
+                ConnectionsAnswer{{{NodeId{0x00700011},
+                                    "robot",
+                                    1,
+                                    "tcp",
+                                    "127.0.0.1:40000",
+                                    true,
+                                    {4096, 100, 1200, 10, 160, 3}}},
+                                  false});
   expect_request("ctrl/routes", 9, Routes{});
   expect_answer("ctrl/routes_answer", 9, RoutesAnswer{{{HubId{7}, "lab", HubId{7}, 0, 3}}});
 }
@@ -60,8 +66,9 @@ TEST(CtrlMessages, ThatChangeTheHubAreAsTheVectorsSay) {
   expect_request("ctrl/drain", 6, Drain{});
   expect_answer("ctrl/drain_answer", 6, DrainAnswer{});
   expect_request("ctrl/reload", 7, Reload{});
-  expect_answer("ctrl/reload_answer", 7,
-                ReloadAnswer{{{"limits.nodes", "10", "20", false}, {"shards", "1", "2", true}}, false});
+  expect_answer(
+      "ctrl/reload_answer", 7,
+      ReloadAnswer{{{"limits.nodes", "10", "20", false}, {"shards", "1", "2", true}}, false});
   expect_request("ctrl/log_level", 8, SetLogLevel{"debug"});
   expect_answer("ctrl/log_level_answer", 8, SetLogLevelAnswer{"info"});
 }
@@ -78,7 +85,8 @@ TEST(CtrlMessages, EachRequestHasAName) {
   for (std::uint16_t operation = 1; operation < kRequestsEnd; ++operation)
     EXPECT_NE(operation_name(operation), nullptr);
   EXPECT_STREQ(operation_name(Kick::kOperation), "kick");
-  for (const std::uint16_t none : {std::uint16_t{0}, std::uint16_t{kRequestsEnd}, KickAnswer::kOperation}) {
+  for (const std::uint16_t none :
+       {std::uint16_t{0}, std::uint16_t{kRequestsEnd}, KickAnswer::kOperation}) {
     EXPECT_EQ(operation_name(none), nullptr) << none;
   }
 }
@@ -94,7 +102,8 @@ TEST(CtrlMessages, SkipCountersThatAreNotNumbers) {
   body.put_u8(7, 1);
   body.end_nested();
   body.end_nested();
-  const auto answer = decode_answer<StatisticsAnswer>(assemble_control({StatisticsAnswer::kOperation, 1}, body));
+  const auto answer =
+      decode_answer<StatisticsAnswer>(assemble_control({StatisticsAnswer::kOperation, 1}, body));
   ASSERT_TRUE(answer);
   EXPECT_EQ(*answer, (StatisticsAnswer{{{0, {{"accepted", 1}}}}}));
 }
@@ -105,7 +114,8 @@ TEST(CtrlMessages, AConnectionMayComeWithoutCounts) {
   body.begin_nested(3);
   body.put_u32(1, 0x00700011);
   body.end_nested();
-  const auto answer = decode_answer<ConnectionsAnswer>(assemble_control({ConnectionsAnswer::kOperation, 1}, body));
+  const auto answer =
+      decode_answer<ConnectionsAnswer>(assemble_control({ConnectionsAnswer::kOperation, 1}, body));
   ASSERT_TRUE(answer);
   ASSERT_EQ(answer->connections.size(), 1u);
   EXPECT_EQ(answer->connections[0].counts, ConnectionCounts{});
@@ -117,7 +127,8 @@ TEST(CtrlMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   record.transport.assign(kRemarkBytesMax, 't');
   record.peer.assign(kRemarkBytesMax, 'p');
   const ConnectionsAnswer one{{record}, false};
-  EXPECT_LE(encode_answer(one, 1).size() - encode_answer(ConnectionsAnswer{}, 1).size(), page_bytes_max(record));
+  EXPECT_LE(encode_answer(one, 1).size() - encode_answer(ConnectionsAnswer{}, 1).size(),
+            page_bytes_max(record));
 }
 
 }  // namespace

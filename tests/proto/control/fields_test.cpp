@@ -55,14 +55,19 @@ TEST(Fields, SayWhatIsWrong) {
   };
   EXPECT_EQ(sentence([](Fields& f) { return f.number<std::uint8_t>(1, "role", 0); }),
             "TEST has a role that is not a number that fits");
-  EXPECT_EQ(sentence([](Fields& f) { return f.required_number<int>(3, "node id"); }), "TEST has no node id (key 3)");
-  EXPECT_EQ(sentence([](Fields& f) { return f.text(1, "name", 9); }), "TEST has a name that is not text");
+  EXPECT_EQ(sentence([](Fields& f) { return f.required_number<int>(3, "node id"); }),
+            "TEST has no node id (key 3)");
+  EXPECT_EQ(sentence([](Fields& f) { return f.text(1, "name", 9); }),
+            "TEST has a name that is not text");
   EXPECT_EQ(sentence([](Fields& f) { return f.text(2, "name", 5); }), "");
   EXPECT_EQ(sentence([](Fields& f) { return f.text(2, "name", 4); }),
             "TEST has a name of 5 bytes; at most 4 are allowed");
-  EXPECT_EQ(sentence([](Fields& f) { return f.flag(1, "flag", false); }), "TEST has a flag that is not a bool");
-  EXPECT_EQ(sentence([](Fields& f) { return f.time(1, "time"); }), "TEST has a time that is not a time");
-  EXPECT_EQ(sentence([](Fields& f) { return f.opaque(1, "token", 9); }), "TEST has a token that is not opaque");
+  EXPECT_EQ(sentence([](Fields& f) { return f.flag(1, "flag", false); }),
+            "TEST has a flag that is not a bool");
+  EXPECT_EQ(sentence([](Fields& f) { return f.time(1, "time"); }),
+            "TEST has a time that is not a time");
+  EXPECT_EQ(sentence([](Fields& f) { return f.opaque(1, "token", 9); }),
+            "TEST has a token that is not opaque");
 }
 
 TEST(Fields, KeepTheFirstFaultAndGiveFallbacksAfterIt) {
@@ -92,8 +97,8 @@ TEST(Fields, ReadRecordsInOrder) {
     body.put_u8(4, 9);
   }
   Fields fields(body.bytes(), "TEST");
-  const auto records =
-      fields.records<int>(3, "record", [](Fields& record) { return record.required_number<int>(1, "number"); });
+  const auto records = fields.records<int>(
+      3, "record", [](Fields& record) { return record.required_number<int>(1, "number"); });
   EXPECT_EQ(records, (std::vector<int>{1, 2, 3}));
 }
 
@@ -103,8 +108,8 @@ TEST(Fields, TakeAFaultFromARecord) {
   body.put_u8(2, 1);
   body.end_nested();
   Fields fields(body.bytes(), "TEST");
-  static_cast<void>(
-      fields.records<int>(3, "record", [](Fields& record) { return record.required_number<int>(1, "number"); }));
+  static_cast<void>(fields.records<int>(
+      3, "record", [](Fields& record) { return record.required_number<int>(1, "number"); }));
   ASSERT_TRUE(fields.failed());
   EXPECT_EQ(fields.error().sentence, "TEST has no number (key 1)");
 }

@@ -32,7 +32,8 @@ TEST(OpeningBytes, AreAwaitedAsLongAsTheyFit) {
 }
 
 TEST(OpeningBytes, TellVersionAndProtocolApart) {
-  EXPECT_EQ(check_opening(from_hex("47 49 4d 6e 65 74 01 07")), Opening::accepted) << "the minor version may differ";
+  EXPECT_EQ(check_opening(from_hex("47 49 4d 6e 65 74 01 07")), Opening::accepted)
+      << "the minor version may differ";
   EXPECT_EQ(check_opening(from_hex("47 49 4d 6e 65 74 02")), Opening::bad_version);
   EXPECT_EQ(check_opening(from_hex("47 45")), Opening::other_protocol);
   EXPECT_EQ(check_opening(from_hex("48")), Opening::other_protocol);

@@ -14,12 +14,13 @@ std::string repeated(const std::string& part, std::size_t times) {
 }
 
 TEST(Names, AcceptPartsOfTheAllowedCharacters) {
-  for (const char* name : {"a", "robot1/base", "A-Z_a-z.0-9", "...", "a/b/c"}) EXPECT_TRUE(valid_name(name)) << name;
+  for (const char* name : {"a", "robot1/base", "A-Z_a-z.0-9", "...", "a/b/c"})
+    EXPECT_TRUE(valid_name(name)) << name;
 }
 
 TEST(Names, RefuseEverythingElse) {
-  for (const char* name : {"", "/", "a/", "/a", "a//b", "a b", "a*", "*", "**", "a\n", "\xC3\xA4", "a\\b", "a:b", ".",
-                           "..", "a/../b", "./a", "a/."}) {
+  for (const char* name : {"", "/", "a/", "/a", "a//b", "a b", "a*", "*", "**", "a\n", "\xC3\xA4",
+                           "a\\b", "a:b", ".", "..", "a/../b", "./a", "a/."}) {
     EXPECT_FALSE(valid_name(name)) << name;
   }
   EXPECT_FALSE(valid_name(std::string("a\0b", 3)));
@@ -42,15 +43,18 @@ TEST(Names, OfNodesDoNotReadAsIdsDo) {
     EXPECT_STREQ(node_name_fault(name), "it reads as the id of a node does, NUMBER.NUMBER") << name;
     EXPECT_TRUE(valid_name(name)) << "as that of a service within its node, or a pattern: " << name;
   }
-  for (const char* name : {"7", "7.", ".7", "7.17.1", "7.17/a", "a/7.17", "v7.17", "7.17a", "7-17", "7.-1"}) {
+  for (const char* name :
+       {"7", "7.", ".7", "7.17.1", "7.17/a", "a/7.17", "v7.17", "7.17a", "7-17", "7.-1"}) {
     EXPECT_STREQ(node_name_fault(name), nullptr) << name;
   }
   EXPECT_STREQ(node_name_fault("a b"), name_fault("a b"));
 }
 
 TEST(Patterns, AreNamesWithWildcardParts) {
-  for (const char* pattern : {"a", "*", "**", "a/*", "*/a/**", "**/**"}) EXPECT_TRUE(valid_pattern(pattern)) << pattern;
-  for (const char* pattern : {"", "a*", "***", "*/", "**a", "a//*"}) EXPECT_FALSE(valid_pattern(pattern)) << pattern;
+  for (const char* pattern : {"a", "*", "**", "a/*", "*/a/**", "**/**"})
+    EXPECT_TRUE(valid_pattern(pattern)) << pattern;
+  for (const char* pattern : {"", "a*", "***", "*/", "**a", "a//*"})
+    EXPECT_FALSE(valid_pattern(pattern)) << pattern;
 }
 
 TEST(Patterns, MatchTheWholeName) {
@@ -89,7 +93,9 @@ TEST(Patterns, MatchTheLongestOfBoth) {
   EXPECT_FALSE(matches(repeated("**", 15) + "/b", repeated("a", 16)));
 }
 
-TEST(ServiceNames, StandBehindTheirNodes) { EXPECT_EQ(join_service_name("robot/base", "odom"), "robot/base/odom"); }
+TEST(ServiceNames, StandBehindTheirNodes) {
+  EXPECT_EQ(join_service_name("robot/base", "odom"), "robot/base/odom");
+}
 
 TEST(ServiceNames, HaveOnePart) {
   EXPECT_TRUE(valid_service_name("odom"));

@@ -15,7 +15,8 @@ TEST(NsRegisterMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   test::expect_request("ns/unregister", 10, UnregisterName{});
   test::expect_answer("ns/unregister_answer", 10, UnregisterNameAnswer{token()});
   test::expect_request("ns/name_confirmed", 0, NameConfirmed{"robot/base"});
-  test::expect_request("ns/name_lost", 0, NameLost{"robot/base", NodeId{0x00800012}, "it was there first"});
+  test::expect_request("ns/name_lost", 0,
+                       NameLost{"robot/base", NodeId{0x00800012}, "it was there first"});
 }
 
 TEST(NsRegisterMessages, NeedAName) {

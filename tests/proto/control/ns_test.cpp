@@ -19,7 +19,8 @@ constexpr GroupId kGroup{0x00700005};
 
 std::vector<std::byte> proof() {
   std::vector<std::byte> bytes;
-  for (const int each : {0x48, 0x9e, 0x85, 0xf2, 0x6b, 0x35, 0xf3, 0x25, 0x37, 0x09, 0x1b, 0xea, 0x2e, 0x1f, 0x33, 0}) {
+  for (const int each : {0x48, 0x9e, 0x85, 0xf2, 0x6b, 0x35, 0xf3, 0x25, 0x37, 0x09, 0x1b, 0xea,
+                         0x2e, 0x1f, 0x33, 0}) {
     bytes.push_back(static_cast<std::byte>(each));
   }
   return bytes;
@@ -31,8 +32,9 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
   expect_request("ns/reverse", 2, Reverse{kNode});
   expect_answer("ns/reverse_answer", 2, ReverseAnswer{"robot/base", kNode});
   expect_request("ns/list", 3, List{"robot/**", NodeId{0x00700011}, 2});
-  expect_request("ns/advertise", 4,
-                 Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta", kGroup});
+  expect_request(
+      "ns/advertise", 4,
+      Advertise{"odom", 3, 1, Direction::provides, Delivery::latest, "x y theta", kGroup});
   expect_answer("ns/advertise_answer", 4, AdvertiseAnswer{kGroup, 2});
   Advertise again{"odom", 3, 1, Direction::provides, Delivery::latest, "", kGroup};
   again.former_proof = proof();
@@ -65,14 +67,15 @@ TEST(NsMessages, AreDecodedAndWrittenAsTheVectorsSay) {
 TEST(NsMessages, ListRecordsAsTheVectorsSay) {
   ListAnswer list;
   list.nodes = {{kNode, "robot/base", HubId{7}, "lab", true, "a robot", "127.0.0.1:40000", 1500, 2},
-                {NodeId{0x00700013}, "robot/laser", HubId{7}, "lab", false, "a robot", "127.0.0.1:40000", 1500, 2}};
+                {NodeId{0x00700013}, "robot/laser", HubId{7}, "lab", false, "a robot",
+                 "127.0.0.1:40000", 1500, 2}};
   list.more = true;
   list.next = NodeId{0x00700013};
   expect_answer("ns/list_answer", 3, list);
 
   ServicesAnswer services;
-  services.services = {
-      {kGroup, "robot/odom", NodeId{0x00700011}, 3, 1, Direction::provides, Delivery::latest, "x y theta", 2, "lab"}};
+  services.services = {{kGroup, "robot/odom", NodeId{0x00700011}, 3, 1, Direction::provides,
+                        Delivery::latest, "x y theta", 2, "lab"}};
   expect_answer("ns/services_answer", 6, services);
 }
 
@@ -92,10 +95,17 @@ TEST(NsMessages, AMoveTellsOfAsManyGroupsInBetweenAsTheLimitSays) {
 TEST(NsMessages, EventsAreAsTheVectorsSay) {
   expect_request("ns/service_moved", 0,
                  ServiceMoved{"robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest});
-  expect_request(
-      "ns/service_moved_again", 0,
-      ServiceMoved{
-          "robot/odom", kGroup, GroupId{0x00700006}, 3, 1, Delivery::latest, 0, false, true, {GroupId{0x00700008}}});
+  expect_request("ns/service_moved_again", 0,
+                 ServiceMoved{"robot/odom",
+                              kGroup,
+                              GroupId{0x00700006},
+                              3,
+                              1,
+                              Delivery::latest,
+                              0,
+                              false,
+                              true,
+                              {GroupId{0x00700008}}});
   ServiceMoved accepting{"robot/cmd", GroupId{}, GroupId{0x00700006}, 3};
   accepting.direction = Direction::accepts;
   expect_request("ns/service_moved_accepting", 0, accepting);
@@ -151,7 +161,8 @@ TEST(NsMessages, RecordsFitInTheBytesThatArePlannedForThem) {
   service.name.assign(kNameBytesMax, 'n');
   service.metadata.assign(kMetadataBytesMax, 'm');
   service.hub_name.assign(kNameBytesMax, 'h');
-  EXPECT_LE(size_of(ServicesAnswer{{service}, false, {}}) - size_of(ServicesAnswer{}), page_bytes_max(service));
+  EXPECT_LE(size_of(ServicesAnswer{{service}, false, {}}) - size_of(ServicesAnswer{}),
+            page_bytes_max(service));
 }
 
 }  // namespace

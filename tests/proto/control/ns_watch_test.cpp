@@ -22,8 +22,8 @@ WatchEvents events_of_the_vector() {
   events.changes[1].kind = ChangeKind::renamed;
   events.changes[1].version = 42;
   events.changes[1].former_name = "robot/old";
-  events.changes[1].node =
-      NodeRecord{NodeId{0x00700012}, "robot/base", HubId{7}, "lab", true, "a robot", "127.0.0.1:40000", 1500, 2};
+  events.changes[1].node = NodeRecord{NodeId{0x00700012}, "robot/base",      HubId{7}, "lab", true,
+                                      "a robot",          "127.0.0.1:40000", 1500,     2};
   events.changes[2].kind = ChangeKind::withdrawn;
   events.changes[2].version = 43;
   events.changes[2].service.emplace();

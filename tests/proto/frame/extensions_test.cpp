@@ -37,7 +37,8 @@ TEST(Extensions, AreReadInOrder) {
 TEST(Extensions, AreValidWhereEachFits) {
   EXPECT_TRUE(valid_extensions({}));
   EXPECT_TRUE(valid_extensions(from_hex("00 00")));
-  EXPECT_TRUE(valid_extensions(from_hex("01 01 00"))) << "a TRACE of a wrong size is carried like an unknown one";
+  EXPECT_TRUE(valid_extensions(from_hex("01 01 00")))
+      << "a TRACE of a wrong size is carried like an unknown one";
   EXPECT_FALSE(valid_extensions(from_hex("00")));
   EXPECT_FALSE(valid_extensions(from_hex("00 02 00")));
   EXPECT_FALSE(valid_extensions(from_hex("00 00 00")));
@@ -132,7 +133,8 @@ TEST(ExtensionWriter, WritesTheVectors) {
   ExtensionWriter trace(memory);
   ASSERT_TRUE(trace.add(ExtensionType::pad, from_hex("00")));
   ASSERT_TRUE(trace.add_trace(2));
-  ASSERT_TRUE(fill_trace(std::span(memory).first(trace.written().size()), {HubId{7}, kNewYear, kNewYear + 1500}));
+  ASSERT_TRUE(fill_trace(std::span(memory).first(trace.written().size()),
+                         {HubId{7}, kNewYear, kNewYear + 1500}));
   EXPECT_EQ(test::to_bytes(trace.written()), extensions_of("frame/unicast_trace"));
 }
 

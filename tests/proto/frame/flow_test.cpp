@@ -38,7 +38,9 @@ Bytes payload_of(const std::string& vector) {
   return test::to_bytes(parse_frame(bytes, Origin::node)->payload);
 }
 
-TEST(Flow, HasAnExampleForEveryVector) { EXPECT_EQ(test::vectors_in("flow").size(), examples().size()); }
+TEST(Flow, HasAnExampleForEveryVector) {
+  EXPECT_EQ(test::vectors_in("flow").size(), examples().size());
+}
 
 TEST(Flow, IsDecodedAndWrittenAsTheVectorsSay) {
   for (const auto& [name, message] : examples()) {
@@ -46,7 +48,9 @@ TEST(Flow, IsDecodedAndWrittenAsTheVectorsSay) {
     std::array<std::byte, kFrameSizeMax> frame{};
     frame.fill(std::byte{0xEE});
     const std::size_t size = encode_frame(message, kNode, frame);
-    EXPECT_EQ(Bytes(frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(size)), load_vector(name)) << name;
+    EXPECT_EQ(Bytes(frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(size)),
+              load_vector(name))
+        << name;
   }
 }
 

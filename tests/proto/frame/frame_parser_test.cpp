@@ -136,16 +136,18 @@ TEST(NextRun, GoesOnBehindEqualFramesWithOneOfAnotherLength) {
 }
 
 TEST(NextRun, GivesSomeFramesSingly) {
-  const std::vector<FrameHeader> single = {header_to(2, Kind::list),          header_to(0, Kind::flow),
-                                           header_to(0, Kind::link),          header_to(0, Kind::ns),
-                                           header_to(0, Kind::ctrl),          header_to(0, static_cast<Kind>(200)),
-                                           header_to(1, Kind::unicast, 0x08), header_to(1, Kind::unicast, 0x10),
-                                           header_to(1, Kind::unicast, 0x23), header_to(1, Kind::group, 3)};
+  const std::vector<FrameHeader> single = {
+      header_to(2, Kind::list),          header_to(0, Kind::flow),
+      header_to(0, Kind::link),          header_to(0, Kind::ns),
+      header_to(0, Kind::ctrl),          header_to(0, static_cast<Kind>(200)),
+      header_to(1, Kind::unicast, 0x08), header_to(1, Kind::unicast, 0x10),
+      header_to(1, Kind::unicast, 0x23), header_to(1, Kind::group, 3)};
   for (const FrameHeader& header : single) {
     Bytes bytes;
     append_frame(bytes, header, 32);
     append_frame(bytes, header, 32);
-    EXPECT_EQ(run_of(bytes).run.frames, 1u) << int{static_cast<std::uint8_t>(header.kind)} << " " << int{header.flags};
+    EXPECT_EQ(run_of(bytes).run.frames, 1u)
+        << int{static_cast<std::uint8_t>(header.kind)} << " " << int{header.flags};
   }
 }
 
@@ -174,7 +176,8 @@ TEST(NextRun, EndsBeforeALengthOverTheLimit) {
   EXPECT_EQ(run_of(bytes, 64).run.frames, 1u);
 }
 
-/// Frames of a stream, each with its bytes, as a reader finds them that gets the stream in the given pieces.
+/// Frames of a stream, each with its bytes, as a reader finds them that gets the stream in the
+/// given pieces.
 std::vector<Bytes> frames_of(const Bytes& stream, const std::vector<std::size_t>& cuts) {
   std::vector<Bytes> frames;
   Bytes buffer;
@@ -206,7 +209,8 @@ TEST(NextRun, FindsTheSameFramesHoweverTheBytesAreSplit) {
   ASSERT_EQ(whole.size(), 40u);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<std::size_t> cuts;
-    for (std::size_t at = random() % 30; at < stream.size(); at += 1 + random() % 60) cuts.push_back(at);
+    for (std::size_t at = random() % 30; at < stream.size(); at += 1 + random() % 60)
+      cuts.push_back(at);
     cuts.push_back(stream.size());
     EXPECT_EQ(frames_of(stream, cuts), whole);
   }
@@ -230,8 +234,10 @@ TEST(CheckHeader, NamesEachCause) {
   auto hops = header_to(1);
   hops.hops = 1;
   EXPECT_EQ(check_header_from_node(hops), FrameError::hops_not_zero);
-  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x40)), FrameError::reserved_flag_bits);
-  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x80)), FrameError::reserved_flag_bits);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x40)),
+            FrameError::reserved_flag_bits);
+  EXPECT_EQ(check_header_from_node(header_to(1, Kind::unicast, 0x80)),
+            FrameError::reserved_flag_bits);
   EXPECT_EQ(check_header_from_node(header_to(1, static_cast<Kind>(20))), FrameError::unknown_kind);
   EXPECT_EQ(check_header_from_node(header_to(1, static_cast<Kind>(255))), FrameError::unknown_kind);
   EXPECT_EQ(check_header_from_node(header_to(1, Kind::report)), FrameError::kind_not_allowed);
@@ -254,9 +260,10 @@ TEST(CheckHeader, KnowsWhichFlagsAKindMayCarry) {
           << static_cast<unsigned>(kind) << " with " << flags;
     }
   }
-  for (const Kind kind : {Kind::unicast, Kind::group, Kind::list, Kind::broadcast, Kind::service, Kind::taken,
-                          static_cast<Kind>(8), static_cast<Kind>(15)}) {
-    EXPECT_EQ(check_header_from_node(header_to(1, kind, 0x3C)), FrameError::none) << static_cast<unsigned>(kind);
+  for (const Kind kind : {Kind::unicast, Kind::group, Kind::list, Kind::broadcast, Kind::service,
+                          Kind::taken, static_cast<Kind>(8), static_cast<Kind>(15)}) {
+    EXPECT_EQ(check_header_from_node(header_to(1, kind, 0x3C)), FrameError::none)
+        << static_cast<unsigned>(kind);
   }
 }
 
@@ -390,7 +397,8 @@ TEST(FrameErrorText, SaysEachCause) {
   for (std::size_t i = 0; i < kFrameErrorCount; ++i) {
     EXPECT_STRNE(frame_error_text(static_cast<FrameError>(i)), "unknown error");
   }
-  EXPECT_STREQ(frame_error_text(FrameError::fragment_over_total), "a fragment ends after the message's total");
+  EXPECT_STREQ(frame_error_text(FrameError::fragment_over_total),
+               "a fragment ends after the message's total");
   EXPECT_STREQ(frame_error_text(static_cast<FrameError>(kFrameErrorCount)), "unknown error");
 }
 

@@ -19,7 +19,9 @@ using test::to_bytes;
 
 constexpr FragmentStream kStream{0x00700011, 0x00700012, Kind::unicast, 2};
 
-FragmentStream stream_of(std::uint32_t src, std::uint32_t dst = 0x00700012) { return {src, dst, Kind::unicast, 2}; }
+FragmentStream stream_of(std::uint32_t src, std::uint32_t dst = 0x00700012) {
+  return {src, dst, Kind::unicast, 2};
+}
 
 std::string text_of(const Reassembled& result) {
   return {reinterpret_cast<const char*>(result.message.data()), result.message.size()};
@@ -62,21 +64,24 @@ TEST(Reassembler, KeepsStreamsApart) {
                                                stream_of(1, 7),
                                                {1, 0x00700012, Kind::service, 2},
                                                {1, 0x00700012, Kind::unicast, 3}};
-  for (const auto& stream : streams) EXPECT_EQ(take(reassembler, {9, 0, 4}, "ab", stream).state, State::part);
+  for (const auto& stream : streams)
+    EXPECT_EQ(take(reassembler, {9, 0, 4}, "ab", stream).state, State::part);
   EXPECT_EQ(reassembler.open_messages(), streams.size());
-  for (const auto& stream : streams) EXPECT_EQ(text_of(take(reassembler, {9, 2, 4}, "cd", stream)), "abcd");
+  for (const auto& stream : streams)
+    EXPECT_EQ(text_of(take(reassembler, {9, 2, 4}, "cd", stream)), "abcd");
 }
 
 TEST(Reassembler, LosesAMessageAtAGapAnOverlapOrAnotherTotal) {
-  for (const FragmentHeader& wrong :
-       {FragmentHeader{9, 3, 6}, FragmentHeader{9, 1, 6}, FragmentHeader{9, 0, 6}, FragmentHeader{9, 2, 7}}) {
+  for (const FragmentHeader& wrong : {FragmentHeader{9, 3, 6}, FragmentHeader{9, 1, 6},
+                                      FragmentHeader{9, 0, 6}, FragmentHeader{9, 2, 7}}) {
     Reassembler reassembler;
     ASSERT_EQ(take(reassembler, {9, 0, 6}, "GI").state, State::part);
     const auto lost = take(reassembler, wrong, "M");
     EXPECT_EQ(lost.state, State::lost);
     EXPECT_EQ(lost.lost_messages, 1u);
     EXPECT_EQ(reassembler.waiting_bytes(), 0u);
-    EXPECT_EQ(take(reassembler, {9, 2, 6}, "Mnet").state, State::lost) << "what is left of it is not taken";
+    EXPECT_EQ(take(reassembler, {9, 2, 6}, "Mnet").state, State::lost)
+        << "what is left of it is not taken";
     EXPECT_EQ(reassembler.lost_messages(), 1u) << "and counted once";
   }
 }
@@ -115,7 +120,8 @@ TEST(Reassembler, RefusesMessagesOverItsLimit) {
 }
 
 TEST(Reassembler, ReservesWhatComesAndNotWhatIsClaimed) {
-  Reassembler reassembler({.message_bytes_max = kMessageBytesMax, .waiting_bytes_max = kMessageBytesMax});
+  Reassembler reassembler(
+      {.message_bytes_max = kMessageBytesMax, .waiting_bytes_max = kMessageBytesMax});
   const Bytes some(1000);
   std::uint32_t offset = 0;
   for (int i = 0; i < 100; ++i, offset += 1000) {
@@ -168,7 +174,9 @@ TEST(Reassembler, ForgetsASource) {
 
 TEST(Reassembler, GivesWhatWasCutHoweverStreamsInterleave) {
   std::mt19937 generator(7);  // NOLINT: the same every time
-  const auto below = [&generator](std::uint32_t end) { return static_cast<std::uint32_t>(generator()) % end; };
+  const auto below = [&generator](std::uint32_t end) {
+    return static_cast<std::uint32_t>(generator()) % end;
+  };
   constexpr std::uint32_t kStreams = 5;
   Reassembler reassembler;
   std::vector<Bytes> messages(kStreams);
@@ -182,8 +190,9 @@ TEST(Reassembler, GivesWhatWasCutHoweverStreamsInterleave) {
     const std::uint32_t i = below(kStreams);
     if (fragmenters[i].done()) continue;
     const Piece piece = fragmenters[i].next(1 + below(2000));
-    const auto result = reassembler.take(stream_of(i + 1), {i, piece.offset, fragmenters[i].total()},
-                                         std::span<const std::byte>(messages[i]).subspan(piece.offset, piece.size));
+    const auto result =
+        reassembler.take(stream_of(i + 1), {i, piece.offset, fragmenters[i].total()},
+                         std::span<const std::byte>(messages[i]).subspan(piece.offset, piece.size));
     if (result.state != State::whole) continue;
     EXPECT_EQ(to_bytes(result.message), messages[i]);
     ++whole;

@@ -89,7 +89,8 @@ TEST(ReceiveWindow, MayChangeBetweenDueAndTell) {
   EXPECT_FALSE(window.due(99));
   ASSERT_TRUE(window.due(100));
   window.set_window(4000);
-  EXPECT_EQ(window.tell(100), (Taken{9, 100, 4100})) << "although a quarter of the new one did not come";
+  EXPECT_EQ(window.tell(100), (Taken{9, 100, 4100}))
+      << "although a quarter of the new one did not come";
   EXPECT_FALSE(window.due(1099));
   EXPECT_TRUE(window.due(1100));
 }

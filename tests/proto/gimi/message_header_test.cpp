@@ -28,7 +28,8 @@ TEST(GimiMessage, HasATimeStamp) {
   const auto payload = payload_of("gimi/data");
   const auto message = parse_message(payload);
   ASSERT_TRUE(message);
-  EXPECT_EQ(message->header, (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8}));
+  EXPECT_EQ(message->header,
+            (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8}));
   EXPECT_EQ(message->timestamp_ns, kNewYear);
   EXPECT_EQ(to_bytes(message->data), to_bytes("hi"));
 }

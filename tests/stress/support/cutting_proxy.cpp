@@ -30,7 +30,8 @@ CuttingProxy::~CuttingProxy() {
 void CuttingProxy::choose_cut() {
   const bool is_planned = cuts_.load() < plan_.cuts && plan_.bytes_between > 0;
   until_cut_ =
-      is_planned ? std::uniform_int_distribution<std::uint64_t>(1, 2 * plan_.bytes_between)(random_) : UINT64_MAX;
+      is_planned ? std::uniform_int_distribution<std::uint64_t>(1, 2 * plan_.bytes_between)(random_)
+                 : UINT64_MAX;
   is_cut_due_ = false;
 }
 
@@ -56,8 +57,8 @@ void CuttingProxy::serve() {
   }
   std::vector<int> waited{node_.get()};
   if (!held_.load()) waited.push_back(hub_.get());
-  const bool stuck =
-      std::any_of(directions_.begin(), directions_.end(), [](const Direction& d) { return d.bytes.size() > d.sent; });
+  const bool stuck = std::any_of(directions_.begin(), directions_.end(),
+                                 [](const Direction& d) { return d.bytes.size() > d.sent; });
   wait_readable(waited, stuck ? 1 : 20);
   const bool goes_on = forward(node_.get(), hub_.get(), directions_[0]) &&
                        (held_.load() || forward(hub_.get(), node_.get(), directions_[1]));

@@ -17,14 +17,15 @@ namespace gimnet::stress {
 
 /// What the proxy does to the connection that goes through it.
 struct CutPlan {
-  std::size_t cuts = 0;                     ///< so many, then it only forwards
-  std::uint64_t bytes_between = 0;          ///< of both directions together, on average
-  std::chrono::milliseconds least_life{0};  ///< a connection whose time has come stands still until it is so old
+  std::size_t cuts = 0;             ///< so many, then it only forwards
+  std::uint64_t bytes_between = 0;  ///< of both directions together, on average
+  std::chrono::milliseconds least_life{
+      0};  ///< a connection whose time has come stands still until it is so old
   std::uint32_t seed = 1;
 };
 
-/// Stands between one node and its hub: forwards bytes, and cuts the connection at random bytes, now by an end of the
-/// stream, now by a reset; bytes that it holds then are lost, as in a network.
+/// Stands between one node and its hub: forwards bytes, and cuts the connection at random bytes,
+/// now by an end of the stream, now by a reset; bytes that it holds then are lost, as in a network.
 /// Thread safety: start and destruction by one thread; the counters by any. It owns one thread.
 class CuttingProxy {
  public:
@@ -35,7 +36,8 @@ class CuttingProxy {
 
   [[nodiscard]] const std::string& url() const { return url_; }
   [[nodiscard]] std::size_t cuts() const { return cuts_.load(); }
-  /// While held, nothing from the hub is taken, so that its kernel's buffers fill; the other direction goes on.
+  /// While held, nothing from the hub is taken, so that its kernel's buffers fill; the other
+  /// direction goes on.
   void hold_downstream(bool held) { held_.store(held); }
   /// Cuts as soon as it can, outside the plan. Bytes that it holds are lost.
   void cut_now() { cut_now_.store(true); }

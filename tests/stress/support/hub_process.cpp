@@ -92,7 +92,8 @@ void HubProcess::launch() {
   output_ = std::move(started.output);
   std::istringstream line(read_output(output_.get(), false));
   std::string ready;
-  if (!(line >> ready >> tcp_url_ >> unix_url_) || ready != "ready") throw std::runtime_error("tcphub is not ready");
+  if (!(line >> ready >> tcp_url_ >> unix_url_) || ready != "ready")
+    throw std::runtime_error("tcphub is not ready");
 }
 
 void HubProcess::expect_exact_ledger() noexcept {

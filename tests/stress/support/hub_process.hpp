@@ -11,12 +11,13 @@
 
 namespace gimnet::stress {
 
-/// The shipped tcphub as a process of its own, on a free port and a Unix socket in a new temporary folder. Ended and
-/// cleaned up when this goes; it dies with the test program, too. In the end it has to be alive and to have an exact
-/// ledger: else the test fails. Thread safety: none.
+/// The shipped tcphub as a process of its own, on a free port and a Unix socket in a new temporary
+/// folder. Ended and cleaned up when this goes; it dies with the test program, too. In the end it
+/// has to be alive and to have an exact ledger: else the test fails. Thread safety: none.
 class HubProcess {
  public:
-  /// `arguments` beside the addresses, for example {"--shards", "2"}. Returns when the hub is ready.
+  /// `arguments` beside the addresses, for example {"--shards", "2"}. Returns when the hub is
+  /// ready.
   explicit HubProcess(const std::vector<std::string>& arguments = {});
   HubProcess(const HubProcess&) = delete;
   HubProcess& operator=(const HubProcess&) = delete;

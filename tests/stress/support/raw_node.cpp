@@ -36,7 +36,8 @@ void RawNode::begin_join(const std::string& url, const JoinOptions& options) {
 
 bool RawNode::finish_join() {
   read_some();
-  if (is_closed_ && !goodbye_) throw std::runtime_error("the hub closed the connection before WELCOME");
+  if (is_closed_ && !goodbye_)
+    throw std::runtime_error("the hub closed the connection before WELCOME");
   if (goodbye_) throw std::runtime_error("not admitted: " + goodbye_->sentence);
   if (buffer_.size() < proto::kOpeningSize) return false;
   if (taken_ == 0) taken_ = proto::kOpeningSize;
@@ -63,7 +64,8 @@ bool RawNode::read_some(std::size_t bytes_max) {
   }
   // Shared, and never cleared: mostly nothing or little comes, and a node keeps no more than that.
   static thread_local std::array<std::byte, kReadBytesMax> arrived;
-  const ssize_t size = ::recv(socket_.get(), arrived.data(), std::min(bytes_max, arrived.size()), 0);
+  const ssize_t size =
+      ::recv(socket_.get(), arrived.data(), std::min(bytes_max, arrived.size()), 0);
   const std::size_t came = size > 0 ? static_cast<std::size_t>(size) : 0;
   buffer_.insert(buffer_.end(), arrived.data(), arrived.data() + came);
   bytes_read_ += came;
@@ -88,7 +90,9 @@ std::optional<Frame> RawNode::next() {
 Frame RawNode::wait_next(const Deadline& deadline) {
   for (;;) {
     if (const auto frame = next()) return *frame;
-    if (is_closed_) throw std::runtime_error("closed: " + (goodbye_ ? goodbye_->sentence : std::string("no word")));
+    if (is_closed_)
+      throw std::runtime_error("closed: " +
+                               (goodbye_ ? goodbye_->sentence : std::string("no word")));
     deadline.check("frame");
     if (!read_some()) wait_readable({socket_.get()}, 100);
   }
@@ -128,7 +132,8 @@ void RawNode::put(proto::FrameParts parts, std::span<const std::byte> payload) {
   parts.payload_size = payload.size();
   const std::size_t before = out_.size();
   out_.resize(before + proto::prefix_size(parts) + payload.size());
-  if (proto::write_frame(parts, payload, std::span(out_).subspan(before)) == 0) throw std::runtime_error("no frame");
+  if (proto::write_frame(parts, payload, std::span(out_).subspan(before)) == 0)
+    throw std::runtime_error("no frame");
   if (is_for_nodes(parts.header.kind)) ++frames_sent_;
 }
 
@@ -138,11 +143,14 @@ void RawNode::put_flow(const proto::flow::Message& message) {
   put_bytes(std::span(frame).first(size));
 }
 
-void RawNode::put_bytes(std::span<const std::byte> bytes) { out_.insert(out_.end(), bytes.begin(), bytes.end()); }
+void RawNode::put_bytes(std::span<const std::byte> bytes) {
+  out_.insert(out_.end(), bytes.begin(), bytes.end());
+}
 
 bool RawNode::flush() {
   while (written_ < out_.size()) {
-    const ssize_t size = ::send(socket_.get(), out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
+    const ssize_t size =
+        ::send(socket_.get(), out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);
     if (size < 0 && errno != EINTR && errno != EAGAIN) {
       // What the hub said before it closed can still be read; nothing more can be written.
       written_ = out_.size();
@@ -193,13 +201,15 @@ std::vector<std::byte> RawNode::exchange(proto::Kind kind, const proto::Payload&
 }
 
 void RawNode::leave() {
-  put(parts_of(proto::Kind::link, 0), proto::encode(proto::Goodbye{proto::GoodbyeCode::done, "done"}));
+  put(parts_of(proto::Kind::link, 0),
+      proto::encode(proto::Goodbye{proto::GoodbyeCode::done, "done"}));
   flush();
 }
 
 void RawNode::shut_down() { ::shutdown(socket_.get(), SHUT_WR); }
 
-proto::FrameParts parts_of(proto::Kind kind, std::uint32_t dst, proto::Policy policy, proto::Lane lane) {
+proto::FrameParts parts_of(proto::Kind kind, std::uint32_t dst, proto::Policy policy,
+                           proto::Lane lane) {
   proto::FrameParts parts;
   parts.header.kind = kind;
   parts.header.dst = dst;

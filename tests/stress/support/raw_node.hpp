@@ -26,7 +26,9 @@ inline constexpr std::size_t kReadBytesMax = 256 * 1024;
 struct Frame {
   proto::FrameHeader header;
   std::span<const std::byte> bytes;  ///< header included
-  [[nodiscard]] std::span<const std::byte> body() const { return bytes.subspan(proto::kHeaderSize); }
+  [[nodiscard]] std::span<const std::byte> body() const {
+    return bytes.subspan(proto::kHeaderSize);
+  }
 };
 
 /// How to join; the rest of HELLO as in `hello`.
@@ -35,16 +37,17 @@ struct JoinOptions {
   SocketOptions socket;
 };
 
-/// A node made of the protocol library and a socket, which does exactly what a test wants and counts what it does: it
-/// reads, writes and keeps alive only when told to. Failures throw.
-/// Thread safety: one thread.
+/// A node made of the protocol library and a socket, which does exactly what a test wants and
+/// counts what it does: it reads, writes and keeps alive only when told to. Failures throw. Thread
+/// safety: one thread.
 class RawNode {
  public:
   RawNode() = default;
   /// Joins and waits for WELCOME.
   RawNode(const std::string& url, const JoinOptions& options = {});
 
-  /// The two halves of joining, for those who join many at once. finish_join() is false as long as nothing came.
+  /// The two halves of joining, for those who join many at once. finish_join() is false as long as
+  /// nothing came.
   void begin_join(const std::string& url, const JoinOptions& options = {});
   [[nodiscard]] bool finish_join();
 
@@ -58,13 +61,15 @@ class RawNode {
 
   /// One recv(). True: something came.
   bool read_some(std::size_t bytes_max = kReadBytesMax);
-  /// The next whole frame that was read. PINGs are answered, PAUSE and RESUME noted, GOODBYE kept, and not returned.
+  /// The next whole frame that was read. PINGs are answered, PAUSE and RESUME noted, GOODBYE kept,
+  /// and not returned.
   [[nodiscard]] std::optional<Frame> next();
   /// Reads until there is a frame, or throws when the time is over or the connection ended.
   [[nodiscard]] Frame wait_next(const Deadline& deadline = Deadline());
   /// Bytes taken from the socket since the beginning.
   [[nodiscard]] std::uint64_t bytes_read() const { return bytes_read_; }
-  /// Frames for nodes that put() was given, and frames of nodes that next() gave: what the hub's ledger counts.
+  /// Frames for nodes that put() was given, and frames of nodes that next() gave: what the hub's
+  /// ledger counts.
   [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
   [[nodiscard]] std::uint64_t frames_got() const { return frames_got_; }
   /// Position in bytes_read() of the end of the frame that next() gave last.
@@ -82,10 +87,12 @@ class RawNode {
   [[nodiscard]] bool is_paused(proto::Kind kind, std::uint8_t lane, std::uint32_t dst) const;
   [[nodiscard]] std::size_t pauses() const { return pauses_; }
   void ping();
-  /// Sends a PING where nothing was sent for half a second: to be called often by who wants to stay.
+  /// Sends a PING where nothing was sent for half a second: to be called often by who wants to
+  /// stay.
   void keep_alive();
 
-  /// Asks the hub and waits for its answer, or why it says no; data frames that come before it are lost to the test.
+  /// Asks the hub and waits for its answer, or why it says no; data frames that come before it are
+  /// lost to the test.
   template <class Answer, class Request>
   [[nodiscard]] Result<Answer, proto::Refusal> try_ask(proto::Kind kind, const Request& request) {
     return proto::decode_answer<Answer>(exchange(kind, proto::encode(request, ++request_)));
@@ -100,7 +107,8 @@ class RawNode {
 
   /// Says GOODBYE `done`.
   void leave();
-  /// No more bytes from here: the hub sees the end of the stream, and what it wrote can still be read.
+  /// No more bytes from here: the hub sees the end of the stream, and what it wrote can still be
+  /// read.
   void shut_down();
   /// The connection alone, for who holds many and says nothing more on them.
   [[nodiscard]] Descriptor release() { return std::move(socket_); }

@@ -10,7 +10,8 @@
 
 namespace gimnet::stress {
 
-/// True with GIMNET_STRESS=full in the environment: the sizes of docs/requirements.md instead of a tenth of them.
+/// True with GIMNET_STRESS=full in the environment: the sizes of docs/requirements.md instead of a
+/// tenth of them.
 [[nodiscard]] inline bool is_full_size() {
   const char* size = std::getenv("GIMNET_STRESS");
   return size != nullptr && std::string_view(size) == "full";
@@ -21,7 +22,8 @@ using Clock = std::chrono::steady_clock;
 /// A point in time after which waiting is a failure.
 class Deadline {
  public:
-  explicit Deadline(std::chrono::milliseconds patience = std::chrono::seconds(is_full_size() ? 300 : 30))
+  explicit Deadline(std::chrono::milliseconds patience = std::chrono::seconds(is_full_size() ? 300
+                                                                                             : 30))
       : end_(Clock::now() + patience) {}
   [[nodiscard]] bool is_over() const { return Clock::now() >= end_; }
   /// Throws, which fails the test, when the time is over.

@@ -16,7 +16,9 @@
 namespace gimnet::stress {
 namespace {
 
-[[noreturn]] void fail(const char* what) { throw std::runtime_error(std::string(what) + ": " + std::strerror(errno)); }
+[[noreturn]] void fail(const char* what) {
+  throw std::runtime_error(std::string(what) + ": " + std::strerror(errno));
+}
 
 void make_nonblocking(int socket) {
   if (::fcntl(socket, F_SETFL, ::fcntl(socket, F_GETFL) | O_NONBLOCK) != 0) fail("O_NONBLOCK");
@@ -38,9 +40,11 @@ Descriptor dial_unix(const std::string& path, const SocketOptions& options) {
   set_buffers(socket.get(), options);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) throw std::runtime_error("the socket's path is too long: " + path);
+  if (path.size() >= sizeof address.sun_path)
+    throw std::runtime_error("the socket's path is too long: " + path);
   std::memcpy(address.sun_path, path.data(), path.size());
-  if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) fail("connect");
+  if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+    fail("connect");
   return socket;
 }
 
@@ -52,7 +56,8 @@ Descriptor dial_tcp(const std::string& port, const SocketOptions& options) {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   address.sin_port = htons(static_cast<std::uint16_t>(std::stoul(port)));
-  if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) fail("connect");
+  if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+    fail("connect");
   const int on = 1;
   ::setsockopt(socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   return socket;
@@ -66,7 +71,8 @@ void Descriptor::reset() {
 
 Descriptor dial(const std::string& url, const SocketOptions& options) {
   const bool is_unix = url.starts_with("unix:");
-  Descriptor socket = is_unix ? dial_unix(url.substr(5), options) : dial_tcp(url.substr(url.rfind(':') + 1), options);
+  Descriptor socket = is_unix ? dial_unix(url.substr(5), options)
+                              : dial_tcp(url.substr(url.rfind(':') + 1), options);
   make_nonblocking(socket.get());
   return socket;
 }

@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-// Sockets and descriptors of the stress tests. Failures throw std::runtime_error, which fails the test.
+// Sockets and descriptors of the stress tests. Failures throw std::runtime_error, which fails the
+// test.
 
 namespace gimnet::stress {
 

@@ -9,7 +9,8 @@ namespace gimnet::stress {
 
 Statistics Statistics::of(RawNode& observer) {
   Statistics statistics;
-  const auto answer = observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{});
+  const auto answer =
+      observer.ask<proto::ctrl::StatisticsAnswer>(proto::Kind::ctrl, proto::ctrl::Statistics{});
   for (const auto& shard : answer.shards) {
     for (const auto& counter : shard.counters) {
       statistics.counters_[counter.name] += counter.value;
@@ -28,12 +29,14 @@ std::uint64_t Statistics::dropped() const {
 }
 
 bool Statistics::is_balanced() const {
-  return (*this)["accepted"] + (*this)["copies"] == (*this)["delivered"] + dropped() + (*this)["queued"];
+  return (*this)["accepted"] + (*this)["copies"] ==
+         (*this)["delivered"] + dropped() + (*this)["queued"];
 }
 
 bool Statistics::has_the_ledger_of(const Statistics& other) const {
   const auto same = [&](const char* name) { return (*this)[name] == other[name]; };
-  return same("accepted") && same("copies") && same("delivered") && same("queued") && dropped() == other.dropped();
+  return same("accepted") && same("copies") && same("delivered") && same("queued") &&
+         dropped() == other.dropped();
 }
 
 std::string Statistics::text() const {
@@ -60,7 +63,8 @@ Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics
   for (;;) {
     Statistics statistics = Statistics::of(observer);
     if (condition(statistics)) return statistics;
-    if (deadline.is_over()) throw std::runtime_error("waited in vain: " + what + ": " + statistics.text());
+    if (deadline.is_over())
+      throw std::runtime_error("waited in vain: " + what + ": " + statistics.text());
     wait_readable({}, 5);
   }
 }

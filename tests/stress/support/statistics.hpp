@@ -16,7 +16,9 @@ class Statistics {
   static Statistics of(RawNode& observer);
 
   /// REQUIRES: the hub has a counter of that name.
-  [[nodiscard]] std::uint64_t operator[](const std::string& name) const { return counters_.at(name); }
+  [[nodiscard]] std::uint64_t operator[](const std::string& name) const {
+    return counters_.at(name);
+  }
   /// The same of a counter that the hub only tells where it is not 0: the conductor's.
   [[nodiscard]] std::uint64_t told(const std::string& name) const {
     const auto found = counters_.find(name);
@@ -39,12 +41,14 @@ class Statistics {
   std::map<std::size_t, std::map<std::string, std::uint64_t>> by_shard_;
 };
 
-/// What the hub counted as soon as nothing moves: twice in a row the same ledger, which is exact. Throws, with the last
-/// counters, when there is no such moment.
+/// What the hub counted as soon as nothing moves: twice in a row the same ledger, which is exact.
+/// Throws, with the last counters, when there is no such moment.
 [[nodiscard]] Statistics wait_for_exact_ledger(RawNode& observer);
 
-/// Asks until the condition holds, and returns what held; throws, with the last counters, when time is over.
-[[nodiscard]] Statistics wait_for(RawNode& observer, const std::function<bool(const Statistics&)>& condition,
+/// Asks until the condition holds, and returns what held; throws, with the last counters, when time
+/// is over.
+[[nodiscard]] Statistics wait_for(RawNode& observer,
+                                  const std::function<bool(const Statistics&)>& condition,
                                   const std::string& what);
 
 }  // namespace gimnet::stress

@@ -45,7 +45,8 @@ TEST(AnsiWriter, UsesTheColoursThereAre) {
   EXPECT_THAT(AnsiWriter({true, ColourDepth::k256}).update(canvas), HasSubstr("38;5;121"));
   EXPECT_THAT(AnsiWriter({true, ColourDepth::k16}).update(canvas), HasSubstr("\x1b[0;92m"));
   const std::string plain = AnsiWriter(kColourless).update(canvas);
-  for (const char* colour : {"38;5", "48;5", "[0;9", "[0;3"}) EXPECT_THAT(plain, Not(HasSubstr(colour)));
+  for (const char* colour : {"38;5", "48;5", "[0;9", "[0;3"})
+    EXPECT_THAT(plain, Not(HasSubstr(colour)));
 }
 
 TEST(AnsiWriter, LinesHaveNoCursorMovementsAndNoTrailingBlanks) {

@@ -43,7 +43,8 @@ TEST(Canvas, FramesHaveRoundCorners) {
 }
 
 TEST(Utf8, ComesBack) {
-  for (const char32_t code : {U'a', U'µ', U'⣿', U'\U0001F916', U'\u07FF', U'\u0800', U'\uFFFF', U'\U00010000'}) {
+  for (const char32_t code :
+       {U'a', U'µ', U'⣿', U'\U0001F916', U'\u07FF', U'\u0800', U'\uFFFF', U'\U00010000'}) {
     std::string text;
     append_utf8(text, code);
     EXPECT_EQ(decoded_utf8(text), std::u32string(1, code));

@@ -40,13 +40,15 @@ TEST(CarmenLine, ReadsAScanWithThePoseOfTheLaser) {
 
 TEST(CarmenLine, BlanksMayBeManyAndTabs) {
   LogRecord record;
-  EXPECT_EQ(parse_carmen_line("  ODOM\t1  2 3 0 0 0\t4 host 4  ", record).value(), LineKind::kOdometry);
+  EXPECT_EQ(parse_carmen_line("  ODOM\t1  2 3 0 0 0\t4 host 4  ", record).value(),
+            LineKind::kOdometry);
 }
 
 TEST(CarmenLine, PassesOverWhatIsNotItsBusiness) {
   LogRecord record;
   for (const std::string_view line :
-       {"", "   ", "# comment", "#", "PARAM robot_length 0.54 1.5 b21 1.5", "NEFF 27.6", "RAWLASER1 1 2 3", "SYNC x"}) {
+       {"", "   ", "# comment", "#", "PARAM robot_length 0.54 1.5 b21 1.5", "NEFF 27.6",
+        "RAWLASER1 1 2 3", "SYNC x"}) {
     EXPECT_EQ(parse_carmen_line(line, record).value(), LineKind::kIgnored) << line;
   }
 }
@@ -55,7 +57,8 @@ TEST(CarmenLine, RefusesBrokenLinesAndSaysWhy) {
   EXPECT_THAT(complaint("ODOM 1 2 3 0 0 0 4 host"), HasSubstr("ends before logger timestamp"));
   EXPECT_THAT(complaint("ODOM"), HasSubstr("ends before x"));
   EXPECT_THAT(complaint("ODOM 1 2 3 0 0 0 4 host 4 5"), HasSubstr("more than"));
-  EXPECT_THAT(complaint("ODOM 1 two 3 0 0 0 4 host 4"), HasSubstr("y is \"two\", which is no number"));
+  EXPECT_THAT(complaint("ODOM 1 two 3 0 0 0 4 host 4"),
+              HasSubstr("y is \"two\", which is no number"));
   EXPECT_THAT(complaint("ODOM 1 2x 3 0 0 0 4 host 4"), HasSubstr("no number"));
   EXPECT_THAT(complaint("ODOM nan 2 3 0 0 0 4 host 4"), HasSubstr("no number"));
   EXPECT_THAT(complaint("ODOM inf 2 3 0 0 0 4 host 4"), HasSubstr("no number"));
@@ -69,8 +72,10 @@ TEST(CarmenLine, RefusesScansWhoseCountsDoNotFit) {
   EXPECT_THAT(complaint("FLASER 0 1 2 3 1 2 3 4 host 4"), HasSubstr("outside 1 .."));
   EXPECT_THAT(complaint("FLASER -1 1 2 3 1 2 3 4 host 4"), HasSubstr("outside 1 .."));
   EXPECT_THAT(complaint("FLASER 1.5 1 1 2 3 1 2 3 4 host 4"), HasSubstr("no number of beams"));
-  EXPECT_THAT(complaint("FLASER 4 1.5 2 81.91 1 2 0.25 1.5 2.5 0.75 33.5 pippo 33.5"), HasSubstr("no number"));
-  EXPECT_THAT(complaint("FLASER 2 1.5 -2 1 2 0.25 1.5 2.5 0.75 33.5 pippo 33.5"), HasSubstr("range is -2, outside"));
+  EXPECT_THAT(complaint("FLASER 4 1.5 2 81.91 1 2 0.25 1.5 2.5 0.75 33.5 pippo 33.5"),
+              HasSubstr("no number"));
+  EXPECT_THAT(complaint("FLASER 2 1.5 -2 1 2 0.25 1.5 2.5 0.75 33.5 pippo 33.5"),
+              HasSubstr("range is -2, outside"));
   EXPECT_THAT(complaint("FLASER 4294967297"), HasSubstr("outside 1 .."));
 }
 
@@ -86,7 +91,8 @@ TEST(CarmenLine, TakesAsManyBeamsAsAllowedAndNotOneMore) {
 }
 
 TEST(RobotLog, KeepsOrderAndCounts) {
-  const TemporaryFile file(std::string("# log\n") + std::string(kOdom) + "\n" + std::string(kScan) + "\n", true);
+  const TemporaryFile file(
+      std::string("# log\n") + std::string(kOdom) + "\n" + std::string(kScan) + "\n", true);
   const Result<RobotLog> log = load_robot_log(file.path());
   ASSERT_TRUE(log) << log.error().sentence;
   ASSERT_EQ(log->records.size(), 2U);
@@ -98,12 +104,14 @@ TEST(RobotLog, NamesFileAndLineOfGarbage) {
   const TemporaryFile file(std::string(kOdom) + "\n# fine\nODOM 1 2\n");
   const Result<RobotLog> log = load_robot_log(file.path());
   ASSERT_FALSE(log);
-  EXPECT_EQ(log.error().sentence, file.path() + ":3: ODOM: the line ends before theta; was it cut?");
+  EXPECT_EQ(log.error().sentence,
+            file.path() + ":3: ODOM: the line ends before theta; was it cut?");
 }
 
 TEST(RobotLog, RefusesALogInWhichNothingHappens) {
   const TemporaryFile file("# nothing\nPARAM a b\n");
-  EXPECT_THAT(load_robot_log(file.path()).error().sentence, HasSubstr("no ODOM and no FLASER line in 2 lines"));
+  EXPECT_THAT(load_robot_log(file.path()).error().sentence,
+              HasSubstr("no ODOM and no FLASER line in 2 lines"));
 }
 
 }  // namespace

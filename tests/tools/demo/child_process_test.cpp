@@ -74,7 +74,8 @@ TEST_F(ChildProcessTest, HasAGroupOfItsOwn) {
 }
 
 TEST_F(ChildProcessTest, SaysWhichProgramIsMissing) {
-  const Result<ChildProcess> child = ChildProcess::start({"the hub", {"/nowhere/tcphub"}, folder_ / "log"});
+  const Result<ChildProcess> child =
+      ChildProcess::start({"the hub", {"/nowhere/tcphub"}, folder_ / "log"});
   ASSERT_FALSE(child);
   EXPECT_THAT(child.error().sentence, HasSubstr("cannot start the hub: /nowhere/tcphub"));
 }

@@ -20,7 +20,8 @@ DifferentialDrive drive_at(const Pose& pose) { return {pose, DriveSpec{}}; }
 
 void run(DifferentialDrive& drive, const Twist& command, double seconds) {
   const WorldMap map = room();
-  for (int step = 0; step < static_cast<int>(seconds / 0.01 + 0.5); ++step) drive.step(command, 0.01, map);
+  for (int step = 0; step < static_cast<int>(seconds / 0.01 + 0.5); ++step)
+    drive.step(command, 0.01, map);
 }
 
 TEST(DifferentialDrive, DrivesStraight) {

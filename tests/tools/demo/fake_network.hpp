@@ -8,8 +8,8 @@
 
 namespace gimnet::demo {
 
-/// A robot's and a viewer's end without a hub between them, on one thread and with a clock of their own: whoever would
-/// wait lets the other work, and if there is none, the time passes.
+/// A robot's and a viewer's end without a hub between them, on one thread and with a clock of their
+/// own: whoever would wait lets the other work, and if there is none, the time passes.
 class FakeNetwork {
  public:
   /// One end; what it sends arrives in the other's queue.
@@ -66,7 +66,8 @@ class FakeNetwork {
   HubCounters counters;
 
  private:
-  void sent(Service service, std::span<const std::byte> payload, std::deque<NodePort::Event>& queue) {
+  void sent(Service service, std::span<const std::byte> payload,
+            std::deque<NodePort::Event>& queue) {
     ++counters.accepted;
     if (lose_each != 0 && counters.accepted % lose_each == 0) {
       counters.add("dropped.queue_full", 1);

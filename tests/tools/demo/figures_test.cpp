@@ -25,8 +25,8 @@ std::string panel(const Monitor& monitor, const ScreenState& state, int rows) {
 
 TEST(Figures, ShowRobotStreamsLatencyAndHub) {
   const std::string text = panel(busy_monitor(), at_one_second(), 22);
-  for (const char* expected :
-       {"ROBOT", "driven by you", "4.25", "5.50 m", "0.75 m/s", "← odom", "40.0", "120 µs", "ledger exact", "12,345"}) {
+  for (const char* expected : {"ROBOT", "driven by you", "4.25", "5.50 m", "0.75 m/s", "← odom",
+                               "40.0", "120 µs", "ledger exact", "12,345"}) {
     EXPECT_THAT(text, HasSubstr(expected));
   }
 }

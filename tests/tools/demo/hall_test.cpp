@@ -18,7 +18,8 @@ TEST(Hall, IsClosed) {
   const WorldMap map = WorldMap::parse(kHallText).value();
   const auto columns = static_cast<long>(map.columns());
   const auto rows = static_cast<long>(map.rows());
-  for (long column = 0; column < columns; ++column) EXPECT_TRUE(map.wall(column, 0) && map.wall(column, rows - 1));
+  for (long column = 0; column < columns; ++column)
+    EXPECT_TRUE(map.wall(column, 0) && map.wall(column, rows - 1));
   for (long row = 0; row < rows; ++row) EXPECT_TRUE(map.wall(0, row) && map.wall(columns - 1, row));
 }
 

@@ -11,8 +11,8 @@ using testing::IsEmpty;
 
 TEST(KeyParser, KnowsLettersInEitherCase) {
   KeyParser parser;
-  EXPECT_THAT(parser.take("wAsD q", 0),
-              ElementsAre(Key::kForward, Key::kLeft, Key::kBack, Key::kRight, Key::kStop, Key::kQuit));
+  EXPECT_THAT(parser.take("wAsD q", 0), ElementsAre(Key::kForward, Key::kLeft, Key::kBack,
+                                                    Key::kRight, Key::kStop, Key::kQuit));
 }
 
 TEST(KeyParser, KnowsArrowsInBothModes) {
@@ -51,7 +51,8 @@ TEST(KeyParser, EscSwallowsNoOtherKey) {
 
 TEST(KeyParser, AControlCharacterIsAKeyWithinASequenceToo) {
   KeyParser parser;
-  EXPECT_THAT(parser.take("\x1b[1\x03\x1bO\x03q", 0), ElementsAre(Key::kQuit, Key::kQuit, Key::kQuit));
+  EXPECT_THAT(parser.take("\x1b[1\x03\x1bO\x03q", 0),
+              ElementsAre(Key::kQuit, Key::kQuit, Key::kQuit));
 }
 
 TEST(KeyParser, WhatBecomesNoSequenceInTimeIsForgotten) {
@@ -61,7 +62,8 @@ TEST(KeyParser, WhatBecomesNoSequenceInTimeIsForgotten) {
     EXPECT_THAT(parser.take(begun, 1000), IsEmpty());
     EXPECT_THAT(parser.take("", 1000 + kPatience_ns), IsEmpty());
     EXPECT_THAT(parser.take("O", 1001 + kPatience_ns), IsEmpty());
-    EXPECT_THAT(parser.take("q ", 1002 + kPatience_ns), ElementsAre(Key::kQuit, Key::kStop)) << begun;
+    EXPECT_THAT(parser.take("q ", 1002 + kPatience_ns), ElementsAre(Key::kQuit, Key::kStop))
+        << begun;
   }
   KeyParser parser;
   EXPECT_THAT(parser.take("\x1b[", 1000), IsEmpty());

@@ -32,10 +32,13 @@ Outcome read_all(const std::string& path) {
 }
 
 TEST(LineReader, GivesEachLineWithoutItsEnd) {
-  EXPECT_THAT(read_all(TemporaryFile("one\ntwo\r\n\nlast").path()).lines, ElementsAre("one", "two", "", "last"));
+  EXPECT_THAT(read_all(TemporaryFile("one\ntwo\r\n\nlast").path()).lines,
+              ElementsAre("one", "two", "", "last"));
 }
 
-TEST(LineReader, AnEmptyFileHasNoLine) { EXPECT_TRUE(read_all(TemporaryFile("").path()).lines.empty()); }
+TEST(LineReader, AnEmptyFileHasNoLine) {
+  EXPECT_TRUE(read_all(TemporaryFile("").path()).lines.empty());
+}
 
 TEST(LineReader, ReadsWhatGzipPacked) {
   std::string text;
@@ -48,9 +51,11 @@ TEST(LineReader, ReadsWhatGzipPacked) {
 
 TEST(LineReader, TakesALineOfTheLimitAndRefusesOneBeyond) {
   const std::string longest(LineReader::kLineBytesMax - 1, 'x');
-  EXPECT_THAT(read_all(TemporaryFile(longest + "\nend\n").path()).lines, ElementsAre(longest, "end"));
+  EXPECT_THAT(read_all(TemporaryFile(longest + "\nend\n").path()).lines,
+              ElementsAre(longest, "end"));
   const TemporaryFile beyond("first\n" + longest + "xx\n");
-  EXPECT_THAT(read_all(beyond.path()).error, HasSubstr(beyond.path() + ":2: the line is longer than 1 MiB"));
+  EXPECT_THAT(read_all(beyond.path()).error,
+              HasSubstr(beyond.path() + ":2: the line is longer than 1 MiB"));
 }
 
 TEST(LineReader, SaysThatAnArchiveWasCut) {
@@ -64,7 +69,8 @@ TEST(LineReader, SaysThatAnArchiveWasCut) {
 }
 
 TEST(LineReader, SaysWhatIsWrongWithThePath) {
-  EXPECT_THAT(read_all("/nowhere/at all").error, HasSubstr("cannot open /nowhere/at all: No such file"));
+  EXPECT_THAT(read_all("/nowhere/at all").error,
+              HasSubstr("cannot open /nowhere/at all: No such file"));
   EXPECT_THAT(read_all("/").error, HasSubstr("not a regular file"));
 }
 

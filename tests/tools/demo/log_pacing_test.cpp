@@ -50,8 +50,10 @@ TEST(LogPacing, LongPausesAreCut) {
 TEST(LogPacing, AStampThatFitsNeitherNeighbourIsPassedOver) {
   EXPECT_THAT(due_times({moving(1.0, 0), moving(9999.0, 1), moving(2.0, 2), moving(3.0, 3)}),
               ElementsAre(0.0, 0.0, 1.0, 2.0));
-  EXPECT_THAT(due_times({moving(101.0, 0), moving(1e-42, 1), moving(102.0, 2)}), ElementsAre(0.0, 0.0, 1.0));
-  EXPECT_THAT(due_times({moving(101.0, 0), moving(102.0, 1), moving(2.0, 2)}), ElementsAre(0.0, 1.0, 1.0));
+  EXPECT_THAT(due_times({moving(101.0, 0), moving(1e-42, 1), moving(102.0, 2)}),
+              ElementsAre(0.0, 0.0, 1.0));
+  EXPECT_THAT(due_times({moving(101.0, 0), moving(102.0, 1), moving(2.0, 2)}),
+              ElementsAre(0.0, 1.0, 1.0));
 }
 
 TEST(LogPacing, AnotherClockIsFollowed) {
@@ -61,7 +63,8 @@ TEST(LogPacing, AnotherClockIsFollowed) {
 
 TEST(LogPacing, LeavesOutTheStandingStillBefore) {
   RobotLog log;
-  for (int step = 0; step < 100; ++step) log.records.push_back(moving(1.0 + step * 0.1, step < 90 ? 0.0 : step));
+  for (int step = 0; step < 100; ++step)
+    log.records.push_back(moving(1.0 + step * 0.1, step < 90 ? 0.0 : step));
   pace_log(log);
   EXPECT_EQ(log.records.size(), 20U);
   EXPECT_NEAR(log.records.front().due_s, 0.0, 0.11);
@@ -79,8 +82,8 @@ TEST(LogPacing, WithoutUsableStampsTheWayPaces) {
 }
 
 TEST(LogPacing, NothingIsEverDueBeforeWhatStandsBeforeIt) {
-  const std::vector<double> due =
-      due_times({moving(5, 0), moving(4, 1), moving(0, 2), moving(500, 3), moving(1, 4), moving(7, 5)});
+  const std::vector<double> due = due_times(
+      {moving(5, 0), moving(4, 1), moving(0, 2), moving(500, 3), moving(1, 4), moving(7, 5)});
   EXPECT_TRUE(std::is_sorted(due.begin(), due.end()));
 }
 

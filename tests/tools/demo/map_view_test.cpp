@@ -52,7 +52,8 @@ TEST(MapView, FollowsAndZoomsAroundTheRobot) {
   choice.zoom = 2.0;
   const View near = choose_view(in_the_hall(), choice, kExtent);
   EXPECT_EQ(near.centre.y_m, 5.0);
-  EXPECT_NEAR(near.metres_per_dot * 2.0, choose_view(in_the_hall(), MapChoice{}, kExtent).metres_per_dot, 1e-9);
+  EXPECT_NEAR(near.metres_per_dot * 2.0,
+              choose_view(in_the_hall(), MapChoice{}, kExtent).metres_per_dot, 1e-9);
 }
 
 TEST(MapView, DrawsEachLayer) {

@@ -12,8 +12,8 @@ namespace {
 std::map<std::pair<int, int>, bool> cells_of(const OccupancyMap& map) {
   std::map<std::pair<int, int>, bool> cells;
   map.for_each([&](const OccupancyMap::Cell& cell) {
-    cells[{static_cast<int>(std::floor(cell.centre.x_m * 10)), static_cast<int>(std::floor(cell.centre.y_m * 10))}] =
-        cell.occupied;
+    cells[{static_cast<int>(std::floor(cell.centre.x_m * 10)),
+           static_cast<int>(std::floor(cell.centre.y_m * 10))}] = cell.occupied;
   });
   return cells;
 }

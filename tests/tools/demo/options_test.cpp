@@ -50,7 +50,9 @@ TEST(Options, NumbersHaveBounds) {
   EXPECT_EQ(complaint({"--seconds", "0.1"}), "none");
   EXPECT_EQ(complaint({"--seconds", "86400"}), "none");
   for (const char* bad : {"0.09", "86401", "-1", "nan", "inf", "ten", "5s", ""}) {
-    EXPECT_THAT(complaint({"--seconds", bad}), HasSubstr("--seconds takes a number from 0.1 to 86400")) << bad;
+    EXPECT_THAT(complaint({"--seconds", bad}),
+                HasSubstr("--seconds takes a number from 0.1 to 86400"))
+        << bad;
   }
   EXPECT_THAT(complaint({"--log", "a", "--speed", "101"}), HasSubstr("from 0.1 to 100"));
 }

@@ -19,26 +19,30 @@ void plant(const TemporaryFolder& folder, const std::string& name, const std::st
 }
 
 TEST(ReadyLine, NamesBothAddresses) {
-  const HubAddresses addresses = parse_ready_line("ready tcp://127.0.0.1:41233 unix:/tmp/x/hub.sock").value();
+  const HubAddresses addresses =
+      parse_ready_line("ready tcp://127.0.0.1:41233 unix:/tmp/x/hub.sock").value();
   EXPECT_EQ(addresses.tcp, "tcp://127.0.0.1:41233");
   EXPECT_EQ(addresses.unix_socket, "unix:/tmp/x/hub.sock");
 }
 
 TEST(ReadyLine, AnotherLineIsRefused) {
-  for (const char* line : {"", "ready", "ready tcp://127.0.0.1:1", "steady tcp://127.0.0.1:1 unix:/x"}) {
+  for (const char* line :
+       {"", "ready", "ready tcp://127.0.0.1:1", "steady tcp://127.0.0.1:1 unix:/x"}) {
     EXPECT_THAT(parse_ready_line(line).error().sentence, HasSubstr("instead of 'ready'")) << line;
   }
 }
 
 TEST(OwnNetwork, SaysThatTheHubIsMissing) {
   const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
-  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence, HasSubstr("cannot start the hub"));
+  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence,
+              HasSubstr("cannot start the hub"));
 }
 
 TEST(OwnNetwork, PassesOnWhyTheHubDoesNotStart) {
   const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
   plant(programs, "tcphub", "echo 'no room' >&2; exit 1");
-  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence, HasSubstr("ended at once: no room"));
+  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence,
+              HasSubstr("ended at once: no room"));
 }
 
 TEST(OwnNetwork, GivesTheRobotItsArgumentsAndNoticesItsEnd) {
@@ -53,11 +57,15 @@ TEST(OwnNetwork, GivesTheRobotItsArgumentsAndNoticesItsEnd) {
   EXPECT_EQ(network->hub_url(), "tcp://127.0.0.1:1");
   std::optional<Error> trouble;
   while (!trouble) trouble = network->trouble();
-  EXPECT_THAT(trouble->sentence, HasSubstr("the robot ended by itself with status 3: robot --hub unix:/x --robot robot "
-                                           "--log a b.log --speed 2.5"));
+  EXPECT_THAT(
+      trouble->sentence,
+      HasSubstr("the robot ended by itself with status 3: robot --hub unix:/x --robot robot "
+                "--log a b.log --speed 2.5"));
 }
 
-TEST(OwnNetwork, FindsTheFolderOfThisProgram) { EXPECT_TRUE(std::filesystem::is_directory(folder_of_this_program())); }
+TEST(OwnNetwork, FindsTheFolderOfThisProgram) {
+  EXPECT_TRUE(std::filesystem::is_directory(folder_of_this_program()));
+}
 
 }  // namespace
 }  // namespace gimnet::demo

@@ -26,7 +26,8 @@ TEST(Plot, SetsTheDotOfAPoint) {
 
 TEST(Plot, WhatLiesOutsideIsNotDrawn) {
   Plot plot(kExtent, kView);
-  for (const Point& point : {Point{-4.5, 0}, {4.5, 0}, {0, 4.5}, {0, -4.5}, {1e300, 0}, {0, -1e300}}) {
+  for (const Point& point :
+       {Point{-4.5, 0}, {4.5, 0}, {0, 4.5}, {0, -4.5}, {1e300, 0}, {0, -1e300}}) {
     plot.dot(point, Ink::kWall);
     plot.ground(point, Ground::kBeam);
   }

@@ -16,7 +16,8 @@ std::unique_ptr<RobotSource> simulated(std::int64_t now_ns) {
 template <class Condition>
 testing::AssertionResult run_until(Robot& robot, Condition condition) {
   for (int step = 0; step < 10'000; ++step) {
-    if (const std::optional<Error> error = robot.step()) return testing::AssertionFailure() << error->sentence;
+    if (const std::optional<Error> error = robot.step())
+      return testing::AssertionFailure() << error->sentence;
     if (condition()) return testing::AssertionSuccess();
   }
   return testing::AssertionFailure() << "never";
@@ -28,7 +29,9 @@ std::size_t count(const FakeNetwork& network, Service service) {
   return number;
 }
 
-void tell(FakeNetwork& network, const DriveCommand& command) { (void)network.viewer.command(encode(command)); }
+void tell(FakeNetwork& network, const DriveCommand& command) {
+  (void)network.viewer.command(encode(command));
+}
 
 TEST(Robot, SaysNothingToNobody) {
   FakeNetwork network;

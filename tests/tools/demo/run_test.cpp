@@ -65,7 +65,8 @@ class RunTest : public testing::Test {
   }
 
   [[nodiscard]] std::ptrdiff_t files_left() const {
-    return std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator());
+    return std::distance(std::filesystem::directory_iterator(folder_.path()),
+                         std::filesystem::directory_iterator());
   }
 
   // What the demo's nodes keep for their next life is not among its own files.
@@ -132,7 +133,9 @@ TEST_F(RunTest, ClosesDownWhereNobodyReadsAnyMore) {
   ASSERT_EQ(::setenv("TMPDIR", folder_.path().c_str(), 1), 0);
   const std::string program = folder_of_this_program() + "/gimnet-demo";
   Result<ChildProcess> shell = ChildProcess::start(
-      {"the shell", {"/bin/sh", "-c", "{ " + program + " --seconds 1; echo $? >&2; } | true"}, folder_ / "err"});
+      {"the shell",
+       {"/bin/sh", "-c", "{ " + program + " --seconds 1; echo $? >&2; } | true"},
+       folder_ / "err"});
   ASSERT_EQ(::unsetenv("TMPDIR"), 0);
   ASSERT_TRUE(shell);
   EXPECT_EQ(shell->wait(kPatience_ns), 0);
@@ -143,8 +146,8 @@ TEST_F(RunTest, ClosesDownWhereNobodyReadsAnyMore) {
 TEST_F(RunTest, SaysThatItsSummaryCouldNotBeWritten) {
   const std::string program = folder_of_this_program() + "/gimnet-demo";
   for (const char* words : {" --seconds 0.5 >/dev/full", " --help >/dev/full", " --help >&-"}) {
-    Result<ChildProcess> shell =
-        ChildProcess::start({"the shell", {"/bin/sh", "-c", program + words + "; echo $? >&2"}, folder_ / "err"});
+    Result<ChildProcess> shell = ChildProcess::start(
+        {"the shell", {"/bin/sh", "-c", program + words + "; echo $? >&2"}, folder_ / "err"});
     ASSERT_TRUE(shell);
     EXPECT_EQ(shell->wait(kPatience_ns), 0);
     EXPECT_THAT(said(), HasSubstr("gimnet-demo: cannot write to standard output: ")) << words;

@@ -8,7 +8,9 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(SampleWindow, HasNoPercentileWithoutSamples) { EXPECT_FALSE(SampleWindow(4).percentile_ns(50)); }
+TEST(SampleWindow, HasNoPercentileWithoutSamples) {
+  EXPECT_FALSE(SampleWindow(4).percentile_ns(50));
+}
 
 TEST(SampleWindow, GivesTheNearestRank) {
   SampleWindow window(200);

@@ -9,7 +9,9 @@
 namespace gimnet::demo {
 
 /// What a screen says, as lines.
-inline std::string lines_of(const Canvas& canvas) { return AnsiWriter({true, ColourDepth::kNone}).lines(canvas); }
+inline std::string lines_of(const Canvas& canvas) {
+  return AnsiWriter({true, ColourDepth::kNone}).lines(canvas);
+}
 
 /// A monitor that has heard a little of everything.
 inline Monitor busy_monitor() {

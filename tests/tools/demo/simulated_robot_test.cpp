@@ -47,7 +47,8 @@ TEST(SimulatedRobot, StopsWhenItsDriverIsGone) {
   SimulatedRobot robot(WorldMap::hall(), kStart_ns);
   Heard heard;
   robot.handle(ahead(1), kStart_ns);
-  for (int step = 1; step <= 80; ++step) robot.advance(kStart_ns + step * SimulatedRobot::kPeriod_ns, heard.output);
+  for (int step = 1; step <= 80; ++step)
+    robot.advance(kStart_ns + step * SimulatedRobot::kPeriod_ns, heard.output);
   EXPECT_NEAR(heard.odometry[15].twist.linear_mps, 0.5, 1e-9);
   EXPECT_EQ(heard.odometry.back().twist.linear_mps, 0.0);
 }

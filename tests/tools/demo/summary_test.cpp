@@ -43,18 +43,20 @@ RunRecord run() { return {"tcp://127.0.0.1:1", 2.0, 5, 1, true, true, ""}; }
 TEST(Summary, IsContentWhereEverythingArrived) {
   EXPECT_THAT(complaints_about(heard(80, 80), run()), IsEmpty());
   const std::string text = summary_text(heard(80, 80), run(), true);
-  for (const char* expected :
-       {"robot/odom", "40.0", "85 µs", "accepted 100 + copies 10\n       = delivered 110 + dropped 0", "exact",
-        "7.9 m, 1 of the course's corners", "Nothing was lost."}) {
+  for (const char* expected : {"robot/odom", "40.0", "85 µs",
+                               "accepted 100 + copies 10\n       = delivered 110 + dropped 0",
+                               "exact", "7.9 m, 1 of the course's corners", "Nothing was lost."}) {
     EXPECT_THAT(text, HasSubstr(expected));
   }
 }
 
 TEST(Summary, CountsBothEnds) {
-  EXPECT_THAT(complaints_about(heard(79, 80), run()), Contains(HasSubstr("the robot sent 80 messages, 79 arrived")));
+  EXPECT_THAT(complaints_about(heard(79, 80), run()),
+              Contains(HasSubstr("the robot sent 80 messages, 79 arrived")));
   RunRecord more = run();
   more.commands = 6;
-  EXPECT_THAT(complaints_about(heard(80, 80), more), Contains(HasSubstr("6 commands were sent, 5 reached")));
+  EXPECT_THAT(complaints_about(heard(80, 80), more),
+              Contains(HasSubstr("6 commands were sent, 5 reached")));
 }
 
 TEST(Summary, SeesGapsAlsoOfARobotThatGoesOn) {
@@ -105,16 +107,20 @@ TEST(Summary, SaysWhyARunWasBroken) {
   RunRecord broken = run();
   broken.finished = false;
   broken.broken = "the hub was ended by signal 9";
-  EXPECT_THAT(complaints_about(heard(80, 80), broken), testing::ElementsAre("the hub was ended by signal 9"));
-  EXPECT_THAT(complaints_about(Monitor(0), broken), testing::ElementsAre("the hub was ended by signal 9"));
+  EXPECT_THAT(complaints_about(heard(80, 80), broken),
+              testing::ElementsAre("the hub was ended by signal 9"));
+  EXPECT_THAT(complaints_about(Monitor(0), broken),
+              testing::ElementsAre("the hub was ended by signal 9"));
 }
 
 TEST(Summary, SilenceIsALoss) {
   EXPECT_THAT(complaints_about(Monitor(0), run()), Contains(HasSubstr("never heard")));
-  EXPECT_THAT(complaints_about(heard(0, 0), run()), testing::ElementsAre(HasSubstr("no message came at all")));
+  EXPECT_THAT(complaints_about(heard(0, 0), run()),
+              testing::ElementsAre(HasSubstr("no message came at all")));
   Monitor without_hub(0);
   without_hub.take(RobotInfo{}, 0);
-  EXPECT_THAT(complaints_about(without_hub, run()), Contains(HasSubstr("did not give its counters")));
+  EXPECT_THAT(complaints_about(without_hub, run()),
+              Contains(HasSubstr("did not give its counters")));
 }
 
 TEST(Summary, WhatALogDoesNotHoldIsNotMissed) {
@@ -131,7 +137,8 @@ TEST(Summary, WhatALogDoesNotHoldIsNotMissed) {
   only_scans.take(info, 0);
   RunRecord open = run();
   open.finished = false;
-  EXPECT_THAT(complaints_about(only_scans, open), testing::ElementsAre("robot/odom: no message came at all"));
+  EXPECT_THAT(complaints_about(only_scans, open),
+              testing::ElementsAre("robot/odom: no message came at all"));
 }
 
 TEST(Summary, IsAsciiWhereItMustBe) {

@@ -21,7 +21,8 @@ class TemporaryFile {
     path_ = name;
     gzFile file = gzopen(path_.c_str(), compressed ? "wb" : "wbT");
     EXPECT_NE(file, nullptr);
-    EXPECT_EQ(gzwrite(file, text.data(), static_cast<unsigned>(text.size())), static_cast<int>(text.size()));
+    EXPECT_EQ(gzwrite(file, text.data(), static_cast<unsigned>(text.size())),
+              static_cast<int>(text.size()));
     EXPECT_EQ(gzclose(file), Z_OK);
   }
   ~TemporaryFile() { ::unlink(path_.c_str()); }

@@ -29,8 +29,9 @@ class ViewerTest : public testing::Test {
   }
 
   FakeNetwork network_;
-  Robot robot_{network_.robot,
-               [](std::int64_t now_ns) { return std::make_unique<SimulatedRobot>(WorldMap::hall(), now_ns); }};
+  Robot robot_{network_.robot, [](std::int64_t now_ns) {
+                 return std::make_unique<SimulatedRobot>(WorldMap::hall(), now_ns);
+               }};
   ViewerOptions options_;
 };
 
@@ -73,7 +74,9 @@ TEST_F(ViewerTest, ABrokenConnectionIsExplainedByTheEndOfAProcess) {
   options_.trouble = [](std::int64_t wait_ns) {
     return wait_ns > 0 ? std::optional(Error{"the hub was ended by signal 9"}) : std::nullopt;
   };
-  options_.on_progress = [this](const std::string&) { network_.broken = Error{"cannot send to 1.1"}; };
+  options_.on_progress = [this](const std::string&) {
+    network_.broken = Error{"cannot send to 1.1"};
+  };
   Viewer viewer(network_.viewer, nullptr, options_);
   network_.viewer.when_idle = [this] { static_cast<void>(robot_.step()); };
   const std::optional<Error> error = viewer.run();

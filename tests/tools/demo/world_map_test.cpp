@@ -69,7 +69,8 @@ TEST(WorldMap, MeasuresDistancesToWalls) {
   EXPECT_NEAR(map.distance_to_wall_m({start, 0.0}, 10.0), 0.375, 1e-9);
   EXPECT_NEAR(map.distance_to_wall_m({start, std::numbers::pi}, 10.0), 0.375, 1e-9);
   EXPECT_NEAR(map.distance_to_wall_m({start, std::numbers::pi / 2}, 10.0), 0.375, 1e-9);
-  EXPECT_NEAR(map.distance_to_wall_m({start, -std::numbers::pi / 4}, 10.0), 0.125 * std::numbers::sqrt2, 1e-9);
+  EXPECT_NEAR(map.distance_to_wall_m({start, -std::numbers::pi / 4}, 10.0),
+              0.125 * std::numbers::sqrt2, 1e-9);
   EXPECT_EQ(map.distance_to_wall_m({start, 0.0}, 0.2), 0.2);
 }
 
@@ -87,7 +88,8 @@ TEST(WorldMap, LoadsAFileAndNamesItInErrors) {
   const TemporaryFile good(kRoom);
   EXPECT_TRUE(WorldMap::load(good.path()));
   const TemporaryFile bad("#?");
-  EXPECT_THAT(WorldMap::load(bad.path()).error().sentence, HasSubstr(bad.path() + ": line 1, column 2"));
+  EXPECT_THAT(WorldMap::load(bad.path()).error().sentence,
+              HasSubstr(bad.path() + ": line 1, column 2"));
   EXPECT_FALSE(WorldMap::load("/nowhere"));
 }
 

@@ -50,8 +50,11 @@ TEST(CtlOptions, OptionsOfAllCommandsStandAnywhere) {
 }
 
 TEST(CtlOptions, WhatIsMissingIsToldWithExitCode2) {
-  for (const std::vector<const char*>& words :
-       {std::vector<const char*>{"ctl"}, {"ctl", "kick"}, {"ctl", "reassign", "7.1"}, {"ctl", "log"}, {"ctl", "kik"}}) {
+  for (const std::vector<const char*>& words : {std::vector<const char*>{"ctl"},
+                                                {"ctl", "kick"},
+                                                {"ctl", "reassign", "7.1"},
+                                                {"ctl", "log"},
+                                                {"ctl", "kik"}}) {
     const auto parsed = parse(words);
     ASSERT_TRUE(std::holds_alternative<CommandLineEnding>(parsed)) << words.size();
     EXPECT_EQ(std::get<CommandLineEnding>(parsed).code, ExitCode::usage);

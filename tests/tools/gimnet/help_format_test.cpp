@@ -26,7 +26,8 @@ std::string help(const std::vector<std::string>& words) {
 
 std::size_t count(const std::string& text, const std::string& part) {
   std::size_t found = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++found;
   return found;
 }
 
@@ -46,8 +47,8 @@ TEST(HelpFormat, EverythingThatCanBeCalledHasAnExample) {
     EXPECT_NE(text.find("Usage: " + called), std::string::npos) << text;
     EXPECT_EQ(count(text, "Examples:"), 1u) << "its own, not those of its parts: " << text;
     const std::string examples = text.substr(0, text.find("Usage: "));
-    const bool shown =
-        std::ranges::all_of(words, [&](const std::string& word) { return examples.find(word) != std::string::npos; });
+    const bool shown = std::ranges::all_of(
+        words, [&](const std::string& word) { return examples.find(word) != std::string::npos; });
     EXPECT_TRUE(shown) << examples;
   }
 }
@@ -70,7 +71,8 @@ TEST(HelpFormat, ListsCommandsInALineEach) {
   const std::string text = help({});
   const std::string list = text.substr(text.find("Subcommands:"));
   EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(list, '\n')), kCommands.size() + 2) << list;
-  for (const auto& [word, command] : kCommands) EXPECT_NE(list.find("  " + std::string(word) + " "), std::string::npos);
+  for (const auto& [word, command] : kCommands)
+    EXPECT_NE(list.find("  " + std::string(word) + " "), std::string::npos);
 }
 
 TEST(HelpFormat, TellsWhatStandsWithEveryCommand) {

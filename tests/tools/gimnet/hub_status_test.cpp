@@ -8,10 +8,20 @@ namespace {
 HubStatus status() {
   HubStatus status;
   status.hub = {7, "lab", "1.2.3", 2, 5000, 1, 0};
-  status.shards = {
-      {0, {{"accepted", 10}, {"delivered", 8}, {"queued", 1}, {"pinned_bytes_max", 50}, {"dropped.away", 1}}},
-      {1, {{"accepted", 5}, {"copies", 3}, {"delivered", 8}, {"pinned_bytes_max", 20}, {"dropped.away", 0}}}};
-  status.connections = {{Peer{(7u << 20) | 1}, "robot", 1, "tcp", "127.0.0.1:5", true, 9, 100, 1200, 20, 320, 3}};
+  status.shards = {{0,
+                    {{"accepted", 10},
+                     {"delivered", 8},
+                     {"queued", 1},
+                     {"pinned_bytes_max", 50},
+                     {"dropped.away", 1}}},
+                   {1,
+                    {{"accepted", 5},
+                     {"copies", 3},
+                     {"delivered", 8},
+                     {"pinned_bytes_max", 20},
+                     {"dropped.away", 0}}}};
+  status.connections = {
+      {Peer{(7u << 20) | 1}, "robot", 1, "tcp", "127.0.0.1:5", true, 9, 100, 1200, 20, 320, 3}};
   return status;
 }
 
@@ -32,23 +42,33 @@ TEST(HubStatus, BalancesTheLedger) {
 
 TEST(HubStatus, IsWrittenAsJson) {
   const std::string json = json_of(status());
-  EXPECT_NE(json.find(R"("hub":{"id":7,"name":"lab","version":"1.2.3","shards":2)"), std::string::npos) << json;
-  EXPECT_NE(json.find(R"("ledger":{"accepted":15,"copies":3,"delivered":16,"dropped":1,"queued":1,"exact":true})"),
-            std::string::npos);
+  EXPECT_NE(json.find(R"("hub":{"id":7,"name":"lab","version":"1.2.3","shards":2)"),
+            std::string::npos)
+      << json;
   EXPECT_NE(
-      json.find(R"({"shard":1,"ledger":{"accepted":5,"copies":3,"delivered":8,"dropped":0,"queued":0},"counters":)"),
+      json.find(
+          R"("ledger":{"accepted":15,"copies":3,"delivered":16,"dropped":1,"queued":1,"exact":true})"),
+      std::string::npos);
+  EXPECT_NE(
+      json.find(
+          R"({"shard":1,"ledger":{"accepted":5,"copies":3,"delivered":8,"dropped":0,"queued":0},"counters":)"),
       std::string::npos)
       << "only the sum can be exact: " << json;
-  EXPECT_NE(json.find(R"({"id":"7.1","name":"robot","shard":1,"transport":"tcp")"), std::string::npos);
-  EXPECT_NE(json.find(R"("connected":true,"queued_bytes":9,"accepted":100,"received_bytes":1200,"delivered":20,)"
-                      R"("sent_bytes":320,"dropped":3})"),
-            std::string::npos)
+  EXPECT_NE(json.find(R"({"id":"7.1","name":"robot","shard":1,"transport":"tcp")"),
+            std::string::npos);
+  EXPECT_NE(
+      json.find(
+          R"("connected":true,"queued_bytes":9,"accepted":100,"received_bytes":1200,"delivered":20,)"
+          R"("sent_bytes":320,"dropped":3})"),
+      std::string::npos)
       << json;
 }
 
 TEST(HubStatus, IsWrittenForPeople) {
   const std::string text = text_of(status());
-  EXPECT_NE(text.find("15 accepted + 3 copies = 16 delivered + 1 dropped + 1 queued\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("15 accepted + 3 copies = 16 delivered + 1 dropped + 1 queued\n"),
+            std::string::npos)
+      << text;
   EXPECT_NE(text.find("dropped.away: 1"), std::string::npos);
   EXPECT_NE(text.find("7.1  robot"), std::string::npos);
   EXPECT_NE(text.find("connected  100       20         3        9"), std::string::npos) << text;

@@ -7,7 +7,14 @@ namespace {
 
 TEST(JsonWriter, NestsObjectsAndArrays) {
   JsonWriter json;
-  json.begin_object().member("a", 1).key("b").begin_array().number(2).text("x").begin_object().end_object();
+  json.begin_object()
+      .member("a", 1)
+      .key("b")
+      .begin_array()
+      .number(2)
+      .text("x")
+      .begin_object()
+      .end_object();
   json.end_array().member("c", true).member("d", 0.5).end_object();
   EXPECT_EQ(json.str(), R"({"a":1,"b":[2,"x",{}],"c":true,"d":0.500})");
 }

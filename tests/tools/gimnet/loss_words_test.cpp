@@ -20,7 +20,8 @@ TEST(LossWords, SayThatANodeHasLeftThatWasCalledByItsName) {
 }
 
 TEST(LossWords, LeaveOtherReasonsAlone) {
-  for (const LossReason reason : {LossReason::queue_full, LossReason::no_route, LossReason::not_received}) {
+  for (const LossReason reason :
+       {LossReason::queue_full, LossReason::no_route, LossReason::not_received}) {
     EXPECT_EQ(loss_words(lost(reason), "robot"), "as the library says it");
   }
 }

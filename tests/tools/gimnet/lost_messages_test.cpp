@@ -19,14 +19,18 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
   LostMessages lost;
   lost.take({.incomplete = 1, .too_large = 2, .frames_broken_off = 3, .unknown_service = 4});
   EXPECT_EQ(lost.all(), 10u);
-  EXPECT_EQ(lost.rest(),
-            (Sentences{"1 message was lost: a part did not come, or did not fit the others",
-                       "2 messages were lost: larger than this end takes",
-                       "3 frames were lost: on the way when the connection broke, and a large message has many frames",
-                       "4 messages were lost: of a service that this end does not know to have subscribed"}));
+  EXPECT_EQ(
+      lost.rest(),
+      (Sentences{
+          "1 message was lost: a part did not come, or did not fit the others",
+          "2 messages were lost: larger than this end takes",
+          "3 frames were lost: on the way when the connection broke, and a large message has many "
+          "frames",
+          "4 messages were lost: of a service that this end does not know to have subscribed"}));
   EXPECT_EQ(lost.rest(), Sentences{});
   lost.take({.incomplete = 4, .too_large = 2, .frames_broken_off = 3, .unknown_service = 4});
-  EXPECT_EQ(lost.rest(), Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
+  EXPECT_EQ(lost.rest(),
+            Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
 }
 
 TEST(LostMessages, NewsComeAtMostOnceASecond) {

@@ -15,14 +15,16 @@ std::vector<ServiceReading> readings() {
 }
 
 TEST(MeterReport, AnObjectALine) {
-  EXPECT_EQ(json_of(readings(), Measure::rate, Span::recent),
-            R"({"service":"robot/odom","whole":false,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
-            R"("rate_hz":40.000,"gap_min_ms":20.000,"gap_mean_ms":25.000,"gap_max_ms":30.000,"gap_std_ms":5.000})"
-            "\n");
-  EXPECT_EQ(json_of(readings(), Measure::bytes, Span::whole),
-            R"({"service":"robot/odom","whole":true,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
-            R"("bytes_per_s":3000.000,"bytes":6000,"size_min":1000,"size_mean":2000.000,"size_max":3000})"
-            "\n");
+  EXPECT_EQ(
+      json_of(readings(), Measure::rate, Span::recent),
+      R"({"service":"robot/odom","whole":false,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
+      R"("rate_hz":40.000,"gap_min_ms":20.000,"gap_mean_ms":25.000,"gap_max_ms":30.000,"gap_std_ms":5.000})"
+      "\n");
+  EXPECT_EQ(
+      json_of(readings(), Measure::bytes, Span::whole),
+      R"({"service":"robot/odom","whole":true,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
+      R"("bytes_per_s":3000.000,"bytes":6000,"size_min":1000,"size_mean":2000.000,"size_max":3000})"
+      "\n");
 }
 
 TEST(MeterReport, ATableForPeople) {
@@ -39,12 +41,15 @@ TEST(MeterReport, ATableForPeople) {
 TEST(MeterReport, AServiceThatFellSilentIsAWarning) {
   auto silent = readings();
   silent.front().reading.silent_s = 1.5;
-  EXPECT_NE(text_of(silent, Measure::rate, Span::recent, Paint(true)).find("\x1b[33mrobot/odom"), std::string::npos);
-  EXPECT_EQ(text_of(readings(), Measure::rate, Span::recent, Paint(true)).find("\x1b[33m"), std::string::npos);
+  EXPECT_NE(text_of(silent, Measure::rate, Span::recent, Paint(true)).find("\x1b[33mrobot/odom"),
+            std::string::npos);
+  EXPECT_EQ(text_of(readings(), Measure::rate, Span::recent, Paint(true)).find("\x1b[33m"),
+            std::string::npos);
 }
 
 TEST(MeterReport, AServiceOfWhichNothingCameHasNoGaps) {
-  EXPECT_NE(text_of({{"a/b", {}, 0}}, Measure::rate, Span::recent).find("a/b      0.0  -"), std::string::npos);
+  EXPECT_NE(text_of({{"a/b", {}, 0}}, Measure::rate, Span::recent).find("a/b      0.0  -"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ using test::make_message;
 using Sentences = std::vector<std::string>;
 
 const char* const kUnknown =
-    " of r/s did not come: this reader was too slow, or the sender's connection broke (`gimnet status` counts what the "
+    " of r/s did not come: this reader was too slow, or the sender's connection broke (`gimnet "
+    "status` counts what the "
     "hub dropped)";
 const char* const kBroken = " of r/s did not come: the connection to the hub was broken";
 
@@ -46,17 +47,20 @@ TEST_F(MissedMessagesTest, ABrokenConnectionIsTheCauseOfTheGapAcrossIt) {
   take(3);
   EXPECT_EQ(take(13, 1), 10u);
   EXPECT_EQ(take(15, 1), 11u);
-  EXPECT_EQ(missed_.rest(), (Sentences{std::string("9 messages") + kBroken, std::string("2 messages") + kUnknown}));
+  EXPECT_EQ(missed_.rest(),
+            (Sentences{std::string("9 messages") + kBroken, std::string("2 messages") + kUnknown}));
   take(17, 1);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("3 messages") + kUnknown});
 }
 
 TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
   take(1);
-  missed_.take_lost({.incomplete = 1, .too_large = 0, .frames_broken_off = 50, .unknown_service = 1});
+  missed_.take_lost(
+      {.incomplete = 1, .too_large = 0, .frames_broken_off = 50, .unknown_service = 1});
   EXPECT_EQ(take(4), 2u);
   EXPECT_EQ(missed_.rest(), Sentences{});
-  missed_.take_lost({.incomplete = 1, .too_large = 1, .frames_broken_off = 50, .unknown_service = 1});
+  missed_.take_lost(
+      {.incomplete = 1, .too_large = 1, .frames_broken_off = 50, .unknown_service = 1});
   EXPECT_EQ(take(7), 4u);
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
 }
@@ -71,10 +75,12 @@ TEST_F(MissedMessagesTest, WhatWasBeforeALateSubscriptionCounts) {
   EXPECT_EQ(missed.take(make_message("x", 4, {}, "r/s")), 3u);
   EXPECT_EQ(missed.take(make_message("x", 5, {}, "r/s")), 3u);
   EXPECT_EQ(missed.take(make_message("x", 7, {}, "r/s")), 4u);
-  EXPECT_EQ(missed.rest(),
-            (Sentences{"3 messages of r/s did not come: published before this node had heard of the service and "
-                       "subscribed to it",
-                       std::string("1 message") + kUnknown}));
+  EXPECT_EQ(
+      missed.rest(),
+      (Sentences{
+          "3 messages of r/s did not come: published before this node had heard of the service and "
+          "subscribed to it",
+          std::string("1 message") + kUnknown}));
   EXPECT_EQ(missed.take(make_message("x", 1000, {}, "r/t")), 0u) << "is not late";
   EXPECT_EQ(asked, (Sentences{"r/s", "r/t"})) << "once each";
 }
@@ -103,7 +109,8 @@ TEST_F(MissedMessagesTest, NewsComeAtMostOnceASecond) {
   EXPECT_EQ(missed_.news(100).size(), 1u);
   take(5);
   EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs - 1), Sentences{});
-  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs), Sentences{std::string("2 messages") + kUnknown});
+  EXPECT_EQ(missed_.news(100 + NewsPace::kPeriodNs),
+            Sentences{std::string("2 messages") + kUnknown});
 }
 
 }  // namespace

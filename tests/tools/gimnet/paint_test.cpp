@@ -46,8 +46,8 @@ TEST(Printable, HidesControlCharacters) {
   EXPECT_EQ(printable("\u009b2J"), ".2J");
   EXPECT_EQ(printable("a\u202eb\u2066c\u2069\u200e\u200f\u061c\u2028"), "a.b.c.....");
   // Their neighbours are letters and spaces, and what is cut off is left as it is.
-  for (const char* text :
-       {"\u00a0", "\u061b", "\u200d", "\u2010", "\u2027", "\u202f", "\u2065", "\u206a", "\xe2\x80", "\xc2"}) {
+  for (const char* text : {"\u00a0", "\u061b", "\u200d", "\u2010", "\u2027", "\u202f", "\u2065",
+                           "\u206a", "\xe2\x80", "\xc2"}) {
     EXPECT_EQ(printable(text), text);
   }
 }

@@ -19,14 +19,16 @@ TEST(Printer, OfSeveralServicesALineNamesItsOwn) {
 }
 
 TEST(Printer, AnObjectForPrograms) {
-  EXPECT_EQ(json_line(test::make_message("a\"b", 3, {4, 2})),
-            R"({"from":"7.5","type":4,"instance":2,"sequence":3,"arrival_ns":1000,"lost":0,"size":3,"text":"a\"b"})"
-            "\n");
+  EXPECT_EQ(
+      json_line(test::make_message("a\"b", 3, {4, 2})),
+      R"({"from":"7.5","type":4,"instance":2,"sequence":3,"arrival_ns":1000,"lost":0,"size":3,"text":"a\"b"})"
+      "\n");
 }
 
 TEST(Printer, AnObjectTellsWhatDidNotCome) {
   const Absent absent{.lost = 5, .missed = 941};
-  EXPECT_NE(json_line(test::make_message("x", 3), absent).find(R"("lost":5,"missed":941,"size":1)"), std::string::npos);
+  EXPECT_NE(json_line(test::make_message("x", 3), absent).find(R"("lost":5,"missed":941,"size":1)"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -9,7 +9,8 @@ namespace {
 
 TEST(RoundTrips, AreNoNumbersWithoutAny) {
   const auto us = RoundTrips().summary_us();
-  for (const double value : {us.min, us.mean, us.p50, us.p99, us.p99_9, us.max}) EXPECT_TRUE(std::isnan(value));
+  for (const double value : {us.min, us.mean, us.p50, us.p99, us.p99_9, us.max})
+    EXPECT_TRUE(std::isnan(value));
 }
 
 TEST(RoundTrips, OfOneAreAllTheSame) {

@@ -17,7 +17,8 @@ class UnheardLinesTest : public testing::Test {
 };
 
 const char* const kWhy =
-    " went to nobody: nobody had subscribed to r/s then; --wait 1 holds the first until somebody has";
+    " went to nobody: nobody had subscribed to r/s then; --wait 1 holds the first until somebody "
+    "has";
 
 TEST_F(UnheardLinesTest, WithoutLinesThereIsNothingToSay) { EXPECT_EQ(said(), ""); }
 

@@ -13,7 +13,8 @@ const auto kHeard = [] { return false; };
 
 Sentences said(const std::string& who, const std::string& them) {
   return {who + " came and went, and nothing came of " + them +
-          ": what is published before this node has heard of a service and subscribed to it passes it by (`gimnet pub "
+          ": what is published before this node has heard of a service and subscribed to it passes "
+          "it by (`gimnet pub "
           "--wait 1` waits for that)"};
 }
 

@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::int64_t kNoon = (12ll * 3600 + 34 * 60 + 56) * 1'000'000'000 + 789'000'000;
 
-WatchEvent node_event(Change change, std::uint32_t index, const std::string& name, const std::string& description) {
+WatchEvent node_event(Change change, std::uint32_t index, const std::string& name,
+                      const std::string& description) {
   WatchEvent event;
   event.change = change;
   event.hub_id = 7;
@@ -33,7 +34,8 @@ TEST(WatchReport, ALineForPeople) {
   ::tzset();
   WatchEvent joined = node_event(Change::joined, 17, "robot", "a\x1b[2J");
   joined.node->place = "127.0.0.1:5";
-  EXPECT_EQ(text_line(joined, kNoon), "12:34:56.789  joined      node robot 7.17, from 127.0.0.1:5, a.[2J\n");
+  EXPECT_EQ(text_line(joined, kNoon),
+            "12:34:56.789  joined      node robot 7.17, from 127.0.0.1:5, a.[2J\n");
   WatchEvent renamed = node_event(Change::renamed, 17, "two", "");
   renamed.former_name = "one";
   EXPECT_EQ(text_line(renamed, kNoon), "12:34:56.789  renamed     node two 7.17, before one\n");
@@ -52,12 +54,14 @@ TEST(WatchReport, AnObjectForPrograms) {
             R"({"time_ns":5,"change":"left","hub_id":7,"epoch":3,"version":9,)"
             R"("node":{"id":"7.17","name":"robot","hub_id":7}})"
             "\n");
-  EXPECT_EQ(json_line(node_event(Change::joined, 17, "robot", ""), 5),
-            R"({"time_ns":5,"change":"joined","hub_id":7,"epoch":3,"version":9,"node":{"id":"7.17","name":"robot",)"
-            R"("hub":"lab","hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+  EXPECT_EQ(
+      json_line(node_event(Change::joined, 17, "robot", ""), 5),
+      R"({"time_ns":5,"change":"joined","hub_id":7,"epoch":3,"version":9,"node":{"id":"7.17","name":"robot",)"
+      R"("hub":"lab","hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+      "\n");
+  EXPECT_EQ(json_line(WatchEvent{}, 5),
+            R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"epoch":0,"version":0})"
             "\n");
-  EXPECT_EQ(json_line(WatchEvent{}, 5), R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"epoch":0,"version":0})"
-                                        "\n");
 }
 
 TEST(WatchReport, OfAWithdrawnServiceOnlyWhoItWas) {
@@ -67,9 +71,10 @@ TEST(WatchReport, OfAWithdrawnServiceOnlyWhoItWas) {
   event.service->name = "robot/odom";
   event.service->node = Peer{(7u << 20) | 17};
   event.service->group_id = 12;
-  EXPECT_EQ(json_line(event, 5), R"({"time_ns":5,"change":"withdrawn","hub_id":0,"epoch":0,"version":0,)"
-                                 R"("service":{"name":"robot/odom","node":"7.17","group":12}})"
-                                 "\n");
+  EXPECT_EQ(json_line(event, 5),
+            R"({"time_ns":5,"change":"withdrawn","hub_id":0,"epoch":0,"version":0,)"
+            R"("service":{"name":"robot/odom","node":"7.17","group":12}})"
+            "\n");
 }
 
 TEST(WatchReport, KnowsWhatWasThereBefore) {
@@ -83,7 +88,8 @@ TEST(ToolFilter, HidesTheWholeLifeOfALook) {
   ToolFilter filter;
   EXPECT_TRUE(filter.hides(node_event(Change::joined, 1, "", kToolDescription)));
   EXPECT_TRUE(filter.hides(node_event(Change::away, 1, "", kToolDescription)));
-  EXPECT_TRUE(filter.hides(node_event(Change::left, 1, "", ""))) << "the last event tells no description";
+  EXPECT_TRUE(filter.hides(node_event(Change::left, 1, "", "")))
+      << "the last event tells no description";
   EXPECT_FALSE(filter.hides(node_event(Change::joined, 1, "", ""))) << "the id is another's now";
 }
 

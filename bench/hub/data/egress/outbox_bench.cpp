@@ -1,4 +1,5 @@
-// One connection's queue: in and out at once, with a backlog under each policy, and as fragments of large messages.
+// One connection's queue: in and out at once, with a backlog under each policy, and as fragments of
+// large messages.
 
 #include <benchmark/benchmark.h>
 

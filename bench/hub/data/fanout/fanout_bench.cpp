@@ -15,7 +15,8 @@ void fan_out(benchmark::State& state, bool by_reference) {
   for (std::uint32_t i = 0; i < recipients; ++i) rig.add_here(2 + i);
   benchmarks::NullTransport transport;
   GatherWriter writer;
-  const hub::Run run = rig.make_run(7u << 20 | 1, {std::string(bytes, 'x')}, {.kind = proto::Kind::group});
+  const hub::Run run =
+      rig.make_run(7u << 20 | 1, {std::string(bytes, 'x')}, {.kind = proto::Kind::group});
   const proto::FrameHeader header = run.header();
   for (auto _ : state) {
     for (const auto& recipient : rig.recipients_made) {
@@ -23,7 +24,8 @@ void fan_out(benchmark::State& state, bool by_reference) {
     }
     for (Recipient* recipient : rig.recipients.dirty()) {
       recipient->dirty = false;
-      benchmark::DoNotOptimize(writer.flush(recipient->outbox, nullptr, transport, rig.egress.context));
+      benchmark::DoNotOptimize(
+          writer.flush(recipient->outbox, nullptr, transport, rig.egress.context));
       recipient->outbox.on_emptied(rig.egress.context);
     }
     rig.recipients.dirty().clear();
@@ -34,7 +36,8 @@ void fan_out(benchmark::State& state, bool by_reference) {
 /// Above a kilobyte there is a reference in both: a frame is never copied then.
 void sizes(benchmark::internal::Benchmark* bench) {
   for (const std::int64_t recipients : {10, 100, 1'000}) {
-    for (const std::int64_t bytes : {16, 256, 1'000, 4'096, 65'536}) bench->Args({recipients, bytes});
+    for (const std::int64_t bytes : {16, 256, 1'000, 4'096, 65'536})
+      bench->Args({recipients, bytes});
   }
 }
 BENCHMARK_CAPTURE(fan_out, by_copy, false)->Apply(sizes);

@@ -1,5 +1,5 @@
-// A session ends, that provided a retained service or none, where many others provide one each: what it costs must not
-// grow with those.
+// A session ends, that provided a retained service or none, where many others provide one each:
+// what it costs must not grow with those.
 
 #include <benchmark/benchmark.h>
 
@@ -12,7 +12,8 @@ constexpr std::uint32_t kFirstOther = 10;
 
 class Kept {
  public:
-  explicit Kept(std::uint32_t groups) : run_(rig_.make_run(7u << 20 | 1, {"last"}, {.kind = proto::Kind::group})) {
+  explicit Kept(std::uint32_t groups)
+      : run_(rig_.make_run(7u << 20 | 1, {"last"}, {.kind = proto::Kind::group})) {
     for (std::uint32_t i = 0; i < groups; ++i) keep(kFirstOther + i, kFirstOther + i);
   }
   void keep(std::uint32_t group, std::uint32_t provider) {
@@ -21,7 +22,9 @@ class Kept {
     header.src = make_id<NodeId>(HubId{7}, provider).value();
     rig_.retained.keep(run_, header);
   }
-  void end_session(std::uint32_t node) { rig_.retained.forget_provider(make_id<NodeId>(HubId{7}, node)); }
+  void end_session(std::uint32_t node) {
+    rig_.retained.forget_provider(make_id<NodeId>(HubId{7}, node));
+  }
 
  private:
   testing::RouteRig rig_;

@@ -1,10 +1,11 @@
-// What it costs to forward one frame of 16 bytes, from a read buffer of 256 KiB as a shard sees it: parsed, routed,
-// written. By how many nodes the hub has, and by how many of them one buffer speaks to. The look-up itself is two array
-// indexes and costs the same for any number of nodes: as many instructions, and as much time where a buffer speaks to
-// as many of them. What differs is what each further recipient of a buffer costs: about 1,300 instructions for a write
-// of its own, and its memory, which is in no cache where there are many. In the running hub that write is a system
-// call, which takes several times as long. Fetching recipients ahead, 4 to 6 frames before their turn, was tried and
-// could not be seen in the figures.
+// What it costs to forward one frame of 16 bytes, from a read buffer of 256 KiB as a shard sees it:
+// parsed, routed, written. By how many nodes the hub has, and by how many of them one buffer speaks
+// to. The look-up itself is two array indexes and costs the same for any number of nodes: as many
+// instructions, and as much time where a buffer speaks to as many of them. What differs is what
+// each further recipient of a buffer costs: about 1,300 instructions for a write of its own, and
+// its memory, which is in no cache where there are many. In the running hub that write is a system
+// call, which takes several times as long. Fetching recipients ahead, 4 to 6 frames before their
+// turn, was tried and could not be seen in the figures.
 
 #include <benchmark/benchmark.h>
 
@@ -22,8 +23,8 @@ constexpr std::uint32_t kFrames = 8'000;
 constexpr std::uint32_t kBuffers = 16;
 const char* const kPayload = "0123456789abcdef";
 
-/// A hub's routing side with so many nodes, and read buffers whose frames go in turns to so many of them, which differ
-/// from buffer to buffer.
+/// A hub's routing side with so many nodes, and read buffers whose frames go in turns to so many of
+/// them, which differ from buffer to buffer.
 class Forwarding {
  public:
   Forwarding(std::uint32_t nodes, std::uint32_t destinations) : writers_(nodes + kFirstNode) {
@@ -31,7 +32,8 @@ class Forwarding {
     std::mt19937 random(7);
     for (std::uint32_t i = 0; i < kBuffers; ++i) {
       std::vector<std::uint32_t> to(destinations);
-      for (std::uint32_t& each : to) each = kFirstNode + static_cast<std::uint32_t>(random() % nodes);
+      for (std::uint32_t& each : to)
+        each = kFirstNode + static_cast<std::uint32_t>(random() % nodes);
       BufferRef& slab = slabs_.emplace_back(rig_.egress.pool.take_slab());
       std::byte* at = slab->data;
       for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
@@ -58,8 +60,8 @@ class Forwarding {
   void flush() {
     for (Recipient* recipient : rig_.recipients.dirty()) {
       recipient->dirty = false;
-      benchmark::DoNotOptimize(
-          writers_[recipient->slot.value()].flush(recipient->outbox, nullptr, transport_, rig_.egress.context));
+      benchmark::DoNotOptimize(writers_[recipient->slot.value()].flush(
+          recipient->outbox, nullptr, transport_, rig_.egress.context));
       recipient->outbox.on_emptied(rig_.egress.context);
     }
     rig_.recipients.dirty().clear();
@@ -76,7 +78,8 @@ class Forwarding {
 
 /// Arguments: nodes of the hub, and of them the recipients of one buffer.
 void forward(benchmark::State& state) {
-  Forwarding forwarding(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
+  Forwarding forwarding(static_cast<std::uint32_t>(state.range(0)),
+                        static_cast<std::uint32_t>(state.range(1)));
   for (auto _ : state) {
     forwarding.forward_buffer();
     forwarding.flush();

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <span>
 
-// The file that a hub goes on from. The input is the file without its digest, which nobody could guess: whatever it
-// holds is refused, or is what a hub writes, byte for byte.
+// The file that a hub goes on from. The input is the file without its digest, which nobody could
+// guess: whatever it holds is refused, or is what a hub writes, byte for byte.
 
 namespace {
 
@@ -19,7 +19,8 @@ void require(bool condition) {
 /// No newcomer of the next start gets what somebody may have, and what it gets is kept.
 void check_indices(const IndexRange& range, const IndexSet& found, const IndexSet& kept) {
   constexpr std::uint32_t kMost = gimnet::kEveryIndex - 1;
-  require(range.used == found && kept.size() == found.size() + std::min(IndexPool::kBlock, kMost - found.size()));
+  require(range.used == found &&
+          kept.size() == found.size() + std::min(IndexPool::kBlock, kMost - found.size()));
   std::uint32_t unused = 0;
   for (std::uint64_t i = 0; i < range.count; ++i) {
     const auto index = static_cast<std::uint32_t>((range.first - 1 + i) % kMost) + 1;
@@ -29,7 +30,8 @@ void check_indices(const IndexRange& range, const IndexSet& found, const IndexSe
   require(unused == kept.size() - found.size());
 }
 
-/// As a hub writes it, or wrote it when there were no proofs of groups (2), or no sets of used indices (1).
+/// As a hub writes it, or wrote it when there were no proofs of groups (2), or no sets of used
+/// indices (1).
 bool is_canonical(const HubState& state, std::span<const std::byte> file) {
   if (file[8] == std::byte{3}) return std::ranges::equal(write_hub_state(state), file);
   require(state.group_forgettings == 0 && state.groups_outlasting == IndexSet{});
@@ -39,7 +41,8 @@ bool is_canonical(const HubState& state, std::span<const std::byte> file) {
   bytes[8] = file[8];
   bytes.erase(bytes.begin() + 88, bytes.begin() + 104);
   const std::size_t size = bytes.size() - std::tuple_size_v<Digest>;
-  return file.size() == bytes.size() && std::ranges::equal(std::span{bytes}.first(size), file.first(size));
+  return file.size() == bytes.size() &&
+         std::ranges::equal(std::span{bytes}.first(size), file.first(size));
 }
 
 void check(std::span<const std::byte> file) {

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <span>
 
-// A token as somebody shows it: nothing but the hub's own bytes is genuine. The input is shown as it is, and laid over
-// a genuine token, bit by bit, so that the mutations begin close to one.
+// A token as somebody shows it: nothing but the hub's own bytes is genuine. The input is shown as
+// it is, and laid over a genuine token, bit by bit, so that the mutations begin close to one.
 
 namespace {
 

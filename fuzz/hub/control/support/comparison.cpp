@@ -19,7 +19,9 @@ bool same_set(List a, List b) {
   return a == b;
 }
 
-Seat seat_of(std::uint8_t shard, const hub::SessionRef& ref) { return {shard, ref.slot.value(), ref.generation}; }
+Seat seat_of(std::uint8_t shard, const hub::SessionRef& ref) {
+  return {shard, ref.slot.value(), ref.generation};
+}
 
 /// Of each member: where it is, and whether it got everything before it was paced.
 using Members = std::vector<std::pair<Seat, bool>>;
@@ -31,7 +33,9 @@ Members members_of(const std::vector<hub::MemberList<Member>>& by_shard) {
     by_shard[shard].for_each([&](const Member& member) {
       bool was_plain = false;
       if constexpr (requires { member.was_plain; }) was_plain = member.was_plain;
-      members.emplace_back(Seat{static_cast<std::uint8_t>(shard), member.slot.value(), member.generation}, was_plain);
+      members.emplace_back(
+          Seat{static_cast<std::uint8_t>(shard), member.slot.value(), member.generation},
+          was_plain);
     });
   }
   return members;
@@ -43,7 +47,8 @@ ns::Change change_of(const hub::Journal::Note& note) {
   ns::WatchEvents head;
   head.watch = 1;
   head.write_head(writer);
-  proto::Payload payload = proto::assemble_control({ns::WatchEvents::kOperation, proto::kNoRequest}, writer);
+  proto::Payload payload =
+      proto::assemble_control({ns::WatchEvents::kOperation, proto::kNoRequest}, writer);
   payload.insert(payload.begin() + proto::kControlHeaderSize, note.bytes.begin(), note.bytes.end());
   const auto events = proto::decode<ns::WatchEvents>(payload);
   FUZZ_MUST(events && events->changes.size() == 1);
@@ -92,7 +97,8 @@ void Reference::compare_tables(const ControlHub& hub) const {
     FUZZ_MUST(place.exists() == (found != by_index_.end()));
     FUZZ_MUST(place.is_renumbered() == (found == by_index_.end() && moved_.contains(index)));
     if (found == by_index_.end()) continue;
-    FUZZ_MUST((Seat{place.shard.value(), place.slot.value(), place.generation} == sessions_.at(found->second).seat));
+    FUZZ_MUST((Seat{place.shard.value(), place.slot.value(), place.generation} ==
+               sessions_.at(found->second).seat));
   }
   for (const std::uint32_t index : groups_given_) {
     const hub::GroupMembers* members = hub.groups.find(index);
@@ -114,9 +120,11 @@ void Reference::compare_group(const hub::GroupMembers& members, const Topic& top
   Members paced;
   for (const auto& [subscriber, terms] : topic.subscribers) {
     const Seat& seat = sessions_.at(subscriber).seat;
-    (pace_of(topic, subscriber) ? paced : plain).emplace_back(seat, topic.once_plain.contains(subscriber));
+    (pace_of(topic, subscriber) ? paced : plain)
+        .emplace_back(seat, topic.once_plain.contains(subscriber));
   }
-  FUZZ_MUST(same_set(members_of(members.by_shard), plain) && same_set(members_of(members.paced_by_shard), paced));
+  FUZZ_MUST(same_set(members_of(members.by_shard), plain) &&
+            same_set(members_of(members.paced_by_shard), paced));
 }
 
 void Reference::compare_events(const ControlHub& hub) {
@@ -133,7 +141,8 @@ void Reference::compare_events(const ControlHub& hub) {
     const std::uint64_t to = session_at(seat_of(shard, command->session));
     FUZZ_MUST(to != 0 && command->attachment == 0);
     if (const auto moved = proto::decode<ns::ServiceMoved>(payload)) {
-      told.emplace_back(to, operation, std::string(reinterpret_cast<const char*>(payload.data()), payload.size()),
+      told.emplace_back(to, operation,
+                        std::string(reinterpret_cast<const char*>(payload.data()), payload.size()),
                         index_of(moved->old_group), index_of(moved->new_group), 0);
     } else if (const auto joined = proto::decode<ns::SubscriberJoined>(payload)) {
       take(to, operation, *joined);
@@ -167,9 +176,11 @@ void Reference::compare_notes(const ControlHub& hub) {
     const ns::Change change = change_of(journal.at(++version_));
     FUZZ_MUST(change.version == version_);
     const bool service = change.service.has_value();
-    const std::uint32_t index = service ? index_of(change.service->group) : index_of(change.node->node);
+    const std::uint32_t index =
+        service ? index_of(change.service->group) : index_of(change.node->node);
     const std::string& name = service ? change.service->name : change.node->name;
-    told.emplace_back(static_cast<std::uint8_t>(change.kind), service, index, name, change.former_name);
+    told.emplace_back(static_cast<std::uint8_t>(change.kind), service, index, name,
+                      change.former_name);
   }
   FUZZ_MUST(same_set(told, notes_));
 }
@@ -199,7 +210,8 @@ void Reference::compare_commands(const ControlHub& hub) {
       FUZZ_MUST(command->limits.*limit.field == limits_.*limit.field);
     }
   }
-  for (const hub::LimitInfo& limit : hub::limit_table()) FUZZ_MUST(hub.limits.*limit.field == limits_.*limit.field);
+  for (const hub::LimitInfo& limit : hub::limit_table())
+    FUZZ_MUST(hub.limits.*limit.field == limits_.*limit.field);
 }
 
 /// What the shards were told of pace is what there is.

@@ -42,16 +42,17 @@ hub::HubFacts ControlHub::facts() {
 
 ControlHub::ControlHub(const hub::Limits& first_limits)
     : limits(first_limits),
-      conductor(facts(), hub::Placement::spread, limits,
-                hub::Conductor::Wiring{shards,
-                                       {nodes, groups, quiescence},
-                                       readable,
-                                       {},
-                                       {},
-                                       {},
-                                       nullptr,
-                                       [this] { return read_again ? read_again() : hub::Reloading{}; },
-                                       {}}) {
+      conductor(
+          facts(), hub::Placement::spread, limits,
+          hub::Conductor::Wiring{shards,
+                                 {nodes, groups, quiescence},
+                                 readable,
+                                 {},
+                                 {},
+                                 {},
+                                 nullptr,
+                                 [this] { return read_again ? read_again() : hub::Reloading{}; },
+                                 {}}) {
   shards.on_send = [this](const hub::ShardCommand& command) { before_it_leaves(command); };
 }
 
@@ -62,9 +63,11 @@ void ControlHub::before_it_leaves(const hub::ShardCommand& command) const {
   const auto* control = std::get_if<hub::SendControlCommand>(&command);
   if (control == nullptr) return;
   if (control->answers != 0) FUZZ_MUST(groups_are_published());
-  if (const auto moved = proto::decode<ns::ServiceMoved>(payload_of(*control)); moved && control->answers == 0) {
+  if (const auto moved = proto::decode<ns::ServiceMoved>(payload_of(*control));
+      moved && control->answers == 0) {
     // Who subscribed hears of a group before anybody can send to it.
-    if (moved->new_group != GroupId{}) FUZZ_MUST(groups.find(index_of(moved->new_group)) == nullptr);
+    if (moved->new_group != GroupId{})
+      FUZZ_MUST(groups.find(index_of(moved->new_group)) == nullptr);
   }
 }
 
@@ -95,28 +98,32 @@ std::optional<proto::Goodbye> ControlHub::admit(const Stranger& stranger) {
   made.peer = {"tcp", stranger.place};
   made.identity = stranger.identity;
   made.may_administer = stranger.may_administer;
-  auto refusal = conductor.admit(made, stranger.hello, {now, std::chrono::nanoseconds{wall()}.count()});
+  auto refusal =
+      conductor.admit(made, stranger.hello, {now, std::chrono::nanoseconds{wall()}.count()});
   for (const auto& [shard, attach] : all<hub::AttachCommand>()) {
     if (!attach->tell_heard) continue;
-    conductor.on_event({ShardIndex{shard}, hub::HeardEvent{attach->session, attach->attachment, attach->node}}, now);
+    conductor.on_event(
+        {ShardIndex{shard}, hub::HeardEvent{attach->session, attach->attachment, attach->node}},
+        now);
   }
   pass_fences();
   return refusal;
 }
 
-std::optional<proto::Payload> ControlHub::ask(const Line& line, proto::Kind kind, std::span<const std::byte> payload,
-                                              NodeId dst) {
+std::optional<proto::Payload> ControlHub::ask(const Line& line, proto::Kind kind,
+                                              std::span<const std::byte> payload, NodeId dst) {
   shards.sent.clear();
-  conductor.on_event(
-      {ShardIndex{line.seat.shard}, hub::ControlFrameEvent{ref_of(line.seat), line.attachment, line.node,
-                                                           hub::control_frame(kind, dst, HubId{}, payload)}},
-      now);
+  conductor.on_event({ShardIndex{line.seat.shard},
+                      hub::ControlFrameEvent{ref_of(line.seat), line.attachment, line.node,
+                                             hub::control_frame(kind, dst, HubId{}, payload)}},
+                     now);
   pass_fences();
   std::optional<proto::Payload> answer;
   for (const auto& [shard, command] : all<hub::SendControlCommand>()) {
     if (command->answers == 0) continue;
     FUZZ_MUST(!answer && command->answers == 1);
-    FUZZ_MUST((Seat{shard, command->session.slot.value(), command->session.generation} == line.seat));
+    FUZZ_MUST(
+        (Seat{shard, command->session.slot.value(), command->session.generation} == line.seat));
     FUZZ_MUST(command->attachment == line.attachment);
     const proto::FrameHeader header = proto::load_header(command->frame.data());
     FUZZ_MUST(header.kind == kind && header.dst == line.node.value());
@@ -132,9 +139,10 @@ std::optional<proto::Payload> ControlHub::ask(const Line& line, proto::Kind kind
 
 void ControlHub::end(const Line& line, bool said_by_peer, proto::GoodbyeCode code) {
   shards.sent.clear();
-  conductor.on_event({ShardIndex{line.seat.shard},
-                      hub::DetachedEvent{ref_of(line.seat), line.attachment, line.node, said_by_peer, code, "why"}},
-                     now);
+  conductor.on_event(
+      {ShardIndex{line.seat.shard}, hub::DetachedEvent{ref_of(line.seat), line.attachment,
+                                                       line.node, said_by_peer, code, "why"}},
+      now);
   pass_fences();
 }
 

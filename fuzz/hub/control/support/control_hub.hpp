@@ -10,8 +10,8 @@
 #include "hub/control/conductor.hpp"
 #include "tests/hub/control/support/fake_shards.hpp"
 
-// The hub's own control library as fuzz targets drive it: shards that only write down what they are told, and no
-// sockets, threads or clocks.
+// The hub's own control library as fuzz targets drive it: shards that only write down what they are
+// told, and no sockets, threads or clocks.
 
 namespace gimnet::fuzz {
 
@@ -25,14 +25,16 @@ struct Seat {
   friend auto operator<=>(const Seat&, const Seat&) = default;
 };
 
-/// A connection as its shard knows it. What was said by it may still be under way when it has ended.
+/// A connection as its shard knows it. What was said by it may still be under way when it has
+/// ended.
 struct Line {
   std::uint64_t session = 0;  ///< by the reference
   NodeId node;
   Seat seat;
   std::uint32_t attachment = 0;
   bool open = false;
-  std::optional<proto::GoodbyeCode> told;  ///< the hub had it closed, and has not heard of its end yet
+  std::optional<proto::GoodbyeCode>
+      told;  ///< the hub had it closed, and has not heard of its end yet
 };
 
 /// Who says HELLO.
@@ -43,7 +45,8 @@ struct Stranger {
   std::string place;
 };
 
-/// Ends in an abort where a command makes no sense: two answers, one to another connection, one before the tables.
+/// Ends in an abort where a command makes no sense: two answers, one to another connection, one
+/// before the tables.
 class ControlHub {
  public:
   static constexpr HubId kHub{7};
@@ -67,7 +70,8 @@ class ControlHub {
   [[nodiscard]] std::vector<std::pair<std::uint8_t, const Command*>> all() const {
     std::vector<std::pair<std::uint8_t, const Command*>> found;
     for (const hub::FakeShards::Sent& each : shards.sent) {
-      if (const auto* command = std::get_if<Command>(&each.command)) found.emplace_back(each.shard.value(), command);
+      if (const auto* command = std::get_if<Command>(&each.command))
+        found.emplace_back(each.shard.value(), command);
     }
     return found;
   }
@@ -86,7 +90,8 @@ class ControlHub {
 
  private:
   static hub::HubFacts facts();
-  /// The other shards take what each one handed over before it was told to fence, at once: a group that ends is gone.
+  /// The other shards take what each one handed over before it was told to fence, at once: a group
+  /// that ends is gone.
   void pass_fences();
   void before_it_leaves(const hub::ShardCommand& command) const;
   /// Do the tables say what the hub's own state says?

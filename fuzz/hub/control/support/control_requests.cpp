@@ -103,7 +103,8 @@ void ControlRun::advertise(Choices& input) {
   offer.delivery = static_cast<ns::Delivery>((terms >> 2 & 3) % 3);
   offer.direction = (terms & 0x70) == 0x70 ? ns::Direction::accepts : ns::Direction::provides;
   offer.instance = terms >> 7;
-  if (offer.delivery == ns::Delivery::sync || (terms & 0x70) == 0x10) offer.window = input.below(10);
+  if (offer.delivery == ns::Delivery::sync || (terms & 0x70) == 0x10)
+    offer.window = input.below(10);
   offer.metadata = some_metadata(input);
   offer.former_group = some_group(input);
   offer.former_proof = some_proof(index_of(offer.former_group));
@@ -144,7 +145,8 @@ void ControlRun::watch(Choices& input) {
     // It goes on where it says it is: a little behind, at the end, or beyond it.
     const std::uint64_t behind = input.below(16);
     wanted.epoch = journal.epoch() + ((choice & 0xE0) == 0xE0 ? 1 : 0);
-    wanted.version = behind == 15 ? journal.version() + 1 : journal.version() - std::min(behind, journal.version());
+    wanted.version = behind == 15 ? journal.version() + 1
+                                  : journal.version() - std::min(behind, journal.version());
   }
   ask(input, Kind::ns, wanted);
 }
@@ -152,15 +154,16 @@ void ControlRun::watch(Choices& input) {
 /// Bytes that nobody who keeps to the protocol sends.
 void ControlRun::ask_anything(Choices& input) {
   constexpr Kind kKinds[] = {Kind::ns, Kind::ns, Kind::ctrl, Kind::route};
-  constexpr std::uint32_t kDestinations[] = {0, 0, 0, 7u << kIndexBits, (7u << kIndexBits) + 3, 9u << kIndexBits};
+  constexpr std::uint32_t kDestinations[] = {
+      0, 0, 0, 7u << kIndexBits, (7u << kIndexBits) + 3, 9u << kIndexBits};
   const Kind kind = kKinds[input.below(std::size(kKinds))];
   const NodeId dst{kDestinations[input.below(std::size(kDestinations))]};
   const Line* line = pick(input);
   const auto bytes = input.bytes(input.byte());
   // RELOAD would have nothing to read here, and LOG_LEVEL would have this program speak.
   if (const auto view = proto::split_control(bytes); view && kind == Kind::ctrl) {
-    const bool apart =
-        view->header.operation == ctrl::Reload::kOperation || view->header.operation == ctrl::SetLogLevel::kOperation;
+    const bool apart = view->header.operation == ctrl::Reload::kOperation ||
+                       view->header.operation == ctrl::SetLogLevel::kOperation;
     if (apart) return;
   }
   if (line != nullptr) ask(*line, kind, bytes, dst);

@@ -55,7 +55,8 @@ std::string some_name(Choices& input) {
 }
 
 std::string some_pattern(Choices& input) {
-  constexpr std::string_view kPatterns[] = {"", "**", "*", "a/**", "a", "*/b/*", "**/s1", "a/b/*", "a/"};
+  constexpr std::string_view kPatterns[] = {"",      "**",    "*",     "a/**", "a",
+                                            "*/b/*", "**/s1", "a/b/*", "a/"};
   const std::uint32_t choice = input.below(std::size(kPatterns) + 1);
   return choice < std::size(kPatterns) ? std::string{kPatterns[choice]} : some_name(input);
 }
@@ -79,7 +80,8 @@ Line* ControlRun::pick(Choices& input) {
   Line& line = lines_[choice % lines_.size()];
   // A connection that ended says nothing more, but what a replaced one said may still be under way.
   const auto session = reference_.sessions().find(line.session);
-  const bool over = session == reference_.sessions().end() || session->second.attachment != line.attachment;
+  const bool over =
+      session == reference_.sessions().end() || session->second.attachment != line.attachment;
   return line.open || over ? &line : nullptr;
 }
 
@@ -95,8 +97,9 @@ void ControlRun::join(Choices& input) {
   Stranger stranger;
   stranger.hello.name = some_name(input);
   const std::uint8_t how = input.byte();
-  constexpr proto::Role kRoles[] = {proto::Role::node,  proto::Role::node, proto::Role::node, proto::Role::admin,
-                                    proto::Role::admin, proto::Role::hub,  proto::Role{77},   proto::Role::node};
+  constexpr proto::Role kRoles[] = {proto::Role::node,  proto::Role::node,  proto::Role::node,
+                                    proto::Role::admin, proto::Role::admin, proto::Role::hub,
+                                    proto::Role{77},    proto::Role::node};
   stranger.hello.role = kRoles[how & 7];
   stranger.may_administer = (how & 8) == 0;
   stranger.identity = (how & 16) != 0 ? "uid 1000" : "open";
@@ -131,13 +134,15 @@ void ControlRun::take_in(const Stranger& who) {
   keep_token(attach.welcome.token);
   lines_.push_back(line);
   if (lines_.size() <= kLinesMax) return;
-  const auto closed = std::find_if(lines_.begin(), lines_.end(), [](const Line& each) { return !each.open; });
+  const auto closed =
+      std::find_if(lines_.begin(), lines_.end(), [](const Line& each) { return !each.open; });
   if (closed != lines_.end()) lines_.erase(closed);
 }
 
 void ControlRun::end(Choices& input) {
-  constexpr GoodbyeCode kCodes[] = {GoodbyeCode::done,         GoodbyeCode::done,        GoodbyeCode::silent,
-                                    GoodbyeCode::malformed,    GoodbyeCode::not_allowed, GoodbyeCode::too_many_requests,
+  constexpr GoodbyeCode kCodes[] = {GoodbyeCode::done,         GoodbyeCode::done,
+                                    GoodbyeCode::silent,       GoodbyeCode::malformed,
+                                    GoodbyeCode::not_allowed,  GoodbyeCode::too_many_requests,
                                     GoodbyeCode::wrong_source, GoodbyeCode::draining};
   const std::uint8_t how = input.byte();
   Line* line = pick(input);
@@ -191,8 +196,10 @@ void ControlRun::ask(const Line& line, Kind kind, std::span<const std::byte> pay
 }
 
 void ControlRun::note_tokens(std::span<const std::byte> answer) {
-  if (const auto named = proto::decode_answer<ns::RegisterNameAnswer>(answer)) keep_token(named->token);
-  if (const auto nameless = proto::decode_answer<ns::UnregisterNameAnswer>(answer)) keep_token(nameless->token);
+  if (const auto named = proto::decode_answer<ns::RegisterNameAnswer>(answer))
+    keep_token(named->token);
+  if (const auto nameless = proto::decode_answer<ns::UnregisterNameAnswer>(answer))
+    keep_token(nameless->token);
 }
 
 // ---- watches
@@ -217,7 +224,8 @@ void ControlRun::settle() {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       const Line line = lines_[i];
       const auto session = reference_.sessions().find(line.session);
-      if (!line.open || session == reference_.sessions().end() || session->second.attachment != line.attachment) {
+      if (!line.open || session == reference_.sessions().end() ||
+          session->second.attachment != line.attachment) {
         continue;
       }
       std::vector<ns::WatchTaken> taken;
@@ -246,7 +254,8 @@ void ControlRun::finish() {
   reference_.passed(hub_);
   compare();
   FUZZ_MUST(reference_.sessions().empty() && reference_.groups().empty());
-  FUZZ_MUST(hub_.conductor.membership().services().topics() == 0 && hub_.conductor.watches().size() == 0);
+  FUZZ_MUST(hub_.conductor.membership().services().topics() == 0 &&
+            hub_.conductor.watches().size() == 0);
 }
 
 }  // namespace gimnet::fuzz

@@ -10,8 +10,8 @@
 
 namespace gimnet::fuzz {
 
-/// A hub and the reference, led through the same operations, which are read from the input: whatever the order, they
-/// agree after each. Ends in an abort where they do not.
+/// A hub and the reference, led through the same operations, which are read from the input:
+/// whatever the order, they agree after each. Ends in an abort where they do not.
 class ControlRun {
  public:
   /// The first byte chooses the limits.
@@ -19,7 +19,8 @@ class ControlRun {
 
   /// One operation, chosen and filled in from the input.
   using Step = void (*)(ControlRun&, Choices&);
-  /// What a fuzz target does with its input: a run of such steps until nothing is left of it, then finish().
+  /// What a fuzz target does with its input: a run of such steps until nothing is left of it, then
+  /// finish().
   static void of_input(const std::uint8_t* data, std::size_t size, Step step);
 
   // Operations; what they are about is read from the input.

@@ -15,7 +15,8 @@ using proto::ns::ChangeKind;
 
 // ---- what a HELLO is worth
 
-std::optional<GoodbyeCode> Reference::judge_name(const std::string& name, std::uint64_t claimant) const {
+std::optional<GoodbyeCode> Reference::judge_name(const std::string& name,
+                                                 std::uint64_t claimant) const {
   if (proto::node_name_fault(name) != nullptr) return GoodbyeCode::bad_name;
   const auto holder = names_.find(name);
   if (holder == names_.end() || holder->second == claimant) return std::nullopt;
@@ -126,15 +127,18 @@ std::uint64_t Reference::came(const Stranger& who, const ControlHub& hub,
   session.renumbered = false;
   FUZZ_MUST(attach.attachment == ++session.attachment);
   const proto::Welcome& welcome = attach.welcome;
-  FUZZ_MUST(welcome.node == attach.node && welcome.name == session.name && !welcome.name_provisional);
+  FUZZ_MUST(welcome.node == attach.node && welcome.name == session.name &&
+            !welcome.name_provisional);
   FUZZ_MUST(welcome.last_goodbye_code == session.last_goodbye);
   FUZZ_MUST(hub_of(attach.node) == ControlHub::kHub && welcome.hub == ControlHub::kHub);
   session.last_goodbye = 0;
-  tokens_[welcome.token] = {session.index, session.number, session.name, session.identity, session.token_expiry};
+  tokens_[welcome.token] = {session.index, session.number, session.name, session.identity,
+                            session.token_expiry};
   return id;
 }
 
-std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachCommand& attach, const ControlHub& hub) {
+std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachCommand& attach,
+                                 const ControlHub& hub) {
   const std::uint32_t index = index_of(attach.node);
   if (verdict.session != 0) {
     Session& session = sessions_.at(verdict.session);
@@ -178,17 +182,20 @@ bool Reference::is_current(const Line& line) const {
   return found != sessions_.end() && found->second.attachment == line.attachment;
 }
 
-void Reference::ended(const Line& line, bool said_by_peer, GoodbyeCode code, const ControlHub& hub) {
+void Reference::ended(const Line& line, bool said_by_peer, GoodbyeCode code,
+                      const ControlHub& hub) {
   if (!is_current(line) || !sessions_.at(line.session).connected) return;
   Session& session = sessions_.at(line.session);
-  const bool misconduct = !said_by_peer && (code == GoodbyeCode::malformed || code == GoodbyeCode::wrong_source ||
-                                            code == GoodbyeCode::not_allowed ||
-                                            code == GoodbyeCode::too_many_requests || code == GoodbyeCode::oddities);
+  const bool misconduct =
+      !said_by_peer && (code == GoodbyeCode::malformed || code == GoodbyeCode::wrong_source ||
+                        code == GoodbyeCode::not_allowed ||
+                        code == GoodbyeCode::too_many_requests || code == GoodbyeCode::oddities);
   if ((said_by_peer && code == GoodbyeCode::done) || (misconduct && session.name.empty())) {
     spend_tokens(session);
     return end(line.session, hub.now);
   }
-  if (!said_by_peer && code != GoodbyeCode::done) session.last_goodbye = static_cast<std::uint16_t>(code);
+  if (!said_by_peer && code != GoodbyeCode::done)
+    session.last_goodbye = static_cast<std::uint16_t>(code);
   session.connected = false;
   session.watches.clear();
   session.away_until = hub.now + milliseconds{limits_.grace_ms};
@@ -199,7 +206,8 @@ void Reference::ended(const Line& line, bool said_by_peer, GoodbyeCode code, con
 void Reference::spend_tokens(const Session& session) {
   least_[session.index] = std::max(least_[session.index], session.number + 1);
   for (const auto& [index, moved] : moved_) {
-    if (sessions_.at(moved.session).index == session.index) least_[index] = std::max(least_[index], moved.number + 1);
+    if (sessions_.at(moved.session).index == session.index)
+      least_[index] = std::max(least_[index], moved.number + 1);
   }
 }
 
@@ -245,7 +253,8 @@ void Reference::end(std::uint64_t id, milliseconds now) {
 }
 
 milliseconds Reference::rests_until(milliseconds now) const {
-  return now + milliseconds{limits_.grace_ms + std::max(limits_.block_ms, limits_.slow_consumer_ms)};
+  return now +
+         milliseconds{limits_.grace_ms + std::max(limits_.block_ms, limits_.slow_consumer_ms)};
 }
 
 bool Reference::is_free(const std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
@@ -255,7 +264,8 @@ bool Reference::is_free(const std::map<std::uint32_t, milliseconds>& resting, st
 }
 
 void Reference::note_node(ChangeKind kind, const Session& session, const std::string& former_name) {
-  notes_.emplace_back(static_cast<std::uint8_t>(kind), false, session.index, session.name, former_name);
+  notes_.emplace_back(static_cast<std::uint8_t>(kind), false, session.index, session.name,
+                      former_name);
 }
 
 void Reference::note_service(ChangeKind kind, std::uint32_t group, const std::string& full_name) {

@@ -14,9 +14,10 @@
 
 namespace gimnet::fuzz {
 
-/// What a hub owes its nodes, in maps, written from docs/protocol.md. It follows each step of a hub and ends in an
-/// abort at the first difference. It shares nothing with the hub but the messages, names and patterns (src/proto) and
-/// the limits; where the hub may choose (the id of a newcomer) the choice is taken over, if it was allowed.
+/// What a hub owes its nodes, in maps, written from docs/protocol.md. It follows each step of a hub
+/// and ends in an abort at the first difference. It shares nothing with the hub but the messages,
+/// names and patterns (src/proto) and the limits; where the hub may choose (the id of a newcomer)
+/// the choice is taken over, if it was allowed.
 class Reference {
  public:
   explicit Reference(const hub::Limits& limits) : limits_(limits) {}
@@ -44,9 +45,10 @@ class Reference {
     milliseconds joined{};
     milliseconds away_until{};  ///< while it is not connected
     std::uint64_t away_order = 0;
-    std::optional<milliseconds> declare_until;        ///< after a return
-    std::uint64_t life = 0;                           ///< counts its returns
-    std::map<std::string, std::uint64_t> provides;    ///< full name: the life in which it was declared last
+    std::optional<milliseconds> declare_until;  ///< after a return
+    std::uint64_t life = 0;                     ///< counts its returns
+    std::map<std::string, std::uint64_t>
+        provides;  ///< full name: the life in which it was declared last
     std::map<std::string, std::uint64_t> subscribes;  ///< the same
     std::map<std::uint32_t, WatchView> watches;
     std::uint16_t last_goodbye = 0;
@@ -63,7 +65,8 @@ class Reference {
   struct Topic {
     std::optional<Service> service;
     std::map<std::uint64_t, Terms> subscribers;
-    /// Those that changed their terms in this group: they got everything and are paced now, or the reverse.
+    /// Those that changed their terms in this group: they got everything and are paced now, or the
+    /// reverse.
     std::set<std::uint64_t> once_plain;
     std::set<std::uint64_t> once_paced;
   };
@@ -71,7 +74,8 @@ class Reference {
   // ---- steps that were done; each looks at what came of it
 
   /// Returns the session that was let in, 0: none.
-  std::uint64_t came(const Stranger& who, const ControlHub& hub, const std::optional<proto::Goodbye>& refusal);
+  std::uint64_t came(const Stranger& who, const ControlHub& hub,
+                     const std::optional<proto::Goodbye>& refusal);
   void ended(const Line& line, bool said_by_peer, proto::GoodbyeCode code, const ControlHub& hub);
   void passed(const ControlHub& hub);
   /// `after` is the hub's answer, if it gave one.
@@ -82,15 +86,19 @@ class Reference {
   /// The configuration that the next RELOAD finds.
   void expect_reload(const hub::Reloading& reloading) { next_reload_ = reloading; }
 
-  /// Compares everything else that the step did: tables, commands, events, notes for those who watch.
+  /// Compares everything else that the step did: tables, commands, events, notes for those who
+  /// watch.
   void compare(const ControlHub& hub);
   /// Each watch agrees with what there is, now that it was told everything.
   void require_agreed_watches() const;
 
   [[nodiscard]] const std::map<std::uint64_t, Session>& sessions() const { return sessions_; }
   [[nodiscard]] const std::map<std::uint32_t, std::string>& groups() const { return groups_; }
-  /// A proof that was given for a group: of those for that index, and of all, the latest. Empty: none was.
-  [[nodiscard]] const std::vector<std::byte>& proof_of(std::uint32_t group) { return latest_proofs_[group]; }
+  /// A proof that was given for a group: of those for that index, and of all, the latest. Empty:
+  /// none was.
+  [[nodiscard]] const std::vector<std::byte>& proof_of(std::uint32_t group) {
+    return latest_proofs_[group];
+  }
   [[nodiscard]] const std::vector<std::byte>& latest_proof() const { return latest_proof_; }
   [[nodiscard]] const hub::Limits& limits() const { return limits_; }
   [[nodiscard]] LogLevel level() const { return level_; }
@@ -113,8 +121,10 @@ class Reference {
     std::uint64_t session = 0;         ///< whose token it is
     std::optional<Token> former = {};  ///< of a session that is over
   };
-  /// What somebody has to be told, numbers apart: those who go in one step may be told of in any order.
-  using Event = std::tuple<std::uint64_t, std::uint16_t, std::string, std::uint32_t, std::uint32_t, std::uint32_t>;
+  /// What somebody has to be told, numbers apart: those who go in one step may be told of in any
+  /// order.
+  using Event = std::tuple<std::uint64_t, std::uint16_t, std::string, std::uint32_t, std::uint32_t,
+                           std::uint32_t>;
   using Count = std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>;
   /// What those who watch have to hear: kind, node or group, name, former name.
   using Note = std::tuple<std::uint8_t, bool, std::uint32_t, std::string, std::string>;
@@ -129,16 +139,18 @@ class Reference {
   // Sessions and names
   [[nodiscard]] Verdict judge(const Stranger& who, milliseconds wall) const;
   void judge_token(const Stranger& who, milliseconds wall, Verdict& verdict) const;
-  [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name, std::uint64_t claimant) const;
+  [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name,
+                                                             std::uint64_t claimant) const;
   [[nodiscard]] std::uint64_t longest_away_nameless(std::uint64_t but) const;
   [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
-  std::uint64_t take_in(const Verdict& verdict, const hub::AttachCommand& attach, const ControlHub& hub);
+  std::uint64_t take_in(const Verdict& verdict, const hub::AttachCommand& attach,
+                        const ControlHub& hub);
   void take_name(std::uint64_t id, const std::string& name, milliseconds now);
   void end(std::uint64_t id, milliseconds now);
   void spend_tokens(const Session& session);
   void drop_undeclared(std::uint64_t id, milliseconds now);
-  [[nodiscard]] bool is_free(const std::map<std::uint32_t, milliseconds>& resting, std::uint32_t index,
-                             milliseconds now) const;
+  [[nodiscard]] bool is_free(const std::map<std::uint32_t, milliseconds>& resting,
+                             std::uint32_t index, milliseconds now) const;
   [[nodiscard]] milliseconds rests_until(milliseconds now) const;
   /// The session that has the index, or had it before it was given another; 0: none.
   [[nodiscard]] std::uint64_t holder_of(std::uint32_t index) const;
@@ -147,8 +159,10 @@ class Reference {
 
   // Services
   [[nodiscard]] std::optional<Terms> pace_of(const Topic& topic, std::uint64_t subscriber) const;
-  void note_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof);
-  [[nodiscard]] bool is_proven(const std::string& full_name, const proto::ns::Advertise& terms) const;
+  void note_proof(std::uint32_t group, const std::string& full_name,
+                  const std::vector<std::byte>& proof);
+  [[nodiscard]] bool is_proven(const std::string& full_name,
+                               const proto::ns::Advertise& terms) const;
   void open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
                   const proto::ns::Advertise& terms);
   void withdraw(const std::string& full_name, milliseconds now);
@@ -157,10 +171,12 @@ class Reference {
   void forget_if_unused(const std::string& full_name);
   void tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
                   const proto::ns::Advertise& terms);
-  void tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined, std::size_t count);
+  void tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined,
+                     std::size_t count);
 
   // Requests
-  /// One more name, service or subscription that is begun or changed. False: the answer must be `rate`.
+  /// One more name, service or subscription that is begun or changed. False: the answer must be
+  /// `rate`.
   [[nodiscard]] bool may_declare(const Asked& asked);
   /// After an answer of no use to anybody: the connection is closed if there were too many.
   void count_oddity(const Asked& asked);
@@ -176,7 +192,8 @@ class Reference {
   void on_services(const Asked& asked) const;
   void on_advertise(const Asked& asked);
   /// Is there anything wrong with it by itself?
-  [[nodiscard]] proto::Status judge_terms(const Asked& asked, const proto::ns::Advertise& offer) const;
+  [[nodiscard]] proto::Status judge_terms(const Asked& asked,
+                                          const proto::ns::Advertise& offer) const;
   [[nodiscard]] bool terms_fit(const Asked& asked, const proto::ns::Subscribe& wanted) const;
   [[nodiscard]] proto::Status judge_offer(const Asked& asked, const proto::ns::Advertise& offer);
   void on_withdraw(const Asked& asked);
@@ -206,10 +223,15 @@ class Reference {
   void compare_paces(const ControlHub& hub);
   void compare_deadline(const ControlHub& hub) const;
 
-  [[nodiscard]] static NodeId id_of(std::uint32_t index) { return make_id<NodeId>(ControlHub::kHub, index); }
-  [[nodiscard]] static GroupId group_id(std::uint32_t index) { return make_id<GroupId>(ControlHub::kHub, index); }
+  [[nodiscard]] static NodeId id_of(std::uint32_t index) {
+    return make_id<NodeId>(ControlHub::kHub, index);
+  }
+  [[nodiscard]] static GroupId group_id(std::uint32_t index) {
+    return make_id<GroupId>(ControlHub::kHub, index);
+  }
   [[nodiscard]] std::uint64_t session_at(const Seat& seat) const;
-  void note_node(proto::ns::ChangeKind kind, const Session& session, const std::string& former_name = {});
+  void note_node(proto::ns::ChangeKind kind, const Session& session,
+                 const std::string& former_name = {});
   void note_service(proto::ns::ChangeKind kind, std::uint32_t group, const std::string& full_name);
 
   hub::Limits limits_;
@@ -220,11 +242,13 @@ class Reference {
   std::map<std::uint32_t, std::string> groups_;
   std::map<std::uint32_t, milliseconds> resting_nodes_;
   std::map<std::uint32_t, milliseconds> resting_groups_;
-  std::map<std::uint32_t, Moved> moved_;          ///< by the index that a session had before
-  std::map<std::uint32_t, std::uint64_t> least_;  ///< index: sessions of a lower number are over for good
+  std::map<std::uint32_t, Moved> moved_;  ///< by the index that a session had before
+  std::map<std::uint32_t, std::uint64_t>
+      least_;  ///< index: sessions of a lower number are over for good
   std::map<std::vector<std::byte>, Token> tokens_;
-  std::map<std::vector<std::byte>, std::pair<std::uint32_t, std::string>> proofs_;  ///< of which group and full name
-  std::map<std::uint32_t, std::vector<std::byte>> latest_proofs_;                   ///< by group
+  std::map<std::vector<std::byte>, std::pair<std::uint32_t, std::string>>
+      proofs_;                                                     ///< of which group and full name
+  std::map<std::uint32_t, std::vector<std::byte>> latest_proofs_;  ///< by group
   std::vector<std::byte> latest_proof_;
   std::set<std::uint32_t> nodes_given_;
   std::set<std::uint32_t> groups_given_;
@@ -244,12 +268,14 @@ class Reference {
   std::vector<Seat> released_;
   std::map<Seat, proto::GoodbyeCode> closed_;
   std::vector<std::pair<Seat, std::uint32_t>> renumbered_;
-  std::vector<std::pair<std::uint32_t, std::uint64_t>> dropped_;  ///< groups whose last message goes, providers
+  std::vector<std::pair<std::uint32_t, std::uint64_t>>
+      dropped_;  ///< groups whose last message goes, providers
   bool reloaded_ = false;
 
-  std::uint64_t version_ = 0;                                               ///< of names and services
-  std::optional<std::uint64_t> kept_from_;                                  ///< the version when the first watch began
-  std::map<std::pair<Seat, std::uint32_t>, std::pair<Terms, bool>> paces_;  ///< as the shards were told
+  std::uint64_t version_ = 0;               ///< of names and services
+  std::optional<std::uint64_t> kept_from_;  ///< the version when the first watch began
+  std::map<std::pair<Seat, std::uint32_t>, std::pair<Terms, bool>>
+      paces_;  ///< as the shards were told
 };
 
 /// The answer's status is this one.

@@ -75,7 +75,8 @@ void Reference::dispatch_control(const Asked& asked, std::uint16_t operation) {
 void Reference::on_hub_info(const Asked& asked) const {
   if (!readable<ctrl::HubInfo>(asked.payload, asked.answer)) return;
   const auto answer = proto::decode_answer<ctrl::HubInfoAnswer>(asked.answer);
-  FUZZ_MUST(answer && answer->hub == ControlHub::kHub && answer->hub_name == "fuzzed" && answer->version == "0");
+  FUZZ_MUST(answer && answer->hub == ControlHub::kHub && answer->hub_name == "fuzzed" &&
+            answer->version == "0");
   FUZZ_MUST(answer->shards == ControlHub::kShards && answer->nodes == sessions_.size());
   FUZZ_MUST(answer->services == groups_.size());
   FUZZ_MUST(answer->uptime_ms == static_cast<std::uint64_t>(asked.hub.now.count()));
@@ -89,8 +90,10 @@ void Reference::on_statistics(const Asked& asked) const {
   for (const auto& [asked_kind, count] : asked_) {
     const auto [kind, operation] = asked_kind;
     const bool about_names = kind == Kind::ns;
-    const char* name = about_names ? ns::operation_name(operation) : ctrl::operation_name(operation);
-    due[(about_names ? "names." : "ctrl.") + std::string{name != nullptr ? name : "unknown"}] += count;
+    const char* name =
+        about_names ? ns::operation_name(operation) : ctrl::operation_name(operation);
+    due[(about_names ? "names." : "ctrl.") + std::string{name != nullptr ? name : "unknown"}] +=
+        count;
   }
   std::map<std::string, std::uint64_t> said;
   for (const ctrl::ShardRecord& record : answer->shards) {
@@ -111,11 +114,13 @@ void Reference::on_connections(const Asked& asked) const {
   for (const ctrl::ConnectionRecord& record : answer->connections) {
     FUZZ_MUST(entry != by_index_.end() && record.node == id_of(entry->first));
     const Session& session = sessions_.at(entry->second);
-    FUZZ_MUST(record.name == session.name && record.connected == session.connected && record.peer == session.place &&
-              record.shard == session.seat.shard && record.transport == "tcp");
+    FUZZ_MUST(record.name == session.name && record.connected == session.connected &&
+              record.peer == session.place && record.shard == session.seat.shard &&
+              record.transport == "tcp");
     ++entry;
   }
-  FUZZ_MUST(answer->more == (entry != by_index_.end()) && (!answer->more || answer->connections.size() == room));
+  FUZZ_MUST(answer->more == (entry != by_index_.end()) &&
+            (!answer->more || answer->connections.size() == room));
 }
 
 void Reference::on_routes(const Asked& asked) const {
@@ -139,16 +144,18 @@ void Reference::on_list(const Asked& asked) const {
   const std::uint32_t last = answer->more ? index_of(answer->next) : UINT32_MAX;
   FUZZ_MUST(last > index_of(wanted->after));
   auto record = answer->nodes.begin();
-  for (auto entry = by_index_.upper_bound(index_of(wanted->after)); entry != by_index_.end() && entry->first <= last;
-       ++entry) {
+  for (auto entry = by_index_.upper_bound(index_of(wanted->after));
+       entry != by_index_.end() && entry->first <= last; ++entry) {
     const Session& session = sessions_.at(entry->second);
     if (!wanted->pattern.empty() && !proto::matches(wanted->pattern, session.name)) continue;
     if (wanted->connected_only && !session.connected) continue;
     FUZZ_MUST(record != answer->nodes.end());
-    FUZZ_MUST(record->node == id_of(entry->first) && record->name == session.name && record->place == session.place);
+    FUZZ_MUST(record->node == id_of(entry->first) && record->name == session.name &&
+              record->place == session.place);
     FUZZ_MUST(record->connected == session.connected && record->description == session.description);
     FUZZ_MUST(record->services == session.provides.size());
-    FUZZ_MUST(record->joined_ms == static_cast<std::uint64_t>((asked.hub.now - session.joined).count()));
+    FUZZ_MUST(record->joined_ms ==
+              static_cast<std::uint64_t>((asked.hub.now - session.joined).count()));
     ++record;
   }
   FUZZ_MUST(record == answer->nodes.end());
@@ -165,8 +172,8 @@ void Reference::on_services(const Asked& asked) const {
   const std::uint32_t last = answer->more ? index_of(answer->next) : UINT32_MAX;
   FUZZ_MUST(last > index_of(wanted->after));
   auto record = answer->services.begin();
-  for (auto entry = groups_.upper_bound(index_of(wanted->after)); entry != groups_.end() && entry->first <= last;
-       ++entry) {
+  for (auto entry = groups_.upper_bound(index_of(wanted->after));
+       entry != groups_.end() && entry->first <= last; ++entry) {
     if (!wanted->pattern.empty() && !proto::matches(wanted->pattern, entry->second)) continue;
     const Topic& topic = topics_.at(entry->second);
     const ns::Advertise& terms = topic.service->terms;
@@ -177,7 +184,8 @@ void Reference::on_services(const Asked& asked) const {
     FUZZ_MUST(record->direction == terms.direction && record->delivery == terms.delivery);
     FUZZ_MUST(record->metadata == terms.metadata && record->retain == terms.retain);
     FUZZ_MUST(record->subscribers == topic.subscribers.size());
-    const std::uint32_t window = terms.delivery == ns::Delivery::sync ? std::max(1u, terms.window) : 0;
+    const std::uint32_t window =
+        terms.delivery == ns::Delivery::sync ? std::max(1u, terms.window) : 0;
     FUZZ_MUST(record->window == window);
     ++record;
   }
@@ -209,8 +217,8 @@ void Reference::on_reassign(const Asked& asked) {
   const std::optional<std::uint32_t> target = own_index(wanted->new_node);
   const bool legal = target && id != asked.id && *target != kHubIndex && *target < kEveryIndex;
   if (!legal) return require_status(asked.answer, Status::bad_request);
-  const bool free =
-      !by_index_.contains(*target) && is_free(resting_nodes_, *target, asked.hub.now) && !sessions_.at(id).renumbered;
+  const bool free = !by_index_.contains(*target) &&
+                    is_free(resting_nodes_, *target, asked.hub.now) && !sessions_.at(id).renumbered;
   require_status(asked.answer, free ? Status::done : Status::taken);
   if (free) renumber(id, *target, asked.hub.now);
 }
@@ -250,7 +258,8 @@ void Reference::on_drain(const Asked& asked) {
 }
 
 void Reference::on_reload(const Asked& asked) {
-  if (!proto::decode<ctrl::Reload>(asked.payload)) return require_status(asked.answer, Status::bad_request);
+  if (!proto::decode<ctrl::Reload>(asked.payload))
+    return require_status(asked.answer, Status::bad_request);
   FUZZ_MUST(next_reload_.has_value());
   const hub::Reloading& found = *next_reload_;
   require_status(asked.answer, found.faults.empty() ? Status::done : Status::bad_request);
@@ -260,17 +269,20 @@ void Reference::on_reload(const Asked& asked) {
   level_ = found.log_level;
   const auto answer = proto::decode_answer<ctrl::ReloadAnswer>(asked.answer);
   const std::size_t fit = std::min<std::size_t>(found.changes.size(), limits_.page_records);
-  FUZZ_MUST(answer && answer->changes.size() == fit && answer->more == (fit < found.changes.size()));
+  FUZZ_MUST(answer && answer->changes.size() == fit &&
+            answer->more == (fit < found.changes.size()));
   for (std::size_t i = 0; i < fit; ++i) {
     const hub::Reloading::Change& due = found.changes[i];
-    FUZZ_MUST((answer->changes[i] == ctrl::ChangeRecord{due.key, due.from, due.to, due.needs_restart}));
+    FUZZ_MUST(
+        (answer->changes[i] == ctrl::ChangeRecord{due.key, due.from, due.to, due.needs_restart}));
   }
 }
 
 void Reference::on_log_level(const Asked& asked) {
   const auto wanted = proto::decode<ctrl::SetLogLevel>(asked.payload);
   constexpr std::string_view kLevels[] = {"error", "warning", "info", "debug", "off"};
-  const auto* found = wanted ? std::find(std::begin(kLevels), std::end(kLevels), wanted->level) : std::end(kLevels);
+  const auto* found =
+      wanted ? std::find(std::begin(kLevels), std::end(kLevels), wanted->level) : std::end(kLevels);
   const bool legal = found != std::end(kLevels);
   require_status(asked.answer, legal ? Status::done : Status::bad_request);
   if (!legal) return;

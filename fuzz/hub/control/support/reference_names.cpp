@@ -19,8 +19,8 @@ namespace ns = proto::ns;
 void require_status(std::span<const std::byte> answer, Status status) {
   const proto::Refusal said = proto::read_status(proto::split_control(answer)->body);
   if (said.status != status) {
-    std::fprintf(stderr, "answered %s (%s), due is %s\n", proto::status_name(said.status), said.sentence.c_str(),
-                 proto::status_name(status));
+    std::fprintf(stderr, "answered %s (%s), due is %s\n", proto::status_name(said.status),
+                 said.sentence.c_str(), proto::status_name(status));
   }
   FUZZ_MUST(said.status == status);
   FUZZ_MUST(said.sentence.empty() == (status == Status::done));
@@ -66,8 +66,10 @@ bool Reference::may_declare(const Asked& asked) {
 
 void Reference::count_oddity(const Asked& asked) {
   const Status said = proto::read_status(proto::split_control(asked.answer)->body).status;
-  if (said != Status::bad_request && said != Status::not_supported && said != Status::denied) return;
-  if (asked.session.oddities.spend(limits_.oddities_per_s, limits_.oddities_burst, asked.hub.now)) return;
+  if (said != Status::bad_request && said != Status::not_supported && said != Status::denied)
+    return;
+  if (asked.session.oddities.spend(limits_.oddities_per_s, limits_.oddities_burst, asked.hub.now))
+    return;
   closed_[asked.session.seat] = GoodbyeCode::oddities;
 }
 
@@ -120,7 +122,8 @@ void Reference::on_register(const Asked& asked) {
     if (!may_declare(asked)) return require_status(asked.answer, Status::rate);
     const std::optional<GoodbyeCode> refusal = judge_name(wanted->name, asked.id);
     if (refusal) {
-      return require_status(asked.answer, refusal == GoodbyeCode::name_taken ? Status::taken : Status::bad_request);
+      return require_status(
+          asked.answer, refusal == GoodbyeCode::name_taken ? Status::taken : Status::bad_request);
     }
   }
   require_status(asked.answer, Status::done);
@@ -130,7 +133,8 @@ void Reference::on_register(const Asked& asked) {
 }
 
 void Reference::on_unregister(const Asked& asked) {
-  if (!proto::decode<ns::UnregisterName>(asked.payload)) return require_status(asked.answer, Status::bad_request);
+  if (!proto::decode<ns::UnregisterName>(asked.payload))
+    return require_status(asked.answer, Status::bad_request);
   if (asked.session.name.empty()) return require_status(asked.answer, Status::not_found);
   if (!may_declare(asked)) return require_status(asked.answer, Status::rate);
   require_status(asked.answer, Status::done);
@@ -139,7 +143,8 @@ void Reference::on_unregister(const Asked& asked) {
   renamed(asked, "", answer->token);
 }
 
-void Reference::renamed(const Asked& asked, const std::string& name, const std::vector<std::byte>& token) {
+void Reference::renamed(const Asked& asked, const std::string& name,
+                        const std::vector<std::byte>& token) {
   Session& session = asked.session;
   if (name != session.name) {
     const auto holder = name.empty() ? names_.end() : names_.find(name);
@@ -149,7 +154,8 @@ void Reference::renamed(const Asked& asked, const std::string& name, const std::
     session.token_name = name;
     note_node(ChangeKind::renamed, session, former);
   }
-  tokens_[token] = {session.index, session.number, session.token_name, session.identity, session.token_expiry};
+  tokens_[token] = {session.index, session.number, session.token_name, session.identity,
+                    session.token_expiry};
 }
 
 void Reference::on_resolve(const Asked& asked) const {
@@ -175,14 +181,16 @@ void Reference::on_reverse(const Asked& asked) const {
   const auto found = ours ? by_index_.find(index_of(wanted->node)) : by_index_.end();
   if (found == by_index_.end()) return require_status(asked.answer, Status::not_found);
   require_status(asked.answer, Status::done);
-  FUZZ_MUST(answer && answer->name == sessions_.at(found->second).name && answer->node == id_of(found->first));
+  FUZZ_MUST(answer && answer->name == sessions_.at(found->second).name &&
+            answer->node == id_of(found->first));
 }
 
 // ---- watches
 
 void Reference::on_watch(const Asked& asked) {
   const auto wanted = proto::decode<ns::Watch>(asked.payload);
-  const bool legal = wanted && wanted->watch != 0 && (wanted->pattern.empty() || proto::valid_pattern(wanted->pattern));
+  const bool legal = wanted && wanted->watch != 0 &&
+                     (wanted->pattern.empty() || proto::valid_pattern(wanted->pattern));
   if (!legal) return require_status(asked.answer, Status::bad_request);
   std::size_t all = 0;
   for (const auto& [id, session] : sessions_) all += session.watches.size();
@@ -223,7 +231,8 @@ void Reference::served(const ControlHub& hub) {
   for (const auto& [shard, command] : hub.all<hub::SendControlCommand>()) {
     const auto events = proto::decode<ns::WatchEvents>(payload_of(*command));
     FUZZ_MUST(command->answers == 0 && events && events->hub == ControlHub::kHub);
-    const std::uint64_t id = session_at({shard, command->session.slot.value(), command->session.generation});
+    const std::uint64_t id =
+        session_at({shard, command->session.slot.value(), command->session.generation});
     FUZZ_MUST(id != 0 && sessions_.at(id).connected);
     auto& watches = sessions_.at(id).watches;
     const auto watch = watches.find(events->watch);
@@ -237,7 +246,8 @@ void Reference::require_agreed_watches() const {
   for (const auto& [id, session] : sessions_) {
     for (const auto& [number, view] : session.watches) {
       if (!session.connected || view.awaits_snapshot()) FUZZ_MUST(!session.connected);
-      if (!view.complete()) continue;  // it went on behind a version, and knows only what came since
+      if (!view.complete())
+        continue;  // it went on behind a version, and knows only what came since
       std::size_t nodes = 0;
       for (const auto& [other, each] : sessions_) {
         if (!view.wants(ns::kWatchNodes, each.name)) continue;
@@ -245,8 +255,8 @@ void Reference::require_agreed_watches() const {
         const auto known = view.nodes().find(each.index);
         FUZZ_MUST(known != view.nodes().end());
         const ns::NodeRecord& record = known->second;
-        FUZZ_MUST(record.name == each.name && record.connected == each.connected && record.place == each.place &&
-                  record.description == each.description);
+        FUZZ_MUST(record.name == each.name && record.connected == each.connected &&
+                  record.place == each.place && record.description == each.description);
       }
       FUZZ_MUST(view.nodes().size() == nodes);
       std::size_t services = 0;
@@ -256,7 +266,8 @@ void Reference::require_agreed_watches() const {
         const auto known = view.services().find(group);
         const Service& service = *topics_.at(full_name).service;
         FUZZ_MUST(known != view.services().end());
-        FUZZ_MUST(known->second.name == full_name && known->second.metadata == service.terms.metadata &&
+        FUZZ_MUST(known->second.name == full_name &&
+                  known->second.metadata == service.terms.metadata &&
                   known->second.node == id_of(sessions_.at(service.provider).index));
       }
       FUZZ_MUST(view.services().size() == services);

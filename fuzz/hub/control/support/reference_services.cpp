@@ -21,8 +21,9 @@ std::uint32_t window_of(const ns::Advertise& terms) {
 
 /// Do subscribers that know the one understand the other?
 bool same_stream(const ns::Advertise& a, const ns::Advertise& b) {
-  return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
-         a.delivery == b.delivery && window_of(a) == window_of(b) && a.retain == b.retain;
+  return a.message_type == b.message_type && a.instance == b.instance &&
+         a.direction == b.direction && a.delivery == b.delivery && window_of(a) == window_of(b) &&
+         a.retain == b.retain;
 }
 
 /// Does the one say exactly what the other says?
@@ -38,7 +39,8 @@ std::uint32_t own_index(Id id) {
 
 }  // namespace
 
-std::optional<Reference::Terms> Reference::pace_of(const Topic& topic, std::uint64_t subscriber) const {
+std::optional<Reference::Terms> Reference::pace_of(const Topic& topic,
+                                                   std::uint64_t subscriber) const {
   if (!topic.service) return std::nullopt;
   Terms terms = topic.subscribers.at(subscriber);
   const std::uint32_t most = window_of(topic.service->terms);
@@ -54,8 +56,8 @@ void Reference::forget_if_unused(const std::string& full_name) {
   if (!found->second.service && found->second.subscribers.empty()) topics_.erase(found);
 }
 
-void Reference::tell_moved(const std::string& full_name, std::uint32_t old_group, std::uint32_t new_group,
-                           const ns::Advertise& terms) {
+void Reference::tell_moved(const std::string& full_name, std::uint32_t old_group,
+                           std::uint32_t new_group, const ns::Advertise& terms) {
   const Topic& topic = topics_.at(full_name);
   for (const auto& [subscriber, asked] : topic.subscribers) {
     ns::ServiceMoved event;
@@ -67,17 +69,21 @@ void Reference::tell_moved(const std::string& full_name, std::uint32_t old_group
     event.delivery = terms.delivery;
     event.retain = terms.retain;
     event.direction = terms.direction;
-    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt) event.window = pace->window;
+    if (const auto pace = new_group != 0 ? pace_of(topic, subscriber) : std::nullopt)
+      event.window = pace->window;
     const proto::Payload bytes = proto::encode(event);
     due_.emplace_back(subscriber, ns::ServiceMoved::kOperation,
-                      std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), old_group, new_group, 0);
+                      std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
+                      old_group, new_group, 0);
   }
 }
 
-void Reference::tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined, std::size_t count) {
+void Reference::tell_provider(const std::string& full_name, std::uint32_t subscriber, bool joined,
+                              std::size_t count) {
   const std::optional<Service>& service = topics_.at(full_name).service;
   if (!service) return;
-  const std::uint16_t operation = joined ? ns::SubscriberJoined::kOperation : ns::SubscriberLeft::kOperation;
+  const std::uint16_t operation =
+      joined ? ns::SubscriberJoined::kOperation : ns::SubscriberLeft::kOperation;
   due_.emplace_back(service->provider, operation, std::string{}, service->group, 0, subscriber);
   counts_.emplace_back(service->provider, service->group, static_cast<std::uint32_t>(count));
 }
@@ -114,14 +120,17 @@ void Reference::withdraw(const std::string& full_name, milliseconds now) {
 }
 
 Status Reference::judge_terms(const Asked& asked, const ns::Advertise& offer) const {
-  if (asked.session.name.empty() || !proto::valid_service_name(offer.service)) return Status::bad_request;
+  if (asked.session.name.empty() || !proto::valid_service_name(offer.service))
+    return Status::bad_request;
   const bool counted = offer.delivery == ns::Delivery::sync;
-  if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) return Status::bad_request;
+  if (offer.direction == ns::Direction::accepts && (counted || offer.retain))
+    return Status::bad_request;
   if (!counted && offer.window != 0) return Status::bad_request;
   if (!counted || offer.window <= limits_.sync_window) return Status::done;
   // What stands is not held to a limit that was lowered meanwhile.
   const auto topic = topics_.find(proto::join_service_name(asked.session.name, offer.service));
-  const bool provided = topic != topics_.end() && topic->second.service && topic->second.service->provider == asked.id;
+  const bool provided = topic != topics_.end() && topic->second.service &&
+                        topic->second.service->provider == asked.id;
   const bool stands = provided && topic->second.service->terms.delivery == ns::Delivery::sync &&
                       topic->second.service->terms.window == offer.window;
   return stands ? Status::done : Status::bad_request;
@@ -132,7 +141,8 @@ bool Reference::terms_fit(const Asked& asked, const ns::Subscribe& wanted) const
   const bool has_rate = rate >= 0.001 && rate <= 1e6;
   if (wanted.depth < 1 || (rate != 0.0 && !has_rate)) return false;
   Terms stands{0, 0, 0};
-  if (asked.session.subscribes.contains(wanted.name)) stands = topics_.at(wanted.name).subscribers.at(asked.id);
+  if (asked.session.subscribes.contains(wanted.name))
+    stands = topics_.at(wanted.name).subscribers.at(asked.id);
   const bool rate_fits = rate <= static_cast<double>(limits_.subscription_rate_hz) ||
                          stands.interval_us == static_cast<std::uint32_t>(std::ceil(1e6 / rate));
   return (wanted.window <= limits_.sync_window || wanted.window == stands.window) &&
@@ -175,9 +185,11 @@ void Reference::on_advertise(const Asked& asked) {
   topic.service->terms = *offer;
 }
 
-void Reference::note_proof(std::uint32_t group, const std::string& full_name, const std::vector<std::byte>& proof) {
+void Reference::note_proof(std::uint32_t group, const std::string& full_name,
+                           const std::vector<std::byte>& proof) {
   FUZZ_MUST(!proof.empty());
-  // No two services have the same, nor one for two groups; one for the same group has, as nothing is forgotten here.
+  // No two services have the same, nor one for two groups; one for the same group has, as nothing
+  // is forgotten here.
   const auto [given, fresh] = proofs_.try_emplace(proof, group, full_name);
   FUZZ_MUST(fresh || given->second == std::pair(group, full_name));
   latest_proofs_[group] = latest_proof_ = proof;
@@ -185,7 +197,8 @@ void Reference::note_proof(std::uint32_t group, const std::string& full_name, co
 
 bool Reference::is_proven(const std::string& full_name, const ns::Advertise& terms) const {
   const auto given = proofs_.find(terms.former_proof);
-  return given != proofs_.end() && given->second == std::pair(own_index(terms.former_group), full_name);
+  return given != proofs_.end() &&
+         given->second == std::pair(own_index(terms.former_group), full_name);
 }
 
 void Reference::open_group(const Asked& asked, const std::string& full_name, std::uint32_t group,
@@ -227,7 +240,8 @@ void Reference::on_subscribe(const Asked& asked) {
   const double rate = wanted->rate_hz;
   if (!terms_fit(asked, *wanted)) return require_status(asked.answer, Status::bad_request);
   Session& session = asked.session;
-  const Terms wants{wanted->window, wanted->depth, rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
+  const Terms wants{wanted->window, wanted->depth,
+                    rate == 0.0 ? 0 : static_cast<std::uint32_t>(std::ceil(1e6 / rate))};
   const bool fresh = !session.subscribes.contains(wanted->name);
   const bool said_before = !fresh && topics_.at(wanted->name).subscribers.at(asked.id) == wants;
   if (!said_before && !may_declare(asked)) return require_status(asked.answer, Status::rate);
@@ -241,7 +255,8 @@ void Reference::on_subscribe(const Asked& asked) {
   const bool was_paced = !fresh && pace_of(topic, asked.id);
   topic.subscribers[asked.id] = wants;
   if (was_paced && !pace_of(topic, asked.id)) topic.once_paced.insert(asked.id);
-  if (!fresh && topic.service && !was_paced && pace_of(topic, asked.id)) topic.once_plain.insert(asked.id);
+  if (!fresh && topic.service && !was_paced && pace_of(topic, asked.id))
+    topic.once_plain.insert(asked.id);
   if (fresh) tell_provider(wanted->name, session.index, true, topic.subscribers.size());
   const auto answer = proto::decode_answer<ns::SubscribeAnswer>(asked.answer);
   FUZZ_MUST(answer.has_value());

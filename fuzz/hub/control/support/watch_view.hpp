@@ -8,8 +8,8 @@
 
 namespace gimnet::fuzz {
 
-/// What a node knows by one of its watches. Ends in an abort when it is told something twice, too late, with a gap, or
-/// for nothing.
+/// What a node knows by one of its watches. Ends in an abort when it is told something twice, too
+/// late, with a gap, or for nothing.
 class WatchView {
  public:
   /// WATCH was granted; `under_way` is what an earlier watch of that number has not answered.
@@ -25,8 +25,12 @@ class WatchView {
   /// It knows everything: by a snapshot of its own, not by going on behind one.
   [[nodiscard]] bool complete() const { return complete_; }
   [[nodiscard]] bool awaits_snapshot() const { return awaits_snapshot_; }
-  [[nodiscard]] const std::map<std::uint32_t, proto::ns::NodeRecord>& nodes() const { return nodes_; }
-  [[nodiscard]] const std::map<std::uint32_t, proto::ns::ServiceRecord>& services() const { return services_; }
+  [[nodiscard]] const std::map<std::uint32_t, proto::ns::NodeRecord>& nodes() const {
+    return nodes_;
+  }
+  [[nodiscard]] const std::map<std::uint32_t, proto::ns::ServiceRecord>& services() const {
+    return services_;
+  }
 
  private:
   void take_one(const proto::ns::Change& change, const proto::ns::WatchEvents& events);

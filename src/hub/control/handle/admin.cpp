@@ -50,7 +50,8 @@ ctrl::ConnectionCounts counts_of(const SessionCounts& counts) {
           counts.delivered,    counts.sent_bytes, counts.dropped};
 }
 
-ctrl::ConnectionsAnswer connections(const HandlerContext& context, const ctrl::Connections& wanted) {
+ctrl::ConnectionsAnswer connections(const HandlerContext& context,
+                                    const ctrl::Connections& wanted) {
   ctrl::ConnectionsAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
   const auto& all = context.membership.sessions().all();
@@ -65,7 +66,8 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context, const ctrl::C
     record.connected = session.connected;
     const std::size_t shard = session.place.shard.value();
     if (shard < context.sessions.size()) {
-      record.counts = counts_of(context.sessions[shard]->counts(session.place.slot, session.place.generation));
+      record.counts =
+          counts_of(context.sessions[shard]->counts(session.place.slot, session.place.generation));
     }
     if (!budget.take(ctrl::page_bytes_max(record))) {
       answer.more = true;
@@ -102,8 +104,9 @@ proto::Payload handle_connections(HandlerContext& context, const Request& reques
 }
 
 proto::Payload handle_routes(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Routes>(
-      request, [&context](const ctrl::Routes&) { return Result<ctrl::RoutesAnswer, proto::Refusal>(routes(context)); });
+  return answer_to<ctrl::Routes>(request, [&context](const ctrl::Routes&) {
+    return Result<ctrl::RoutesAnswer, proto::Refusal>(routes(context));
+  });
 }
 
 }  // namespace gimnet::hub

@@ -18,18 +18,23 @@ Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) 
   const std::optional<std::uint32_t> index = own_index(context.facts, node);
   Session* session = index ? sessions.find(sessions.present_index(*index)) : nullptr;
   if (session != nullptr) return session;
-  return Refusal{Status::not_found,
-                 "there is no node " + to_string(node) + " on this hub; `gimnet nodes` lists those that are there"};
+  return Refusal{Status::not_found, "there is no node " + to_string(node) +
+                                        " on this hub; `gimnet nodes` lists those that are there"};
 }
 
-std::string by_whom(const Session& admin) { return admin.origin.transport.str() + " " + admin.origin.address.str(); }
+std::string by_whom(const Session& admin) {
+  return admin.origin.transport.str() + " " + admin.origin.address.str();
+}
 
 Membership::KeepNow keep_now(const HandlerContext& context) {
   if (context.administration == nullptr) return {};
-  return [administration = context.administration, now = context.now] { return administration->keep_state(now); };
+  return [administration = context.administration, now = context.now] {
+    return administration->keep_state(now);
+  };
 }
 
-Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& request, const ctrl::Kick& wanted) {
+Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& request,
+                                       const ctrl::Kick& wanted) {
   const auto session = find_node(context, wanted.node);
   if (!session) return session.error();
   if (*session == &request.session) {
@@ -39,8 +44,8 @@ Result<ctrl::KickAnswer, Refusal> kick(HandlerContext& context, const Request& r
   const std::string why = wanted.reason.empty() ? "" : ": " + wanted.reason;
   log_warning(who + " was kicked by " + by_whom(request.session) + why);
   const std::string failure = context.membership.kick(
-      **session, "an administrator ended this session" + why + "; ask them before you come back", context.now,
-      context.effects, keep_now(context));
+      **session, "an administrator ended this session" + why + "; ask them before you come back",
+      context.now, context.effects, keep_now(context));
   if (failure.empty()) return ctrl::KickAnswer{};
   return ctrl::KickAnswer{"if the hub ends now it forgets that it kicked " + who +
                           ", which then may come back: " + failure};
@@ -57,19 +62,22 @@ Result<ctrl::ReassignAnswer, Refusal> reassign(HandlerContext& context, const Re
                                             std::to_string(context.facts.id.value()) + "."};
   }
   if (*session == &request.session) {
-    return Refusal{Status::bad_request, "that is you: an administrator's own id cannot change while it asks"};
+    return Refusal{Status::bad_request,
+                   "that is you: an administrator's own id cannot change while it asks"};
   }
   const std::string who = title(context.membership.sessions().node_id(**session), **session);
-  if (auto failure = context.membership.renumber(**session, *index, context.now, context.effects, keep_now(context))) {
+  if (auto failure = context.membership.renumber(**session, *index, context.now, context.effects,
+                                                 keep_now(context))) {
     return *failure;
   }
-  log_warning(who + " has the id " + to_string(context.membership.sessions().node_id(**session)) + " now, by " +
-              by_whom(request.session));
+  log_warning(who + " has the id " + to_string(context.membership.sessions().node_id(**session)) +
+              " now, by " + by_whom(request.session));
   return ctrl::ReassignAnswer{};
 }
 
 Result<ctrl::DrainAnswer, Refusal> drain(HandlerContext& context, const Request& request) {
-  if (context.administration == nullptr) return Refusal{Status::not_supported, "this hub cannot be drained"};
+  if (context.administration == nullptr)
+    return Refusal{Status::not_supported, "this hub cannot be drained"};
   log_warning("draining, asked for by " + by_whom(request.session));
   context.administration->want_drain();
   return ctrl::DrainAnswer{};
@@ -77,7 +85,8 @@ Result<ctrl::DrainAnswer, Refusal> drain(HandlerContext& context, const Request&
 
 Result<ctrl::ReloadAnswer, Refusal> reload(HandlerContext& context) {
   if (context.administration == nullptr) {
-    return Refusal{Status::not_supported, "this hub has no configuration that could be read again; start it anew"};
+    return Refusal{Status::not_supported,
+                   "this hub has no configuration that could be read again; start it anew"};
   }
   const Reloading reloading = context.administration->reload();
   if (!reloading.faults.empty()) {
@@ -96,10 +105,12 @@ Result<ctrl::ReloadAnswer, Refusal> reload(HandlerContext& context) {
   return answer;
 }
 
-Result<ctrl::SetLogLevelAnswer, Refusal> set_level(HandlerContext& context, const ctrl::SetLogLevel& wanted) {
+Result<ctrl::SetLogLevelAnswer, Refusal> set_level(HandlerContext& context,
+                                                   const ctrl::SetLogLevel& wanted) {
   LogLevel level{};
   if (!parse_log_level(wanted.level, level)) {
-    return Refusal{Status::bad_request, "there is no log level '" + escaped(wanted.level, kQuotedMax) +
+    return Refusal{Status::bad_request, "there is no log level '" +
+                                            escaped(wanted.level, kQuotedMax) +
                                             "': error, warning, info, debug or off" +
                                             did_you_mean(wanted.level, kLogLevelNames)};
   }
@@ -112,16 +123,18 @@ Result<ctrl::SetLogLevelAnswer, Refusal> set_level(HandlerContext& context, cons
 }  // namespace
 
 proto::Payload handle_kick(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Kick>(request, [&](const ctrl::Kick& wanted) { return kick(context, request, wanted); });
+  return answer_to<ctrl::Kick>(
+      request, [&](const ctrl::Kick& wanted) { return kick(context, request, wanted); });
 }
 
 proto::Payload handle_reassign(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Reassign>(request,
-                                   [&](const ctrl::Reassign& wanted) { return reassign(context, request, wanted); });
+  return answer_to<ctrl::Reassign>(
+      request, [&](const ctrl::Reassign& wanted) { return reassign(context, request, wanted); });
 }
 
 proto::Payload handle_drain(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::Drain>(request, [&](const ctrl::Drain&) { return drain(context, request); });
+  return answer_to<ctrl::Drain>(request,
+                                [&](const ctrl::Drain&) { return drain(context, request); });
 }
 
 proto::Payload handle_reload(HandlerContext& context, const Request& request) {
@@ -129,15 +142,16 @@ proto::Payload handle_reload(HandlerContext& context, const Request& request) {
 }
 
 proto::Payload handle_log_level(HandlerContext& context, const Request& request) {
-  return answer_to<ctrl::SetLogLevel>(request,
-                                      [&](const ctrl::SetLogLevel& wanted) { return set_level(context, wanted); });
+  return answer_to<ctrl::SetLogLevel>(
+      request, [&](const ctrl::SetLogLevel& wanted) { return set_level(context, wanted); });
 }
 
 proto::Payload handle_denied(HandlerContext&, const Request& request) {
   return proto::encode_refusal(
-      request.header, {Status::denied,
-                       "only administrators change a hub: connect with the role admin over its Unix socket, as "
-                       "root or as the user that runs it"});
+      request.header,
+      {Status::denied,
+       "only administrators change a hub: connect with the role admin over its Unix socket, as "
+       "root or as the user that runs it"});
 }
 
 }  // namespace gimnet::hub

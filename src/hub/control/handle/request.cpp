@@ -19,26 +19,30 @@ std::optional<proto::Refusal> count_declaration(HandlerContext& context, const S
   return std::nullopt;
 #endif
 #ifdef GIMNET_BUG_DECLARATIONS_COUNT_FOR_ANOTHER
-  const std::uint32_t account = std::min(session.index, context.membership.sessions().all().begin()->first);
+  const std::uint32_t account =
+      std::min(session.index, context.membership.sessions().all().begin()->first);
 #else
   const std::uint32_t account = session.index;
 #endif
   Session& counted = *context.membership.sessions().find(account);
-  if (counted.declarations.take({limits.declarations_per_s, burst}, context.now)) return std::nullopt;
+  if (counted.declarations.take({limits.declarations_per_s, burst}, context.now))
+    return std::nullopt;
 #ifdef GIMNET_BUG_RATE_SAYS_LIMIT
   constexpr proto::Status kStatus = proto::Status::limit;
 #else
   constexpr proto::Status kStatus = proto::Status::rate;
 #endif
-  return proto::Refusal{kStatus, "this node began or changed more names, services and subscriptions than it may: " +
-                                     std::to_string(burst) + " at once and " +
-                                     std::to_string(limits.declarations_per_s) +
-                                     " a second; go slower, or start the hub with a larger --limit declarations_per_s"};
+  return proto::Refusal{
+      kStatus,
+      "this node began or changed more names, services and subscriptions than it may: " +
+          std::to_string(burst) + " at once and " + std::to_string(limits.declarations_per_s) +
+          " a second; go slower, or start the hub with a larger --limit declarations_per_s"};
 }
 
 PageBudget::PageBudget(const Limits& limits, std::uint32_t records_wanted)
     : records_(std::clamp<std::size_t>(records_wanted, 1, limits.page_records)),
-      bytes_(std::min<std::size_t>(limits.frame_bytes, proto::kFrameLengthDefault) - kBesideRecords) {}
+      bytes_(std::min<std::size_t>(limits.frame_bytes, proto::kFrameLengthDefault) -
+             kBesideRecords) {}
 
 bool PageBudget::take(std::size_t bytes) {
   if (records_ == 0 || bytes > bytes_) return false;

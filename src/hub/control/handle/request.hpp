@@ -56,22 +56,24 @@ struct Request {
 /// The payload of the answer.
 using Handler = proto::Payload (*)(HandlerContext&, const Request&);
 
-/// Reads a request of type Message, lets `grant` answer it, and writes the answer. `grant` takes the message and
-/// returns a Result<its answer, proto::Refusal>.
+/// Reads a request of type Message, lets `grant` answer it, and writes the answer. `grant` takes
+/// the message and returns a Result<its answer, proto::Refusal>.
 template <class Message, class Grant>
 [[nodiscard]] proto::Payload answer_to(const Request& request, Grant&& grant) {
   const Result<Message> message = proto::decode<Message>(request.payload);
   if (!message) {
-    return proto::encode_refusal(request.header, {proto::Status::bad_request, message.error().sentence});
+    return proto::encode_refusal(request.header,
+                                 {proto::Status::bad_request, message.error().sentence});
   }
   const auto answer = std::forward<Grant>(grant)(*message);
   if (!answer) return proto::encode_refusal(request.header, answer.error());
   return proto::encode_answer(*answer, request.header.request);
 }
 
-/// Counts one name, service or subscription that the node begins or changes. nullopt: it may; else the answer is that
-/// it asked too often, and nothing is to change.
-[[nodiscard]] std::optional<proto::Refusal> count_declaration(HandlerContext& context, const Session& session);
+/// Counts one name, service or subscription that the node begins or changes. nullopt: it may; else
+/// the answer is that it asked too often, and nothing is to change.
+[[nodiscard]] std::optional<proto::Refusal> count_declaration(HandlerContext& context,
+                                                              const Session& session);
 
 /// How much fits in one page of records.
 class PageBudget {

@@ -19,25 +19,32 @@ GroupId group_id(const HandlerContext& context, std::uint32_t index) {
   return make_id<GroupId>(context.facts.id, index);
 }
 
-proto::Refusal out_of_range(std::string_view what, const std::string& range, std::string_view limit) {
-  return proto::Refusal{Status::bad_request, std::string{what} + " must be " + range + "; the hub's --limit " +
-                                                 std::string{limit} + " bounds it"};
+proto::Refusal out_of_range(std::string_view what, const std::string& range,
+                            std::string_view limit) {
+  return proto::Refusal{Status::bad_request, std::string{what} + " must be " + range +
+                                                 "; the hub's --limit " + std::string{limit} +
+                                                 " bounds it"};
 }
 
-/// What is wrong with how a service wants to be delivered. A limit that was lowered meanwhile holds for what is new: a
-/// service keeps the n that `standing` has, or it would be gone when its node comes back and repeats it.
-std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer, const ServiceTerms* standing) {
+/// What is wrong with how a service wants to be delivered. A limit that was lowered meanwhile holds
+/// for what is new: a service keeps the n that `standing` has, or it would be gone when its node
+/// comes back and repeats it.
+std::optional<proto::Refusal> fault_of(const Limits& limits, const ns::Advertise& offer,
+                                       const ServiceTerms* standing) {
   const bool counted = offer.delivery == ns::Delivery::sync;
   if (offer.direction == ns::Direction::accepts && (counted || offer.retain)) {
-    return proto::Refusal{Status::bad_request,
-                          "a service that accepts data has no subscribers: leave out delivery sync(n) and retain"};
+    return proto::Refusal{
+        Status::bad_request,
+        "a service that accepts data has no subscribers: leave out delivery sync(n) and retain"};
   }
   if (!counted && offer.window != 0) {
-    return proto::Refusal{Status::bad_request, "a window belongs to delivery sync(n): leave one of them out"};
+    return proto::Refusal{Status::bad_request,
+                          "a window belongs to delivery sync(n): leave one of them out"};
   }
   const bool stands = standing != nullptr && standing->window == offer.window;
   if (counted && offer.window > limits.sync_window && !stands) {
-    return out_of_range("n of delivery sync(n)", "1 to " + std::to_string(limits.sync_window), "sync_window");
+    return out_of_range("n of delivery sync(n)", "1 to " + std::to_string(limits.sync_window),
+                        "sync_window");
   }
   return std::nullopt;
 }
@@ -50,37 +57,45 @@ Result<SubscriberTerms, proto::Refusal> terms_of(const Limits& limits, const ns:
   terms.window = wanted.window;
   terms.depth = wanted.depth;
   if (wanted.window > limits.sync_window && !(standing && standing->window == terms.window)) {
-    return out_of_range("the window of a subscription", "1 to " + std::to_string(limits.sync_window), "sync_window");
+    return out_of_range("the window of a subscription",
+                        "1 to " + std::to_string(limits.sync_window), "sync_window");
   }
-  if (wanted.depth < 1 || (wanted.depth > limits.subscription_depth && !(standing && standing->depth == terms.depth))) {
-    return out_of_range("the depth of a subscription", "1 to " + std::to_string(limits.subscription_depth),
-                        "subscription_depth");
+  if (wanted.depth < 1 ||
+      (wanted.depth > limits.subscription_depth && !(standing && standing->depth == terms.depth))) {
+    return out_of_range("the depth of a subscription",
+                        "1 to " + std::to_string(limits.subscription_depth), "subscription_depth");
   }
   if (wanted.rate_hz == 0.0) return terms;
   const auto rate_max = static_cast<double>(limits.subscription_rate_hz);
   // Not a number is neither.
   const bool has_interval = wanted.rate_hz >= kRateMin;
   if (has_interval) terms.interval_us = static_cast<std::uint32_t>(std::ceil(1e6 / wanted.rate_hz));
-  const bool stands = standing && terms.interval_us != 0 && standing->interval_us == terms.interval_us;
+  const bool stands =
+      standing && terms.interval_us != 0 && standing->interval_us == terms.interval_us;
   if (!has_interval || (wanted.rate_hz > rate_max && !stands)) {
     return out_of_range("the maximal rate of a subscription",
-                        "0.001 to " + std::to_string(limits.subscription_rate_hz) + " Hz", "subscription_rate_hz");
+                        "0.001 to " + std::to_string(limits.subscription_rate_hz) + " Hz",
+                        "subscription_rate_hz");
   }
   return terms;
 }
 
-Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, const Session& session,
+Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
+                                                      const Session& session,
                                                       const ns::Advertise& offer) {
   if (session.name.empty()) {
-    return proto::Refusal{Status::bad_request,
-                          "a node without a name cannot advertise: services are named after their node"};
+    return proto::Refusal{
+        Status::bad_request,
+        "a node without a name cannot advertise: services are named after their node"};
   }
   if (!proto::valid_service_name(offer.service)) {
-    return proto::Refusal{Status::bad_request, "'" + escaped(offer.service, kQuotedMax) +
-                                                   "' is no name of a service: one part of A-Z a-z 0-9 . _ -"};
+    return proto::Refusal{Status::bad_request,
+                          "'" + escaped(offer.service, kQuotedMax) +
+                              "' is no name of a service: one part of A-Z a-z 0-9 . _ -"};
   }
   const std::string full_name = proto::join_service_name(session.name, offer.service);
-  const ServiceTerms* const standing = context.membership.services().provided(session.index, full_name);
+  const ServiceTerms* const standing =
+      context.membership.services().provided(session.index, full_name);
   if (auto refusal = fault_of(context.limits, offer, standing)) return *refusal;
   ServiceTerms terms;
   terms.message_type = offer.message_type;
@@ -93,25 +108,27 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context, c
   if (standing == nullptr || *standing != terms) {
     if (auto refusal = count_declaration(context, session)) return *refusal;
   }
-  const Services::FormerGroup former{own_index(context.facts, offer.former_group).value_or(0), offer.former_proof};
-  const auto done =
-      context.membership.services().advertise(session.index, full_name, terms, context.now, context.effects, former);
+  const Services::FormerGroup former{own_index(context.facts, offer.former_group).value_or(0),
+                                     offer.former_proof};
+  const auto done = context.membership.services().advertise(session.index, full_name, terms,
+                                                            context.now, context.effects, former);
   if (!done) return done.error();
   return ns::AdvertiseAnswer{
       group_id(context, done->group), done->subscribers, {done->proof.begin(), done->proof.end()}};
 }
 
-Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context, const ns::Services& wanted) {
+Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& context,
+                                                    const ns::Services& wanted) {
   const auto pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !pattern) {
-    return proto::Refusal{
-        Status::bad_request,
-        "'" + escaped(wanted.pattern, kQuotedMax) +
-            "' is no pattern: write a full name of at most 16 parts and 255 bytes in which a part may be * or **"};
+    return proto::Refusal{Status::bad_request,
+                          "'" + escaped(wanted.pattern, kQuotedMax) +
+                              "' is no pattern: write a full name of at most 16 parts and 255 "
+                              "bytes in which a part may be * or **"};
   }
-  const Listed listed =
-      list_services(context.membership.services(), {pattern ? &*pattern : nullptr, index_of(wanted.after), false,
-                                                    context.limits.page_records, context.limits.scan_records});
+  const Listed listed = list_services(context.membership.services(),
+                                      {pattern ? &*pattern : nullptr, index_of(wanted.after), false,
+                                       context.limits.page_records, context.limits.scan_records});
   ns::ServicesAnswer answer;
   answer.more = listed.more;
   answer.next = listed.more ? group_id(context, listed.next) : GroupId{};
@@ -132,8 +149,9 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
 }  // namespace
 
 proto::Payload handle_advertise(HandlerContext& context, const Request& request) {
-  return answer_to<ns::Advertise>(
-      request, [&](const ns::Advertise& offer) { return advertise(context, request.session, offer); });
+  return answer_to<ns::Advertise>(request, [&](const ns::Advertise& offer) {
+    return advertise(context, request.session, offer);
+  });
 }
 
 proto::Payload handle_withdraw(HandlerContext& context, const Request& request) {
@@ -141,28 +159,30 @@ proto::Payload handle_withdraw(HandlerContext& context, const Request& request) 
       request, [&](const ns::Withdraw& wanted) -> Result<ns::WithdrawAnswer, proto::Refusal> {
         const std::optional<std::uint32_t> group = own_index(context.facts, wanted.group);
         if (!group) return proto::Refusal{Status::not_found, "that group belongs to another hub"};
-        const std::optional<proto::Refusal> failed =
-            context.membership.services().withdraw(request.session.index, *group, context.now, context.effects);
+        const std::optional<proto::Refusal> failed = context.membership.services().withdraw(
+            request.session.index, *group, context.now, context.effects);
         if (failed) return *failed;
         return ns::WithdrawAnswer{};
       });
 }
 
 proto::Payload handle_services(HandlerContext& context, const Request& request) {
-  return answer_to<ns::Services>(request, [&](const ns::Services& wanted) { return services(context, wanted); });
+  return answer_to<ns::Services>(
+      request, [&](const ns::Services& wanted) { return services(context, wanted); });
 }
 
 proto::Payload handle_subscribe(HandlerContext& context, const Request& request) {
   return answer_to<ns::Subscribe>(
       request, [&](const ns::Subscribe& wanted) -> Result<ns::SubscribeAnswer, proto::Refusal> {
-        const auto standing = context.membership.services().subscribed(request.session.index, wanted.name);
+        const auto standing =
+            context.membership.services().subscribed(request.session.index, wanted.name);
         const auto terms = terms_of(context.limits, wanted, standing);
         if (!terms) return terms.error();
         if (standing != *terms) {
           if (auto refusal = count_declaration(context, request.session)) return *refusal;
         }
-        const auto topic =
-            context.membership.services().subscribe(request.session.index, wanted.name, *terms, context.effects);
+        const auto topic = context.membership.services().subscribe(
+            request.session.index, wanted.name, *terms, context.effects);
         if (!topic) return topic.error();
         ns::SubscribeAnswer answer;
         if (const std::optional<Service>& service = (*topic)->service) {
@@ -172,7 +192,8 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
           answer.delivery = service->terms.delivery;
           answer.retain = service->terms.retain;
           answer.direction = service->terms.direction;
-          if (const auto pace = (*topic)->pace_of(request.session.index)) answer.window = pace->window;
+          if (const auto pace = (*topic)->pace_of(request.session.index))
+            answer.window = pace->window;
         }
         return answer;
       });
@@ -181,8 +202,8 @@ proto::Payload handle_subscribe(HandlerContext& context, const Request& request)
 proto::Payload handle_unsubscribe(HandlerContext& context, const Request& request) {
   return answer_to<ns::Unsubscribe>(
       request, [&](const ns::Unsubscribe& wanted) -> Result<ns::UnsubscribeAnswer, proto::Refusal> {
-        const std::optional<proto::Refusal> failed =
-            context.membership.services().unsubscribe(request.session.index, wanted.name, context.effects);
+        const std::optional<proto::Refusal> failed = context.membership.services().unsubscribe(
+            request.session.index, wanted.name, context.effects);
         if (failed) return *failed;
         return ns::UnsubscribeAnswer{};
       });

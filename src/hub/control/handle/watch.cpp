@@ -7,16 +7,19 @@ namespace gimnet::hub {
 namespace ns = proto::ns;
 
 proto::Payload handle_watch(HandlerContext& context, const Request& request) {
-  return answer_to<ns::Watch>(
-      request, [&](const ns::Watch& wanted) { return context.watches.watch(request.session.index, wanted); });
+  return answer_to<ns::Watch>(request, [&](const ns::Watch& wanted) {
+    return context.watches.watch(request.session.index, wanted);
+  });
 }
 
 proto::Payload handle_unwatch(HandlerContext& context, const Request& request) {
-  return answer_to<ns::Unwatch>(request, [&](const ns::Unwatch& wanted) -> Result<ns::UnwatchAnswer, proto::Refusal> {
-    const std::optional<proto::Refusal> failed = context.watches.unwatch(request.session.index, wanted.watch);
-    if (failed) return *failed;
-    return ns::UnwatchAnswer{};
-  });
+  return answer_to<ns::Unwatch>(
+      request, [&](const ns::Unwatch& wanted) -> Result<ns::UnwatchAnswer, proto::Refusal> {
+        const std::optional<proto::Refusal> failed =
+            context.watches.unwatch(request.session.index, wanted.watch);
+        if (failed) return *failed;
+        return ns::UnwatchAnswer{};
+      });
 }
 
 proto::Payload handle_watch_taken(HandlerContext& context, const Request& request) {

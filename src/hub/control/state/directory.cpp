@@ -28,21 +28,24 @@ bool Directory::is_provisional(std::string_view name) const {
 }
 
 std::optional<proto::Goodbye> Directory::refusal(std::string_view name, const Session* claimant,
-                                                 const Sessions& sessions, std::chrono::milliseconds now) const {
+                                                 const Sessions& sessions,
+                                                 std::chrono::milliseconds now) const {
   if (const char* fault = proto::node_name_fault(name)) {
     return proto::Goodbye{proto::GoodbyeCode::bad_name, "the name '" + escaped(name, kQuotedMax) +
-                                                            "' cannot be taken: " + fault + "; choose another one"};
+                                                            "' cannot be taken: " + fault +
+                                                            "; choose another one"};
   }
   const std::optional<std::uint32_t> index = find(name);
   if (!index || (claimant != nullptr && claimant->index == *index)) return std::nullopt;
   const Session* holder = sessions.find(*index);
   GIMNET_CHECK(holder != nullptr);
   if (!holder->connected) return std::nullopt;
-  return proto::Goodbye{proto::GoodbyeCode::name_taken,
-                        "the name '" + std::string{name} + "' is held by node " + to_string(sessions.node_id(*holder)) +
-                            ", connected over " + holder->origin.transport.str() + " from " +
-                            holder->origin.address.str() + " since " + age_text(now - holder->connected_at) +
-                            "; end that one, or choose another name"};
+  return proto::Goodbye{
+      proto::GoodbyeCode::name_taken,
+      "the name '" + std::string{name} + "' is held by node " +
+          to_string(sessions.node_id(*holder)) + ", connected over " +
+          holder->origin.transport.str() + " from " + holder->origin.address.str() + " since " +
+          age_text(now - holder->connected_at) + "; end that one, or choose another name"};
 }
 
 void Directory::put(std::string_view name, std::uint32_t index, NameStanding standing) {

@@ -10,8 +10,8 @@
 #include "proto/control/link.hpp"
 #include "proto/control/ns_watch.hpp"
 
-// What the state machines want done, to be carried out in this order: tables first or messages first is part of the
-// meaning (docs/protocol.md, section 8).
+// What the state machines want done, to be carried out in this order: tables first or messages
+// first is part of the meaning (docs/protocol.md, section 8).
 
 namespace gimnet::hub {
 
@@ -38,15 +38,16 @@ struct CloseDue {
   proto::GoodbyeCode code{};
   std::string sentence;
 };
-/// Tell the shard that the session's node has another id, by index, and that its connection is to learn it: GOODBYE
-/// `renumbered`, after which the node comes back with its token.
+/// Tell the shard that the session's node has another id, by index, and that its connection is to
+/// learn it: GOODBYE `renumbered`, after which the node comes back with its token.
 struct RenumberDue {
   Place place;
   std::uint32_t former = 0;
   std::uint32_t index = 0;
   std::string sentence;
 };
-/// Tell a subscriber that a service has another group id. Groups and nodes are named by index here; 0: none.
+/// Tell a subscriber that a service has another group id. Groups and nodes are named by index here;
+/// 0: none.
 struct ServiceMovedDue {
   std::uint32_t subscriber = 0;
   std::string full_name;
@@ -70,7 +71,8 @@ struct SubscriberTerms {
   std::uint32_t interval_us = 0;
   friend bool operator==(const SubscriberTerms&, const SubscriberTerms&) = default;
 };
-/// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms` are in force.
+/// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms`
+/// are in force.
 struct PaceDue {
   std::uint32_t subscriber = 0;
   std::uint32_t group = 0;
@@ -108,7 +110,8 @@ struct NameDecided {
   NodeId holder{};  ///< who has it, if it is not confirmed
   std::string sentence;
 };
-/// Those who watch are to hear of a node. Its record is looked up; the name is that of a node which has left.
+/// Those who watch are to hear of a node. Its record is looked up; the name is that of a node which
+/// has left.
 struct NodeNoted {
   proto::ns::ChangeKind kind{};
   std::uint32_t index = 0;
@@ -123,9 +126,9 @@ struct ServiceNoted {
   std::string full_name;
 };
 
-using Effect =
-    std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMovedDue, PaceDue, PaceEnded,
-                 RetainedDropped, SubscriberDue, CloseDue, RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
+using Effect = std::variant<NodeChanged, GroupChanged, MemberChanged, SessionEnded, ServiceMovedDue,
+                            PaceDue, PaceEnded, RetainedDropped, SubscriberDue, CloseDue,
+                            RenumberDue, StateDue, NameDecided, NodeNoted, ServiceNoted>;
 using Effects = std::vector<Effect>;
 
 }  // namespace gimnet::hub

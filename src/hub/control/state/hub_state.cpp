@@ -8,19 +8,20 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::array<std::byte, 8> kMagic = {std::byte{'G'}, std::byte{'I'}, std::byte{'M'}, std::byte{'s'},
-                                             std::byte{'t'}, std::byte{'a'}, std::byte{'t'}, std::byte{'e'}};
+constexpr std::array<std::byte, 8> kMagic = {std::byte{'G'}, std::byte{'I'}, std::byte{'M'},
+                                             std::byte{'s'}, std::byte{'t'}, std::byte{'a'},
+                                             std::byte{'t'}, std::byte{'e'}};
 constexpr std::uint32_t kVersion = 3;
 /// Without the sets of used indices: all below the marks count as used.
 constexpr std::uint32_t kVersionOfMarks = 1;
 // Version 2: without what proofs of groups are judged by, as there were none.
 constexpr const char* kNoHub = "it holds numbers that no hub writes";
 
-// Layout, little-endian: magic, u32 version, u32 number of kicked tokens, secret, unique id, u64 boot, u32 node mark,
-// u32 group mark, u32 bytes of the set of used nodes, u32 of that of groups, u64 forgettings of groups, u32 bytes of
-// the set of groups that outlasted the last one, u32 0; 24 bytes for each kicked token (u32 index, u32 0, u64 number,
-// i64 expiry); the three sets (IndexSet::bytes()); SHA-256 of all that. Before version 3 there was nothing of
-// forgettings.
+// Layout, little-endian: magic, u32 version, u32 number of kicked tokens, secret, unique id, u64
+// boot, u32 node mark, u32 group mark, u32 bytes of the set of used nodes, u32 of that of groups,
+// u64 forgettings of groups, u32 bytes of the set of groups that outlasted the last one, u32 0; 24
+// bytes for each kicked token (u32 index, u32 0, u64 number, i64 expiry); the three sets
+// (IndexSet::bytes()); SHA-256 of all that. Before version 3 there was nothing of forgettings.
 constexpr std::size_t kVersionAt = 8;
 constexpr std::size_t kKickedCountAt = 12;
 constexpr std::size_t kSecretAt = 16;
@@ -38,7 +39,8 @@ constexpr std::size_t kHeadSizeWithoutProofs = 88;
 constexpr std::size_t kKickedSize = 24;
 static_assert(kHeadSizeWithoutProofs + std::tuple_size_v<Digest> >= kHeadSize);
 constexpr std::size_t kSetBytesMax = IndexSet::bytes_max(kIndexMost);
-static_assert(kHubStateBytesMax == kHeadSize + kKickedMax * kKickedSize + 3 * kSetBytesMax + std::tuple_size_v<Digest>);
+static_assert(kHubStateBytesMax ==
+              kHeadSize + kKickedMax * kKickedSize + 3 * kSetBytesMax + std::tuple_size_v<Digest>);
 
 void write_kicked(std::byte* to, const SessionToken& token) {
   store_le(to, token.index);
@@ -50,7 +52,8 @@ SessionToken read_kicked(const std::byte* from) {
   SessionToken token;
   token.index = load_le<std::uint32_t>(from);
   token.number = load_le<std::uint64_t>(from + 8);
-  token.expiry = std::chrono::milliseconds{static_cast<std::int64_t>(load_le<std::uint64_t>(from + 16))};
+  token.expiry =
+      std::chrono::milliseconds{static_cast<std::int64_t>(load_le<std::uint64_t>(from + 16))};
   return token;
 }
 
@@ -71,7 +74,8 @@ struct Lengths {
   std::size_t groups_used = 0;
   std::size_t groups_outlasting = 0;
   [[nodiscard]] std::size_t file() const {
-    return head + kicked * kKickedSize + nodes_used + groups_used + groups_outlasting + std::tuple_size_v<Digest>;
+    return head + kicked * kKickedSize + nodes_used + groups_used + groups_outlasting +
+           std::tuple_size_v<Digest>;
   }
 };
 /// REQUIRES: the file is as long as the longest head at least: the shortest one is.
@@ -81,7 +85,8 @@ std::optional<Lengths> lengths_of(std::span<const std::byte> file, std::uint32_t
   lengths.kicked = load_le<std::uint32_t>(file.data() + kKickedCountAt);
   lengths.nodes_used = load_le<std::uint32_t>(file.data() + kNodesUsedBytesAt);
   lengths.groups_used = load_le<std::uint32_t>(file.data() + kGroupsUsedBytesAt);
-  if (version == kVersion) lengths.groups_outlasting = load_le<std::uint32_t>(file.data() + kOutlastingBytesAt);
+  if (version == kVersion)
+    lengths.groups_outlasting = load_le<std::uint32_t>(file.data() + kOutlastingBytesAt);
   const auto is_set = [](std::size_t bytes) { return bytes <= kSetBytesMax; };
   if (lengths.kicked > kKickedMax || !is_set(lengths.nodes_used) || !is_set(lengths.groups_used) ||
       !is_set(lengths.groups_outlasting)) {
@@ -112,7 +117,8 @@ bool read_sets(std::span<const std::byte> sets, const Lengths& lengths, HubState
     if (set) into = std::move(*set);
     return set.has_value();
   };
-  return take(lengths.nodes_used, state.nodes_used) && take(lengths.groups_used, state.groups_used) &&
+  return take(lengths.nodes_used, state.nodes_used) &&
+         take(lengths.groups_used, state.groups_used) &&
          take(lengths.groups_outlasting, state.groups_outlasting) &&
          state.groups_outlasting.is_within(state.groups_used);
 }
@@ -120,8 +126,8 @@ bool read_sets(std::span<const std::byte> sets, const Lengths& lengths, HubState
 /// What newcomers of the next start may be given, and what is kept of that before.
 IndexRange begin(std::uint32_t& mark, IndexSet& used) {
   IndexRange range{mark, 0, used};
-  IndexPool::Grant grant =
-      IndexPool(kIndexMost, {}, range, std::chrono::milliseconds::max()).next_grant(std::chrono::milliseconds{0});
+  IndexPool::Grant grant = IndexPool(kIndexMost, {}, range, std::chrono::milliseconds::max())
+                               .next_grant(std::chrono::milliseconds{0});
   range.count = grant.count;
   mark = grant.mark;
   used = std::move(grant.used);
@@ -162,11 +168,14 @@ std::vector<std::byte> write_hub_state(const HubState& state) {
 }
 
 Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
-  if (bytes.size() < kHeadSizeWithoutProofs + std::tuple_size_v<Digest>) return Error{"it is too short"};
+  if (bytes.size() < kHeadSizeWithoutProofs + std::tuple_size_v<Digest>)
+    return Error{"it is too short"};
   if (bytes.size() > kHubStateBytesMax) return Error{"it is too long"};
-  if (!std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) return Error{"it does not hold the state of a hub"};
+  if (!std::equal(kMagic.begin(), kMagic.end(), bytes.begin()))
+    return Error{"it does not hold the state of a hub"};
   const auto version = load_le<std::uint32_t>(bytes.data() + kVersionAt);
-  if (version < kVersionOfMarks || version > kVersion) return Error{"another version of tcphub wrote it"};
+  if (version < kVersionOfMarks || version > kVersion)
+    return Error{"another version of tcphub wrote it"};
   const std::optional<Lengths> lengths = lengths_of(bytes, version);
 #ifdef GIMNET_BUG_STATE_LONGER_THAN_IT_SAYS
   if (!lengths || bytes.size() < lengths->file()) return Error{"its length is not what it says"};
@@ -183,7 +192,8 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
     if (!is_index(token.index) || load_le<std::uint32_t>(at + 4) != 0) return Error{kNoHub};
     state.kicked.push_back(token);
   }
-  if (!read_sets(bytes.subspan(lengths->head + lengths->kicked * kKickedSize), *lengths, state)) return Error{kNoHub};
+  if (!read_sets(bytes.subspan(lengths->head + lengths->kicked * kKickedSize), *lengths, state))
+    return Error{kNoHub};
   if (version == kVersionOfMarks) {
     if (lengths->nodes_used + lengths->groups_used != 0) return Error{kNoHub};
     state.nodes_used = all_below(state.node_mark);
@@ -206,7 +216,8 @@ Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wal
 #ifdef GIMNET_BUG_NEWCOMERS_BEGIN_AT_ONE
   start.nodes = {1, IndexPool::kBlock};
 #endif
-  std::erase_if(start.state.kicked, [wall](const SessionToken& token) { return token.expiry <= wall; });
+  std::erase_if(start.state.kicked,
+                [wall](const SessionToken& token) { return token.expiry <= wall; });
   return start;
 }
 

@@ -12,8 +12,8 @@
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/session_token.hpp"
 
-// What a hub keeps over its restarts, and the bytes of the file that it is kept in: docs/operations.md, "State".
-// Thread safety: value types and pure functions.
+// What a hub keeps over its restarts, and the bytes of the file that it is kept in:
+// docs/operations.md, "State". Thread safety: value types and pure functions.
 
 namespace gimnet::hub {
 
@@ -26,18 +26,19 @@ struct HubState {
   IndexSet nodes_used;                    ///< node indices that the next start must not hand out
   IndexSet groups_used;                   ///< the same for groups
   std::uint64_t group_forgettings = 0;    ///< how often used groups were forgotten
-  IndexSet groups_outlasting;             ///< those that were in use the last time; all of them are used
-  std::vector<SessionToken> kicked;       ///< not honoured any more
+  IndexSet groups_outlasting;        ///< those that were in use the last time; all of them are used
+  std::vector<SessionToken> kicked;  ///< not honoured any more
   friend bool operator==(const HubState&, const HubState&) = default;
 };
 
 inline constexpr std::size_t kKickedMax = 65'536;
 /// The longest legal file.
-inline constexpr std::size_t kHubStateBytesMax = 104 + kKickedMax * 24 + 3 * IndexSet::bytes_max(kIndexMost) + 32;
+inline constexpr std::size_t kHubStateBytesMax =
+    104 + kKickedMax * 24 + 3 * IndexSet::bytes_max(kIndexMost) + 32;
 
 [[nodiscard]] std::vector<std::byte> write_hub_state(const HubState& state);
-/// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is wrong with it, as
-/// the end of a sentence about the file.
+/// The file is not trusted: whatever it holds is read as written above or refused. Errors: what is
+/// wrong with it, as the end of a sentence about the file.
 [[nodiscard]] Result<HubState> read_hub_state(std::span<const std::byte> bytes);
 
 /// A start of the hub: what has to be kept before it begins, and what newcomers may be given.
@@ -46,9 +47,9 @@ struct HubStart {
   IndexRange nodes{};
   IndexRange groups{};
 };
-/// How the hub goes on from what it found: the next boot number, unused indices from the marks on, all of them kept as
-/// used, without the kicked ones whose tokens have expired by `wall` (since 1970). Errors: the boot number is at its
-/// end.
+/// How the hub goes on from what it found: the next boot number, unused indices from the marks on,
+/// all of them kept as used, without the kicked ones whose tokens have expired by `wall` (since
+/// 1970). Errors: the boot number is at its end.
 [[nodiscard]] Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wall);
 
 }  // namespace gimnet::hub

@@ -8,12 +8,14 @@ namespace gimnet::hub {
 namespace {
 
 /// Forgetting goes over all indices, and is kept on the disk: what it gains has to be worth that.
-std::uint32_t worth_forgetting(std::uint32_t most) { return std::min(IndexPool::kBlock / 2, most / 512 + 1); }
+std::uint32_t worth_forgetting(std::uint32_t most) {
+  return std::min(IndexPool::kBlock / 2, most / 512 + 1);
+}
 
 }  // namespace
 
-IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range,
-                     std::chrono::milliseconds returns_until)
+IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time,
+                     const IndexRange& range, std::chrono::milliseconds returns_until)
     : most_(most),
       resting_time_(resting_time),
       first_(range.first),
@@ -24,7 +26,8 @@ IndexPool::IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time,
       forgettings_(range.forgettings),
       outlasting_(range.outlasting) {
   GIMNET_CHECK(first_ > 0 && first_ <= most_);
-  for (std::uint64_t position = 0; position < end_; ++position) granted_left_ += used(index_at(position)) ? 0 : 1;
+  for (std::uint64_t position = 0; position < end_; ++position)
+    granted_left_ += used(index_at(position)) ? 0 : 1;
 }
 
 bool IndexPool::ready(std::chrono::milliseconds now) {
@@ -71,13 +74,16 @@ void IndexPool::give_back(std::uint32_t index, std::chrono::milliseconds now) {
   wake(now);
 }
 
-bool IndexPool::held(std::uint32_t index) const { return taken_.contains(index) && !rests_until_.contains(index); }
+bool IndexPool::held(std::uint32_t index) const {
+  return taken_.contains(index) && !rests_until_.contains(index);
+}
 
 void IndexPool::put_off_returns(std::chrono::milliseconds by, std::chrono::milliseconds latest) {
   returns_until_ = std::min(returns_until_ + by, latest);
 }
 
-std::optional<std::chrono::milliseconds> IndexPool::waits_for_returns(std::chrono::milliseconds now) const {
+std::optional<std::chrono::milliseconds> IndexPool::waits_for_returns(
+    std::chrono::milliseconds now) const {
   if (unused() > 0 || now >= returns_until_) return std::nullopt;
   return returns_until_ - now;
 }
@@ -100,11 +106,14 @@ IndexPool::Grant IndexPool::next_grant(std::chrono::milliseconds now) const {
   next.outlasting = next.forgets_gone ? taken_ : outlasting_;
   next.count = position_;
   std::uint64_t left = 0;
-  // What was granted stays so. Beyond it no further than to the last one that is not used: the others may be forgotten
-  // one day, and are not granted then.
-  std::uint64_t most = next.forgets_gone ? kBlock : granted_left_ < kBlock / 2 ? granted_left_ + kBlock : granted_left_;
+  // What was granted stays so. Beyond it no further than to the last one that is not used: the
+  // others may be forgotten one day, and are not granted then.
+  std::uint64_t most = next.forgets_gone            ? kBlock
+                       : granted_left_ < kBlock / 2 ? granted_left_ + kBlock
+                                                    : granted_left_;
   if (keeps_nothing_) most = most_;
-  for (std::uint64_t position = position_; left < most && position < position_ + most_; ++position) {
+  for (std::uint64_t position = position_; left < most && position < position_ + most_;
+       ++position) {
     const std::uint32_t index = index_at(position);
     if (next.used.contains(index)) continue;
     next.used.insert(index);
@@ -134,7 +143,8 @@ bool IndexPool::granted(std::uint32_t index) const {
   return (index + most_ - index_at(position_)) % most_ < end_ - position_;
 }
 
-/// Early enough that a restart, after which nothing is forgotten for a time, finds many that are not used.
+/// Early enough that a restart, after which nothing is forgotten for a time, finds many that are
+/// not used.
 bool IndexPool::forgetting_due(std::chrono::milliseconds now) const {
 #ifndef GIMNET_BUG_USED_FORGOTTEN_EARLY
   if (now < returns_until_) return false;

@@ -10,8 +10,8 @@
 
 namespace gimnet::hub {
 
-/// From where a pool hands out indices to newcomers: `count` of them from `first` on, cyclically, without those that
-/// were used before a restart and wait for who comes back.
+/// From where a pool hands out indices to newcomers: `count` of them from `first` on, cyclically,
+/// without those that were used before a restart and wait for who comes back.
 struct IndexRange {
   std::uint32_t first = 1;
   std::uint64_t count = kAll;
@@ -22,22 +22,24 @@ struct IndexRange {
   static constexpr std::uint64_t kAll = std::uint64_t{1} << 62;
 };
 
-/// Hands out indices 1..most cyclically, none twice before the others are used up. An index that was given back rests
-/// before it can come again, so that frames still under way to its former holder never reach a stranger.
+/// Hands out indices 1..most cyclically, none twice before the others are used up. An index that
+/// was given back rests before it can come again, so that frames still under way to its former
+/// holder never reach a stranger.
 ///
-/// What a newcomer may get outlives the hub before anybody gets it: some indices are granted ahead, and kept as used.
-/// A later start that goes on from what was kept gives newcomers none that anybody may have. Used indices that nobody
-/// has any more are forgotten when few others are left, but never while nodes of before a restart may still come back.
-/// Between two forgettings no index is handed out twice.
-/// Thread safety: none. Limits: `most` indices; two bits each.
+/// What a newcomer may get outlives the hub before anybody gets it: some indices are granted ahead,
+/// and kept as used. A later start that goes on from what was kept gives newcomers none that
+/// anybody may have. Used indices that nobody has any more are forgotten when few others are left,
+/// but never while nodes of before a restart may still come back. Between two forgettings no index
+/// is handed out twice. Thread safety: none. Limits: `most` indices; two bits each.
 class IndexPool {
  public:
   /// What is granted at a time.
   static constexpr std::uint32_t kBlock = 4'096;
 
-  /// REQUIRES: 0 < range.first <= most. Until `returns_until` those of before a restart may come back.
-  IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time, const IndexRange& range = {},
-            std::chrono::milliseconds returns_until = {});
+  /// REQUIRES: 0 < range.first <= most. Until `returns_until` those of before a restart may come
+  /// back.
+  IndexPool(std::uint32_t most, std::chrono::milliseconds resting_time,
+            const IndexRange& range = {}, std::chrono::milliseconds returns_until = {});
 
   /// Has take() one to give?
   [[nodiscard]] bool ready(std::chrono::milliseconds now);
@@ -45,7 +47,8 @@ class IndexPool {
   [[nodiscard]] std::optional<std::uint32_t> take(std::chrono::milliseconds now);
   /// That index, granted or not, if nobody holds it and it does not rest.
   [[nodiscard]] bool take_free(std::uint32_t index, std::chrono::milliseconds now);
-  /// Nobody was told of that index, which take_free() gave: it need not rest, but stays used. REQUIRES: it is held.
+  /// Nobody was told of that index, which take_free() gave: it need not rest, but stays used.
+  /// REQUIRES: it is held.
   void let_go(std::uint32_t index);
   /// That index, if nobody holds it: for its former holder, for whom it need not rest.
   [[nodiscard]] bool take_back(std::uint32_t index);
@@ -57,31 +60,37 @@ class IndexPool {
   [[nodiscard]] bool used(std::uint32_t index) const { return used_.contains(index); }
   /// Those of before a restart may come back for so much longer, at the latest until `latest`.
   void put_off_returns(std::chrono::milliseconds by, std::chrono::milliseconds latest);
-  /// Are there used ones that were not kept as used yet? A start that goes on from what was kept could hand them out.
+  /// Are there used ones that were not kept as used yet? A start that goes on from what was kept
+  /// could hand them out.
   [[nodiscard]] bool unkept() const { return unkept_ && !keeps_nothing_; }
   /// How often used indices were forgotten, over all starts.
   [[nodiscard]] std::uint64_t forgettings() const { return forgettings_; }
-  /// Was it in use the last time that others were forgotten? Who got it between the time before and then, or had it
-  /// already, is the last that got it.
-  [[nodiscard]] bool outlasted_forgetting(std::uint32_t index) const { return outlasting_.contains(index); }
-  /// How long newcomers have to wait for those of before a restart, since all indices are used; nothing: it is not
-  /// that.
-  [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(std::chrono::milliseconds now) const;
+  /// Was it in use the last time that others were forgotten? Who got it between the time before and
+  /// then, or had it already, is the last that got it.
+  [[nodiscard]] bool outlasted_forgetting(std::uint32_t index) const {
+    return outlasting_.contains(index);
+  }
+  /// How long newcomers have to wait for those of before a restart, since all indices are used;
+  /// nothing: it is not that.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> waits_for_returns(
+      std::chrono::milliseconds now) const;
 
   /// Would there be one to give, if next_grant() could be kept?
   [[nodiscard]] bool waits_for_keeping(std::chrono::milliseconds now) const;
 
   /// What has to be kept where it outlives the hub, and what may be handed out then.
   struct Grant {
-    IndexSet used;                  ///< what the next start must not hand out
-    std::uint32_t mark = 1;         ///< from which it begins
-    std::uint64_t count = 0;        ///< how many indices may be looked at from the pool's first on
-    bool forgets_gone = false;      ///< used indices that nobody holds and that do not rest may be handed out anew
+    IndexSet used;            ///< what the next start must not hand out
+    std::uint32_t mark = 1;   ///< from which it begins
+    std::uint64_t count = 0;  ///< how many indices may be looked at from the pool's first on
+    bool forgets_gone =
+        false;  ///< used indices that nobody holds and that do not rest may be handed out anew
     std::uint64_t forgettings = 0;  ///< this one included
     IndexSet outlasting{};          ///< what was in use at the last one
   };
-  /// Is there reason to keep next_grant()? Less than half a block of what was granted is left, or somebody has an
-  /// index that was not kept as used, or used ones are due to be forgotten; and it helps.
+  /// Is there reason to keep next_grant()? Less than half a block of what was granted is left, or
+  /// somebody has an index that was not kept as used, or used ones are due to be forgotten; and it
+  /// helps.
   [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;
   [[nodiscard]] Grant next_grant(std::chrono::milliseconds now) const;
   /// That was kept. REQUIRES: next_grant() answered it, and nothing was asked of the pool since.
@@ -107,8 +116,9 @@ class IndexPool {
   const std::uint32_t first_;
   const bool keeps_nothing_;
   std::chrono::milliseconds returns_until_;
-  std::uint64_t position_ = 0;      ///< of the one to look at next; index_at() tells which that is
-  std::uint64_t end_;               ///< granted are the positions from there to here, no more than there are indices
+  std::uint64_t position_ = 0;  ///< of the one to look at next; index_at() tells which that is
+  std::uint64_t
+      end_;  ///< granted are the positions from there to here, no more than there are indices
   std::uint32_t granted_left_ = 0;  ///< of those, how many are not used
   IndexSet taken_;                  ///< held or resting
   IndexSet used_;                   ///< the same, and what was or may have been

@@ -37,7 +37,8 @@ std::optional<IndexSet> IndexSet::from_bytes(std::span<const std::byte> bytes, s
   if (bytes.size() > bytes_max(most)) return std::nullopt;
   const auto last = std::to_integer<unsigned>(bytes.back());
   if (last == 0 || (bytes.front() & bit(0)) != std::byte{0}) return std::nullopt;
-  const std::size_t highest = 8 * (bytes.size() - 1) + static_cast<std::size_t>(std::bit_width(last)) - 1;
+  const std::size_t highest =
+      8 * (bytes.size() - 1) + static_cast<std::size_t>(std::bit_width(last)) - 1;
   if (highest > most) return std::nullopt;
   IndexSet set;
   set.bytes_.assign(bytes.begin(), bytes.end());
@@ -47,6 +48,8 @@ std::optional<IndexSet> IndexSet::from_bytes(std::span<const std::byte> bytes, s
   return set;
 }
 
-bool operator==(const IndexSet& a, const IndexSet& b) { return std::ranges::equal(a.bytes(), b.bytes()); }
+bool operator==(const IndexSet& a, const IndexSet& b) {
+  return std::ranges::equal(a.bytes(), b.bytes());
+}
 
 }  // namespace gimnet::hub

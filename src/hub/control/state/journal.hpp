@@ -11,9 +11,10 @@
 
 namespace gimnet::hub {
 
-/// The latest changes of names and services, numbered without gaps: what those who watch have yet to hear. It is one
-/// for all of them, so that who is slow keeps nothing for himself. Until somebody watches it only counts: nobody could
-/// come back for what was before. Thread safety: none. Limits: watch_changes and watch_bytes; the oldest go.
+/// The latest changes of names and services, numbered without gaps: what those who watch have yet
+/// to hear. It is one for all of them, so that who is slow keeps nothing for himself. Until
+/// somebody watches it only counts: nobody could come back for what was before. Thread safety:
+/// none. Limits: watch_changes and watch_bytes; the oldest go.
 class Journal {
  public:
   /// A change as it travels, and what decides who hears of it.
@@ -46,7 +47,9 @@ class Journal {
     return version <= version_ && version_ - version <= notes_.size();
   }
   /// The change that led to this version. REQUIRES: reaches(version - 1), version <= version().
-  [[nodiscard]] const Note& at(std::uint64_t version) const { return notes_[notes_.size() - (version_ - version) - 1]; }
+  [[nodiscard]] const Note& at(std::uint64_t version) const {
+    return notes_[notes_.size() - (version_ - version) - 1];
+  }
 
  private:
   [[nodiscard]] static std::size_t size_of(const Note& note);

@@ -18,10 +18,11 @@ Listed first_of(std::vector<std::uint32_t> indices, std::size_t most) {
   return listed;
 }
 
-/// By name: all whose names begin with the same parts as the pattern, if those are few. `wanted` says the index of an
-/// entry that is to be listed, or 0. Nothing: they are too many.
+/// By name: all whose names begin with the same parts as the pattern, if those are few. `wanted`
+/// says the index of an entry that is to be listed, or 0. Nothing: they are too many.
 template <class ByName, class Wanted>
-std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& request, Wanted wanted) {
+std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& request,
+                                   Wanted wanted) {
   if (request.pattern == nullptr || request.pattern->beginning().empty()) return std::nullopt;
   const std::string_view beginning = request.pattern->beginning();
   std::vector<std::uint32_t> found;
@@ -32,7 +33,8 @@ std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& 
     const std::uint32_t index = wanted(entry.second);
     if (index > request.after) found.push_back(index);
   };
-  // What only begins with the same letters, as hall-30 does for hall-3/*, may be any number of names.
+  // What only begins with the same letters, as hall-30 does for hall-3/*, may be any number of
+  // names.
   if (const auto exact = by_name.find(beginning); exact != by_name.end()) {
     if (work == 0) return std::nullopt;
     look_at(*exact);
@@ -73,21 +75,25 @@ Listed list_by_id(const ById& by_id, const ListingRequest& request, Wanted wante
 
 std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request) {
   const auto& sessions = membership.sessions();
-  return list_by_name(membership.directory().names(), request, [&](const Directory::Holder& holder) -> std::uint32_t {
-    return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
-  });
+  return list_by_name(
+      membership.directory().names(), request,
+      [&](const Directory::Holder& holder) -> std::uint32_t {
+        return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
+      });
 }
 
 std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request) {
-  return list_by_name(services.by_name(), request,
-                      [](const Topic& topic) -> std::uint32_t { return topic.service ? topic.service->group : 0; });
+  return list_by_name(services.by_name(), request, [](const Topic& topic) -> std::uint32_t {
+    return topic.service ? topic.service->group : 0;
+  });
 }
 
 Listed list_nodes(const Membership& membership, const ListingRequest& request) {
   if (const auto few = list_few_nodes(membership, request)) return *few;
   return list_by_id(membership.sessions().all(), request, [&](const Session& session) {
     if (request.connected_only && !session.connected) return false;
-    return request.pattern == nullptr || (!session.name.empty() && request.pattern->matches(session.name));
+    return request.pattern == nullptr ||
+           (!session.name.empty() && request.pattern->matches(session.name));
   });
 }
 

@@ -8,9 +8,9 @@
 #include "hub/control/state/membership.hpp"
 #include "proto/control/pattern.hpp"
 
-// Which nodes and services fit a pattern, in ascending order of their ids and in bounded pieces of work: what LIST and
-// SERVICES page through. What joins or leaves between two pages neither hides nor repeats anything else.
-// Thread safety: pure functions.
+// Which nodes and services fit a pattern, in ascending order of their ids and in bounded pieces of
+// work: what LIST and SERVICES page through. What joins or leaves between two pages neither hides
+// nor repeats anything else. Thread safety: pure functions.
 
 namespace gimnet::hub {
 
@@ -33,10 +33,13 @@ struct ListingRequest {
 [[nodiscard]] Listed list_nodes(const Membership& membership, const ListingRequest& request);
 [[nodiscard]] Listed list_services(const Services& services, const ListingRequest& request);
 
-/// The same where all whose names begin with the pattern's parts before its first `*` are few: these alone are looked
-/// at, in one piece of work, whatever else begins with the same letters. Nothing: there is no pattern, it begins with a
+/// The same where all whose names begin with the pattern's parts before its first `*` are few:
+/// these alone are looked at, in one piece of work, whatever else begins with the same letters.
+/// Nothing: there is no pattern, it begins with a
 /// `*`, or they are more than `work`.
-[[nodiscard]] std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request);
-[[nodiscard]] std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request);
+[[nodiscard]] std::optional<Listed> list_few_nodes(const Membership& membership,
+                                                   const ListingRequest& request);
+[[nodiscard]] std::optional<Listed> list_few_services(const Services& services,
+                                                      const ListingRequest& request);
 
 }  // namespace gimnet::hub

@@ -10,8 +10,8 @@
 
 namespace gimnet::hub {
 
-/// What a MAC of the hub covers, field by field, so that no two lists of fields give the same bytes.
-/// Thread safety: none.
+/// What a MAC of the hub covers, field by field, so that no two lists of fields give the same
+/// bytes. Thread safety: none.
 class MacText {
  public:
   /// `purpose` keeps this use of the hub's secret apart from any other.

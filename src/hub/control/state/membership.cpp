@@ -29,43 +29,51 @@ Places places_for(const JoinRequest& request) {
 Membership::Membership(const Sessions::Options& options, const Limits& limits)
     : limits_(limits),
       sessions_(options, limits),
-      services_(options.hub, limits, options.groups, options.returns_until.value_or(milliseconds{0}), options.secret) {}
+      services_(options.hub, limits, options.groups,
+                options.returns_until.value_or(milliseconds{0}), options.secret) {}
 
-Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request, milliseconds now,
-                                                            Effects& effects) {
+Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& request,
+                                                            milliseconds now, Effects& effects) {
   if (std::optional<proto::Goodbye> refusal = check(request)) return std::move(*refusal);
-  const Sessions::Claim claim = sessions_.claim({request.token, request.name, request.identity, request.wall});
+  const Sessions::Claim claim =
+      sessions_.claim({request.token, request.name, request.identity, request.wall});
   if (!request.name.empty()) {
-    if (std::optional<proto::Goodbye> refusal = directory_.refusal(request.name, claim.session, sessions_, now)) {
+    if (std::optional<proto::Goodbye> refusal =
+            directory_.refusal(request.name, claim.session, sessions_, now)) {
       return std::move(*refusal);
     }
   }
   if (claim.session == nullptr) {
     if (keeping_due(now)) effects.emplace_back(StateDue{});
-    if (std::optional<proto::Goodbye> refusal = room_refusal(request, claim, now)) return std::move(*refusal);
+    if (std::optional<proto::Goodbye> refusal = room_refusal(request, claim, now))
+      return std::move(*refusal);
   }
   if (!request.name.empty()) end_absent_holder(request.name, claim.session, now, effects);
   const Result<Joined, proto::Goodbye> found = session_for(request, claim, now, effects);
   if (!found) return found.error();
   Session& session = *found->session;
-  if (!request.name.empty() && request.name != session.name) take_name(session, request.name, now, effects);
+  if (!request.name.empty() && request.name != session.name)
+    take_name(session, request.name, now, effects);
   session.role = request.role;
   session.description = request.description;
   session.identity = request.identity;
   session.origin = request.origin;
   sessions_.renew_token(session, request.wall);
   sessions_.attach(session, now);
-  effects.emplace_back(NodeNoted{found->new_session ? ChangeKind::joined : ChangeKind::back, session.index, {}, {}});
+  effects.emplace_back(
+      NodeNoted{found->new_session ? ChangeKind::joined : ChangeKind::back, session.index, {}, {}});
   if (!found->new_session) {
-    redeclaring_.add(
-        {now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment},
-        sessions_.all().size(), [this](const Redeclaring& each) { return !still_redeclares(each); });
+    redeclaring_.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation,
+                      session.attachment},
+                     sessions_.all().size(),
+                     [this](const Redeclaring& each) { return !still_redeclares(each); });
   }
   return *found;
 }
 
 Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinRequest& request,
-                                                                   const Sessions::Claim& claim, milliseconds now,
+                                                                   const Sessions::Claim& claim,
+                                                                   milliseconds now,
                                                                    Effects& effects) {
   if (claim.session != nullptr) {
     services_.node_returned(claim.session->index);
@@ -82,9 +90,11 @@ Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinReq
   return Joined{*created, true};
 }
 
-void Membership::connection_ended(Session& session, const Ending& ending, milliseconds now, Effects& effects) {
+void Membership::connection_ended(Session& session, const Ending& ending, milliseconds now,
+                                  Effects& effects) {
   const bool left = ending.said_by_peer && ending.code == GoodbyeCode::done;
-  // Nobody knows a nameless node but by its id, and sessions kept for those who send rubbish would fill the hub.
+  // Nobody knows a nameless node but by its id, and sessions kept for those who send rubbish would
+  // fill the hub.
   if (left || (session.name.empty() && is_misconduct(ending))) {
     sessions_.spend_token(session);
     end(session, now, effects);
@@ -97,13 +107,15 @@ void Membership::connection_ended(Session& session, const Ending& ending, millis
   effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
 }
 
-std::optional<proto::Refusal> Membership::rename(Session& session, const std::string& name, milliseconds now,
-                                                 Effects& effects) {
+std::optional<proto::Refusal> Membership::rename(Session& session, const std::string& name,
+                                                 milliseconds now, Effects& effects) {
   if (name == session.name) return std::nullopt;
   if (!name.empty()) {
-    if (const std::optional<proto::Goodbye> refusal = directory_.refusal(name, &session, sessions_, now)) {
+    if (const std::optional<proto::Goodbye> refusal =
+            directory_.refusal(name, &session, sessions_, now)) {
       const bool taken = refusal->code == GoodbyeCode::name_taken;
-      return proto::Refusal{taken ? proto::Status::taken : proto::Status::bad_request, refusal->sentence};
+      return proto::Refusal{taken ? proto::Status::taken : proto::Status::bad_request,
+                            refusal->sentence};
     }
     end_absent_holder(name, &session, now, effects);
   }
@@ -112,7 +124,8 @@ std::optional<proto::Refusal> Membership::rename(Session& session, const std::st
   return std::nullopt;
 }
 
-void Membership::name_decided(Session& session, const NameDecision& decision, milliseconds now, Effects& effects) {
+void Membership::name_decided(Session& session, const NameDecision& decision, milliseconds now,
+                              Effects& effects) {
   const std::string name = session.name.str();
   if (!directory_.is_provisional(name)) return;
   if (decision.confirmed) {
@@ -120,11 +133,12 @@ void Membership::name_decided(Session& session, const NameDecision& decision, mi
   } else {
     take_name(session, "", now, effects);
   }
-  effects.emplace_back(NameDecided{session.index, name, decision.confirmed, decision.holder, decision.sentence});
+  effects.emplace_back(
+      NameDecided{session.index, name, decision.confirmed, decision.holder, decision.sentence});
 }
 
-std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now, Effects& effects,
-                             const KeepNow& keep) {
+std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now,
+                             Effects& effects, const KeepNow& keep) {
 #ifndef GIMNET_BUG_KICKED_TOKEN_HONOURED
   const bool remembered = sessions_.remember_kicked(session);
 #else
@@ -137,7 +151,8 @@ std::string Membership::kick(Session& session, const std::string& sentence, mill
     effects.emplace_back(StateDue{});
   }
   if (failure.empty() && !remembered) {
-    failure = "its limit kicked_tokens is " + std::to_string(limits_.kicked_tokens) + "; make it larger";
+    failure =
+        "its limit kicked_tokens is " + std::to_string(limits_.kicked_tokens) + "; make it larger";
   }
   effects.emplace_back(CloseDue{session.place, GoodbyeCode::kicked, sentence});
   end(session, now, effects);
@@ -149,7 +164,8 @@ bool Membership::keeping_due(milliseconds now) const {
 }
 
 Durable Membership::durable(milliseconds now) const {
-  return {sessions_.indices().next_grant(now), services_.group_indices().next_grant(now), sessions_.kicked()};
+  return {sessions_.indices().next_grant(now), services_.group_indices().next_grant(now),
+          sessions_.kicked()};
 }
 
 void Membership::state_not_kept() {
@@ -162,21 +178,23 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
-std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index, milliseconds now,
-                                                   const KeepNow& keep) {
+std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index,
+                                                   milliseconds now, const KeepNow& keep) {
   if (index == kHubIndex || index >= kEveryIndex) {
     return proto::Refusal{proto::Status::bad_request,
                           "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
   }
   if (index == session.index) {
-    return proto::Refusal{proto::Status::taken, "this node has the id " + to_string(sessions_.node_id(session)) +
+    return proto::Refusal{proto::Status::taken, "this node has the id " +
+                                                    to_string(sessions_.node_id(session)) +
                                                     " already; choose a free one"};
   }
-  // Messages for an id that the node never learned of would wait for it, and it would take none of them. A WELCOME that
-  // was sent may have been lost: that is why it has to be heard of.
+  // Messages for an id that the node never learned of would wait for it, and it would take none of
+  // them. A WELCOME that was sent may have been lost: that is why it has to be heard of.
   if (session.renumbered) {
-    return proto::Refusal{proto::Status::taken, "this node was given the id " + to_string(sessions_.node_id(session)) +
-                                                    " and has not come back under it yet; try again when it has"};
+    return proto::Refusal{proto::Status::taken,
+                          "this node was given the id " + to_string(sessions_.node_id(session)) +
+                              " and has not come back under it yet; try again when it has"};
   }
 #ifndef GIMNET_BUG_RETURNING_ID_GIVEN_AWAY
   const bool awaited = sessions_.find(index) == nullptr && sessions_.indices().used(index) &&
@@ -186,18 +204,21 @@ std::optional<proto::Refusal> Membership::take_for(const Session& session, std::
 #endif
   const NodeId node = make_id<NodeId>(hub_of(sessions_.node_id(session)), index);
   IndexPool& indices = sessions_.indices();
-  if (awaited || !indices.take_free(index, now)) return proto::Refusal{proto::Status::taken, why_taken(node, now)};
+  if (awaited || !indices.take_free(index, now))
+    return proto::Refusal{proto::Status::taken, why_taken(node, now)};
   if (!keep || !indices.unkept()) return std::nullopt;
   const std::string failure = keep();
   if (failure.empty()) return std::nullopt;
   indices.let_go(index);
-  return proto::Refusal{proto::Status::limit, "the hub cannot keep that a node has the id " + to_string(node) +
-                                                  ", and would give it to another one after a restart: " + failure +
-                                                  "; mend that and try again"};
+  return proto::Refusal{proto::Status::limit,
+                        "the hub cannot keep that a node has the id " + to_string(node) +
+                            ", and would give it to another one after a restart: " + failure +
+                            "; mend that and try again"};
 }
 
-std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index, milliseconds now,
-                                                   Effects& effects, const KeepNow& keep) {
+std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index,
+                                                   milliseconds now, Effects& effects,
+                                                   const KeepNow& keep) {
   if (auto failure = take_for(session, index, now, keep)) return failure;
   const std::uint32_t former = session.index;
   sessions_.renumber(session, index, now);
@@ -209,16 +230,17 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
   for (Redeclaring& due : redeclaring_) {
     if (due.index == former && due.generation == session.place.generation) due.index = index;
   }
-  // The new id leads to the node before the old one says that it moved. Its groups may be published at any time: what
-  // is sent to them goes by places (docs/architecture.md, "Another id").
+  // The new id leads to the node before the old one says that it moved. Its groups may be published
+  // at any time: what is sent to them goes by places (docs/architecture.md, "Another id").
   effects.emplace_back(NodeChanged{index});
 #ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});
 #endif
-  // Who hears of the new id may send to it at once: by then no frame goes to the connection on which the node has the
-  // old one.
+  // Who hears of the new id may send to it at once: by then no frame goes to the connection on
+  // which the node has the old one.
   effects.emplace_back(RenumberDue{session.place, former, index,
-                                   "an administrator gave this node the id " + to_string(sessions_.node_id(session)) +
+                                   "an administrator gave this node the id " +
+                                       to_string(sessions_.node_id(session)) +
                                        "; come back with the token"});
   effects.emplace_back(NodeNoted{ChangeKind::left, former, session.name.str(), {}});
   effects.emplace_back(NodeNoted{ChangeKind::joined, index, {}, {}});
@@ -234,9 +256,11 @@ std::string Membership::why_taken(NodeId node, milliseconds now) const {
   }
   if (const milliseconds left = sessions_.returns_expected_for(now); left > milliseconds{0}) {
     return "the hub was restarted a moment ago, and if a node had the id " + id +
-           ", its node has not come back yet; try again in " + std::to_string((left.count() + 999) / 1'000) + " s";
+           ", its node has not come back yet; try again in " +
+           std::to_string((left.count() + 999) / 1'000) + " s";
   }
-  return "the id " + id + " rests, since a node had it a moment ago; choose another one, or try again in a minute";
+  return "the id " + id +
+         " rests, since a node had it a moment ago; choose another one, or try again in a minute";
 }
 
 void Membership::stood_still(milliseconds time, milliseconds now) {
@@ -257,8 +281,8 @@ void Membership::tick(milliseconds now, Effects& effects) {
 
 bool Membership::still_redeclares(const Redeclaring& due) const {
   const Session* session = sessions_.find(due.index);
-  return session != nullptr && session->place.generation == due.generation && session->attachment == due.attachment &&
-         session->connected;
+  return session != nullptr && session->place.generation == due.generation &&
+         session->attachment == due.attachment && session->connected;
 }
 
 std::optional<milliseconds> Membership::next_deadline() const {
@@ -271,39 +295,44 @@ std::optional<milliseconds> Membership::next_deadline() const {
 
 std::optional<proto::Goodbye> Membership::check(const JoinRequest& request) const {
   if (request.role == proto::Role::hub) {
-    return proto::Goodbye{GoodbyeCode::not_allowed, "this hub takes no links from other hubs; connect as a node"};
+    return proto::Goodbye{GoodbyeCode::not_allowed,
+                          "this hub takes no links from other hubs; connect as a node"};
   }
   if (request.role == proto::Role::admin && !request.may_administer) {
-    // By another way it would not be told apart from nobody, by this one it is told as whom it came.
+    // By another way it would not be told apart from nobody, by this one it is told as whom it
+    // came.
     if (request.identity.starts_with("uid ")) {
       return proto::Goodbye{GoodbyeCode::not_allowed,
-                            "only root and the user that runs the hub administer it, and this is " + request.identity +
-                                "; run the command as one of them"};
+                            "only root and the user that runs the hub administer it, and this is " +
+                                request.identity + "; run the command as one of them"};
     }
-    return proto::Goodbye{
-        GoodbyeCode::not_allowed,
-        "administrators connect over the hub's Unix socket, as root or as the user that runs the hub"};
+    return proto::Goodbye{GoodbyeCode::not_allowed,
+                          "administrators connect over the hub's Unix socket, as root or as the "
+                          "user that runs the hub"};
   }
   if (request.role != proto::Role::node && request.role != proto::Role::admin) {
-    return proto::Goodbye{
-        GoodbyeCode::not_allowed,
-        "there is no role " + std::to_string(static_cast<int>(request.role)) + "; connect as a node (0)"};
+    return proto::Goodbye{GoodbyeCode::not_allowed,
+                          "there is no role " + std::to_string(static_cast<int>(request.role)) +
+                              "; connect as a node (0)"};
   }
   return std::nullopt;
 }
 
-void Membership::end_absent_holder(const std::string& name, const Session* claimant, milliseconds now,
-                                   Effects& effects) {
+void Membership::end_absent_holder(const std::string& name, const Session* claimant,
+                                   milliseconds now, Effects& effects) {
   const std::optional<std::uint32_t> holder = directory_.find(name);
   if (!holder || (claimant != nullptr && claimant->index == *holder)) return;
   end(*sessions_.find(*holder), now, effects);
 }
 
-std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& request,
+                                                       const Sessions::Claim& claim,
                                                        milliseconds now) {
   // The limit may have been lowered, so that more would have to go than make way.
-  const std::size_t ending = (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
-  if (std::optional<proto::Goodbye> refusal = sessions_.full_refusal(places_for(request), ending)) return refusal;
+  const std::size_t ending =
+      (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
+  if (std::optional<proto::Goodbye> refusal = sessions_.full_refusal(places_for(request), ending))
+    return refusal;
   return claim.token ? std::nullopt : sessions_.id_refusal(now);
 }
 
@@ -312,7 +341,8 @@ void Membership::make_room(milliseconds now, Effects& effects) {
   if (Session* away = sessions_.longest_away_nameless()) end(*away, now, effects);
 }
 
-void Membership::take_name(Session& session, const std::string& name, milliseconds now, Effects& effects) {
+void Membership::take_name(Session& session, const std::string& name, milliseconds now,
+                           Effects& effects) {
   const std::string former = std::exchange(session.name, CompactText(name)).str();
   if (!former.empty()) {
     services_.node_renamed(session.index, now, effects);
@@ -321,8 +351,10 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
 #endif
   }
   if (!name.empty()) directory_.put(name, session.index, standing_);
-  // A node that has not been attached yet has nothing to change: it will be told of as one that joined.
-  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::renamed, session.index, {}, former});
+  // A node that has not been attached yet has nothing to change: it will be told of as one that
+  // joined.
+  if (session.attachment > 0)
+    effects.emplace_back(NodeNoted{ChangeKind::renamed, session.index, {}, former});
 }
 
 void Membership::end(Session& session, milliseconds now, Effects& effects) {
@@ -335,7 +367,8 @@ void Membership::end(Session& session, milliseconds now, Effects& effects) {
 #ifndef GIMNET_BUG_SLOT_NOT_RELEASED
   effects.emplace_back(SessionEnded{session.place});
 #endif
-  if (session.attachment > 0) effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name.str(), {}});
+  if (session.attachment > 0)
+    effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name.str(), {}});
   for (const std::uint32_t index : former) effects.emplace_back(NodeChanged{index});
   sessions_.end(session, now);
 }

@@ -21,7 +21,7 @@ struct JoinRequest {
   proto::Role role{};
   std::string name;                  ///< "": none, or the one that the session has
   std::span<const std::byte> token;  ///< empty: none
-  std::string identity;              ///< who the peer is, as its connection tells: "uid 1000", "open"
+  std::string identity;  ///< who the peer is, as its connection tells: "uid 1000", "open"
   std::string description;
   std::optional<std::uint16_t> shard_hint;
   Origin origin;
@@ -29,9 +29,9 @@ struct JoinRequest {
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
 };
 
-/// Who belongs to this hub, under which name, with which services: the state of one hub without its neighbours. Makes
-/// sure that sessions, names and services agree with each other.
-/// Thread safety: none. Time and randomness are arguments; what is to be done comes back as effects.
+/// Who belongs to this hub, under which name, with which services: the state of one hub without its
+/// neighbours. Makes sure that sessions, names and services agree with each other. Thread safety:
+/// none. Time and randomness are arguments; what is to be done comes back as effects.
 class Membership {
  public:
   Membership(const Sessions::Options& options, const Limits& limits);
@@ -40,9 +40,11 @@ class Membership {
     Session* session = nullptr;
     bool new_session = false;  ///< also one that a token brought back under its former id
   };
-  /// Admits a connection, for a new session or for the one whose token it shows. The caller attaches it at its shard
-  /// and publishes its place after the effects were carried out. Errors: what GOODBYE says.
-  [[nodiscard]] Result<Joined, proto::Goodbye> join(const JoinRequest& request, std::chrono::milliseconds now,
+  /// Admits a connection, for a new session or for the one whose token it shows. The caller
+  /// attaches it at its shard and publishes its place after the effects were carried out. Errors:
+  /// what GOODBYE says.
+  [[nodiscard]] Result<Joined, proto::Goodbye> join(const JoinRequest& request,
+                                                    std::chrono::milliseconds now,
                                                     Effects& effects);
 
   /// How a connection ended.
@@ -53,37 +55,42 @@ class Membership {
   };
   /// A connection of the session ended: for good if the node said so or has no name and was closed
   /// for what it sent, else its grace time begins. REQUIRES: connected.
-  void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now, Effects& effects);
+  void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now,
+                        Effects& effects);
 
-  /// Keeps durable() where it outlives the hub, at once: "", or why it could not. None: a StateDue among the effects
-  /// asks for it.
+  /// Keeps durable() where it outlives the hub, at once: "", or why it could not. None: a StateDue
+  /// among the effects asks for it.
   using KeepNow = std::function<std::string()>;
-  /// Ends the session for good: its id and name are free, its token counts as none, also after a restart, unless the
-  /// answer says why not. `sentence` tells its node who did it and what to do.
-  std::string kick(Session& session, const std::string& sentence, std::chrono::milliseconds now, Effects& effects,
-                   const KeepNow& keep = {});
+  /// Ends the session for good: its id and name are free, its token counts as none, also after a
+  /// restart, unless the answer says why not. `sentence` tells its node who did it and what to do.
+  std::string kick(Session& session, const std::string& sentence, std::chrono::milliseconds now,
+                   Effects& effects, const KeepNow& keep = {});
 
-  /// The session's node goes on under another index, with name, services, subscriptions and token. Errors: taken (held,
-  /// at rest, or perhaps that of a node that has not come back since a restart), bad_request (no index of a node),
-  /// limit (it cannot be kept, and the hub could give the index to another node after a restart). nullopt: done.
+  /// The session's node goes on under another index, with name, services, subscriptions and token.
+  /// Errors: taken (held, at rest, or perhaps that of a node that has not come back since a
+  /// restart), bad_request (no index of a node), limit (it cannot be kept, and the hub could give
+  /// the index to another node after a restart). nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> renumber(Session& session, std::uint32_t index,
-                                                       std::chrono::milliseconds now, Effects& effects,
-                                                       const KeepNow& keep = {});
+                                                       std::chrono::milliseconds now,
+                                                       Effects& effects, const KeepNow& keep = {});
 
-  /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets none of the indices
-  /// that were not granted by state_kept() or at the start, so that no crash makes two nodes of one id.
+  /// What has to outlive the hub. A StateDue among the effects asks to keep it; a newcomer gets
+  /// none of the indices that were not granted by state_kept() or at the start, so that no crash
+  /// makes two nodes of one id.
   [[nodiscard]] Durable durable(std::chrono::milliseconds now) const;
   /// Is there reason to keep it although nothing happened that asks for it?
   [[nodiscard]] bool keeping_due(std::chrono::milliseconds now) const;
-  /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and nothing happened since.
+  /// That was kept where it outlives the hub. REQUIRES: durable() answered it, and nothing happened
+  /// since.
   void state_kept(const Durable& durable);
   /// It could not be.
   void state_not_kept();
-  /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival is judged as when
-  /// it joins. What the node provides is withdrawn, as its full names were the old one's: it advertises anew.
-  /// Errors: taken, bad_request. nullopt: done.
+  /// The node takes that name in place of the one it has, or, for "", goes on without one. A rival
+  /// is judged as when it joins. What the node provides is withdrawn, as its full names were the
+  /// old one's: it advertises anew. Errors: taken, bad_request. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> rename(Session& session, const std::string& name,
-                                                     std::chrono::milliseconds now, Effects& effects);
+                                                     std::chrono::milliseconds now,
+                                                     Effects& effects);
 
   /// What became of a claim to a name.
   struct NameDecision {
@@ -91,13 +98,16 @@ class Membership {
     NodeId holder{};       ///< not confirmed: who has the name now
     std::string sentence;  ///< not confirmed: why
   };
-  /// The network decided on the session's name: it is final, or a rival's. A name that is final already stays so.
-  void name_decided(Session& session, const NameDecision& decision, std::chrono::milliseconds now, Effects& effects);
-  /// Names taken from now on are final at once, as on a hub that is the whole network, or wait for name_decided().
+  /// The network decided on the session's name: it is final, or a rival's. A name that is final
+  /// already stays so.
+  void name_decided(Session& session, const NameDecision& decision, std::chrono::milliseconds now,
+                    Effects& effects);
+  /// Names taken from now on are final at once, as on a hub that is the whole network, or wait for
+  /// name_decided().
   void decide_names(NameStanding standing) { standing_ = standing; }
 
-  /// The hub stood still for so long until now, and nobody could come back or declare anything: what would have run out
-  /// meanwhile has its time again. To be said before tick().
+  /// The hub stood still for so long until now, and nobody could come back or declare anything:
+  /// what would have run out meanwhile has its time again. To be said before tick().
   void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
   /// Ends what is overdue.
   void tick(std::chrono::milliseconds now, Effects& effects);
@@ -121,22 +131,29 @@ class Membership {
   [[nodiscard]] bool still_redeclares(const Redeclaring& due) const;
   [[nodiscard]] std::optional<proto::Goodbye> check(const JoinRequest& request) const;
   /// The session that the request is for: the one whose token it shows, or a new one.
-  [[nodiscard]] Result<Joined, proto::Goodbye> session_for(const JoinRequest& request, const Sessions::Claim& claim,
-                                                           std::chrono::milliseconds now, Effects& effects);
+  [[nodiscard]] Result<Joined, proto::Goodbye> session_for(const JoinRequest& request,
+                                                           const Sessions::Claim& claim,
+                                                           std::chrono::milliseconds now,
+                                                           Effects& effects);
   /// Takes an index for a session that there is. Errors: as of renumber().
   [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, std::uint32_t index,
-                                                       std::chrono::milliseconds now, const KeepNow& keep);
+                                                       std::chrono::milliseconds now,
+                                                       const KeepNow& keep);
   /// Why that id cannot be given to another node.
   [[nodiscard]] std::string why_taken(NodeId node, std::chrono::milliseconds now) const;
-  /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal() saw no reason.
-  void end_absent_holder(const std::string& name, const Session* claimant, std::chrono::milliseconds now,
-                         Effects& effects);
-  /// Why there is no room for that newcomer even when all made way who have to: before any of them does.
-  [[nodiscard]] std::optional<proto::Goodbye> room_refusal(const JoinRequest& request, const Sessions::Claim& claim,
+  /// A name's holder within its grace time makes way for `claimant`. REQUIRES: directory_.refusal()
+  /// saw no reason.
+  void end_absent_holder(const std::string& name, const Session* claimant,
+                         std::chrono::milliseconds now, Effects& effects);
+  /// Why there is no room for that newcomer even when all made way who have to: before any of them
+  /// does.
+  [[nodiscard]] std::optional<proto::Goodbye> room_refusal(const JoinRequest& request,
+                                                           const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now);
   /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
   void make_room(std::chrono::milliseconds now, Effects& effects);
-  void take_name(Session& session, const std::string& name, std::chrono::milliseconds now, Effects& effects);
+  void take_name(Session& session, const std::string& name, std::chrono::milliseconds now,
+                 Effects& effects);
   void end(Session& session, std::chrono::milliseconds now, Effects& effects);
 
   const Limits& limits_;

@@ -9,9 +9,9 @@
 
 namespace gimnet::hub {
 
-/// For each index the least session number whose token may still claim it: lower ones are of sessions that left, or
-/// after which somebody else had the index. Thread safety: none. Limits: 8 bytes an index, in pages of 4,096, of which
-/// there are only those that were written.
+/// For each index the least session number whose token may still claim it: lower ones are of
+/// sessions that left, or after which somebody else had the index. Thread safety: none. Limits: 8
+/// bytes an index, in pages of 4,096, of which there are only those that were written.
 class NumberFloor {
  public:
   /// 0 where nothing was raised.

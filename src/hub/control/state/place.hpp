@@ -6,7 +6,8 @@
 
 namespace gimnet::hub {
 
-/// Where a session lives: its shard, its slot there, and which of the slot's holders it is (never 0).
+/// Where a session lives: its shard, its slot there, and which of the slot's holders it is (never
+/// 0).
 struct Place {
   ShardIndex shard;
   ConnectionSlot slot;

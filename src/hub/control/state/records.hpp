@@ -16,7 +16,8 @@ struct HubTitle {
   std::string name;
 };
 
-[[nodiscard]] proto::ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Services& services,
+[[nodiscard]] proto::ns::NodeRecord record_of(const HubTitle& hub, const Session& session,
+                                              const Services& services,
                                               std::chrono::milliseconds now);
 /// REQUIRES: the topic has a service.
 [[nodiscard]] proto::ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic);

@@ -21,23 +21,27 @@ milliseconds resting_time(const Limits& limits) {
 
 template <class List>
 auto find_topic(List& list, const Topic& topic) {
-  return std::find_if(list.begin(), list.end(), [&topic](const auto& entry) { return entry.topic == &topic; });
+  return std::find_if(list.begin(), list.end(),
+                      [&topic](const auto& entry) { return entry.topic == &topic; });
 }
 
 /// Do subscribers that know the one understand the other?
 bool same_stream(const ServiceTerms& a, const ServiceTerms& b) {
-  return a.message_type == b.message_type && a.instance == b.instance && a.direction == b.direction &&
-         a.delivery == b.delivery && a.window == b.window && a.retain == b.retain;
+  return a.message_type == b.message_type && a.instance == b.instance &&
+         a.direction == b.direction && a.delivery == b.delivery && a.window == b.window &&
+         a.retain == b.retain;
 }
 
 proto::Refusal bad_name(const char* fault) {
-  return proto::Refusal{Status::bad_request, std::string{"the full name of a service cannot be that: "} + fault};
+  return proto::Refusal{Status::bad_request,
+                        std::string{"the full name of a service cannot be that: "} + fault};
 }
 
 proto::Refusal limit_reached(std::string_view what, std::uint64_t limit, std::string_view name) {
-  return proto::Refusal{Status::limit, "a node may have " + std::to_string(limit) + " " + std::string{what} +
-                                           "; end one first, or start the hub with a larger --limit " +
-                                           std::string{name}};
+  return proto::Refusal{Status::limit,
+                        "a node may have " + std::to_string(limit) + " " + std::string{what} +
+                            "; end one first, or start the hub with a larger --limit " +
+                            std::string{name}};
 }
 
 }  // namespace
@@ -54,8 +58,8 @@ std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
   return pace;
 }
 
-Services::Services(HubId hub, const Limits& limits, const IndexRange& groups, milliseconds returns_until,
-                   const Secret& secret)
+Services::Services(HubId hub, const Limits& limits, const IndexRange& groups,
+                   milliseconds returns_until, const Secret& secret)
     : hub_(hub),
       limits_(limits),
       secret_(secret),
@@ -65,9 +69,10 @@ GroupGrant Services::grant_of(std::uint32_t group, std::string_view full_name) c
   return {hub_, group, full_name, group_indices_.forgettings()};
 }
 
-/// Between two forgettings one service at most is given a group anew, so that of the proofs of one such time all are
-/// right. One from the time before is right where the group was in use at the forgetting: then nobody got it since.
-/// Any other one loses: another service may have got the group.
+/// Between two forgettings one service at most is given a group anew, so that of the proofs of one
+/// such time all are right. One from the time before is right where the group was in use at the
+/// forgetting: then nobody got it since. Any other one loses: another service may have got the
+/// group.
 bool Services::is_proven(const FormerGroup& former, std::string_view full_name) const {
 #ifdef GIMNET_BUG_FORMER_GROUP_UNPROVEN
   return former.group != 0 && !full_name.empty();
@@ -80,24 +85,28 @@ bool Services::is_proven(const FormerGroup& former, std::string_view full_name) 
 #endif
 }
 
-std::optional<std::uint32_t> Services::take_group(const FormerGroup& former, std::string_view full_name,
-                                                  milliseconds now) {
-  if (former.group != 0 && is_proven(former, full_name) && group_indices_.take_free(former.group, now)) {
+std::optional<std::uint32_t> Services::take_group(const FormerGroup& former,
+                                                  std::string_view full_name, milliseconds now) {
+  if (former.group != 0 && is_proven(former, full_name) &&
+      group_indices_.take_free(former.group, now)) {
     return former.group;
   }
   return group_indices_.take(now);
 }
 
-Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t provider, std::string_view full_name,
-                                                                 const ServiceTerms& terms, milliseconds now,
-                                                                 Effects& effects, const FormerGroup& former) {
+Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t provider,
+                                                                 std::string_view full_name,
+                                                                 const ServiceTerms& terms,
+                                                                 milliseconds now, Effects& effects,
+                                                                 const FormerGroup& former) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   const auto known = topics_.find(full_name);
   const bool provided = known != topics_.end() && known->second.service.has_value();
   if (provided && known->second.service->provider != provider) {
-    return proto::Refusal{Status::taken, "the service '" + std::string{full_name} + "' is provided by node " +
-                                             to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
-                                             "; choose another name"};
+    return proto::Refusal{Status::taken,
+                          "the service '" + std::string{full_name} + "' is provided by node " +
+                              to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
+                              "; choose another name"};
   }
   Node& node = nodes_[provider];
 #ifdef GIMNET_BUG_ONE_SERVICE_TOO_MANY
@@ -111,7 +120,8 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
   Topic& entry = topic(full_name);
   if (provided) find_topic(node.provides, entry)->life = node.life;
   if (!provided || !same_stream(entry.service->terms, terms)) {
-    const std::optional<std::uint32_t> group = take_group(provided ? FormerGroup{} : former, full_name, now);
+    const std::optional<std::uint32_t> group =
+        take_group(provided ? FormerGroup{} : former, full_name, now);
     if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
     if (!group) {
       forget_if_unused(entry);
@@ -137,16 +147,17 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
                     write_group_proof(grant_of(group, full_name), secret_)};
 }
 
-std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::uint32_t group, milliseconds now,
-                                                 Effects& effects) {
+std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::uint32_t group,
+                                                 milliseconds now, Effects& effects) {
   const auto found = groups_.find(group);
   if (found == groups_.end()) {
-    return proto::Refusal{Status::not_found, "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
+    return proto::Refusal{Status::not_found,
+                          "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
   }
   Topic& entry = *found->second;
   if (entry.service->provider != provider) {
-    return proto::Refusal{Status::denied,
-                          "the service '" + std::string{entry.full_name} + "' is provided by another node"};
+    return proto::Refusal{Status::denied, "the service '" + std::string{entry.full_name} +
+                                              "' is provided by another node"};
   }
   Node& node = nodes_[provider];
   node.provides.erase(find_topic(node.provides, entry));
@@ -156,8 +167,10 @@ std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::ui
   return std::nullopt;
 }
 
-Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_index, std::string_view full_name,
-                                                         const SubscriberTerms& terms, Effects& effects) {
+Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_index,
+                                                         std::string_view full_name,
+                                                         const SubscriberTerms& terms,
+                                                         Effects& effects) {
   if (const char* fault = proto::name_fault(full_name)) return bad_name(fault);
   Node& node = nodes_[node_index];
   const auto known = topics_.find(full_name);
@@ -186,8 +199,8 @@ Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_inde
   return &entry;
 }
 
-std::optional<proto::Refusal> Services::unsubscribe(std::uint32_t node_index, std::string_view full_name,
-                                                    Effects& effects) {
+std::optional<proto::Refusal> Services::unsubscribe(std::uint32_t node_index,
+                                                    std::string_view full_name, Effects& effects) {
   const auto known = topics_.find(full_name);
   const auto node = nodes_.find(node_index);
   if (known != topics_.end() && node != nodes_.end()) {
@@ -202,7 +215,8 @@ std::optional<proto::Refusal> Services::unsubscribe(std::uint32_t node_index, st
   return proto::Refusal{Status::not_found, "this node is not subscribed to that service"};
 }
 
-std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>& list, std::uint32_t life) {
+std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>& list,
+                                                          std::uint32_t life) {
   std::vector<Declared> kept;
   std::vector<Declared> taken;
   for (const Declared& declared : list) (declared.life == life ? kept : taken).push_back(declared);
@@ -220,7 +234,8 @@ void Services::drop_undeclared(std::uint32_t node_index, milliseconds now, Effec
   Node& node = found->second;
   const std::vector<Declared> unsubscribed = take_undeclared(node.subscribes, node.life);
   const std::vector<Declared> closed = take_undeclared(node.provides, node.life);
-  for (const Declared& declared : unsubscribed) remove_subscriber(*declared.topic, node_index, effects);
+  for (const Declared& declared : unsubscribed)
+    remove_subscriber(*declared.topic, node_index, effects);
   for (const Declared& declared : closed) {
     close_group(*declared.topic, now, effects);
     forget_if_unused(*declared.topic);
@@ -240,7 +255,8 @@ void Services::node_renamed(std::uint32_t node_index, milliseconds now, Effects&
   forget_if_idle(node_index);
 }
 
-void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index, Effects& effects) {
+void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index,
+                               Effects& effects) {
   auto node = nodes_.extract(node_index);
   if (node.empty()) return;
   node.key() = new_index;
@@ -268,8 +284,8 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
     // First the one that comes: a provider that hears of no subscribers stops.
     const auto count = static_cast<std::uint32_t>(list.size());
     for (const bool joined : {true, false}) {
-      effects.emplace_back(
-          SubscriberDue{entry.service->provider, entry.service->group, joined ? new_index : node_index, count, joined});
+      effects.emplace_back(SubscriberDue{entry.service->provider, entry.service->group,
+                                         joined ? new_index : node_index, count, joined});
     }
   }
 }
@@ -286,13 +302,16 @@ const Topic* Services::find_group(std::uint32_t group) const {
 
 const ServiceTerms* Services::provided(std::uint32_t node, std::string_view full_name) const {
   const auto known = topics_.find(full_name);
-  if (known == topics_.end() || !known->second.service || known->second.service->provider != node) return nullptr;
+  if (known == topics_.end() || !known->second.service || known->second.service->provider != node)
+    return nullptr;
   return &known->second.service->terms;
 }
 
-std::optional<SubscriberTerms> Services::subscribed(std::uint32_t node, std::string_view full_name) const {
+std::optional<SubscriberTerms> Services::subscribed(std::uint32_t node,
+                                                    std::string_view full_name) const {
   const auto known = topics_.find(full_name);
-  if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node)) return std::nullopt;
+  if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node))
+    return std::nullopt;
   const auto asked = known->second.terms.find(node);
   return asked != known->second.terms.end() ? asked->second : SubscriberTerms{};
 }
@@ -321,7 +340,8 @@ void Services::forget_if_idle(std::uint32_t node) {
   if (found->second.provides.empty() && found->second.subscribes.empty()) nodes_.erase(found);
 }
 
-void Services::change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects) {
+void Services::change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms,
+                            Effects& effects) {
   const std::optional<SubscriberTerms> before = topic.pace_of(subscriber);
   topic.terms.erase(subscriber);
   if (terms != SubscriberTerms{}) topic.terms[subscriber] = terms;
@@ -360,7 +380,8 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
     effects.emplace_back(MemberChanged{topic.service->group, node});
 #endif
     if (paced) effects.emplace_back(PaceEnded{node, topic.service->group, false});
-    effects.emplace_back(SubscriberDue{topic.service->provider, topic.service->group, node, number, false});
+    effects.emplace_back(
+        SubscriberDue{topic.service->provider, topic.service->group, node, number, false});
   }
   forget_if_unused(topic);
 }

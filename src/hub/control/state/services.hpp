@@ -46,8 +46,9 @@ struct Topic {
   std::optional<Service> service;
   std::vector<std::uint32_t> subscribers;                    ///< node indices, ascending
   std::unordered_map<std::uint32_t, SubscriberTerms> terms;  ///< of those that asked for something
-  /// Subscribers that changed their terms in this group: that got everything and are paced now; and that asked for a
-  /// pace and do not any more. Those stay paced, without bounds: what is held for them goes before what comes.
+  /// Subscribers that changed their terms in this group: that got everything and are paced now; and
+  /// that asked for a pace and do not any more. Those stay paced, without bounds: what is held for
+  /// them goes before what comes.
   std::unordered_set<std::uint32_t> once_plain;
   std::unordered_set<std::uint32_t> once_paced;
   UntoldMoves untold;
@@ -56,47 +57,58 @@ struct Topic {
   [[nodiscard]] std::optional<SubscriberTerms> pace_of(std::uint32_t subscriber) const;
 };
 
-/// Services and subscriptions by full name; each service owns a group. Nodes are named by index, and what a node
-/// declared stays while its session lives, its grace time included.
-/// Thread safety: none. Limits: services_per_node, subscriptions_per_node.
+/// Services and subscriptions by full name; each service owns a group. Nodes are named by index,
+/// and what a node declared stays while its session lives, its grace time included. Thread safety:
+/// none. Limits: services_per_node, subscriptions_per_node.
 class Services {
  public:
-  /// In the order of names, which no choice of names can make slow, and which finds at once all that begin alike.
+  /// In the order of names, which no choice of names can make slow, and which finds at once all
+  /// that begin alike.
   using Topics = std::map<std::string, Topic, std::less<>>;
 
-  /// Until `returns_until` providers of before a restart may come back. `secret` proves who had a group.
-  Services(HubId hub, const Limits& limits, const IndexRange& groups = {}, std::chrono::milliseconds returns_until = {},
-           const Secret& secret = {});
+  /// Until `returns_until` providers of before a restart may come back. `secret` proves who had a
+  /// group.
+  Services(HubId hub, const Limits& limits, const IndexRange& groups = {},
+           std::chrono::milliseconds returns_until = {}, const Secret& secret = {});
 
   struct Advertised {
     std::uint32_t group = 0;
     std::uint32_t subscribers = 0;
     GroupProof proof{};  ///< for FormerGroup, from now on
   };
-  /// The group that a service had before its hub or its session came back, as its provider says; 0: none.
+  /// The group that a service had before its hub or its session came back, as its provider says; 0:
+  /// none.
   struct FormerGroup {
     std::uint32_t group = 0;
     std::span<const std::byte> proof{};
   };
-  /// A provider that advertises again what it provides keeps the group; if more than the metadata differs it gets a
-  /// new one, which its subscribers are told before it is published. A service that it begins gets the `former` group
-  /// if the proof is right, nobody else got it since, and nobody has it now. Errors: bad_request, taken, limit.
-  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider, std::string_view full_name,
-                                                             const ServiceTerms& terms, std::chrono::milliseconds now,
-                                                             Effects& effects, const FormerGroup& former);
-  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider, std::string_view full_name,
-                                                             const ServiceTerms& terms, std::chrono::milliseconds now,
+  /// A provider that advertises again what it provides keeps the group; if more than the metadata
+  /// differs it gets a new one, which its subscribers are told before it is published. A service
+  /// that it begins gets the `former` group if the proof is right, nobody else got it since, and
+  /// nobody has it now. Errors: bad_request, taken, limit.
+  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(
+      std::uint32_t provider, std::string_view full_name, const ServiceTerms& terms,
+      std::chrono::milliseconds now, Effects& effects, const FormerGroup& former);
+  [[nodiscard]] Result<Advertised, proto::Refusal> advertise(std::uint32_t provider,
+                                                             std::string_view full_name,
+                                                             const ServiceTerms& terms,
+                                                             std::chrono::milliseconds now,
                                                              Effects& effects) {
     return advertise(provider, full_name, terms, now, effects, FormerGroup{});
   }
   /// Errors: not_found, denied. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> withdraw(std::uint32_t provider, std::uint32_t group,
-                                                       std::chrono::milliseconds now, Effects& effects);
-  /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors: bad_request, limit.
-  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(std::uint32_t node_index, std::string_view full_name,
-                                                               const SubscriberTerms& terms, Effects& effects);
+                                                       std::chrono::milliseconds now,
+                                                       Effects& effects);
+  /// The topic, with or without a service yet. Terms that say nothing: all that comes. Errors:
+  /// bad_request, limit.
+  [[nodiscard]] Result<const Topic*, proto::Refusal> subscribe(std::uint32_t node_index,
+                                                               std::string_view full_name,
+                                                               const SubscriberTerms& terms,
+                                                               Effects& effects);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<proto::Refusal> unsubscribe(std::uint32_t node_index, std::string_view full_name,
+  [[nodiscard]] std::optional<proto::Refusal> unsubscribe(std::uint32_t node_index,
+                                                          std::string_view full_name,
                                                           Effects& effects);
 
   /// The node came back on a new connection: it will declare again what it still wants.
@@ -110,8 +122,8 @@ class Services {
   /// The node's session is over.
   void node_left(std::uint32_t node_index, std::chrono::milliseconds now, Effects& effects);
 
-  /// What the node is to be told, since it came back: each service whose moves it may not know of, once, and where it
-  /// is now. To be told again at its next return unless moves_read() came.
+  /// What the node is to be told, since it came back: each service whose moves it may not know of,
+  /// once, and where it is now. To be told again at its next return unless moves_read() came.
   [[nodiscard]] std::vector<ServiceMovedDue> untold_moves(std::uint32_t node) const;
   /// The node has read what it was told of that move (ServiceMovedDue), and of those before it.
   void moves_read(std::uint32_t node, std::uint64_t move);
@@ -121,9 +133,11 @@ class Services {
   /// Topics with a service, by ascending group index.
   [[nodiscard]] const std::map<std::uint32_t, Topic*>& groups() const { return groups_; }
   [[nodiscard]] const Topics& by_name() const { return topics_; }
-  /// What the node declared of that service; nothing: it has not. The pointer holds until something changes here.
+  /// What the node declared of that service; nothing: it has not. The pointer holds until something
+  /// changes here.
   [[nodiscard]] const ServiceTerms* provided(std::uint32_t node, std::string_view full_name) const;
-  [[nodiscard]] std::optional<SubscriberTerms> subscribed(std::uint32_t node, std::string_view full_name) const;
+  [[nodiscard]] std::optional<SubscriberTerms> subscribed(std::uint32_t node,
+                                                          std::string_view full_name) const;
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
   [[nodiscard]] IndexPool& group_indices() { return group_indices_; }
@@ -142,7 +156,8 @@ class Services {
   };
 
   /// Takes out of `list` what was not declared in that life.
-  [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list, std::uint32_t life);
+  [[nodiscard]] static std::vector<Declared> take_undeclared(std::vector<Declared>& list,
+                                                             std::uint32_t life);
   Topic& topic(std::string_view full_name);
   void forget_if_unused(Topic& topic);
   void forget_if_idle(std::uint32_t node);
@@ -150,13 +165,15 @@ class Services {
   /// Was it that service that was given the group last?
   [[nodiscard]] bool is_proven(const FormerGroup& former, std::string_view full_name) const;
   /// For a service that begins: the group that it had, or a new one.
-  [[nodiscard]] std::optional<std::uint32_t> take_group(const FormerGroup& former, std::string_view full_name,
+  [[nodiscard]] std::optional<std::uint32_t> take_group(const FormerGroup& former,
+                                                        std::string_view full_name,
                                                         std::chrono::milliseconds now);
   void open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects);
   static void end_group(const Topic& topic, Effects& effects);
   static void begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects);
   static void forget_subscriber(Topic& topic, std::uint32_t subscriber);
-  void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms, Effects& effects);
+  void change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms,
+                    Effects& effects);
   [[nodiscard]] static ServiceNoted service_noted(proto::ns::ChangeKind kind, const Topic& topic);
   void tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects);
   /// In force; 0: the subscriber's messages are not counted.

@@ -14,7 +14,8 @@ using std::chrono::milliseconds;
 
 static_assert(UntoldMoves::kBetweenMax == proto::ns::kGroupsBetweenMax);
 
-ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t old_group, std::uint32_t new_group) {
+ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t old_group,
+                      std::uint32_t new_group) {
   ServiceMovedDue event;
   event.full_name = std::string{topic.full_name};
   event.old_group = old_group;
@@ -33,17 +34,18 @@ ServiceNoted Services::service_noted(ChangeKind kind, const Topic& topic) {
   return {kind, topic.service->group, topic.service->provider, std::string{topic.full_name}};
 }
 
-void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group, Effects& effects) {
+void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group,
+                          Effects& effects) {
   topic.service = service;
   topic.once_plain.clear();
   topic.once_paced.clear();
   groups_[service.group] = &topic;
   if (old_group != 0) {
-    effects.emplace_back(
-        ServiceNoted{ChangeKind::withdrawn, old_group, service.provider, std::string{topic.full_name}});
+    effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, old_group, service.provider,
+                                      std::string{topic.full_name}});
   }
-  // Who is told may send at once to a group that accepts data; of one that provides, messages come at once to whoever
-  // may have to be told.
+  // Who is told may send at once to a group that accepts data; of one that provides, messages come
+  // at once to whoever may have to be told.
   const bool accepts = service.terms.direction == proto::ns::Direction::accepts;
   if (accepts) effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
@@ -59,8 +61,8 @@ void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects&
                                topic.once_plain.contains(subscriber)});
 }
 
-/// The topic's group is gone. First from the table: a frame that is read before the provider's shard forgets the last
-/// message would make it anew, for ever.
+/// The topic's group is gone. First from the table: a frame that is read before the provider's
+/// shard forgets the last message would make it anew, for ever.
 void Services::end_group(const Topic& topic, Effects& effects) {
   const Service& service = *topic.service;
   effects.emplace_back(GroupChanged{service.group});
@@ -77,8 +79,8 @@ void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
   groups_.erase(service.group);
   group_indices_.give_back(service.group, now);
   tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
-  effects.emplace_back(
-      ServiceNoted{ChangeKind::withdrawn, service.group, service.provider, std::string{topic.full_name}});
+  effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, service.group, service.provider,
+                                    std::string{topic.full_name}});
 }
 
 void Services::tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects) {
@@ -125,7 +127,8 @@ std::vector<ServiceMovedDue> Services::untold_moves(std::uint32_t node) const {
 void Services::moves_read(std::uint32_t node, std::uint64_t move) {
   const auto found = nodes_.find(node);
   if (found == nodes_.end()) return;
-  for (const Declared& declared : found->second.subscribes) declared.topic->untold.on_read(node, move);
+  for (const Declared& declared : found->second.subscribes)
+    declared.topic->untold.on_read(node, move);
 }
 
 }  // namespace gimnet::hub

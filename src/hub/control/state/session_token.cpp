@@ -34,7 +34,8 @@ SessionNumber first_number(std::uint64_t boot) {
   return boot << kCountBits;
 }
 
-std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder& holder, const Secret& secret) {
+std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder& holder,
+                                   const Secret& secret) {
   std::vector<std::byte> bytes(kMacAt);
   store_le(bytes.data(), kVersion);
   store_le(bytes.data() + kIndexAt, token.index);
@@ -46,11 +47,13 @@ std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder&
 }
 
 std::optional<SessionToken> read_token(std::span<const std::byte> bytes) {
-  if (bytes.size() != kSessionTokenBytes || load_le<std::uint32_t>(bytes.data()) != kVersion) return std::nullopt;
+  if (bytes.size() != kSessionTokenBytes || load_le<std::uint32_t>(bytes.data()) != kVersion)
+    return std::nullopt;
   SessionToken token;
   token.index = load_le<std::uint32_t>(bytes.data() + kIndexAt);
   token.number = load_le<std::uint64_t>(bytes.data() + kNumberAt);
-  token.expiry = std::chrono::milliseconds{static_cast<std::int64_t>(load_le<std::uint64_t>(bytes.data() + kExpiryAt))};
+  token.expiry = std::chrono::milliseconds{
+      static_cast<std::int64_t>(load_le<std::uint64_t>(bytes.data() + kExpiryAt))};
   return token;
 }
 

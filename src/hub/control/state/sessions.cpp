@@ -11,7 +11,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// An id that was given back rests for as long as its node might come back and a frame for it might still wait.
+/// An id that was given back rests for as long as its node might come back and a frame for it might
+/// still wait.
 milliseconds resting_time(const Limits& limits) {
   return milliseconds{limits.grace_ms + std::max(limits.block_ms, limits.slow_consumer_ms)};
 }
@@ -19,7 +20,8 @@ milliseconds resting_time(const Limits& limits) {
 }  // namespace
 
 std::string title(NodeId node, const Session& session) {
-  return "node " + to_string(node) + (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
+  return "node " + to_string(node) +
+         (session.name.empty() ? std::string{} : " '" + session.name.str() + "'");
 }
 
 Sessions::Sessions(const Options& options, const Limits& limits)
@@ -29,7 +31,8 @@ Sessions::Sessions(const Options& options, const Limits& limits)
       secret_(options.secret),
       returns_until_(options.returns_until),
       last_number_(first_number(options.boot)),
-      indices_(kIndexMost, resting_time(limits), options.nodes, options.returns_until.value_or(milliseconds{0})),
+      indices_(kIndexMost, resting_time(limits), options.nodes,
+               options.returns_until.value_or(milliseconds{0})),
       kicked_(options.kicked),
       slots_(options.shards) {
   for (const SessionToken& token : kicked_) floor_.raise(token.index, token.number + 1);
@@ -55,7 +58,8 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
                                                           : 0;
   const bool holds = holder != nullptr && number == token->number;
   const std::string_view name = holds ? std::string_view{holder->token_name} : presented.name;
-  // The proof comes first: what else is wrong with a token is nobody's business who cannot show one.
+  // The proof comes first: what else is wrong with a token is nobody's business who cannot show
+  // one.
   if (!is_genuine(presented.token, {hub_, name, presented.identity}, secret_)) return {};
 #ifndef GIMNET_BUG_TOKEN_NEVER_EXPIRES
   if (token->expiry <= presented.wall) return {};
@@ -66,8 +70,8 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
   return {nullptr, token};
 }
 
-Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> shard_hint, milliseconds now,
-                                                  Places places) {
+Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> shard_hint,
+                                                  milliseconds now, Places places) {
   if (std::optional<proto::Goodbye> refusal = full_refusal(places)) return std::move(*refusal);
   if (std::optional<proto::Goodbye> refusal = id_refusal(now)) return std::move(*refusal);
   const std::optional<std::uint32_t> index = indices_.take(now);
@@ -81,7 +85,8 @@ std::optional<proto::Goodbye> Sessions::id_refusal(milliseconds now) {
                         shortage("node ids", indices_, now) + ", or connect to another hub"};
 }
 
-Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token, std::optional<std::uint16_t> shard_hint,
+Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token,
+                                                   std::optional<std::uint16_t> shard_hint,
                                                    milliseconds now, Places places) {
   if (std::optional<proto::Goodbye> refusal = full_refusal(places)) return std::move(*refusal);
   const bool taken = indices_.take_back(token.index);
@@ -95,17 +100,19 @@ std::optional<proto::Goodbye> Sessions::full_refusal(Places places, std::size_t 
   const std::string limit = places == Places::all ? "administrators" : "nodes";
   return proto::Goodbye{proto::GoodbyeCode::hub_full,
                         "this hub has as many nodes as it takes (" + std::to_string(most) +
-                            "); connect to another one, or start it with a larger --limit " + limit};
+                            "); connect to another one, or start it with a larger --limit " +
+                            limit};
 }
 
-Session& Sessions::put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
-                       milliseconds now) {
+Session& Sessions::put(std::uint32_t index, SessionNumber number,
+                       std::optional<std::uint16_t> shard_hint, milliseconds now) {
   const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
   renumbered_.erase(index);
   Session& session = sessions_[index];
   session.index = index;
   session.number = number;
-  session.place = hinted ? slots_.take_on(ShardIndex{static_cast<std::uint8_t>(*shard_hint)}) : slots_.take();
+  session.place =
+      hinted ? slots_.take_on(ShardIndex{static_cast<std::uint8_t>(*shard_hint)}) : slots_.take();
   session.joined = now;
   floor_.raise(index, number);
   return session;
@@ -135,7 +142,8 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
   session.connected = false;
   --connected_;
   DueList<Away>& away = session.name.empty() ? away_nameless_ : away_named_;
-  away.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation, session.attachment},
+  away.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation,
+            session.attachment},
            sessions_.size(), [this](const Away& each) { return !still_away(each); });
 }
 
@@ -189,7 +197,8 @@ std::vector<std::uint32_t> Sessions::former_indices(const Session& session) cons
 
 void Sessions::spend_token(const Session& session) {
   floor_.raise(session.index, session.number + 1);
-  for (const std::uint32_t former : former_indices(session)) floor_.raise(former, renumbered_.at(former).number + 1);
+  for (const std::uint32_t former : former_indices(session))
+    floor_.raise(former, renumbered_.at(former).number + 1);
 }
 
 void Sessions::end(Session& session, milliseconds now) {
@@ -239,8 +248,8 @@ bool Sessions::still_away(const Away& away) const {
 #ifdef GIMNET_BUG_EARLIER_ABSENCE_COUNTS
   return session != nullptr && !session->connected && session->place.generation == away.generation;
 #else
-  return session != nullptr && !session->connected && session->place.generation == away.generation &&
-         session->attachment == away.attachment;
+  return session != nullptr && !session->connected &&
+         session->place.generation == away.generation && session->attachment == away.attachment;
 #endif
 }
 

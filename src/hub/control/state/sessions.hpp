@@ -26,7 +26,8 @@
 
 namespace gimnet::hub {
 
-/// Where a connection came from, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid 77 uid 1000".
+/// Where a connection came from, as people read it: "tcp" and "127.0.0.1:41234", or "unix" and "pid
+/// 77 uid 1000".
 struct Origin {
   CompactText transport;
   CompactText address;
@@ -38,8 +39,8 @@ struct Closing {
   std::string sentence;
 };
 
-/// A node's membership of this hub: outlives its connections by the grace time. There are as many as nodes, most of
-/// them idle: what few of them have takes a pointer, no more.
+/// A node's membership of this hub: outlives its connections by the grace time. There are as many
+/// as nodes, most of them idle: what few of them have takes a pointer, no more.
 struct Session {
   std::uint32_t index = 0;       ///< of its node id
   std::uint32_t attachment = 0;  ///< of the latest connection, counted from 1
@@ -57,7 +58,8 @@ struct Session {
   std::chrono::milliseconds token_expiry{};  ///< since 1970
   std::chrono::milliseconds joined{};        ///< when the session began
   std::chrono::milliseconds connected_at{};  ///< when its latest connection was admitted
-  std::unique_ptr<const Closing> closing;    ///< of its last connection, if it was; told at its next WELCOME
+  std::unique_ptr<const Closing>
+      closing;  ///< of its last connection, if it was; told at its next WELCOME
   // Over all its connections, so that a new one is no way to get more.
   TokenBucket declarations;  ///< that it begins or changes
   TokenBucket oddities;      ///< requests of no use
@@ -85,16 +87,20 @@ class Sessions {
     IndexRange nodes{};                  ///< indices for newcomers
     IndexRange groups{};                 ///< the same for services
     std::vector<SessionToken> kicked{};  ///< not honoured any more
-    /// Until then nodes of before a restart may come back under their ids. Nothing: there were none.
+    /// Until then nodes of before a restart may come back under their ids. Nothing: there were
+    /// none.
     std::optional<std::chrono::milliseconds> returns_until{};
   };
   Sessions(const Options& options, const Limits& limits);
 
-  [[nodiscard]] NodeId node_id(const Session& session) const { return make_id<NodeId>(hub_, session.index); }
+  [[nodiscard]] NodeId node_id(const Session& session) const {
+    return make_id<NodeId>(hub_, session.index);
+  }
 
   /// What a node shows to get its session back. REQUIRES: renew_token() was called for the session.
   [[nodiscard]] std::vector<std::byte> token_of(const Session& session) const;
-  /// The session's next token is for its present name and good for limits.token_ms from `wall` (since 1970) on.
+  /// The session's next token is for its present name and good for limits.token_ms from `wall`
+  /// (since 1970) on.
   void renew_token(Session& session, std::chrono::milliseconds wall) const;
 
   /// A token as it was presented, and by whom.
@@ -106,8 +112,9 @@ class Sessions {
   };
   /// What a token is good for. Neither member set: it counts as none.
   struct Claim {
-    Session* session = nullptr;         ///< that it is for
-    std::optional<SessionToken> token;  ///< its session is not there, but its index is free: restore()
+    Session* session = nullptr;  ///< that it is for
+    std::optional<SessionToken>
+        token;  ///< its session is not there, but its index is free: restore()
   };
   /// Takes as long for a wrong token as for the right one.
   [[nodiscard]] Claim claim(const Presented& presented);
@@ -123,34 +130,41 @@ class Sessions {
                                                          std::optional<std::uint16_t> shard_hint,
                                                          std::chrono::milliseconds now,
                                                          Places places = Places::ordinary);
-  /// A connection was admitted for the session. What the node says on it tells that it read WELCOME.
+  /// A connection was admitted for the session. What the node says on it tells that it read
+  /// WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
   void begin_grace(Session& session, std::chrono::milliseconds now);
   /// Tokens of the session count as none from now on.
   void spend_token(const Session& session);
-  /// The same, also after a restart, for as long as limits.kicked_tokens allows. False: it does not allow that now.
+  /// The same, also after a restart, for as long as limits.kicked_tokens allows. False: it does not
+  /// allow that now.
   [[nodiscard]] bool remember_kicked(const Session& session);
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
-  /// The session goes on under another index, which indices() gave; the former one rests, and leads here until somebody
-  /// else has it.
+  /// The session goes on under another index, which indices() gave; the former one rests, and leads
+  /// here until somebody else has it.
   void renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
-  /// Until when nodes that were here before a restart may still be on their way back, each under an index that counts
-  /// as used. Nothing: there were none.
-  [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const { return returns_until_; }
+  /// Until when nodes that were here before a restart may still be on their way back, each under an
+  /// index that counts as used. Nothing: there were none.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const {
+    return returns_until_;
+  }
   /// How long that is still so. Not above 0: no longer.
-  [[nodiscard]] std::chrono::milliseconds returns_expected_for(std::chrono::milliseconds now) const {
+  [[nodiscard]] std::chrono::milliseconds returns_expected_for(
+      std::chrono::milliseconds now) const {
     return returns_until_ ? *returns_until_ - now : std::chrono::milliseconds{0};
   }
-  /// The hub stood still for so long, and nobody could come back: grace times, and the time after a restart, did, too.
+  /// The hub stood still for so long, and nobody could come back: grace times, and the time after a
+  /// restart, did, too.
   void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
-  /// Under which index a node goes on that had this one: the same, unless renumber() gave it another.
+  /// Under which index a node goes on that had this one: the same, unless renumber() gave it
+  /// another.
   [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
   /// The indices that the session's node had before.
   [[nodiscard]] std::vector<std::uint32_t> former_indices(const Session& session) const;
 
-  /// The session is over: its slot is free at once, its index after it has rested. Tokens of indices that it had before
-  /// count as none from now on.
+  /// The session is over: its slot is free at once, its index after it has rested. Tokens of
+  /// indices that it had before count as none from now on.
   void end(Session& session, std::chrono::milliseconds now);
 
   /// A session whose grace time is over, or nullptr. The caller ends it and asks again.
@@ -160,7 +174,8 @@ class Sessions {
   /// Is there a session for longest_away_nameless()?
   [[nodiscard]] bool nameless_away();
   /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
-  [[nodiscard]] std::optional<proto::Goodbye> full_refusal(Places places, std::size_t ending = 0) const;
+  [[nodiscard]] std::optional<proto::Goodbye> full_refusal(Places places,
+                                                           std::size_t ending = 0) const;
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.
@@ -205,7 +220,8 @@ class Sessions {
   SlotPool slots_;
   std::map<std::uint32_t, Session> sessions_;
   std::map<std::uint32_t, Moved> renumbered_;  ///< by former index
-  // All grace times are equal, so the order is that of `until`. Apart, so that a nameless one is found at once.
+  // All grace times are equal, so the order is that of `until`. Apart, so that a nameless one is
+  // found at once.
   DueList<Away> away_named_;
   DueList<Away> away_nameless_;
   std::size_t connected_ = 0;

@@ -4,7 +4,9 @@
 
 namespace gimnet::hub {
 
-SlotPool::SlotPool(std::size_t shards) : shards_(shards) { GIMNET_CHECK(shards >= 1 && shards <= 255); }
+SlotPool::SlotPool(std::size_t shards) : shards_(shards) {
+  GIMNET_CHECK(shards >= 1 && shards <= 255);
+}
 
 Place SlotPool::take() {
   std::size_t best = turn_;
@@ -27,7 +29,8 @@ Place SlotPool::take_on(ShardIndex index) {
     shard.free.pop_back();
   }
   ++shard.held;
-  // One count for all slots: it comes round after 2^32 sessions, long after the last frame for the earlier holder.
+  // One count for all slots: it comes round after 2^32 sessions, long after the last frame for the
+  // earlier holder.
   if (++last_generation_ == 0) ++last_generation_;
   return Place{index, ConnectionSlot{slot}, last_generation_};
 }

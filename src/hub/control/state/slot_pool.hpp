@@ -18,7 +18,8 @@ class SlotPool {
   [[nodiscard]] Place take();
   /// A slot on that shard. REQUIRES: index < shards().
   [[nodiscard]] Place take_on(ShardIndex index);
-  /// REQUIRES: the place is held. Its slot may be handed out again at once, under another generation.
+  /// REQUIRES: the place is held. Its slot may be handed out again at once, under another
+  /// generation.
   void give_back(const Place& place);
 
   [[nodiscard]] std::size_t shards() const { return shards_.size(); }

@@ -4,7 +4,8 @@
 
 namespace gimnet::hub {
 
-void UntoldMoves::on_moved(const std::vector<std::uint32_t>& subscribers, std::uint32_t old_group, std::uint64_t move) {
+void UntoldMoves::on_moved(const std::vector<std::uint32_t>& subscribers, std::uint32_t old_group,
+                           std::uint64_t move) {
   if (!entries_.empty() && old_group != 0) {
     if (ended_.size() == kBetweenMax) ended_.erase(ended_.begin());
     ended_.push_back(old_group);

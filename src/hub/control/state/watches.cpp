@@ -14,7 +14,8 @@ namespace ns = proto::ns;
 
 /// No change is longer: a page that has more room than this takes one more.
 constexpr std::size_t kChangeBytesMax = 6 * 1024;
-/// No record is shorter: how many fill a page, which takes none once a longest change might not fit.
+/// No record is shorter: how many fill a page, which takes none once a longest change might not
+/// fit.
 constexpr std::size_t kRecordBytesLeast = 32;
 
 }  // namespace
@@ -29,7 +30,8 @@ void Watches::note(const NodeNoted& noted, const Membership& membership, millise
   ns::Change change;
   change.kind = noted.kind;
   change.former_name = noted.former_name;
-  const Session* session = noted.kind == ns::ChangeKind::left ? nullptr : membership.sessions().find(noted.index);
+  const Session* session =
+      noted.kind == ns::ChangeKind::left ? nullptr : membership.sessions().find(noted.index);
   if (session != nullptr) {
     change.node = record_of(hub_, *session, membership.services(), now);
   } else {
@@ -45,8 +47,9 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
   if (!journal_.keeps()) return journal_.pass();
   ns::Change change;
   change.kind = noted.kind;
-  const Topic* topic =
-      noted.kind == ns::ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
+  const Topic* topic = noted.kind == ns::ChangeKind::withdrawn
+                           ? nullptr
+                           : membership.services().find_group(noted.group);
   if (topic != nullptr) {
     change.service = record_of(hub_, *topic);
   } else {
@@ -58,17 +61,19 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
   journal_.add(std::move(change));
 }
 
-Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node, const ns::Watch& wanted) {
-  if (wanted.watch == 0) return proto::Refusal{Status::bad_request, "a watch has a number other than 0"};
+Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node,
+                                                       const ns::Watch& wanted) {
+  if (wanted.watch == 0)
+    return proto::Refusal{Status::bad_request, "a watch has a number other than 0"};
   Watch watch;
   watch.number = wanted.watch;
   watch.subjects = wanted.subjects;
   if (!wanted.pattern.empty()) watch.pattern = proto::Pattern::parse(wanted.pattern);
   if (!wanted.pattern.empty() && !watch.pattern) {
-    return proto::Refusal{
-        Status::bad_request,
-        "'" + escaped(wanted.pattern, kQuotedMax) +
-            "' is no pattern: write a name of at most 16 parts and 255 bytes in which a part may be * or **"};
+    return proto::Refusal{Status::bad_request,
+                          "'" + escaped(wanted.pattern, kQuotedMax) +
+                              "' is no pattern: write a name of at most 16 parts and 255 bytes in "
+                              "which a part may be * or **"};
   }
   Watcher& watcher = watchers_[node];
   const auto old = std::ranges::find(watcher.watches, wanted.watch, &Watch::number);
@@ -78,9 +83,10 @@ Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node, const
     if (watcher.watches.empty()) watchers_.erase(node);
     const std::string limit = own ? "watches_per_node" : "watches";
     const std::string who = own ? "a node" : "this hub";
-    return proto::Refusal{Status::limit, who + " has as many watches as it may have (" +
-                                             std::to_string(own ? limits_.watches_per_node : limits_.watches) +
-                                             "); end one first, or start the hub with a larger --limit " + limit};
+    return proto::Refusal{Status::limit,
+                          who + " has as many watches as it may have (" +
+                              std::to_string(own ? limits_.watches_per_node : limits_.watches) +
+                              "); end one first, or start the hub with a larger --limit " + limit};
   }
   journal_.begin();
   const bool goes_on = wanted.epoch == journal_.epoch() && journal_.reaches(wanted.version);
@@ -170,7 +176,8 @@ bool Watches::is_full(const Page& page) const {
 bool Watches::is_idle(const Watcher& watcher, const Watch& watch) const {
   if (watch.phase == Phase::live && watch.seen == journal_.version()) return true;
   if (watch.under_way == 0) return false;
-  return watch.under_way >= limits_.watch_window || watcher.under_way >= limits_.watch_window_per_node;
+  return watch.under_way >= limits_.watch_window ||
+         watcher.under_way >= limits_.watch_window_per_node;
 }
 
 void Watches::begin(Watch& watch) {
@@ -180,8 +187,8 @@ void Watches::begin(Watch& watch) {
   watch.seen = watch.told = journal_.version();
 }
 
-/// The changes of what the snapshot has shown come before more of it is shown: so what is shown is true at once, and
-/// what was not shown yet need not be told of.
+/// The changes of what the snapshot has shown come before more of it is shown: so what is shown is
+/// true at once, and what was not shown yet need not be told of.
 Watches::Page Watches::next_page(Watch& watch, Turn& turn) {
   Page page;
   if (watch.phase != Phase::begin && !journal_.reaches(watch.seen)) {
@@ -242,8 +249,9 @@ bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
   const bool of_nodes = watch.phase == Phase::nodes;
   const std::size_t records = (limits_.watch_event_bytes - kChangeBytesMax) / kRecordBytesLeast;
   const ListingRequest request{&*watch.pattern, watch.cursor, false, records, limits_.scan_records};
-  const std::optional<Listed> listed =
-      of_nodes ? list_few_nodes(turn.membership, request) : list_few_services(turn.membership.services(), request);
+  const std::optional<Listed> listed = of_nodes
+                                           ? list_few_nodes(turn.membership, request)
+                                           : list_few_services(turn.membership.services(), request);
   watch.few = listed.has_value();
   if (!listed) return false;
   turn.work -= std::min(turn.work, listed->looked_at);
@@ -305,14 +313,17 @@ proto::Payload Watches::finish(Watch& watch, Page page) const {
   head.version = watch.told = watch.seen;
   proto::bitestream::Writer writer;
   head.write_head(writer);
-  proto::Payload payload = proto::assemble_control({ns::WatchEvents::kOperation, proto::kNoRequest}, writer);
-  // A Bitestream is a row of values: the changes go before the head, as WatchEvents::write() has them.
+  proto::Payload payload =
+      proto::assemble_control({ns::WatchEvents::kOperation, proto::kNoRequest}, writer);
+  // A Bitestream is a row of values: the changes go before the head, as WatchEvents::write() has
+  // them.
   payload.insert(payload.begin() + proto::kControlHeaderSize, page.bytes.begin(), page.bytes.end());
   return payload;
 }
 
 bool Watches::wants(const Watch& watch, const Journal::Note& note) {
-  if ((watch.subjects & (note.of_service ? ns::kWatchServices : ns::kWatchNodes)) == 0) return false;
+  if ((watch.subjects & (note.of_service ? ns::kWatchServices : ns::kWatchNodes)) == 0)
+    return false;
 #ifndef GIMNET_BUG_WATCH_TELLS_TWICE
   // What the snapshot has yet to look at, it will show as it is then.
   if (watch.phase == Phase::nodes && (note.of_service || note.index > watch.cursor)) return false;

@@ -14,11 +14,11 @@
 
 namespace gimnet::hub {
 
-/// Who watches which names and services, and how much of it each has been told. A watch is a place in the journal: one
-/// that fell off its end is told the present state from the start again. Each serve() does a bounded piece of work,
-/// and each node takes part in it in turn.
-/// Thread safety: none. Time is an argument. Limits: watches, watches_per_node, scan_records,
-/// watch_event_bytes, watch_window, watch_window_per_node.
+/// Who watches which names and services, and how much of it each has been told. A watch is a place
+/// in the journal: one that fell off its end is told the present state from the start again. Each
+/// serve() does a bounded piece of work, and each node takes part in it in turn. Thread safety:
+/// none. Time is an argument. Limits: watches, watches_per_node, scan_records, watch_event_bytes,
+/// watch_window, watch_window_per_node.
 class Watches {
  public:
   Watches(HubTitle hub, std::uint64_t epoch, const Limits& limits);
@@ -28,8 +28,8 @@ class Watches {
   void note(const ServiceNoted& noted, const Membership& membership, std::chrono::milliseconds now);
 
   /// Begins a watch, or one of that number anew. Errors: bad_request, limit.
-  [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(std::uint32_t node,
-                                                                     const proto::ns::Watch& wanted);
+  [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(
+      std::uint32_t node, const proto::ns::Watch& wanted);
   /// Errors: not_found. nullopt: done.
   [[nodiscard]] std::optional<proto::Refusal> unwatch(std::uint32_t node, std::uint32_t number);
   /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
@@ -39,7 +39,8 @@ class Watches {
 
   /// Gives `send` what is due, a piece of it. True: there is more to do at once.
   using Send = std::function<void(std::uint32_t node, proto::Payload events)>;
-  [[nodiscard]] bool serve(const Membership& membership, std::chrono::milliseconds now, const Send& send);
+  [[nodiscard]] bool serve(const Membership& membership, std::chrono::milliseconds now,
+                           const Send& send);
 
   [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] std::size_t size() const { return watches_; }
@@ -85,7 +86,8 @@ class Watches {
   void add_changes(Watch& watch, Page& page, Turn& turn) const;
   void add_nodes(Watch& watch, Page& page, Turn& turn) const;
   void add_services(Watch& watch, Page& page, Turn& turn) const;
-  /// By name, where those whose names begin as the pattern does are few. False: they are not, and nothing was added.
+  /// By name, where those whose names begin as the pattern does are few. False: they are not, and
+  /// nothing was added.
   [[nodiscard]] bool add_few(Watch& watch, Page& page, Turn& turn) const;
   void add_node(const Session& session, Page& page, const Turn& turn) const;
   void add_service(const Topic& topic, Page& page) const;

@@ -6,11 +6,12 @@
 
 namespace gimnet::hub {
 
-/// The groups of which a recipient takes only so many messages at a time, as its queues see them. A message counts with
-/// the frame that ends it. Thread safety: one shard.
+/// The groups of which a recipient takes only so many messages at a time, as its queues see them. A
+/// message counts with the frame that ends it. Thread safety: one shard.
 class CountedGroups {
  public:
-  /// Are this group's messages counted? Then a written one is kept until it is confirmed: it is never let go.
+  /// Are this group's messages counted? Then a written one is kept until it is confirmed: it is
+  /// never let go.
   [[nodiscard]] virtual bool counts(GroupId group) const = 0;
   /// So many messages of the group that were on their way to the recipient do not reach it.
   virtual void on_lost(GroupId group, std::uint32_t messages) = 0;

@@ -7,11 +7,14 @@
 
 namespace gimnet::hub {
 
-void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason) {
+void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames,
+                    proto::DropReason reason) {
   tally_.drop(reason, frames);
   if (!wants_report(proto::load_header(first))) return;
   const std::byte* last = first;
-  for (const std::byte* next = first; next < first + size; next += proto::load_header(next).frame_size()) last = next;
+  for (const std::byte* next = first; next < first + size;
+       next += proto::load_header(next).frame_size())
+    last = next;
   remember(last, frames, reason);
 }
 
@@ -42,13 +45,15 @@ void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::Dro
   }
   note->count += frames;
   note->last = header;
-  note->following_size = static_cast<std::uint8_t>(std::min<std::size_t>(header.length, proto::kReportFollowingMax));
+  note->following_size =
+      static_cast<std::uint8_t>(std::min<std::size_t>(header.length, proto::kReportFollowingMax));
   std::memcpy(note->following, frame + proto::kHeaderSize, note->following_size);
 }
 
 DropBook::Note* DropBook::find(NodeId sender, proto::DropReason reason) {
   if (notes_.empty()) return nullptr;
-  for (std::uint32_t number = heads_[place_of(sender, reason)]; number != 0; number = notes_[number - 1].next) {
+  for (std::uint32_t number = heads_[place_of(sender, reason)]; number != 0;
+       number = notes_[number - 1].next) {
     Note& note = notes_[number - 1];
     if (note.sender == sender && note.reason == reason) return &note;
   }
@@ -56,7 +61,8 @@ DropBook::Note* DropBook::find(NodeId sender, proto::DropReason reason) {
 }
 
 std::size_t DropBook::place_of(NodeId sender, proto::DropReason reason) const {
-  // Neighbouring ids, as those of nodes that joined together, have places of their own; so have a node's reasons.
+  // Neighbouring ids, as those of nodes that joined together, have places of their own; so have a
+  // node's reasons.
   return (sender.value() + static_cast<std::size_t>(reason) * 0x9E3779B1u) & (heads_.size() - 1);
 }
 
@@ -71,9 +77,11 @@ void DropBook::link_all() {
   for (std::uint32_t number = 1; number <= notes_.size(); ++number) link(number);
 }
 
-std::size_t DropBook::encode(const Note& note, std::span<std::byte, proto::kReportSizeMax> payload) {
-  return proto::encode_report({note.reason, note.count, note.last, std::span(note.following, note.following_size)},
-                              payload);
+std::size_t DropBook::encode(const Note& note,
+                             std::span<std::byte, proto::kReportSizeMax> payload) {
+  return proto::encode_report(
+      {note.reason, note.count, note.last, std::span(note.following, note.following_size)},
+      payload);
 }
 
 }  // namespace gimnet::hub

@@ -11,20 +11,25 @@
 
 namespace gimnet::hub {
 
-/// Where every frame that is not delivered ends: counted by reason, and, where its sender asked for it, remembered for
-/// a REPORT. Reports for one sender and reason are merged until they are due. Thread safety: one shard.
+/// Where every frame that is not delivered ends: counted by reason, and, where its sender asked for
+/// it, remembered for a REPORT. Reports for one sender and reason are merged until they are due.
+/// Thread safety: one shard.
 class DropBook {
  public:
   /// interval_ms: the shortest time between two reports to one sender for one reason.
-  /// notes_max: senders and reasons remembered at once; the drops of more are counted but not reported.
+  /// notes_max: senders and reasons remembered at once; the drops of more are counted but not
+  /// reported.
   DropBook(Tally& tally, std::uint64_t interval_ms, std::uint64_t notes_max)
       : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
-  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one header but for the
-  /// length. Where a REPORT is wanted all are looked at; who knows the last one calls drop_start() with that.
-  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames, proto::DropReason reason);
+  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one
+  /// header but for the length. Where a REPORT is wanted all are looked at; who knows the last one
+  /// calls drop_start() with that.
+  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames,
+            proto::DropReason reason);
 
-  /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT shows need be there.
+  /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT
+  /// shows need be there.
   void drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
 
   /// The same for frames with any headers.
@@ -35,11 +40,12 @@ class DropBook {
     return header.has(proto::kFlagReport) && header.kind != proto::Kind::report;
   }
 
-  /// True while reports wait for their time, or senders are to be forgotten: flush() has something to do.
+  /// True while reports wait for their time, or senders are to be forgotten: flush() has something
+  /// to do.
   [[nodiscard]] bool pending() const { return !notes_.empty(); }
 
-  /// Calls send(NodeId sender, payload span) for each report that is due, and forgets senders that dropped nothing for
-  /// a while.
+  /// Calls send(NodeId sender, payload span) for each report that is due, and forgets senders that
+  /// dropped nothing for a while.
   template <class Send>
   void flush(std::uint64_t now_ms, Send&& send) {
     const std::size_t before = notes_.size();
@@ -85,8 +91,9 @@ class DropBook {
   Tally& tally_;
   const std::uint64_t interval_ms_;
   const std::uint64_t notes_max_;
-  std::vector<Note> notes_;           ///< Limit: reports
-  std::vector<std::uint32_t> heads_;  ///< by place_of(): a note's number, its index + 1; empty before the first
+  std::vector<Note> notes_;  ///< Limit: reports
+  std::vector<std::uint32_t>
+      heads_;  ///< by place_of(): a note's number, its index + 1; empty before the first
 };
 
 }  // namespace gimnet::hub

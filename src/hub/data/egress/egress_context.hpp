@@ -15,15 +15,15 @@
 
 namespace gimnet::hub {
 
-/// How an outbox reaches the senders that fill it, on whatever shard they are. Called only when a queue is full or has
-/// room again, never per frame.
+/// How an outbox reaches the senders that fill it, on whatever shard they are. Called only when a
+/// queue is full or has room again, never per frame.
 class SenderSignals {
  public:
   virtual ~SenderSignals() = default;
   virtual void pause(NodeId sender, const proto::flow::Target& target) = 0;
   virtual void resume(NodeId sender, const proto::flow::Target& target) = 0;
-  /// The sender ignored its PAUSE past the reserve, or had no time to heed it: stop reading it until release() was
-  /// called as often as hold().
+  /// The sender ignored its PAUSE past the reserve, or had no time to heed it: stop reading it
+  /// until release() was called as often as hold().
   virtual void hold(NodeId sender) = 0;
   virtual void release(NodeId sender) = 0;
 };
@@ -43,10 +43,12 @@ struct EgressContext {
   OwnerThread owner{};           ///< the shard's: asked wherever the data plane is entered
   FrameStarts starts{};          ///< of this turn
 
-  /// A run that is not delivered, whoever's queue it was for. No frame of it is shorter than `shortest_bytes`.
+  /// A run that is not delivered, whoever's queue it was for. No frame of it is shorter than
+  /// `shortest_bytes`.
   void drop(const Run& run, std::uint32_t shortest_bytes, proto::DropReason reason) {
     const bool told = DropBook::wants_report(run.header());
-    drops.drop_start(told ? last_frame(run, shortest_bytes, starts) : run.bytes, run.frames, reason);
+    drops.drop_start(told ? last_frame(run, shortest_bytes, starts) : run.bytes, run.frames,
+                     reason);
   }
 };
 

@@ -9,15 +9,16 @@
 
 namespace gimnet::hub {
 
-/// What waits in a lane: a run of whole messages, or the fragments of one message. All its frames have the same dst,
-/// src, kind, flags and lane.
+/// What waits in a lane: a run of whole messages, or the fragments of one message. All its frames
+/// have the same dst, src, kind, flags and lane.
 struct Entry {
   Run run;
   PieceRef more;
   MorePieces* last = nullptr;
-  std::uint32_t size = 0;            ///< of all pieces
-  std::uint32_t frames = 0;          ///< of all pieces; 0: this entry was dropped or replaced and is skipped
-  std::uint32_t message_number = 0;  ///< of a fragmented message
+  std::uint32_t size = 0;  ///< of all pieces
+  std::uint32_t frames =
+      0;  ///< of all pieces; 0: this entry was dropped or replaced and is skipped
+  std::uint32_t message_number = 0;                   ///< of a fragmented message
   std::uint32_t shortest_bytes = proto::kHeaderSize;  ///< no frame is shorter
   bool fragmented = false;
   bool complete = true;   ///< the last fragment is here
@@ -47,8 +48,8 @@ struct Entry {
     if (!more) last = nullptr;
     return true;
   }
-  /// The first messages of a run, which this entry loses. REQUIRES: there are so many; all, or neither FRAGMENT, EXT,
-  /// LATEST nor BLOCK.
+  /// The first messages of a run, which this entry loses. REQUIRES: there are so many; all, or
+  /// neither FRAGMENT, EXT, LATEST nor BLOCK.
   [[nodiscard]] Entry take_front(const Leading& front) {
     Entry taken;
     if (front.frames == frames) {

@@ -6,7 +6,8 @@ namespace gimnet::hub {
 
 std::size_t FrameStarts::Stretch::index_of(const Run& run) const {
   const auto offset = static_cast<std::uint32_t>(run.bytes - begin_);
-  return static_cast<std::size_t>(std::lower_bound(starts_.begin(), starts_.end(), offset) - starts_.begin());
+  return static_cast<std::size_t>(std::lower_bound(starts_.begin(), starts_.end(), offset) -
+                                  starts_.begin());
 }
 
 Leading FrameStarts::Stretch::leading_frames(const Run& run, std::uint32_t frames) const {
@@ -16,7 +17,8 @@ Leading FrameStarts::Stretch::leading_frames(const Run& run, std::uint32_t frame
 
 Leading FrameStarts::Stretch::leading_from(const Run& run, std::uint64_t bytes) const {
   const auto first = starts_.begin() + static_cast<std::ptrdiff_t>(index_of(run));
-  // The start of the frame behind those that are looked for; behind the run's last one there may be none.
+  // The start of the frame behind those that are looked for; behind the run's last one there may be
+  // none.
   const auto behind = std::lower_bound(first + 1, first + run.frames, *first + bytes);
   const auto frames = static_cast<std::uint32_t>(behind - first);
   return {frames, frames == run.frames ? run.size : *behind - *first};

@@ -15,10 +15,11 @@ struct Leading {
   std::uint32_t size = 0;
 };
 
-/// Where the frames begin of long runs that are not all equally long: looked for once, and then found by bisection for
-/// every queue that drops of the same run, so that one with many subscribers costs each of them little. Keeps the runs'
-/// buffers until forget(): nobody writes over their bytes. Thread safety: one shard. Memory: none before the first such
-/// run, at most kStretches * kFramesMax * 4 bytes.
+/// Where the frames begin of long runs that are not all equally long: looked for once, and then
+/// found by bisection for every queue that drops of the same run, so that one with many subscribers
+/// costs each of them little. Keeps the runs' buffers until forget(): nobody writes over their
+/// bytes. Thread safety: one shard. Memory: none before the first such run, at most kStretches *
+/// kFramesMax * 4 bytes.
 class FrameStarts {
  public:
   /// The starts of one run and of whatever is left of it.
@@ -48,7 +49,8 @@ class FrameStarts {
     std::vector<std::uint32_t> starts_;  ///< from begin_, ascending
   };
 
-  /// nullptr: it is too short to be worth it, or longer than any that comes from one read. Valid until: the next call.
+  /// nullptr: it is too short to be worth it, or longer than any that comes from one read. Valid
+  /// until: the next call.
   [[nodiscard]] const Stretch* find(const Run& run);
   /// The turn is over.
   void forget() {
@@ -58,7 +60,8 @@ class FrameStarts {
   static constexpr std::uint32_t kFramesMin = 32;
   /// The smallest frames in the largest buffer.
   static constexpr std::uint32_t kFramesMax = 384 * 1024 / 16;
-  /// Queues that have been full for as long drop of the same runs: the one that comes, and one or two old ones.
+  /// Queues that have been full for as long drop of the same runs: the one that comes, and one or
+  /// two old ones.
   static constexpr std::size_t kStretches = 4;
 
  private:

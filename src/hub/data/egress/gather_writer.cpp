@@ -11,14 +11,15 @@ namespace {
 /// A waiting lane gets at least this part of the bytes.
 constexpr std::uint32_t kLaneShare = 16;
 
-/// Looks at the extensions of a frame whose turn has come: stamps a TRACE, and returns false if an AGE says that it is
-/// not worth sending any more. The bytes are this recipient's own copy.
+/// Looks at the extensions of a frame whose turn has come: stamps a TRACE, and returns false if an
+/// AGE says that it is not worth sending any more. The bytes are this recipient's own copy.
 bool still_worth_sending(const Entry& entry, HubId hub, std::int64_t now_ns) {
   const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
   if (!frame) return true;
   const auto age = proto::find_age(frame->extensions);
   if (age && proto::too_old(*age, now_ns)) return false;
-  const std::span<std::byte> own(const_cast<std::byte*>(frame->extensions.data()), frame->extensions.size());
+  const std::span<std::byte> own(const_cast<std::byte*>(frame->extensions.data()),
+                                 frame->extensions.size());
   static_cast<void>(proto::stamp_departure(own, hub, now_ns));
   return true;
 }
@@ -38,7 +39,8 @@ void GatherWriter::Batch::add(Source source, const std::byte* begin, std::uint32
   pieces[piece_count++] = {const_cast<std::byte*>(begin), size};
 }
 
-Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport, EgressContext& context) {
+Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport,
+                          EgressContext& context) {
   context.owner.check_here();
   Job job{outbox, resume, context};
   for (int round = 0; round < kBatchesPerTurn; ++round) {
@@ -63,11 +65,13 @@ Run GatherWriter::take_partial() {
   return std::exchange(partial_, Partial{}).run;
 }
 
-// ---- gather --------------------------------------------------------------------------------------------------------
+// ---- gather
+// -------------------------------------------------------------------------------------------------
 
 void GatherWriter::gather(Batch& batch, Job& job) {
   if (in_frame()) {
-    batch.add(Source::partial, partial_.run.bytes + partial_.offset, partial_.run.size - partial_.offset);
+    batch.add(Source::partial, partial_.run.bytes + partial_.offset,
+              partial_.run.size - partial_.offset);
   }
   gather_queue(batch, Source::control, job.outbox.control(), job);
   if (!job.outbox.has_lanes()) return;
@@ -81,9 +85,11 @@ void GatherWriter::gather(Batch& batch, Job& job) {
 }
 
 void GatherWriter::gather_queue(Batch& batch, Source source, RingQueue<Run>& queue, Job& job) {
-  for (std::uint64_t number = queue.first_number(); number != queue.end_number() && !batch.full(); ++number) {
+  for (std::uint64_t number = queue.first_number(); number != queue.end_number() && !batch.full();
+       ++number) {
     const Run& run = queue.at(number);
-    const std::uint32_t size = source == Source::control ? run.size : allowed(run, batch.bytes, job);
+    const std::uint32_t size =
+        source == Source::control ? run.size : allowed(run, batch.bytes, job);
     if (size != 0) batch.add(source, run.bytes, size);
     if (size < run.size) return;
   }
@@ -106,7 +112,9 @@ void GatherWriter::gather_lanes(Batch& batch, Job& job) {
     if (lane == proto::kLaneCount) return;
     const Run& run = *cursors[lane].run;
     const std::uint32_t size = allowed(run, batch.bytes, job);
-    if (size != 0) batch.add(static_cast<Source>(static_cast<std::size_t>(Source::lane0) + lane), run.bytes, size);
+    if (size != 0)
+      batch.add(static_cast<Source>(static_cast<std::size_t>(Source::lane0) + lane), run.bytes,
+                size);
     owe(lane, size, cursors, job.outbox);
     if (size < run.size) return;
     advance(cursors[lane], lane, job);
@@ -119,7 +127,9 @@ void GatherWriter::gather_lane(Batch& batch, std::size_t lane, LaneCursor& curso
   while (cursor.run != nullptr && !batch.full()) {
     const Run& run = *cursor.run;
     const std::uint32_t size = allowed(run, batch.bytes, job);
-    if (size != 0) batch.add(static_cast<Source>(static_cast<std::size_t>(Source::lane0) + lane), run.bytes, size);
+    if (size != 0)
+      batch.add(static_cast<Source>(static_cast<std::size_t>(Source::lane0) + lane), run.bytes,
+                size);
     owed -= std::min<std::uint64_t>(owed, size);
     if (size < run.size) return;
     advance(cursor, lane, job);
@@ -131,7 +141,8 @@ void GatherWriter::load(LaneCursor& cursor, std::size_t lane, Job& job) {
   for (; cursor.number < entries.end_number(); ++cursor.number) {
     Entry& entry = entries.at(cursor.number);
     if (entry.frames == 0) continue;
-    if (entry.extended && !entry.touched && !still_worth_sending(entry, job.context.hub, job.context.now_wall_ns)) {
+    if (entry.extended && !entry.touched &&
+        !still_worth_sending(entry, job.context.hub, job.context.now_wall_ns)) {
       job.outbox.lane(lane).on_left(entry, entry.size);
       job.outbox.lose(entry, proto::DropReason::too_old, job.context);
       continue;
@@ -153,7 +164,8 @@ void GatherWriter::advance(LaneCursor& cursor, std::size_t lane, Job& job) {
   load(cursor, lane, job);
 }
 
-std::size_t GatherWriter::choose_lane(std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox) {
+std::size_t GatherWriter::choose_lane(std::array<LaneCursor, proto::kLaneCount>& cursors,
+                                      Outbox& outbox) {
   for (std::size_t lane = 1; lane < cursors.size(); ++lane) {
     if (cursors[lane].run != nullptr && outbox.owed()[lane] >= cursors[lane].run->size) return lane;
   }
@@ -163,8 +175,8 @@ std::size_t GatherWriter::choose_lane(std::array<LaneCursor, proto::kLaneCount>&
   return cursors.size();
 }
 
-void GatherWriter::owe(std::size_t lane, std::uint32_t bytes, std::array<LaneCursor, proto::kLaneCount>& cursors,
-                       Outbox& outbox) {
+void GatherWriter::owe(std::size_t lane, std::uint32_t bytes,
+                       std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox) {
   auto& owed = outbox.owed();
   owed[lane] -= std::min<std::uint64_t>(owed[lane], bytes);
   for (std::size_t lower = lane + 1; lower < cursors.size(); ++lower) {
@@ -186,7 +198,8 @@ std::uint32_t GatherWriter::allowed(const Run& run, std::size_t planned, Job& jo
   return size;
 }
 
-// ---- consume -------------------------------------------------------------------------------------------------------
+// ---- consume
+// -------------------------------------------------------------------------------------------------
 
 void GatherWriter::consume(const Batch& batch, std::size_t bytes, Job& job) {
   for (std::size_t i = 0; i < batch.pick_count && bytes != 0; ++i) {
@@ -206,7 +219,9 @@ void GatherWriter::consume(const Batch& batch, std::size_t bytes, Job& job) {
         consume_queue(job.outbox.replay(), taken, false, job);
         break;
       default:
-        consume_lane(static_cast<std::size_t>(pick.source) - static_cast<std::size_t>(Source::lane0), taken, job);
+        consume_lane(
+            static_cast<std::size_t>(pick.source) - static_cast<std::size_t>(Source::lane0), taken,
+            job);
     }
   }
 }
@@ -218,9 +233,10 @@ void GatherWriter::consume_partial(std::size_t bytes, Job& job) {
   finish(std::move(whole.run), whole.control, whole.shared, job);
 }
 
-/// Takes `bytes` from the front of `run`: whole frames are finished, one that was begun becomes the partial frame.
-/// Returns the bytes that left the run.
-std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool control, bool shared, Job& job) {
+/// Takes `bytes` from the front of `run`: whole frames are finished, one that was begun becomes the
+/// partial frame. Returns the bytes that left the run.
+std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool control, bool shared,
+                                        Job& job) {
   if (bytes >= run.size) {
     const std::uint32_t size = run.size;
     finish(std::exchange(run, Run{}), control, shared, job);

@@ -18,15 +18,17 @@ enum class Flush : std::uint8_t {
   failed,   ///< the connection is broken
 };
 
-/// Writes an outbox: many frames, one gathered write. Order: a frame begun before, control, frames of an earlier
-/// connection, then lanes by number, where a waiting lane gets at least 1/16 of the bytes. What the transport does not
-/// take stays in its lane, where it can still be overtaken, replaced or dropped; but for a frame partly written.
-/// Thread safety: one shard. One per connection.
+/// Writes an outbox: many frames, one gathered write. Order: a frame begun before, control, frames
+/// of an earlier connection, then lanes by number, where a waiting lane gets at least 1/16 of the
+/// bytes. What the transport does not take stays in its lane, where it can still be overtaken,
+/// replaced or dropped; but for a frame partly written. Thread safety: one shard. One per
+/// connection.
 class GatherWriter {
  public:
-  /// `resume` is nullptr where the connection has no resume. Frames that were taken count as delivered, or go to
-  /// `resume`.
-  [[nodiscard]] Flush flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport, EgressContext& context);
+  /// `resume` is nullptr where the connection has no resume. Frames that were taken count as
+  /// delivered, or go to `resume`.
+  [[nodiscard]] Flush flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport,
+                            EgressContext& context);
 
   [[nodiscard]] bool in_frame() const { return partial_.run.frames != 0; }
   /// A frame partly written makes its reader slow, but for one that a newer message may replace.
@@ -84,15 +86,17 @@ class GatherWriter {
   static void gather_lane(Batch& batch, std::size_t lane, LaneCursor& cursor, Job& job);
   static void load(LaneCursor& cursor, std::size_t lane, Job& job);
   static void advance(LaneCursor& cursor, std::size_t lane, Job& job);
-  [[nodiscard]] static std::size_t choose_lane(std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox);
-  static void owe(std::size_t lane, std::uint32_t bytes, std::array<LaneCursor, proto::kLaneCount>& cursors,
-                  Outbox& outbox);
+  [[nodiscard]] static std::size_t choose_lane(std::array<LaneCursor, proto::kLaneCount>& cursors,
+                                               Outbox& outbox);
+  static void owe(std::size_t lane, std::uint32_t bytes,
+                  std::array<LaneCursor, proto::kLaneCount>& cursors, Outbox& outbox);
   /// How much of the run may be written: all of it, or what fits in the resume buffer.
   [[nodiscard]] static std::uint32_t allowed(const Run& run, std::size_t planned, Job& job);
 
   void consume(const Batch& batch, std::size_t bytes, Job& job);
   void consume_partial(std::size_t bytes, Job& job);
-  [[nodiscard]] std::uint32_t consume_run(Run& run, std::size_t bytes, bool control, bool shared, Job& job);
+  [[nodiscard]] std::uint32_t consume_run(Run& run, std::size_t bytes, bool control, bool shared,
+                                          Job& job);
   void consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job);
   void consume_lane(std::size_t lane, std::size_t bytes, Job& job);
   static void finish(Run run, bool control, bool shared, Job& job);

@@ -5,7 +5,8 @@
 namespace gimnet::hub {
 
 void KeptMessage::append(const Run& frame, bool shared, EgressContext& context) {
-  const bool by_copy = frame.size < kCopyBytesMax && !shared && frame.buffer->kind != BufferKind::chunk;
+  const bool by_copy =
+      frame.size < kCopyBytesMax && !shared && frame.buffer->kind != BufferKind::chunk;
   Run piece = by_copy ? copy(frame, context) : frame.share();
   context.pool.pin(*piece.buffer.get());
   frames_ += piece.frames;

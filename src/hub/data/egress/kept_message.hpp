@@ -8,9 +8,9 @@
 
 namespace gimnet::hub {
 
-/// One message that is kept, whole or as far as it came: references to its frames, and small ones in memory of their
-/// own, so that they do not keep a read buffer. What it keeps counts against the budget. Cleared and filled again it
-/// does not allocate. Thread safety: one shard.
+/// One message that is kept, whole or as far as it came: references to its frames, and small ones
+/// in memory of their own, so that they do not keep a read buffer. What it keeps counts against the
+/// budget. Cleared and filled again it does not allocate. Thread safety: one shard.
 class KeptMessage {
  public:
   KeptMessage() = default;

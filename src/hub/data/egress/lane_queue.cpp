@@ -10,21 +10,26 @@ namespace gimnet::hub {
 namespace {
 
 bool same_header(const std::byte* a, const std::byte* b) {
-  return load_le<std::uint64_t>(a + proto::kAddressesOffset) == load_le<std::uint64_t>(b + proto::kAddressesOffset) &&
-         load_le<std::uint32_t>(a + proto::kAttributesOffset) == load_le<std::uint32_t>(b + proto::kAttributesOffset);
+  return load_le<std::uint64_t>(a + proto::kAddressesOffset) ==
+             load_le<std::uint64_t>(b + proto::kAddressesOffset) &&
+         load_le<std::uint32_t>(a + proto::kAttributesOffset) ==
+             load_le<std::uint32_t>(b + proto::kAttributesOffset);
 }
 
-/// Streams and messages that left may stay in their index until they are more than the others, and these.
+/// Streams and messages that left may stay in their index until they are more than the others, and
+/// these.
 constexpr std::size_t kForgottenMin = 64;
 /// A larger index is freed when it is not needed, since clearing it takes time.
 constexpr std::size_t kKeptBuckets = 4'096;
 
-std::uint64_t message_key(std::uint32_t src, std::uint32_t number) { return std::uint64_t{src} << 32 | number; }
+std::uint64_t message_key(std::uint32_t src, std::uint32_t number) {
+  return std::uint64_t{src} << 32 | number;
+}
 
 /// The message is not whole yet.
 bool waits_for(const Entry& entry, NodeId src, std::uint32_t number) {
-  return entry.frames != 0 && entry.fragmented && entry.message_number == number && !entry.complete &&
-         entry.run.header().src == src.value();
+  return entry.frames != 0 && entry.fragmented && entry.message_number == number &&
+         !entry.complete && entry.run.header().src == src.value();
 }
 
 template <class Index>
@@ -36,7 +41,9 @@ void forget(std::unique_ptr<Index>& index) {
   }
 }
 
-bool is_plain(const Entry& entry) { return !entry.fragmented && !entry.latest && !entry.extended && !entry.touched; }
+bool is_plain(const Entry& entry) {
+  return !entry.fragmented && !entry.latest && !entry.extended && !entry.touched;
+}
 
 }  // namespace
 
@@ -136,7 +143,8 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   if (streams() > 2 * entries_.size() + kForgottenMin) forget_streams();
   if (!indexed_) {
     begin_streams();
-    for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+    for (std::uint64_t number = entries_.first_number(); number != entries_.end_number();
+         ++number) {
       const Entry& each = entries_.at(number);
       if (each.frames != 0 && each.latest && !each.touched) (*streams_)[stream_of(each)] = number;
     }
@@ -160,7 +168,8 @@ bool LaneQueue::drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dro
     discount(entry);
     // Of a message in fragments all go.
     const Leading whole{entry.frames, entry.size};
-    dropped = entry.take_front(entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
+    dropped = entry.take_front(
+        entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
     count(entry);
     skip_dead();
     return true;

@@ -19,17 +19,18 @@ struct LatestStream {
 };
 [[nodiscard]] std::size_t hash_value(const LatestStream& stream);
 
-/// One lane of an outbox: entries in order, found again by stream (to replace an older LATEST message) and by message
-/// (to add a fragment). Both are found in constant time, however many wait, through indexes that are made when they are
-/// needed. What leaves it by being dropped or replaced is handed to a `lose(Entry&, reason)`.
-/// Thread safety: one shard.
+/// One lane of an outbox: entries in order, found again by stream (to replace an older LATEST
+/// message) and by message (to add a fragment). Both are found in constant time, however many wait,
+/// through indexes that are made when they are needed. What leaves it by being dropped or replaced
+/// is handed to a `lose(Entry&, reason)`. Thread safety: one shard.
 class LaneQueue {
  public:
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   /// Bytes of entries that must not be dropped for room.
   [[nodiscard]] std::uint64_t block_bytes() const { return block_bytes_; }
-  /// Does a message wait of which nothing was written yet? The others are finished whatever happens.
+  /// Does a message wait of which nothing was written yet? The others are finished whatever
+  /// happens.
   [[nodiscard]] bool holds_whole() const { return bytes_ != touched_bytes_; }
   /// A fragment of the entry was written; the caller has taken it out of its size.
   void touch(Entry& entry) {
@@ -40,10 +41,11 @@ class LaneQueue {
   /// Bytes of entries that a newer message may replace.
   [[nodiscard]] std::uint64_t latest_bytes() const { return latest_bytes_; }
 
-  /// Adds the entry, or joins it to the last one where both are plain runs of the same header in neighbouring memory.
+  /// Adds the entry, or joins it to the last one where both are plain runs of the same header in
+  /// neighbouring memory.
   void push(Entry entry);
-  /// Counts more frames into the last entry, behind which the caller has put them. REQUIRES: it is plain, of one piece,
-  /// and they have its header.
+  /// Counts more frames into the last entry, behind which the caller has put them. REQUIRES: it is
+  /// plain, of one piece, and they have its header.
   void extend(Entry& last, std::uint32_t bytes, std::uint32_t frames) {
     last.run.size += bytes;
     last.run.frames += frames;
@@ -56,23 +58,25 @@ class LaneQueue {
   [[nodiscard]] Entry* find_message(NodeId src, std::uint32_t message_number);
   void append_fragment(Entry& entry, Run fragment, bool last, PiecePool& pool);
 
-  /// Puts `entry`, a LATEST message, in the place of an untouched older one of its stream, which is moved to `older`.
-  /// Returns whether there was one. From the first call on, LATEST entries are looked up by stream.
+  /// Puts `entry`, a LATEST message, in the place of an untouched older one of its stream, which is
+  /// moved to `older`. Returns whether there was one. From the first call on, LATEST entries are
+  /// looked up by stream.
   [[nodiscard]] bool replace_latest(Entry& entry, Entry& older);
 
-  /// Does the same for all that came while nobody asked for it: of each stream only the newest LATEST message stays, in
-  /// the place of the oldest. Calls lose(Entry& older) for each that goes. The entries get other numbers.
+  /// Does the same for all that came while nobody asked for it: of each stream only the newest
+  /// LATEST message stays, in the place of the oldest. Calls lose(Entry& older) for each that goes.
+  /// The entries get other numbers.
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Takes out the oldest entry that may be dropped for room; of a run as many frames as come to `bytes`, if it has
-  /// those. Returns false if there is none. REQUIRES: bytes is not 0.
+  /// Takes out the oldest entry that may be dropped for room; of a run as many frames as come to
+  /// `bytes`, if it has those. Returns false if there is none. REQUIRES: bytes is not 0.
   [[nodiscard]] bool drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped);
 
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
   [[nodiscard]] Entry& front();
-  /// The front entry's first frame, or first piece, has left: keeps the sums right. The entry itself is changed by the
-  /// caller.
+  /// The front entry's first frame, or first piece, has left: keeps the sums right. The entry
+  /// itself is changed by the caller.
   void on_left(const Entry& entry, std::uint32_t bytes);
   void pop_front();
 
@@ -86,8 +90,10 @@ class LaneQueue {
 
  private:
   using StreamIndex = boost::unordered_flat_map<LatestStream, std::uint64_t>;
-  using MessageIndex = boost::unordered_flat_map<std::uint64_t, std::uint64_t>;  ///< sender and message to entry
-  /// A message among more entries than these is looked up; among fewer, looking through them is cheaper.
+  using MessageIndex =
+      boost::unordered_flat_map<std::uint64_t, std::uint64_t>;  ///< sender and message to entry
+  /// A message among more entries than these is looked up; among fewer, looking through them is
+  /// cheaper.
   static constexpr std::size_t kSearchMax = 64;
 
   [[nodiscard]] static LatestStream stream_of(const Entry& entry);

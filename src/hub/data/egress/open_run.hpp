@@ -9,9 +9,10 @@
 
 namespace gimnet::hub {
 
-/// The last run of a lane, while frames with the same header may be copied right behind it: what the usual case of
-/// small messages needs to know, in one place. Whatever else happens to an outbox closes it first, so nothing else has
-/// to. Thread safety: one shard. Ownership: none; lane, entry and memory are the outbox's.
+/// The last run of a lane, while frames with the same header may be copied right behind it: what
+/// the usual case of small messages needs to know, in one place. Whatever else happens to an outbox
+/// closes it first, so nothing else has to. Thread safety: one shard. Ownership: none; lane, entry
+/// and memory are the outbox's.
 struct OpenRun {
   std::uint32_t room = 0;        ///< bytes that may yet come; 0: closed
   std::uint32_t attributes = 0;  ///< of its frames: kind, flags, hops, lane
@@ -35,8 +36,9 @@ struct OpenRun {
   void close() { room = 0; }
 
  private:
-  /// The C library's memcpy() beats this from some hundred bytes on; below that the call is most of its cost
-  /// (bench/hub/data/egress/outbox_bench.cpp). REQUIRES: at least the 16 bytes of a header.
+  /// The C library's memcpy() beats this from some hundred bytes on; below that the call is most of
+  /// its cost (bench/hub/data/egress/outbox_bench.cpp). REQUIRES: at least the 16 bytes of a
+  /// header.
   static void copy(std::byte* to, const std::byte* from, std::uint32_t size) {
     if (size > kInlineBytesMax) {
       std::memcpy(to, from, size);

@@ -34,7 +34,9 @@ std::uint64_t Outbox::stale_bytes() const {
 }
 
 bool Outbox::has_block() const {
-  return lanes_ && std::ranges::any_of(lanes_->queues, [](const LaneQueue& each) { return each.block_bytes() != 0; });
+  return lanes_ && std::ranges::any_of(lanes_->queues, [](const LaneQueue& each) {
+           return each.block_bytes() != 0;
+         });
 }
 
 bool Outbox::fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const {
@@ -48,9 +50,11 @@ std::uint64_t Outbox::room(std::size_t lane, const Limits& limits) const {
 Run Outbox::copy(const Run& run, EgressContext& context) {
   close_run();
   if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
-    // A large one saves entries and calls where there is room; where there is none, each outbox takes what it must.
-    chunk_bytes_ =
-        context.budget.exhausted() ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kSharedChunkBytes);
+    // A large one saves entries and calls where there is room; where there is none, each outbox
+    // takes what it must.
+    chunk_bytes_ = context.budget.exhausted() ? 0
+                                              : std::clamp(kChunkGrowth * chunk_bytes_,
+                                                           kFirstChunkBytes, kSharedChunkBytes);
     chunk_ = context.pool.take_chunk(std::max(run.size, chunk_bytes_));
     chunk_used_ = 0;
     // At once where something waits: by the end of the turn many outboxes may have begun one.
@@ -63,13 +67,15 @@ Run Outbox::copy(const Run& run, EgressContext& context) {
   return Run{chunk_.share(), place, run.size, run.frames};
 }
 
-Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover, bool has_room,
-                         EgressContext& context) {
+Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Handover handover,
+                         bool has_room, EgressContext& context) {
   Entry entry;
   entry.extended = header.has(proto::kFlagExt);
-  // What is likely to be refused is not copied: it would fill a chunk that others keep. What stays of it is, at the
-  // turn's end. An extension may be a TRACE, which each recipient gets filled in on its own.
-  const bool by_copy = (run.size < kAppendBytesMax && !handover.fan_out && has_room) || entry.extended;
+  // What is likely to be refused is not copied: it would fill a chunk that others keep. What stays
+  // of it is, at the turn's end. An extension may be a TRACE, which each recipient gets filled in
+  // on its own.
+  const bool by_copy =
+      (run.size < kAppendBytesMax && !handover.fan_out && has_room) || entry.extended;
   entry.run = by_copy ? copy(run, context) : run.share();
   entry.size = run.size;
   entry.frames = run.frames;
@@ -89,7 +95,8 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   return entry;
 }
 
-void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context) {
+void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover,
+                  EgressContext& context) {
 #if defined(GIMNET_BUG_SLOW_OUTBOX)
   asm volatile(".rept 98\n\tnop\n\t.endr");
 #endif
@@ -119,9 +126,11 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
 
 void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
   Entry& last = lane.entries().back();
-  last.shortest_bytes = proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
+  last.shortest_bytes =
+      proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
   const std::uint64_t lane_room = limits.lane_bytes(lane_index) - lane.bytes();
-  const auto room = static_cast<std::uint32_t>(std::min<std::uint64_t>(chunk_->capacity - chunk_used_, lane_room));
+  const auto room = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(chunk_->capacity - chunk_used_, lane_room));
   lanes_->open = {room,
                   load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
                   load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),
@@ -132,7 +141,8 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
 
 bool Outbox::push_control(std::span<const std::byte> frame, EgressContext& context) {
   context.owner.check_here();
-  if (control_bytes_ - first_control_bytes() + frame.size() > context.limits.control_bytes) return false;
+  if (control_bytes_ - first_control_bytes() + frame.size() > context.limits.control_bytes)
+    return false;
   put_control(frame, context);
   return true;
 }
@@ -170,14 +180,16 @@ void Outbox::settle(EgressContext& context) {
 void Outbox::replace_latest(EgressContext& context) {
   for (LaneQueue& lane : lanes_->queues) {
     if (lane.latest_bytes() == 0) continue;
-    lane.replace_all_latest([&](Entry& older) { lose(older, proto::DropReason::replaced, context); });
+    lane.replace_all_latest(
+        [&](Entry& older) { lose(older, proto::DropReason::replaced, context); });
   }
 }
 
 void Outbox::charge_entries(EgressContext& context) {
   std::uint64_t bytes = 0;
   for (const LaneQueue& queue : lanes_->queues) bytes += queue.capacity_bytes();
-  // A ring doubles into new memory; the allocator keeps the old one for a while (tests/stress/budget_test.cpp).
+  // A ring doubles into new memory; the allocator keeps the old one for a while
+  // (tests/stress/budget_test.cpp).
   bytes += bytes / 2;
   std::uint64_t& charged = lanes_->charged_bytes;
   if (bytes > charged) context.budget.take(bytes - charged);
@@ -202,7 +214,8 @@ void Outbox::settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext&
 }
 
 void Outbox::settle_run(Run& run, bool shared, EgressContext& context) {
-  if (run.size < kSettleBytesMax && !shared && run.buffer->kind != BufferKind::chunk) run = copy(run, context);
+  if (run.size < kSettleBytesMax && !shared && run.buffer->kind != BufferKind::chunk)
+    run = copy(run, context);
   context.pool.pin(*run.buffer.get());
 }
 
@@ -275,7 +288,8 @@ void Outbox::tell_lost(const Entry& entry) const {
   if (counted_ == nullptr) return;
   const proto::FrameHeader header = entry.run.header();
   if (header.kind != proto::Kind::group) return;
-  counted_->on_lost(GroupId{header.dst}, entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames);
+  counted_->on_lost(GroupId{header.dst},
+                    entry.fragmented ? (entry.complete ? 1 : 0) : entry.frames);
 }
 
 void Outbox::tell_lost(const Run& run, const proto::FrameHeader& header) const {
@@ -313,9 +327,9 @@ std::uint64_t Outbox::waiting_messages(GroupId group) {
 void Outbox::trim() {
   control_.trim();
   if (!lanes_) return;
-  const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) && lanes_->replay.empty() &&
-                    lanes_->pauses.empty() && lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 &&
-                    !backlog_;
+  const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) &&
+                    lanes_->replay.empty() && lanes_->pauses.empty() &&
+                    lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 && !backlog_;
   if (idle) return lanes_.reset();
   lanes_->replay.trim();
   for (LaneQueue& queue : lanes_->queues) queue.trim();

@@ -17,47 +17,54 @@ namespace gimnet::hub {
 
 /// How a run came to an outbox.
 struct Handover {
-  bool fan_out = false;                               ///< the same bytes go to many: keep a reference instead of a copy
-  std::uint32_t shortest_bytes = proto::kHeaderSize;  ///< no frame of the run is shorter, header included
+  bool fan_out = false;  ///< the same bytes go to many: keep a reference instead of a copy
+  std::uint32_t shortest_bytes =
+      proto::kHeaderSize;  ///< no frame of the run is shorter, header included
 };
 
-/// What waits to be written to one connection: control frames, and four lanes of messages, with the policies of
-/// docs/protocol.md, section 5. While the connection takes everything at once, push() is a few instructions: policies
-/// begin when something waits. A connection that only keeps alive has nothing but its control frames; what data needs
-/// is made for the first of it. Thread safety: one shard. Ownership: references to buffers.
+/// What waits to be written to one connection: control frames, and four lanes of messages, with the
+/// policies of docs/protocol.md, section 5. While the connection takes everything at once, push()
+/// is a few instructions: policies begin when something waits. A connection that only keeps alive
+/// has nothing but its control frames; what data needs is made for the first of it. Thread safety:
+/// one shard. Ownership: references to buffers.
 class Outbox {
  public:
   Outbox() = default;
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
 
-  /// The usual case of small messages, made short: frames like those that came last are copied right behind them.
-  /// False: nothing was done, push() them. REQUIRES: as push(), of which one was made in this turn.
-  /// The caller counts them as queued and copied.
+  /// The usual case of small messages, made short: frames like those that came last are copied
+  /// right behind them. False: nothing was done, push() them. REQUIRES: as push(), of which one was
+  /// made in this turn. The caller counts them as queued and copied.
   [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
     if (!lanes_ || !lanes_->open.takes(frames, size) || size >= kAppendBytesMax) return false;
     lanes_->open.append(frames, size, count);
     chunk_used_ += size;
     return true;
   }
-  /// Runs below this are cheaper to copy than to reference: up to a fifth of in_turns at 1 to 2 KiB, and the same from
-  /// there to 4 KiB (docs/performance.md, "Findings"; bench/hub/data/egress/outbox_bench.cpp).
+  /// Runs below this are cheaper to copy than to reference: up to a fifth of in_turns at 1 to 2
+  /// KiB, and the same from there to 4 KiB (docs/performance.md, "Findings";
+  /// bench/hub/data/egress/outbox_bench.cpp).
   static constexpr std::uint32_t kAppendBytesMax = 4096;
   /// Data frames for this connection. Every frame ends in a lane or in the drop book.
-  /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if FRAGMENT, EXT or LATEST.
-  void push(const Run& run, const proto::FrameHeader& header, Handover handover, EgressContext& context);
+  /// REQUIRES: `run` holds whole legal frames with one header but for the length; alone if
+  /// FRAGMENT, EXT or LATEST.
+  void push(const Run& run, const proto::FrameHeader& header, Handover handover,
+            EgressContext& context);
 
-  /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that waits: the peer asks
-  /// and does not listen.
+  /// A frame of FLOW, LINK, NS or CTRL: goes before all lanes. Returns false if too much of that
+  /// waits: the peer asks and does not listen.
   [[nodiscard]] bool push_control(std::span<const std::byte> frame, EgressContext& context);
-  /// What a new connection is to get ahead of all else, whatever its size: frames as push_control() takes them. They do
-  /// not count against the limit on those, or a peer that came back to much could ask for nothing.
+  /// What a new connection is to get ahead of all else, whatever its size: frames as push_control()
+  /// takes them. They do not count against the limit on those, or a peer that came back to much
+  /// could ask for nothing.
   void push_first_control(std::span<const std::byte> frames, EgressContext& context);
 
   /// Who is told of messages of counted groups that are dropped here; nullptr: nobody.
   void set_counted_groups(CountedGroups* counted) { counted_ = counted; }
   [[nodiscard]] const CountedGroups* counted_groups() const { return counted_; }
-  /// Where it is counted what of the session's frames came to what; nullptr: nowhere. Valid until: as SessionGauges.
+  /// Where it is counted what of the session's frames came to what; nullptr: nowhere. Valid until:
+  /// as SessionGauges.
   void set_counters(SessionCounters& counters) { counters_ = &counters; }
   [[nodiscard]] SessionCounters* counters() const { return counters_; }
   /// So many frames that were for this connection are dropped, here or on their way here.
@@ -82,8 +89,8 @@ class Outbox {
   [[nodiscard]] bool has_block() const;
   [[nodiscard]] bool paused_anyone() const { return lanes_ && !lanes_->pauses.empty(); }
 
-  /// After a flush that left something: what stays is counted against the budget, small frames are copied out of
-  /// their slabs, and policies apply from here on.
+  /// After a flush that left something: what stays is counted against the budget, small frames are
+  /// copied out of their slabs, and policies apply from here on.
   void settle(EgressContext& context);
   /// The same for one run, also for what is kept after it was written.
   void settle_run(Run& run, bool shared, EgressContext& context);
@@ -128,22 +135,26 @@ class Outbox {
   struct Lanes {
     OpenRun open;  ///< first, with all that append() looks at
     std::array<LaneQueue, proto::kLaneCount> queues;
-    std::array<std::uint64_t, proto::kLaneCount> settled{};  ///< entries below this number are settled
-    std::array<std::uint64_t, proto::kLaneCount> owed{};     ///< bytes due to a waiting lane, see GatherWriter
+    std::array<std::uint64_t, proto::kLaneCount>
+        settled{};  ///< entries below this number are settled
+    std::array<std::uint64_t, proto::kLaneCount>
+        owed{};  ///< bytes due to a waiting lane, see GatherWriter
     RingQueue<Run> replay;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
-    std::vector<OpenMessage> open_messages;  ///< of which the beginning was taken and the end has not come, by age
+    std::vector<OpenMessage>
+        open_messages;  ///< of which the beginning was taken and the end has not come, by age
     std::uint32_t first_control_bytes =
         0;  ///< of push_first_control() that have not left; here, since few ever have any
   };
-  /// Messages in fragments that may be under way to one connection at a time. Beyond it the rest of the oldest is
-  /// refused: a sender that never ends its messages takes the place of nothing else.
+  /// Messages in fragments that may be under way to one connection at a time. Beyond it the rest of
+  /// the oldest is refused: a sender that never ends its messages takes the place of nothing else.
   static constexpr std::size_t kOpenMessagesMax = 256;
-  /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not pause: beyond so many
-  /// reserves its messages are dropped, BLOCK or not.
+  /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not
+  /// pause: beyond so many reserves its messages are dropped, BLOCK or not.
   static constexpr std::uint64_t kReservesMax = 8;
-  /// A waiting piece below this is copied out of its slab, which it would keep from being used again.
+  /// A waiting piece below this is copied out of its slab, which it would keep from being used
+  /// again.
   static constexpr std::uint32_t kSettleBytesMax = kSharedChunkBytes;
 
   [[nodiscard]] Lanes& lanes() {
@@ -153,10 +164,11 @@ class Outbox {
   void close_run() {
     if (lanes_) lanes_->open.close();
   }
-  /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in the chunk.
+  /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in
+  /// the chunk.
   void open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index);
-  [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header, Handover handover, bool has_room,
-                                 EgressContext& context);
+  [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header,
+                                 Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
   /// Bytes that still fit.
@@ -165,22 +177,28 @@ class Outbox {
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_first(Entry entry, std::size_t lane_index, EgressContext& context);
   void admit_newest(Entry entry, std::size_t lane_index, EgressContext& context);
-  /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns false if it came all
-  /// the same, although it was held: the message is not to be taken.
-  [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
-  [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header, EgressContext& context);
-  /// Takes note of where a fragment stands in its message. Returns whether it may go on: no rest of a message of which
-  /// the beginning did not come or was dropped.
-  [[nodiscard]] bool follow_message(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns
+  /// false if it came all the same, although it was held: the message is not to be taken.
+  [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
+                                  EgressContext& context);
+  [[nodiscard]] bool join_message(Entry& entry, const proto::FrameHeader& header,
+                                  EgressContext& context);
+  /// Takes note of where a fragment stands in its message. Returns whether it may go on: no rest of
+  /// a message of which the beginning did not come or was dropped.
+  [[nodiscard]] bool follow_message(const Entry& entry, const proto::FrameHeader& header,
+                                    EgressContext& context);
   /// Its rest is refused from now on. Returns whether there was such a message.
   bool close_message(const OpenMessage& message);
   void put_control(std::span<const std::byte> frame, EgressContext& context);
-  [[nodiscard]] std::uint32_t first_control_bytes() const { return lanes_ ? lanes_->first_control_bytes : 0; }
+  [[nodiscard]] std::uint32_t first_control_bytes() const {
+    return lanes_ ? lanes_->first_control_bytes : 0;
+  }
   void tell_lost(const Entry& entry) const;
   /// Frames of any headers.
   void tell_lost(const Run& run) const;
   void replace_latest(EgressContext& context);
-  /// Many small messages that cannot form runs take more memory for their entries than for their bytes.
+  /// Many small messages that cannot form runs take more memory for their entries than for their
+  /// bytes.
   void charge_entries(EgressContext& context);
   void settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext& context);
   [[nodiscard]] std::uint64_t data_bytes() const;

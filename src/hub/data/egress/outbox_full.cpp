@@ -3,7 +3,8 @@
 
 #include "hub/data/egress/outbox.hpp"
 
-// What becomes of a message where something waits already: the policies of docs/protocol.md, section 5.
+// What becomes of a message where something waits already: the policies of docs/protocol.md,
+// section 5.
 
 namespace gimnet::hub {
 
@@ -11,8 +12,9 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
   Entry* message = lane.find_message(NodeId{header.src}, entry.message_number);
   if (message == nullptr) return false;
-  // Of a message that is begun nothing is dropped or replaced any more: its frames wait in the order in which they
-  // came, or a large one to a slow reader would hold up everybody else in its lane until it ends.
+  // Of a message that is begun nothing is dropped or replaced any more: its frames wait in the
+  // order in which they came, or a large one to a slow reader would hold up everybody else in its
+  // lane until it ends.
   if (message->touched && message != &lane.entries().back()) return false;
   if (backlog_ && context.budget.exhausted()) {
     lose(entry, proto::DropReason::over_budget, context);
@@ -38,10 +40,12 @@ bool Outbox::close_message(const OpenMessage& message) {
   return true;
 }
 
-bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header,
+                            EgressContext& context) {
   const OpenMessage message{NodeId{header.src}, entry.message_number};
   std::vector<OpenMessage>& open = lanes_->open_messages;
-  if (entry.complete ? close_message(message) : std::find(open.rbegin(), open.rend(), message) != open.rend())
+  if (entry.complete ? close_message(message)
+                     : std::find(open.rbegin(), open.rend(), message) != open.rend())
     return true;
   if (!entry.touched) {
     if (entry.complete) return true;
@@ -52,7 +56,8 @@ bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
-  context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames, proto::DropReason::cut_message);
+  context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames,
+                     proto::DropReason::cut_message);
   return false;
 }
 
@@ -86,16 +91,18 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
   }
 }
 
-bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, EgressContext& context) {
+bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
+                          EgressContext& context) {
   const std::size_t lane = header.lane & proto::kLaneMask;
   const Limits& limits = context.limits;
   const std::uint64_t bytes = lanes_->queues[lane].bytes() + entry.size;
   const std::uint64_t limit = limits.lane_bytes(lane);
-  const std::uint64_t since_held =
-      lanes_->pauses.on_full(NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
-                             bytes > limit + limits.reserve_bytes, context.signals);
-  // Many senders may come at once: each is held, and loses nothing. What one of them had under way by then was in its
-  // shard's mailbox to this one, or came with the reads before its shard heard of the hold.
+  const std::uint64_t since_held = lanes_->pauses.on_full(
+      NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
+      bytes > limit + limits.reserve_bytes, context.signals);
+  // Many senders may come at once: each is held, and loses nothing. What one of them had under way
+  // by then was in its shard's mailbox to this one, or came with the reads before its shard heard
+  // of the hold.
   const std::uint64_t reserves = kReservesMax * limits.reserve_bytes;
   const bool comes_though_held = since_held > limits.mailbox_bytes + limits.turn_bytes + reserves;
   return !comes_though_held || bytes <= limit + reserves;
@@ -105,20 +112,22 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header, 
 void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
   while (entry.frames != 0) {
-    Leading fitting = leading_within(entry.run, entry.shortest_bytes, room(lane_index, context.limits), context.starts);
+    Leading fitting = leading_within(entry.run, entry.shortest_bytes,
+                                     room(lane_index, context.limits), context.starts);
     // Besides what is being written one message may wait, however large it is.
     if (fitting.frames == 0 && !lane.holds_whole())
       fitting = leading_from(entry.run, entry.shortest_bytes, 1, context.starts);
     if (fitting.frames != 0) lane.push(entry.take_front(fitting));
     if (entry.frames == 0) return;
     // Behind those that do not fit there may be shorter ones.
-    Entry lost = entry.take_front(leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, context.limits)));
+    Entry lost = entry.take_front(
+        leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, context.limits)));
     lose(lost, proto::DropReason::queue_full, context);
   }
 }
 
-/// As if each message came alone, and dropped as many older ones as it takes: what waits first, then the first of those
-/// that come.
+/// As if each message came alone, and dropped as many older ones as it takes: what waits first,
+/// then the first of those that come.
 void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
   const std::uint64_t limit = context.limits.lane_bytes(lane_index);
@@ -140,7 +149,8 @@ void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& co
 
 void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
   if (entry.frames == 0) return;
-  if (entry.fragmented && !entry.complete) close_message({NodeId{entry.run.header().src}, entry.message_number});
+  if (entry.fragmented && !entry.complete)
+    close_message({NodeId{entry.run.header().src}, entry.message_number});
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;

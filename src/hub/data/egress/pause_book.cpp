@@ -4,10 +4,11 @@
 
 namespace gimnet::hub {
 
-std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes,
-                                 bool past_reserve, SenderSignals& signals) {
-  auto note = std::find_if(notes_.begin(), notes_.end(),
-                           [&](const Note& each) { return each.sender == sender && each.target == target; });
+std::uint64_t PauseBook::on_full(NodeId sender, const proto::flow::Target& target,
+                                 std::uint32_t bytes, bool past_reserve, SenderSignals& signals) {
+  auto note = std::find_if(notes_.begin(), notes_.end(), [&](const Note& each) {
+    return each.sender == sender && each.target == target;
+  });
   if (note == notes_.end()) {
     note = notes_.insert(notes_.end(), Note{sender, target});
     signals.pause(sender, target);

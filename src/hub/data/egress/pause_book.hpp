@@ -7,16 +7,17 @@
 
 namespace gimnet::hub {
 
-/// The senders that one outbox told to pause, and for what. Each is told again now and then if it goes on sending, held
-/// (not read) once it used up the reserve, and told to resume when there is room. Thread safety: one shard.
+/// The senders that one outbox told to pause, and for what. Each is told again now and then if it
+/// goes on sending, held (not read) once it used up the reserve, and told to resume when there is
+/// room. Thread safety: one shard.
 class PauseBook {
  public:
   [[nodiscard]] bool empty() const { return notes_.empty(); }
 
-  /// A frame with BLOCK of `bytes` came although its lane is full. Returns the bytes that came from its sender for that
-  /// target since it was held, this frame included; 0: it is not held.
-  std::uint64_t on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes, bool past_reserve,
-                        SenderSignals& signals);
+  /// A frame with BLOCK of `bytes` came although its lane is full. Returns the bytes that came from
+  /// its sender for that target since it was held, this frame included; 0: it is not held.
+  std::uint64_t on_full(NodeId sender, const proto::flow::Target& target, std::uint32_t bytes,
+                        bool past_reserve, SenderSignals& signals);
   /// The lane has room again.
   void on_room(proto::Lane lane, SenderSignals& signals);
   /// The outbox is given up.
@@ -30,7 +31,8 @@ class PauseBook {
     std::uint64_t held_bytes = 0;   ///< that came since it was held
     bool held = false;
   };
-  /// A sender that still sends after so many bytes has not seen PAUSE, or lost it with a connection: told again.
+  /// A sender that still sends after so many bytes has not seen PAUSE, or lost it with a
+  /// connection: told again.
   static constexpr std::uint32_t kRemindBytes = 256 * 1024;
 
   static void let_go(Note& note, SenderSignals& signals);

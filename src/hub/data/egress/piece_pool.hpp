@@ -24,9 +24,10 @@ struct MorePieces {
   PiecePool* pool = nullptr;
 };
 
-/// The pieces of a shard's waiting messages. Those that were used once are kept for the next message, so that fragments
-/// do not allocate; those in use are counted against the budget, since a hostile node makes them as large as what they
-/// refer to. Thread safety: one shard. Must outlive all pieces.
+/// The pieces of a shard's waiting messages. Those that were used once are kept for the next
+/// message, so that fragments do not allocate; those in use are counted against the budget, since a
+/// hostile node makes them as large as what they refer to. Thread safety: one shard. Must outlive
+/// all pieces.
 class PiecePool {
  public:
   explicit PiecePool(BudgetLease& budget) : budget_(budget) {}

@@ -2,13 +2,16 @@
 
 namespace gimnet::hub {
 
-bool ResumeBuffer::make_room(std::uint64_t planned, std::uint32_t size, const CountedGroups* counted) {
+bool ResumeBuffer::make_room(std::uint64_t planned, std::uint32_t size,
+                             const CountedGroups* counted) {
   if (planned + size > bytes_max_) return false;
   while (bytes_ + planned + size > bytes_max_) {
     const proto::FrameHeader front = kept_.front().header();
     if (proto::is_block(front)) return false;
     // Nobody could say how many messages of a group a gap has.
-    if (counted != nullptr && front.kind == proto::Kind::group && counted->counts(GroupId{front.dst})) return false;
+    if (counted != nullptr && front.kind == proto::Kind::group &&
+        counted->counts(GroupId{front.dst}))
+      return false;
     let_front_frame_go();
   }
   return true;
@@ -36,7 +39,8 @@ ResumeBuffer::Rewind ResumeBuffer::rewind(std::uint64_t count, RingQueue<Run>& r
   result.confirmed = confirm(count);
   const std::uint64_t first = first_kept();
   result.gap = first - count;
-  // A SKIP may be lost with the connection that carried it: then the gap is announced again, but lost only once.
+  // A SKIP may be lost with the connection that carried it: then the gap is announced again, but
+  // lost only once.
   result.lost = first - std::max(count, std::min(lost_below_, first));
   lost_below_ = std::max(lost_below_, first);
   while (!kept_.empty()) {

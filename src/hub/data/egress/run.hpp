@@ -8,7 +8,8 @@
 
 namespace gimnet::hub {
 
-/// Complete frames that lie one behind the other in one buffer, all with the same header but for the length.
+/// Complete frames that lie one behind the other in one buffer, all with the same header but for
+/// the length.
 struct Run {
   BufferRef buffer;
   const std::byte* bytes = nullptr;

@@ -9,14 +9,19 @@
 
 namespace gimnet::hub {
 
-Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context,
-               const ShardRecipients& elsewhere)
-    : self_(self), mailboxes_(std::move(mailboxes)), recipients_(recipients), context_(context), elsewhere_(elsewhere) {
+Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients,
+               EgressContext& context, const ShardRecipients& elsewhere)
+    : self_(self),
+      mailboxes_(std::move(mailboxes)),
+      recipients_(recipients),
+      context_(context),
+      elsewhere_(elsewhere) {
   GIMNET_CHECK(mailboxes_.size() <= kShardsMax);
   stretches_.resize(mailboxes_.size());
 }
 
-void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
+void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+                     Handover handover) {
 #if defined(GIMNET_BUG_SLOW_FAN_OUT)
   asm volatile(".rept 45\n\tnop\n\t.endr");
 #endif
@@ -26,34 +31,38 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
     return;
   }
   // Only the first frame's length is in `header`; what is short altogether has no long frame in it.
-  if (run.size - proto::kHeaderSize <= recipient.frame_bytes || recipient.frame_bytes >= context_.limits.frame_bytes) {
+  if (run.size - proto::kHeaderSize <= recipient.frame_bytes ||
+      recipient.frame_bytes >= context_.limits.frame_bytes) {
     push(recipient, run, header, handover);
     return;
   }
   deliver_short_ones(recipient, run, header, handover);
 }
 
-void Fanout::deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
-                                Handover handover) {
+void Fanout::deliver_short_ones(Recipient& recipient, const Run& run,
+                                const proto::FrameHeader& header, Handover handover) {
   const std::uint64_t longest = recipient.frame_bytes + proto::kHeaderSize;
   Run rest = run.share();
   while (rest.frames != 0) {
     const Leading taken = leading_up_to(rest, handover.shortest_bytes, longest);
-    if (taken.frames != 0) push(recipient, rest.take_front(taken.frames, taken.size), header, handover);
+    if (taken.frames != 0)
+      push(recipient, rest.take_front(taken.frames, taken.size), header, handover);
     if (rest.frames == 0) break;
     const Leading too_large = leading_beyond(rest, handover.shortest_bytes, longest);
-    lose(recipient, rest.take_front(too_large.frames, too_large.size), header, handover, proto::DropReason::too_large);
+    lose(recipient, rest.take_front(too_large.frames, too_large.size), header, handover,
+         proto::DropReason::too_large);
   }
 }
 
-void Fanout::lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover,
-                  proto::DropReason reason) {
+void Fanout::lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+                  Handover handover, proto::DropReason reason) {
   recipient.outbox.tell_lost(run, header);
   recipient.outbox.count_dropped(run.frames);
   context_.drop(run, handover.shortest_bytes, reason);
 }
 
-void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover) {
+void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+                  Handover handover) {
   recipient.outbox.push(run, header, handover, context_);
   recipients_.mark_dirty(recipient);
 }
@@ -73,10 +82,11 @@ void Fanout::hand_over(ShardIndex to, const Run& run, std::size_t deliveries) {
   open_shards_ |= std::uint64_t{1} << to.value();
 }
 
-/// Frames that alternate between shards would each have an entry of their own. Order: what was handed over stands in
-/// `open` in the order in which it came, and is posted before anything that does not fit behind it. The other shard
-/// reads only bytes that were written before the entry was posted, and those are never written again while it may read
-/// them: later frames go behind them, or into a chunk of which no loan is open.
+/// Frames that alternate between shards would each have an entry of their own. Order: what was
+/// handed over stands in `open` in the order in which it came, and is posted before anything that
+/// does not fit behind it. The other shard reads only bytes that were written before the entry was
+/// posted, and those are never written again while it may read them: later frames go behind them,
+/// or into a chunk of which no loan is open.
 bool Fanout::gather(Stretch& stretch, const Run& run) {
   if (run.size >= kGatherBytesMax) return false;
   const Run& open = stretch.open;
@@ -97,8 +107,10 @@ bool Fanout::gather(Stretch& stretch, const Run& run) {
 }
 
 void Fanout::make_room(Stretch& stretch, std::uint32_t bytes) {
-  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last byte.
-  if (stretch.chunk && stretch.chunk->references == 1 && stretch.chunk->lent.load(std::memory_order_acquire) == 0) {
+  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last
+  // byte.
+  if (stretch.chunk && stretch.chunk->references == 1 &&
+      stretch.chunk->lent.load(std::memory_order_acquire) == 0) {
     stretch.chunk_used = 0;
   }
   if (stretch.chunk && stretch.chunk->capacity - stretch.chunk_used >= bytes) return;
@@ -153,10 +165,12 @@ void Fanout::drop_for(ShardIndex to, const Run& frame) {
   const std::uint32_t recipients = elsewhere_.count(to, frame.bytes);
   // The last of them may have left since the frame was handed over.
   const std::uint32_t outcomes = std::max<std::uint32_t>(recipients, 1);
-  const auto reason = recipients == 0 ? proto::DropReason::no_subscriber : proto::DropReason::shard_full;
+  const auto reason =
+      recipients == 0 ? proto::DropReason::no_subscriber : proto::DropReason::shard_full;
   context_.tally.copies += outcomes - 1;
   const proto::FrameHeader header = frame.header();
-  if (header.kind != proto::Kind::list) return context_.drops.drop_start(frame.bytes, outcomes, reason);
+  if (header.kind != proto::Kind::list)
+    return context_.drops.drop_start(frame.bytes, outcomes, reason);
   const auto start = SharedList::unpack(header.dst).as_sent(frame.bytes, elsewhere_.hub());
   context_.drops.drop_start(start.data(), outcomes, reason);
 }
@@ -181,12 +195,14 @@ Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uin
   const auto size = static_cast<std::uint32_t>(header.frame_size());
   if (lists_ && lists_->references == 1) lists_used_ = 0;
   if (!lists_ || lists_->capacity - lists_used_ < size) {
-    lists_ = size <= kListChunkBytes ? context_.pool.take_chunk(kListChunkBytes) : context_.pool.take_slab();
+    lists_ = size <= kListChunkBytes ? context_.pool.take_chunk(kListChunkBytes)
+                                     : context_.pool.take_slab();
     lists_used_ = 0;
   }
   std::byte* place = lists_->data + lists_used_;
   proto::store_header(place, header);
-  std::memcpy(place + proto::kHeaderSize, frame.bytes + proto::kHeaderSize + ids_size, header.length);
+  std::memcpy(place + proto::kHeaderSize, frame.bytes + proto::kHeaderSize + ids_size,
+              header.length);
   lists_used_ += size;
   context_.tally.copied_bytes += header.length;
   return Run{lists_.share(), place, size, 1};
@@ -195,7 +211,8 @@ Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uin
 void Fanout::look_for_room() {
   for (std::uint64_t shards = crowded_; shards != 0; shards &= shards - 1) {
     const int shard = std::countr_zero(shards);
-    if (!mailboxes_[static_cast<std::size_t>(shard)]->crowded(self_)) crowded_ &= ~(std::uint64_t{1} << shard);
+    if (!mailboxes_[static_cast<std::size_t>(shard)]->crowded(self_))
+      crowded_ &= ~(std::uint64_t{1} << shard);
   }
 }
 

@@ -10,26 +10,28 @@
 
 namespace gimnet::hub {
 
-/// Hands frames to their recipients: a reference or a small copy into each outbox on this shard, and for other shards
-/// one mailbox entry for a whole stretch of frames. Thread safety: one shard.
+/// Hands frames to their recipients: a reference or a small copy into each outbox on this shard,
+/// and for other shards one mailbox entry for a whole stretch of frames. Thread safety: one shard.
 class Fanout {
  public:
   /// mailboxes: of all shards, by index.
-  Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients, EgressContext& context,
-         const ShardRecipients& elsewhere);
+  Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable& recipients,
+         EgressContext& context, const ShardRecipients& elsewhere);
 
   /// To one recipient here. Frames larger than it takes are dropped.
-  void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
-  /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one entry; small ones
-  /// that lie apart, with those for others between them, are copied together for it. Their order is kept. `deliveries`:
-  /// recipients there of frames to many.
+  void deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+               Handover handover);
+  /// To another shard, which routes the frames itself. Neighbouring frames of one buffer become one
+  /// entry; small ones that lie apart, with those for others between them, are copied together for
+  /// it. Their order is kept. `deliveries`: recipients there of frames to many.
   void hand_over(ShardIndex to, const Run& run, std::size_t deliveries = 0);
   /// No frame behind the last one will come: what was handed over is posted.
   void post_all();
 
-  /// A LIST frame as its recipients get it: `header`, and what follows the first `ids_size` bytes behind the old one.
-  /// One copy for all recipients on this shard.
-  [[nodiscard]] Run cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size);
+  /// A LIST frame as its recipients get it: `header`, and what follows the first `ids_size` bytes
+  /// behind the old one. One copy for all recipients on this shard.
+  [[nodiscard]] Run cut_ids(const Run& frame, const proto::FrameHeader& header,
+                            std::uint32_t ids_size);
 
   /// The shards (a bit set) that frames were handed over to since the last call.
   [[nodiscard]] std::uint64_t take_posted() { return std::exchange(posted_, 0); }
@@ -65,18 +67,20 @@ class Fanout {
   };
 
   /// Those that are not larger than it takes; the others are dropped.
-  void deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
-  void lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover,
-            proto::DropReason reason);
-  void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header, Handover handover);
+  void deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+                          Handover handover);
+  void lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+            Handover handover, proto::DropReason reason);
+  void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
+            Handover handover);
   [[nodiscard]] bool gather(Stretch& stretch, const Run& run);
   void make_room(Stretch& stretch, std::uint32_t bytes);
   [[nodiscard]] std::byte* copy_behind(Stretch& stretch, const Run& run);
   void post(ShardIndex to);
   void post_behind(MailKind kind, const Fence& fence);
   void put(ShardIndex to, const Run& run, std::uint32_t deliveries = 0);
-  /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is not read until there
-  /// is room; the rest is dropped.
+  /// The mailbox is full: what was sent with BLOCK goes through all the same, since its sender is
+  /// not read until there is room; the rest is dropped.
   void put_blocking_only(ShardIndex to, const Run& run);
   /// One frame: dropped for each of its recipients there.
   void drop_for(ShardIndex to, const Run& frame);

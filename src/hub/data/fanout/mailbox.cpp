@@ -5,26 +5,34 @@
 namespace gimnet::hub {
 
 Mailbox::Mailbox(std::size_t shards, Bounds bounds, Waker& waker)
-    : bounds_(bounds), waker_(waker), queue_(shards), pairs_(std::make_unique<Pair[]>(shards)), shards_(shards) {}
+    : bounds_(bounds),
+      waker_(waker),
+      queue_(shards),
+      pairs_(std::make_unique<Pair[]>(shards)),
+      shards_(shards) {}
 
 bool Mailbox::over(const Pair& pair, std::uint64_t entries, std::uint64_t bytes) {
   // relaxed: counts for a bound, see on_taken()
-  const std::uint64_t waiting_entries = pair.sent_entries - pair.taken_entries.load(std::memory_order_relaxed);
+  const std::uint64_t waiting_entries =
+      pair.sent_entries - pair.taken_entries.load(std::memory_order_relaxed);
   // relaxed: as above
-  const std::uint64_t waiting_bytes = pair.sent_bytes - pair.taken_bytes.load(std::memory_order_relaxed);
+  const std::uint64_t waiting_bytes =
+      pair.sent_bytes - pair.taken_bytes.load(std::memory_order_relaxed);
   return waiting_entries > entries || waiting_bytes > bytes;
 }
 
 bool Mailbox::over_half(const Pair& pair) const {
   // relaxed: as above
-  const std::uint64_t deliveries = pair.sent_deliveries - pair.taken_deliveries.load(std::memory_order_relaxed);
+  const std::uint64_t deliveries =
+      pair.sent_deliveries - pair.taken_deliveries.load(std::memory_order_relaxed);
   return over(pair, bounds_.entries / 2, bounds_.bytes / 2) || deliveries > bounds_.deliveries / 2;
 }
 
 bool Mailbox::full(ShardIndex from, std::uint32_t bytes) const {
   const Pair& pair = pairs_[from.value()];
   // A stretch larger than the bound goes alone.
-  return over(pair, bounds_.entries - 1, bounds_.bytes - std::min<std::uint64_t>(bytes, bounds_.bytes));
+  return over(pair, bounds_.entries - 1,
+              bounds_.bytes - std::min<std::uint64_t>(bytes, bounds_.bytes));
 }
 
 bool Mailbox::crowded(ShardIndex from) {

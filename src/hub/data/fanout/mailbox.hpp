@@ -25,10 +25,10 @@ enum class MailKind : std::uint8_t {
   hold,     ///< stop reading the node until as many `release`
   release,
   start_wanted,  ///< a subscriber of a retained group wants to begin: `small` is a GroupStart
-  start,         ///< it begins here: what came before in this mailbox is not for it, what comes after is
-  fence,         ///< all that was handed over before was taken when this is: `small` is a Fence
-  retained,      ///< frames of the last message, for that one subscriber
-  last,          ///< the sending shard drains and hands over nothing more: `small` is a Fence
+  start,  ///< it begins here: what came before in this mailbox is not for it, what comes after is
+  fence,  ///< all that was handed over before was taken when this is: `small` is a Fence
+  retained,  ///< frames of the last message, for that one subscriber
+  last,      ///< the sending shard drains and hands over nothing more: `small` is a Fence
 };
 
 /// A subscriber that begins with the last message of a group (RetainedMessages).
@@ -46,7 +46,8 @@ struct Fence {
   std::uint32_t ticket = 0;  ///< numbers the fences of that shard
 };
 
-/// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a word about a sender.
+/// What one shard hands to another: a stretch of a slab with whole frames, once per burst, or a
+/// word about a sender.
 struct Mail {
   MailKind kind = MailKind::frames;
   std::uint8_t small_size = 0;
@@ -57,7 +58,8 @@ struct Mail {
   const std::byte* bytes = nullptr;
   std::byte small[72];
 
-  /// Of frames: how many those to many may come to at the receiver. In `small`, where there are any.
+  /// Of frames: how many those to many may come to at the receiver. In `small`, where there are
+  /// any.
   [[nodiscard]] std::uint32_t deliveries() const {
     if (kind != MailKind::frames || small_size == 0) return 0;
     std::uint32_t count = 0;
@@ -71,9 +73,9 @@ struct Mail {
   }
 };
 
-/// The queues into one shard, one per sending shard as far as order and bounds go. It never makes a shard wait: the
-/// sender asks full() and crowded() first. Thread safety: post() and what a sender asks only from that sender's thread;
-/// drain() from the receiver's.
+/// The queues into one shard, one per sending shard as far as order and bounds go. It never makes a
+/// shard wait: the sender asks full() and crowded() first. Thread safety: post() and what a sender
+/// asks only from that sender's thread; drain() from the receiver's.
 class Mailbox {
  public:
   struct Bounds {
@@ -81,11 +83,13 @@ class Mailbox {
     std::uint64_t bytes;
     std::uint64_t deliveries = ~std::uint64_t{0};  ///< makes it crowded, never full
   };
-  /// So many shares of a turn (turn_deliveries) may wait between two shards before their senders are not read.
+  /// So many shares of a turn (turn_deliveries) may wait between two shards before their senders
+  /// are not read.
   static constexpr std::uint64_t kWaitingShares = 4;
   [[nodiscard]] static Bounds bounds_from(const Limits& limits) {
     // crowded() begins at half of each
-    return {limits.mailbox_entries, limits.mailbox_bytes, 2 * kWaitingShares * limits.turn_deliveries};
+    return {limits.mailbox_entries, limits.mailbox_bytes,
+            2 * kWaitingShares * limits.turn_deliveries};
   }
   Mailbox(std::size_t shards, Bounds bounds, Waker& waker);
 
@@ -93,7 +97,8 @@ class Mailbox {
   [[nodiscard]] bool full(ShardIndex from, std::uint32_t bytes) const;
   /// Sender: more than half full. If so, room() will be told once it is not.
   [[nodiscard]] bool crowded(ShardIndex from);
-  /// Sender: returns whether the receiver had to be woken. Frames are only posted if not full(); words always are.
+  /// Sender: returns whether the receiver had to be woken. Frames are only posted if not full();
+  /// words always are.
   bool post(ShardIndex from, Mail mail);
   /// The same for frames to many. REQUIRES: mail.deliveries() != 0.
   bool post_to_many(ShardIndex from, const Mail& mail) {
@@ -101,8 +106,9 @@ class Mailbox {
     return post(from, mail);
   }
 
-  /// Receiver: calls take(const Mail&) for up to `most` entries, until it returns false for one if it returns anything,
-  /// and before_taking() once for every few of them that were fetched; returns how many.
+  /// Receiver: calls take(const Mail&) for up to `most` entries, until it returns false for one if
+  /// it returns anything, and before_taking() once for every few of them that were fetched; returns
+  /// how many.
   template <class Before, class Take>
   std::size_t drain(std::size_t most, Before&& before_taking, Take&& take);
   /// Receiver: nothing waits.
@@ -131,12 +137,15 @@ class Mailbox {
   };
   static void on_taken(Pair& pair, const Mail& mail) {
     // relaxed: counts for a bound; only the receiver writes them, and the sender may see them late.
-    pair.taken_entries.store(pair.taken_entries.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    pair.taken_entries.store(pair.taken_entries.load(std::memory_order_relaxed) + 1,
+                             std::memory_order_relaxed);
     // relaxed: as above
-    pair.taken_bytes.store(pair.taken_bytes.load(std::memory_order_relaxed) + mail.size, std::memory_order_relaxed);
+    pair.taken_bytes.store(pair.taken_bytes.load(std::memory_order_relaxed) + mail.size,
+                           std::memory_order_relaxed);
     if (mail.small_size == 0) return;
     // relaxed: as above
-    const std::uint64_t deliveries = pair.taken_deliveries.load(std::memory_order_relaxed) + mail.deliveries();
+    const std::uint64_t deliveries =
+        pair.taken_deliveries.load(std::memory_order_relaxed) + mail.deliveries();
     pair.taken_deliveries.store(deliveries, std::memory_order_relaxed);  // relaxed: as above
   }
   /// What `take` says: go on?
@@ -194,13 +203,15 @@ bool Mailbox::take_one(const Letter& letter, Take& take) {
 
 template <class Tell>
 void Mailbox::tell_room(Tell&& tell) {
-  // The fence's partner is the one in crowded(): either the sender saw the room, or this thread sees that it waits.
+  // The fence's partner is the one in crowded(): either the sender saw the room, or this thread
+  // sees that it waits.
   std::atomic_thread_fence(std::memory_order_seq_cst);
   for (std::size_t from = 0; from < shards_; ++from) {
     Pair& pair = pairs_[from];
     // relaxed: ordered by the fence
     if (!pair.sender_waits.load(std::memory_order_relaxed)) continue;
-    if (pair.sender_waits.exchange(false, std::memory_order_relaxed)) {  // relaxed: ordered by the fence
+    if (pair.sender_waits.exchange(false,
+                                   std::memory_order_relaxed)) {  // relaxed: ordered by the fence
       tell(ShardIndex{static_cast<std::uint8_t>(from)});
     }
   }

@@ -16,7 +16,8 @@ namespace gimnet::hub {
 class PacedBook final : public CountedGroups {
  public:
   /// ripe: where subscriptions are put that may have room because something was lost; the shard's.
-  PacedBook(Recipient& recipient, std::vector<PacedSubscription*>& ripe) : recipient_(recipient), ripe_(ripe) {}
+  PacedBook(Recipient& recipient, std::vector<PacedSubscription*>& ripe)
+      : recipient_(recipient), ripe_(ripe) {}
   ~PacedBook() { clear(); }
   PacedBook(const PacedBook&) = delete;
   PacedBook& operator=(const PacedBook&) = delete;

@@ -22,8 +22,9 @@ void PacedSubscription::set_terms(const PaceTerms& terms) {
 
 std::uint64_t PacedSubscription::space() const {
   if (terms_.window == 0) return UINT64_MAX;
-  const auto passing =
-      std::count_if(open_.begin(), open_.end(), [](const Open& open) { return open.state == Open::State::passing; });
+  const auto passing = std::count_if(open_.begin(), open_.end(), [](const Open& open) {
+    return open.state == Open::State::passing;
+  });
   const std::uint64_t under_way = uncredited() + static_cast<std::uint64_t>(passing);
   return terms_.window > under_way ? terms_.window - under_way : 0;
 }

@@ -19,12 +19,13 @@ struct PaceTerms {
   friend bool operator==(const PaceTerms&, const PaceTerms&) = default;
 };
 
-/// One subscriber of one group, where the hub decides which messages it gets when: how many are on their way to it, the
-/// newest ones that are held, and those of which only the beginning has come. It decides; the Pacer moves the frames.
+/// One subscriber of one group, where the hub decides which messages it gets when: how many are on
+/// their way to it, the newest ones that are held, and those of which only the beginning has come.
+/// It decides; the Pacer moves the frames.
 ///
-/// What is on the way is counted in ends of messages: a frame that is a message, or the last fragment of one. Both ends
-/// see the same ones, whatever became of the rest of the message (docs/protocol.md, section 8).
-/// Thread safety: one shard.
+/// What is on the way is counted in ends of messages: a frame that is a message, or the last
+/// fragment of one. Both ends see the same ones, whatever became of the rest of the message
+/// (docs/protocol.md, section 8). Thread safety: one shard.
 class PacedSubscription {
  public:
   PacedSubscription(Recipient& recipient, GroupId group, const PaceTerms& terms)
@@ -35,15 +36,20 @@ class PacedSubscription {
   [[nodiscard]] Recipient& recipient() const { return recipient_; }
   [[nodiscard]] GroupId group() const { return group_; }
   [[nodiscard]] const PaceTerms& terms() const { return terms_; }
-  /// What is held stays, even if it is more than the new depth. A new interval counts from the message that began last.
+  /// What is held stays, even if it is more than the new depth. A new interval counts from the
+  /// message that began last.
   void set_terms(const PaceTerms& terms);
 
   // ---- the window and the clock
 
   /// Messages that may begin now, if the clock allows more than one.
   [[nodiscard]] std::uint64_t space() const;
-  [[nodiscard]] bool is_due(std::uint64_t now_us) const { return terms_.interval_us == 0 || now_us >= due_us_; }
-  [[nodiscard]] bool may_begin(std::uint64_t now_us) const { return space() != 0 && is_due(now_us); }
+  [[nodiscard]] bool is_due(std::uint64_t now_us) const {
+    return terms_.interval_us == 0 || now_us >= due_us_;
+  }
+  [[nodiscard]] bool may_begin(std::uint64_t now_us) const {
+    return space() != 0 && is_due(now_us);
+  }
   /// A message begins to go to the subscriber.
   void on_begun(std::uint64_t now_us);
   /// The next message is due whenever it comes, as if none had begun.
@@ -52,8 +58,8 @@ class PacedSubscription {
   void on_sent(std::uint64_t messages) { sent_ += messages; }
   /// Of them, so many were dropped before they left.
   void on_lost(std::uint64_t messages);
-  /// The subscriber says how many it took in total. False: it cannot be, and counts as all that were sent, or not at
-  /// all where it is less than before.
+  /// The subscriber says how many it took in total. False: it cannot be, and counts as all that
+  /// were sent, or not at all where it is less than before.
   [[nodiscard]] bool on_credit(std::uint64_t total);
   /// Both ends count from 0 again; so many ended messages still wait to be written.
   void on_new_epoch(std::uint64_t waiting);
@@ -66,7 +72,7 @@ class PacedSubscription {
   struct Open {
     enum class State : std::uint8_t {
       none,
-      plain,     ///< it may have begun before the pace, when everything came: what comes of it passes
+      plain,  ///< it may have begun before the pace, when everything came: what comes of it passes
       passing,   ///< its fragments go to the subscriber as they come
       arriving,  ///< they are kept until the message is whole, or may go
       cut,       ///< the rest is dropped
@@ -86,12 +92,14 @@ class PacedSubscription {
   [[nodiscard]] KeptMessage& oldest() { return ring_[first_]; }
   /// Lets the oldest go: clears it. REQUIRES: held() != 0.
   void pop_oldest();
-  /// Holds a whole message behind the others; `message` is empty afterwards. REQUIRES: held() < terms().depth.
+  /// Holds a whole message behind the others; `message` is empty afterwards. REQUIRES: held() <
+  /// terms().depth.
   void push_newest(KeptMessage& message);
 
   /// False: the subscription ended; its counts go on if it begins again on the same connection.
   bool active = true;
-  /// The start that it asked the provider's shard for last (RetainedMessages), and that nothing is for it before that.
+  /// The start that it asked the provider's shard for last (RetainedMessages), and that nothing is
+  /// for it before that.
   std::uint32_t start_ticket = 0;
   bool awaits_start = false;
   bool retained = false;   ///< of a service whose last message is kept

@@ -13,7 +13,8 @@ using State = PacedSubscription::Open::State;
 
 }  // namespace
 
-PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms, bool was_plain) {
+PacedSubscription& Pacer::subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms,
+                                    bool was_plain) {
   if (!recipient.paced) {
     recipient.paced = std::make_unique<PacedBook>(recipient, ripe_);
     recipient.outbox.set_counted_groups(recipient.paced.get());
@@ -61,13 +62,15 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
     release(subscription);
   } else {
     give_up_stalled(subscription);
-    abandon(subscription, subscription.open(header.lane & proto::kLaneMask), DropReason::cut_message);
+    abandon(subscription, subscription.open(header.lane & proto::kLaneMask),
+            DropReason::cut_message);
     offer_plain(subscription, run, header, handover);
   }
   return true;
 }
 
-/// A message is the subscriber's whole or not at all, also where its pace begins in the middle of one.
+/// A message is the subscriber's whole or not at all, also where its pace begins in the middle of
+/// one.
 void Pacer::begin_plain(PacedSubscription& subscription) const {
   for (Open& open : subscription.open()) {
     open.state = State::plain;
@@ -75,16 +78,18 @@ void Pacer::begin_plain(PacedSubscription& subscription) const {
   }
 }
 
-/// A message that its provider gave up in one lane while it goes on in another would keep its place for ever.
+/// A message that its provider gave up in one lane while it goes on in another would keep its place
+/// for ever.
 void Pacer::give_up_stalled(PacedSubscription& subscription) {
   for (Open& open : subscription.open()) {
-    if (open.state == State::none || context_.now_ms - open.came_ms < context_.limits.block_ms) continue;
+    if (open.state == State::none || context_.now_ms - open.came_ms < context_.limits.block_ms)
+      continue;
     abandon(subscription, open, DropReason::cut_message);
   }
 }
 
-void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
-                        Handover handover) {
+void Pacer::offer_plain(PacedSubscription& subscription, const Run& run,
+                        const proto::FrameHeader& header, Handover handover) {
   const bool any_time = subscription.terms().interval_us == 0;
   if (subscription.held() == 0 && any_time && subscription.space() >= run.frames) {
     return pass(subscription, run, run.frames, header, handover);
@@ -101,36 +106,45 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run, const p
       drop_what_has_no_room(subscription, rest, header.lane & proto::kLaneMask, handover);
     }
   }
-  if (rest.frames != 0) hold_newest(subscription, std::move(rest), header.lane & proto::kLaneMask, handover);
+  if (rest.frames != 0)
+    hold_newest(subscription, std::move(rest), header.lane & proto::kLaneMask, handover);
   release(subscription);
 }
 
-/// The frames at the front that a full outbox would refuse one by one, each of which would leave the window open.
-void Pacer::drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane, Handover handover) {
+/// The frames at the front that a full outbox would refuse one by one, each of which would leave
+/// the window open.
+void Pacer::drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane,
+                                  Handover handover) {
   Recipient& recipient = subscription.recipient();
   const LaneQueue& queue = recipient.outbox.lane(lane);
   if (rest.frames == 0 || !queue.holds_whole()) return;
   const std::uint64_t limit = context_.limits.lane_bytes(lane);
   const std::uint64_t room = limit - std::min(limit, queue.bytes());
   // What is too large for the recipient is dropped for that reason.
-  const Leading legal = leading_up_to(rest, handover.shortest_bytes, recipient.frame_bytes + proto::kHeaderSize);
+  const Leading legal =
+      leading_up_to(rest, handover.shortest_bytes, recipient.frame_bytes + proto::kHeaderSize);
   Leading refused = leading_beyond(rest, handover.shortest_bytes, room);
   if (legal.frames < refused.frames) refused = legal;
   if (refused.frames == 0) return;
-  const DropReason reason = context_.budget.exhausted() ? DropReason::over_budget : DropReason::queue_full;
-  drop(subscription, rest.take_front(refused.frames, refused.size), reason, handover.shortest_bytes);
+  const DropReason reason =
+      context_.budget.exhausted() ? DropReason::over_budget : DropReason::queue_full;
+  drop(subscription, rest.take_front(refused.frames, refused.size), reason,
+       handover.shortest_bytes);
 }
 
-/// As if each had come alone and replaced an older one; what would have been held for a moment is never kept.
-void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover) {
-  if (context_.budget.exhausted()) return drop(subscription, rest, DropReason::over_budget, handover.shortest_bytes);
+/// As if each had come alone and replaced an older one; what would have been held for a moment is
+/// never kept.
+void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane,
+                        Handover handover) {
+  if (context_.budget.exhausted())
+    return drop(subscription, rest, DropReason::over_budget, handover.shortest_bytes);
   while (rest.frames != 0) {
     const Leading passed_over = replaced_at_once(subscription, rest, lane, handover);
     if (passed_over.frames != 0) {
       // In the order in which they came: a REPORT shows the last one.
       while (subscription.held() != 0) drop_oldest(subscription, DropReason::replaced);
-      drop(subscription, rest.take_front(passed_over.frames, passed_over.size), DropReason::replaced,
-           handover.shortest_bytes);
+      drop(subscription, rest.take_front(passed_over.frames, passed_over.size),
+           DropReason::replaced, handover.shortest_bytes);
       continue;
     }
     const Run frame = rest.take_frame();
@@ -143,10 +157,10 @@ void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t l
   }
 }
 
-/// Those at the front that others of the run replace, and with them all that is held; none if it has to be looked at
-/// one by one, since their bytes may be too many first.
-Leading Pacer::replaced_at_once(const PacedSubscription& subscription, const Run& run, std::size_t lane,
-                                Handover handover) {
+/// Those at the front that others of the run replace, and with them all that is held; none if it
+/// has to be looked at one by one, since their bytes may be too many first.
+Leading Pacer::replaced_at_once(const PacedSubscription& subscription, const Run& run,
+                                std::size_t lane, Handover handover) {
   const std::uint32_t depth = subscription.terms().depth;
   if (run.frames <= depth) return {};
   Leading fitting{run.frames, run.size};
@@ -160,8 +174,8 @@ Leading Pacer::replaced_at_once(const PacedSubscription& subscription, const Run
   return leading_frames_of(run, handover.shortest_bytes, fitting.frames - depth, context_.starts);
 }
 
-void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
-                           Handover handover) {
+void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run,
+                           const proto::FrameHeader& header, Handover handover) {
   Open& open = subscription.open(header.lane & proto::kLaneMask);
   const auto frame = proto::parse_frame({run.bytes, run.size}, proto::Origin::hub);
   GIMNET_CHECK(frame && frame->fragment);  // the gate parsed it
@@ -176,7 +190,8 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run, cons
   if (fragment.offset == 0) {
     abandon(subscription, open, DropReason::cut_message);
     begin_message(subscription, open, fragment.message);
-  } else if (open.state == State::none || open.number != fragment.message || open.next_offset != fragment.offset) {
+  } else if (open.state == State::none || open.number != fragment.message ||
+             open.next_offset != fragment.offset) {
     abandon(subscription, open, DropReason::cut_message);
     return drop(subscription, run, DropReason::cut_message);
   }
@@ -222,8 +237,8 @@ void Pacer::abandon(PacedSubscription& subscription, Open& open, DropReason reas
   open.state = State::none;
 }
 
-void Pacer::pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended, const proto::FrameHeader& header,
-                 Handover handover) {
+void Pacer::pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended,
+                 const proto::FrameHeader& header, Handover handover) {
   subscription.on_sent(ended);
   fanout_.deliver(subscription.recipient(), run, header, handover);
 }
@@ -234,7 +249,8 @@ void Pacer::keep(KeptMessage& message, const Run& frame, Handover handover) {
 }
 
 void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane) {
-  while (subscription.held() >= subscription.terms().depth) drop_oldest(subscription, DropReason::replaced);
+  while (subscription.held() >= subscription.terms().depth)
+    drop_oldest(subscription, DropReason::replaced);
   const std::uint64_t limit = context_.limits.lane_bytes(lane);
   while (subscription.held() != 0 && subscription.held_bytes() + message.bytes() > limit) {
     drop_oldest(subscription, DropReason::queue_full);
@@ -256,12 +272,14 @@ void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, Dr
   context_.tally.queued -= message.frames();
   message.for_each([&](const Run& run) {
     subscription.recipient().outbox.count_dropped(run.frames);
-    // Nobody else drops of the same run: it is not worth a place among the starts of those that come.
+    // Nobody else drops of the same run: it is not worth a place among the starts of those that
+    // come.
     context_.drops.drop(run.bytes, run.size, run.frames, reason);
   });
 }
 
-void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason, std::uint32_t shortest_bytes) {
+void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason,
+                 std::uint32_t shortest_bytes) {
   subscription.recipient().outbox.count_dropped(run.frames);
   context_.drop(run, shortest_bytes, reason);
 }
@@ -283,7 +301,8 @@ void Pacer::release(PacedSubscription& subscription) {
     }
     release_oldest(subscription);
   }
-  while (subscription.held() == 0 && subscription.may_begin(now_us()) && release_open(subscription)) {
+  while (subscription.held() == 0 && subscription.may_begin(now_us()) &&
+         release_open(subscription)) {
   }
   schedule(subscription);
 }
@@ -381,7 +400,8 @@ void Pacer::schedule(PacedSubscription& subscription) {
 
 void Pacer::unschedule(PacedSubscription& subscription) {
   if (!std::exchange(subscription.scheduled, false)) return;
-  std::erase_if(scheduled_, [&](const Scheduled& each) { return each.subscription == &subscription; });
+  std::erase_if(scheduled_,
+                [&](const Scheduled& each) { return each.subscription == &subscription; });
   std::make_heap(scheduled_.begin(), scheduled_.end(), is_later);
 }
 

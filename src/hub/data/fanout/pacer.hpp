@@ -8,27 +8,30 @@
 
 namespace gimnet::hub {
 
-/// Gives the recipients of a shard no more of a group than their subscriptions allow: a window of messages that they
-/// have not credited, a time between two, the newest ones held. What is held ends like everything else: delivered, or
-/// in the drop book. A subscription that is not paced never comes here.
-/// Thread safety: one shard. Ownership: none; books belong to their recipients, which are forgotten before they go.
+/// Gives the recipients of a shard no more of a group than their subscriptions allow: a window of
+/// messages that they have not credited, a time between two, the newest ones held. What is held
+/// ends like everything else: delivered, or in the drop book. A subscription that is not paced
+/// never comes here. Thread safety: one shard. Ownership: none; books belong to their recipients,
+/// which are forgotten before they go.
 class Pacer {
  public:
   explicit Pacer(Fanout& fanout) : fanout_(fanout), context_(fanout.context()) {}
 
-  /// A subscription begins, or has new terms. Returns it. `was_plain`: the recipient got everything until it began, so
-  /// that it has the beginning of what is just coming.
-  PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms, bool was_plain = false);
+  /// A subscription begins, or has new terms. Returns it. `was_plain`: the recipient got everything
+  /// until it began, so that it has the beginning of what is just coming.
+  PacedSubscription& subscribe(Recipient& recipient, GroupId group, const PaceTerms& terms,
+                               bool was_plain = false);
   /// It ends. Its counts are kept for the next one on this connection, unless the group is gone.
   void unsubscribe(Recipient& recipient, GroupId group, bool group_gone);
   /// The subscription of that group; nullptr if the recipient has none that is active.
   [[nodiscard]] static PacedSubscription* find(const Recipient& recipient, GroupId group);
 
-  /// Frames of the group, as a router has them. False: they are not for this subscriber. REQUIRES: as Outbox::push().
-  [[nodiscard]] bool offer(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
-                           Handover handover);
-  /// The recipient says how many messages of the group it took. False: it has no such subscription, or the number
-  /// cannot be.
+  /// Frames of the group, as a router has them. False: they are not for this subscriber. REQUIRES:
+  /// as Outbox::push().
+  [[nodiscard]] bool offer(PacedSubscription& subscription, const Run& run,
+                           const proto::FrameHeader& header, Handover handover);
+  /// The recipient says how many messages of the group it took. False: it has no such subscription,
+  /// or the number cannot be.
   [[nodiscard]] bool on_credit(const Recipient& recipient, GroupId group, std::uint64_t total);
 
   /// The recipient's counts begin anew; what still waits in its outbox will be written.
@@ -51,23 +54,24 @@ class Pacer {
   static constexpr std::size_t kEndedMax = 1024;
 
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
-  void offer_plain(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
-                   Handover handover);
-  void drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane, Handover handover);
+  void offer_plain(PacedSubscription& subscription, const Run& run,
+                   const proto::FrameHeader& header, Handover handover);
+  void drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane,
+                             Handover handover);
   /// Frames that may not begin. REQUIRES: there are some.
   void hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover);
-  [[nodiscard]] Leading replaced_at_once(const PacedSubscription& subscription, const Run& run, std::size_t lane,
-                                         Handover handover);
-  void offer_fragment(PacedSubscription& subscription, const Run& run, const proto::FrameHeader& header,
-                      Handover handover);
+  [[nodiscard]] Leading replaced_at_once(const PacedSubscription& subscription, const Run& run,
+                                         std::size_t lane, Handover handover);
+  void offer_fragment(PacedSubscription& subscription, const Run& run,
+                      const proto::FrameHeader& header, Handover handover);
   void begin_plain(PacedSubscription& subscription) const;
   void give_up_stalled(PacedSubscription& subscription);
   void begin_message(PacedSubscription& subscription, Open& open, std::uint32_t number);
   void end_message(PacedSubscription& subscription, Open& open);
   /// A message that will not end: what is kept of it goes.
   void abandon(PacedSubscription& subscription, Open& open, proto::DropReason reason);
-  void pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended, const proto::FrameHeader& header,
-            Handover handover);
+  void pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended,
+            const proto::FrameHeader& header, Handover handover);
   void keep(KeptMessage& message, const Run& frame, Handover handover);
   void hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane);
   void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
@@ -79,13 +83,16 @@ class Pacer {
   void release_oldest(PacedSubscription& subscription);
   [[nodiscard]] bool release_open(PacedSubscription& subscription);
   void write_kept(PacedSubscription& subscription, const KeptMessage& message);
-  /// A subscription that something is held for, and when that was due as it was put here. It may have gone since, with
-  /// a message that came at that time; then the next is due later, which is found out here at the time.
+  /// A subscription that something is held for, and when that was due as it was put here. It may
+  /// have gone since, with a message that came at that time; then the next is due later, which is
+  /// found out here at the time.
   struct Scheduled {
     std::uint64_t due_us = 0;
     PacedSubscription* subscription = nullptr;
   };
-  [[nodiscard]] static bool is_later(const Scheduled& a, const Scheduled& b) { return a.due_us > b.due_us; }
+  [[nodiscard]] static bool is_later(const Scheduled& a, const Scheduled& b) {
+    return a.due_us > b.due_us;
+  }
   void schedule(PacedSubscription& subscription);
   void unschedule(PacedSubscription& subscription);
 

@@ -11,7 +11,8 @@
 
 namespace gimnet::hub {
 
-/// A session as the data plane sees it: somebody on this shard to whom frames go. Thread safety: one shard.
+/// A session as the data plane sees it: somebody on this shard to whom frames go. Thread safety:
+/// one shard.
 struct Recipient {
   NodeId node;
   ConnectionSlot slot;
@@ -24,8 +25,8 @@ struct Recipient {
   bool dirty = false;            ///< is in the list of those to be flushed
 };
 
-/// The sessions of a shard by slot, and those that this turn has something to write for. Thread safety: one shard.
-/// Ownership: none; who owns a recipient takes it out before it goes.
+/// The sessions of a shard by slot, and those that this turn has something to write for. Thread
+/// safety: one shard. Ownership: none; who owns a recipient takes it out before it goes.
 class RecipientTable {
  public:
   void put(Recipient& recipient) {
@@ -44,7 +45,9 @@ class RecipientTable {
     Recipient* recipient = by_slot_[slot.value()];
     return recipient != nullptr && recipient->generation == generation ? recipient : nullptr;
   }
-  [[nodiscard]] const std::vector<Recipient*>& by_slot() const { return by_slot_; }  ///< with holes (nullptr)
+  [[nodiscard]] const std::vector<Recipient*>& by_slot() const {
+    return by_slot_;
+  }  ///< with holes (nullptr)
 
   void mark_dirty(Recipient& recipient) {
     if (recipient.dirty) return;

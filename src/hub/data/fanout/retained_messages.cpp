@@ -63,7 +63,8 @@ void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
   if (may_keep(kept, last.size - proto::kHeaderSize)) kept.last.append(last, false, context_);
 }
 
-void RetainedMessages::keep_fragment(Entry& kept, const Run& run, const proto::FrameHeader& header) {
+void RetainedMessages::keep_fragment(Entry& kept, const Run& run,
+                                     const proto::FrameHeader& header) {
   const auto frame = proto::parse_frame({run.bytes, run.size}, proto::Origin::hub);
   GIMNET_CHECK(frame && frame->fragment);  // the gate parsed it
   const proto::FragmentHeader& fragment = *frame->fragment;
@@ -74,7 +75,8 @@ void RetainedMessages::keep_fragment(Entry& kept, const Run& run, const proto::F
     arriving.number = fragment.message;
     arriving.next_offset = 0;
   }
-  const bool follows = arriving.number == fragment.message && arriving.next_offset == fragment.offset;
+  const bool follows =
+      arriving.number == fragment.message && arriving.next_offset == fragment.offset;
   if (!arriving.open || !follows) {
     arriving.open = false;
     return arriving.message.clear();
@@ -107,14 +109,16 @@ void RetainedMessages::forget_provider(NodeId provider) {
   Entry* each = found == first_of_.end() ? nullptr : found->second;
   first_of_.erase(provider.value());
   while (each != nullptr) {
-    const std::uint32_t group = std::exchange(each, each->after)->group;  // not the one that goes with its entry
+    const std::uint32_t group =
+        std::exchange(each, each->after)->group;  // not the one that goes with its entry
     entries_.erase(group);
   }
 }
 
 void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
   if (former == provider) return;
-  for (auto found = first_of_.find(former.value()); found != first_of_.end(); found = first_of_.find(former.value())) {
+  for (auto found = first_of_.find(former.value()); found != first_of_.end();
+       found = first_of_.find(former.value())) {
     set_provider(*found->second, provider);
   }
 }
@@ -154,13 +158,14 @@ void RetainedMessages::ask_start(PacedSubscription& subscription) {
   subscription.awaits_start = true;
   if (members == nullptr) return;  // the subscription is about to end
   const Recipient& recipient = subscription.recipient();
-  const GroupStart start{subscription.group(), recipient.slot, recipient.generation, subscription.start_ticket,
-                         fanout_.self()};
+  const GroupStart start{subscription.group(), recipient.slot, recipient.generation,
+                         subscription.start_ticket, fanout_.self()};
   if (members->provider_place.shard == fanout_.self()) return on_start_wanted(start);
   fanout_.post_word(members->provider_place.shard, mail_about(MailKind::start_wanted, start));
 }
 
-/// nullptr: it has asked for a later start since, or ended, and so, perhaps, has the group, whose id is another's now.
+/// nullptr: it has asked for a later start since, or ended, and so, perhaps, has the group, whose
+/// id is another's now.
 PacedSubscription* RetainedMessages::subscription_of(const GroupStart& start) const {
   const Recipient* recipient = fanout_.recipients().find(start.slot, start.generation);
   if (recipient == nullptr || !recipient->paced) return nullptr;

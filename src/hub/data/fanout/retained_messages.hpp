@@ -12,12 +12,14 @@
 
 namespace gimnet::hub {
 
-/// The last message of each retained group, kept on its provider's shard, which is where the order of the group's
-/// messages is decided; and how a new subscriber gets it, exactly between two others.
+/// The last message of each retained group, kept on its provider's shard, which is where the order
+/// of the group's messages is decided; and how a new subscriber gets it, exactly between two
+/// others.
 ///
-/// The subscriber's shard asks the provider's for a start. That sends the start and the last message by the mailbox
-/// through which it hands over the group's frames: what came before the start the subscriber does not get, what comes
-/// after it does. Of a message that is just coming it gets what came so far behind the last one.
+/// The subscriber's shard asks the provider's for a start. That sends the start and the last
+/// message by the mailbox through which it hands over the group's frames: what came before the
+/// start the subscriber does not get, what comes after it does. Of a message that is just coming it
+/// gets what came so far behind the last one.
 ///
 /// Thread safety: one shard. Limits: retained_bytes for one message, and the budget.
 class RetainedMessages {
@@ -78,7 +80,8 @@ class RetainedMessages {
   EgressContext& context_;
   std::uint32_t starts_ = 0;  ///< asked for
   boost::unordered_flat_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
-  /// The first entry of each provider: sessions end all the time, and most of them had provided nothing.
+  /// The first entry of each provider: sessions end all the time, and most of them had provided
+  /// nothing.
   boost::unordered_flat_map<std::uint32_t, Entry*> first_of_;
 };
 

@@ -9,8 +9,8 @@ namespace {
 /// A node that used up its share of lane 0 gets it back after so long below it.
 constexpr std::uint64_t kDemotionMs = 1'000;
 constexpr std::uint64_t kLane0WindowMs = 100;
-/// A message that was counted when it began may be so much longer with the headers of its fragments. Sent in smaller
-/// ones yet, the rest of it counts once more.
+/// A message that was counted when it began may be so much longer with the headers of its
+/// fragments. Sent in smaller ones yet, the rest of it counts once more.
 constexpr std::uint64_t kFrameBytesPerByte = 2;
 
 Admission refuse(IngressState& state, proto::FrameError error) {
@@ -27,7 +27,8 @@ void write_source(std::byte* run, const proto::RunView& view, std::uint32_t sour
 }
 
 bool is_former(const IngressState& state, NodeId source) {
-  return std::find(state.former_nodes.begin(), state.former_nodes.end(), source) != state.former_nodes.end();
+  return std::find(state.former_nodes.begin(), state.former_nodes.end(), source) !=
+         state.former_nodes.end();
 }
 
 /// Shortens the run to the frames before the first that has no room for its key.
@@ -46,7 +47,8 @@ void keep_frames_with_key(proto::RunView& view) {
 
 }  // namespace
 
-Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
+Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view,
+                               std::uint64_t now_ms) {
   proto::FrameHeader header = proto::load_header(view.bytes);
   const auto attributes = load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset);
 #if defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
@@ -58,22 +60,26 @@ Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunVi
       header.src = state.node.value();
       write_source(run, view, header.src);
     }
-    if (const Admission refused = check(state, header, view); refused != Admission::data) return refused;
+    if (const Admission refused = check(state, header, view); refused != Admission::data)
+      return refused;
     const bool plain = proto::may_form_run(header) && !header.has(proto::kFlagKeyed);
     state.admitted_attributes = plain ? attributes : IngressState::kNoneAdmitted;
   }
-  if (header.lane == static_cast<std::uint8_t>(proto::Lane::real_time)) limit_lane0(state, run, view, now_ms);
+  if (header.lane == static_cast<std::uint8_t>(proto::Lane::real_time))
+    limit_lane0(state, run, view, now_ms);
   return Admission::data;
 }
 
-Admission IngressGate::check(IngressState& state, const proto::FrameHeader& header, proto::RunView& view) {
+Admission IngressGate::check(IngressState& state, const proto::FrameHeader& header,
+                             proto::RunView& view) {
   const proto::FrameError error = proto::check_header_from_node(header);
   if (error != proto::FrameError::none) return refuse(state, error);
   const bool own = header.src == state.node.value();
   const bool unnamed_allowed = header.kind == proto::Kind::flow || header.kind == proto::Kind::link;
   if (!own && !(unnamed_allowed && header.src == 0)) return Admission::wrong_source;
   if (header.kind == proto::Kind::link) return Admission::link;
-  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind) return check_request(state, header, view);
+  if (static_cast<std::uint8_t>(header.kind) >= proto::kFirstControlKind)
+    return check_request(state, header, view);
   if (header.kind == proto::Kind::flow) return Admission::flow;
   if (proto::may_form_run(header)) {
     if (header.has(proto::kFlagKeyed)) keep_frames_with_key(view);
@@ -90,7 +96,9 @@ Admission IngressGate::check_request(IngressState& state, const proto::FrameHead
   return frame ? Admission::control : refuse(state, frame.error());
 }
 
-std::uint64_t IngressGate::lane0_window_bytes() const { return limits_.lane0_bytes_per_s * kLane0WindowMs / 1'000; }
+std::uint64_t IngressGate::lane0_window_bytes() const {
+  return limits_.lane0_bytes_per_s * kLane0WindowMs / 1'000;
+}
 
 bool IngressGate::spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms) {
   if (now_ms >= state.lane0_since_ms + kLane0WindowMs) {
@@ -102,10 +110,12 @@ bool IngressGate::spend_lane0(IngressState& state, std::uint64_t bytes, std::uin
   return now_ms < state.demoted_until_ms;
 }
 
-/// A message is moved whole or not at all: its recipient puts together what came in one lane. So all of it counts when
-/// it begins, and what comes of it then has been counted; of a message of which no beginning is known each frame counts
-/// like any other. One that is too much by itself is moved, and counts for nothing.
-bool IngressGate::moves_fragment(IngressState& state, const proto::RunView& view, std::uint64_t now_ms) {
+/// A message is moved whole or not at all: its recipient puts together what came in one lane. So
+/// all of it counts when it begins, and what comes of it then has been counted; of a message of
+/// which no beginning is known each frame counts like any other. One that is too much by itself is
+/// moved, and counts for nothing.
+bool IngressGate::moves_fragment(IngressState& state, const proto::RunView& view,
+                                 std::uint64_t now_ms) {
   const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
   if (!frame || !frame->fragment) return spend_lane0(state, view.size, now_ms);
   const proto::FragmentHeader& fragment = *frame->fragment;
@@ -134,9 +144,11 @@ bool IngressGate::moves_fragment(IngressState& state, const proto::RunView& view
   return !counted && spend_lane0(state, view.size, now_ms);
 }
 
-void IngressGate::limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms) {
+void IngressGate::limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view,
+                              std::uint64_t now_ms) {
   const bool fragment = proto::load_header(view.bytes).has(proto::kFlagFragment);
-  const bool moves = fragment ? moves_fragment(state, view, now_ms) : spend_lane0(state, view.size, now_ms);
+  const bool moves =
+      fragment ? moves_fragment(state, view, now_ms) : spend_lane0(state, view.size, now_ms);
   if (!moves) return;
   for (std::uint32_t done = 0; done < view.size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());

@@ -30,30 +30,35 @@ struct IngressState {
   static constexpr std::uint64_t kNoneAdmitted = ~std::uint64_t{0};
 
   NodeId node;
-  /// Ids that it had before it was renumbered, under which it sends again what was not confirmed. Its session's.
+  /// Ids that it had before it was renumbered, under which it sends again what was not confirmed.
+  /// Its session's.
   std::span<const NodeId> former_nodes;
-  std::uint64_t admitted_attributes = kNoneAdmitted;  ///< kind, flags, hops and lane of the last plain data run
-  std::uint64_t lane0_bytes = 0;                      ///< since lane0_since_ms
+  std::uint64_t admitted_attributes =
+      kNoneAdmitted;              ///< kind, flags, hops and lane of the last plain data run
+  std::uint64_t lane0_bytes = 0;  ///< since lane0_since_ms
   std::uint64_t lane0_since_ms = 0;
   std::uint64_t demoted_until_ms = 0;
   std::unique_ptr<RealTimeMessages> real_time_messages;  ///< nullptr: it has not begun any
   proto::FrameError error = proto::FrameError::none;     ///< why the last frame was malformed
 };
 
-/// The one gate that every frame from a connection passes, whatever the connection is: is it legal, and does its sender
-/// speak for itself? Frames of a node that sends more in lane 0 than it may are moved to lane 1.
-/// Thread safety: one shard.
+/// The one gate that every frame from a connection passes, whatever the connection is: is it legal,
+/// and does its sender speak for itself? Frames of a node that sends more in lane 0 than it may are
+/// moved to lane 1. Thread safety: one shard.
 class IngressGate {
  public:
   IngressGate(const Limits& limits, Tally& tally) : limits_(limits), tally_(tally) {}
 
-  /// One run of the parser (neighbouring frames with one header but for the length). `run` may be changed in its lane
-  /// byte, and in its source where that is the node's former id: its bytes belong to the reading connection alone until
-  /// they are handed on. Where a later frame of the run is malformed, `view` is shortened to the frames before it, and
-  /// the next run begins with that one.
-  [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms) {
+  /// One run of the parser (neighbouring frames with one header but for the length). `run` may be
+  /// changed in its lane byte, and in its source where that is the node's former id: its bytes
+  /// belong to the reading connection alone until they are handed on. Where a later frame of the
+  /// run is malformed, `view` is shortened to the frames before it, and the next run begins with
+  /// that one.
+  [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view,
+                                std::uint64_t now_ms) {
     // Most runs are like the one before.
-    if (load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset) == state.admitted_attributes &&
+    if (load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset) ==
+            state.admitted_attributes &&
 #if !defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
         load_le<std::uint32_t>(view.bytes + proto::kSrcOffset) == state.node.value() &&
 #endif
@@ -64,15 +69,20 @@ class IngressGate {
   }
 
  private:
-  [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view, std::uint64_t now_ms);
-  [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header, proto::RunView& view);
-  [[nodiscard]] static Admission check_request(IngressState& state, const proto::FrameHeader& header,
+  [[nodiscard]] Admission look_at(IngressState& state, std::byte* run, proto::RunView& view,
+                                  std::uint64_t now_ms);
+  [[nodiscard]] Admission check(IngressState& state, const proto::FrameHeader& header,
+                                proto::RunView& view);
+  [[nodiscard]] static Admission check_request(IngressState& state,
+                                               const proto::FrameHeader& header,
                                                const proto::RunView& view);
   /// Are the frames to be moved to lane 1?
   [[nodiscard]] bool spend_lane0(IngressState& state, std::uint64_t bytes, std::uint64_t now_ms);
-  [[nodiscard]] bool moves_fragment(IngressState& state, const proto::RunView& view, std::uint64_t now_ms);
+  [[nodiscard]] bool moves_fragment(IngressState& state, const proto::RunView& view,
+                                    std::uint64_t now_ms);
   [[nodiscard]] std::uint64_t lane0_window_bytes() const;
-  void limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view, std::uint64_t now_ms);
+  void limit_lane0(IngressState& state, std::byte* run, const proto::RunView& view,
+                   std::uint64_t now_ms);
 
   const Limits& limits_;
   Tally& tally_;

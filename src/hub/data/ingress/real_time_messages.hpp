@@ -6,9 +6,10 @@
 
 namespace gimnet::hub {
 
-/// Fragmented lane 0 messages of one connection that have begun: whether they were moved to lane 1, since a message is
-/// moved whole or not at all, and how much of what was counted when they began is left. Where more are begun at a time,
-/// the one that began longest ago is forgotten: a sender may give up any without a word. Thread safety: one shard.
+/// Fragmented lane 0 messages of one connection that have begun: whether they were moved to lane 1,
+/// since a message is moved whole or not at all, and how much of what was counted when they began
+/// is left. Where more are begun at a time, the one that began longest ago is forgotten: a sender
+/// may give up any without a word. Thread safety: one shard.
 class RealTimeMessages {
  public:
   static constexpr std::size_t kMessagesMax = 8;

@@ -9,7 +9,8 @@
 namespace gimnet::hub {
 
 [[gnu::always_inline]] inline void ReceiveBuffer::make_room() {
-  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last byte.
+  // acquire pairs with the release in BufferPool::end_loan(): the other shard has read its last
+  // byte.
   if (slab_ && slab_->references == 1 && slab_->lent.load(std::memory_order_acquire) == 0) {
     used_ = 0;
     pool_.unpin(*slab_.get());
@@ -25,8 +26,8 @@ std::span<std::byte> ReceiveBuffer::prepare(FrameTail& tail) {
   if (tail.own) {
     reading_ = tail.buffer.share();
     begin_ = tail.begin;
-    // A frame that began in the first kSlabReadBytes always ends in the slab; nothing begins behind them. In a chunk
-    // there is only that frame.
+    // A frame that began in the first kSlabReadBytes always ends in the slab; nothing begins behind
+    // them. In a chunk there is only that frame.
     const std::uint32_t begins_below = reading_->kind == BufferKind::slab ? kSlabReadBytes : 0;
     const std::uint32_t limit = std::max(tail.begin + tail.needed, begins_below);
     const std::uint32_t filled = tail.begin + tail.size;
@@ -51,7 +52,8 @@ ReceiveBuffer::Received ReceiveBuffer::commit(FrameTail& tail, std::size_t bytes
   return {begin, begin + size};
 }
 
-bool ReceiveBuffer::keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed) {
+bool ReceiveBuffer::keep(FrameTail& tail, const std::byte* begin, const std::byte* end,
+                         std::uint32_t needed) {
   const auto size = static_cast<std::uint32_t>(end - begin);
   if (size == 0) return true;
   tail.size = size;
@@ -85,7 +87,8 @@ void ReceiveBuffer::keep_rest(FrameTail& tail, const std::byte* begin, const std
   if (tail.size > kSharedChunkBytes) {
     tail.begin = static_cast<std::uint32_t>(begin - reading_->data);
     tail.buffer = reading_.share();
-    // A frame may have been begun at its end, and goes on there: nobody else reads into that slab any more.
+    // A frame may have been begun at its end, and goes on there: nobody else reads into that slab
+    // any more.
     if (slab_.get() == reading_.get()) slab_.reset();
   } else {
     tail.begin = 0;
@@ -117,7 +120,9 @@ ReceiveBuffer::Received ReceiveBuffer::go_on(FrameTail& tail) {
   return {begin, begin + size};
 }
 
-bool ReceiveBuffer::owns_slab(const FrameTail& tail) { return tail.own && tail.buffer->kind == BufferKind::slab; }
+bool ReceiveBuffer::owns_slab(const FrameTail& tail) {
+  return tail.own && tail.buffer->kind == BufferKind::slab;
+}
 
 std::uint32_t ReceiveBuffer::cost(const FrameTail& tail) {
   return tail.own || tail.rest ? tail.buffer->capacity : tail.size;

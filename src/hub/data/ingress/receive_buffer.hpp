@@ -9,8 +9,9 @@
 
 namespace gimnet::hub {
 
-/// The frame that a connection has begun and not finished, or the rest of a read: whole frames that wait for their
-/// turn. Lies in a buffer that the connection then has for itself, or, when little of it is there, in a copy.
+/// The frame that a connection has begun and not finished, or the rest of a read: whole frames that
+/// wait for their turn. Lies in a buffer that the connection then has for itself, or, when little
+/// of it is there, in a copy.
 struct FrameTail {
   BufferRef buffer;
   std::uint32_t begin = 0;
@@ -22,11 +23,11 @@ struct FrameTail {
   [[nodiscard]] bool empty() const { return size == 0; }
 };
 
-/// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps a reference, so
-/// that it stays in the cache. A large frame that ends in a later read stays where it began, and its connection goes
-/// on reading behind it: no payload byte is moved. Where many are begun at a time, whose senders then are slow, each
-/// further one moves into memory of its own size, once.
-/// Thread safety: one shard.
+/// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps
+/// a reference, so that it stays in the cache. A large frame that ends in a later read stays where
+/// it began, and its connection goes on reading behind it: no payload byte is moved. Where many are
+/// begun at a time, whose senders then are slow, each further one moves into memory of its own
+/// size, once. Thread safety: one shard.
 class ReceiveBuffer {
  public:
   /// tail_bytes_max: what all begun frames together may keep.
@@ -45,15 +46,17 @@ class ReceiveBuffer {
   /// The buffer that holds what commit() returned, to take references of.
   [[nodiscard]] const BufferRef& buffer() const { return reading_; }
 
-  /// After all whole frames were handed on: [begin, end) of buffer() is left over, the start of a frame of `needed`
-  /// bytes. Returns false if too much is kept for begun frames already; nothing is kept then.
-  [[nodiscard]] bool keep(FrameTail& tail, const std::byte* begin, const std::byte* end, std::uint32_t needed);
+  /// After all whole frames were handed on: [begin, end) of buffer() is left over, the start of a
+  /// frame of `needed` bytes. Returns false if too much is kept for begun frames already; nothing
+  /// is kept then.
+  [[nodiscard]] bool keep(FrameTail& tail, const std::byte* begin, const std::byte* end,
+                          std::uint32_t needed);
   /// Instead: [begin, end) of buffer() begins with a whole frame, and is left for a later turn.
   void keep_rest(FrameTail& tail, const std::byte* begin, const std::byte* end);
   /// That turn. REQUIRES: tail.rest. `tail` is empty then, as after commit().
   [[nodiscard]] Received go_on(FrameTail& tail);
-  /// Rests that are kept, and their bytes. A connection reads nothing while it has one, and little while they are more
-  /// than kRestBytesMax, so that they are no more than that and a read each.
+  /// Rests that are kept, and their bytes. A connection reads nothing while it has one, and little
+  /// while they are more than kRestBytesMax, so that they are no more than that and a read each.
   [[nodiscard]] std::size_t rests() const { return rests_; }
   [[nodiscard]] bool many_rests() const { return rest_bytes_ >= kRestBytesMax; }
   static constexpr std::uint64_t kRestBytesMax = std::uint64_t{16} << 20;

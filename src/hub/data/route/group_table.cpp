@@ -14,7 +14,8 @@ static_assert(std::atomic<const GroupMembers*>::is_always_lock_free);
 }  // namespace
 
 GroupTable::GroupTable() {
-  void* memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  void* memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE,
+                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc{};
   members_ = static_cast<std::atomic<const GroupMembers*>*>(memory);
 }
@@ -23,7 +24,8 @@ GroupTable::~GroupTable() { ::munmap(static_cast<void*>(members_), kBytes); }
 
 const GroupMembers* GroupTable::exchange(std::uint32_t index, const GroupMembers* members) {
   GIMNET_CHECK(index < kEntries);
-  // release pairs with the acquire load in find(); acquire because the old members are freed by this thread.
+  // release pairs with the acquire load in find(); acquire because the old members are freed by
+  // this thread.
   return members_[index].exchange(members, std::memory_order_acq_rel);
 }
 

@@ -20,32 +20,35 @@ struct GroupMember {
 struct PacedMember {
   ConnectionSlot slot;
   std::uint32_t generation = 0;
-  /// It got everything before it was paced, and does until its shard has heard of the pace. One that has only just
-  /// subscribed gets nothing until then.
+  /// It got everything before it was paced, and does until its shard has heard of the pace. One
+  /// that has only just subscribed gets nothing until then.
   bool was_plain = false;
 };
 
-/// The recipients of one group at one moment. A copy shares the lists, so that one member more or less is cheap in a
-/// group of any size. Thread safety: immutable once published. Ownership: the table publisher, which frees it when no
-/// shard can still look at it (concurrent/quiescence.hpp).
+/// The recipients of one group at one moment. A copy shares the lists, so that one member more or
+/// less is cheap in a group of any size. Thread safety: immutable once published. Ownership: the
+/// table publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
-  /// Where its provider's session lives: constant while the group lives, whatever id the provider has. Frames to and of
-  /// the service go by it and not by the id, of which the node table may know more or less than this (Router).
+  /// Where its provider's session lives: constant while the group lives, whatever id the provider
+  /// has. Frames to and of the service go by it and not by the id, of which the node table may know
+  /// more or less than this (Router).
   NodePlace provider_place;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<MemberList<GroupMember>> by_shard;
   /// Those of which the shard paces what they get; empty if there are none.
   std::vector<MemberList<PacedMember>> paced_by_shard;
-  bool retain = false;   ///< the provider's shard keeps the last message; then all members are paced
+  bool retain = false;  ///< the provider's shard keeps the last message; then all members are paced
   bool accepts = false;  ///< the service takes data: frames of kind SERVICE go to its provider
 
-  /// It has no provider any more: nothing is taken in for it, but what was handed over before is delivered.
+  /// It has no provider any more: nothing is taken in for it, but what was handed over before is
+  /// delivered.
   [[nodiscard]] bool ends() const { return provider == NodeId{}; }
 };
 
-/// Group index to recipients, for the groups that this hub owns. Thread safety: one writer (the conductor), any
-/// number of readers; reads are wait-free. A reader's pointer is good until its shard's turn ends.
+/// Group index to recipients, for the groups that this hub owns. Thread safety: one writer (the
+/// conductor), any number of readers; reads are wait-free. A reader's pointer is good until its
+/// shard's turn ends.
 class GroupTable {
  public:
   GroupTable();
@@ -53,13 +56,14 @@ class GroupTable {
   GroupTable(const GroupTable&) = delete;
   GroupTable& operator=(const GroupTable&) = delete;
 
-  /// Puts `members` (or nullptr: no such group) in place and returns what stood there, which the caller frees after
-  /// a grace period. REQUIRES: index < 2^20.
+  /// Puts `members` (or nullptr: no such group) in place and returns what stood there, which the
+  /// caller frees after a grace period. REQUIRES: index < 2^20.
   [[nodiscard]] const GroupMembers* exchange(std::uint32_t index, const GroupMembers* members);
 
   /// REQUIRES: index < 2^20. nullptr when no group has that index.
   [[nodiscard]] const GroupMembers* find(std::uint32_t index) const {
-    return members_[index].load(std::memory_order_acquire);  // pairs with the exchange in exchange()
+    return members_[index].load(
+        std::memory_order_acquire);  // pairs with the exchange in exchange()
   }
 
  private:

@@ -15,13 +15,15 @@
 
 namespace gimnet::hub {
 
-/// The members of a group on one shard, each once, in the order of their slots. A copy shares with the list that it
-/// was made from all that neither of them changes afterwards: it costs a pointer for each chunk of members, and a
-/// change no more than one chunk, however long the list is (docs/adr/0008-lists-of-members-share.md).
+/// The members of a group on one shard, each once, in the order of their slots. A copy shares with
+/// the list that it was made from all that neither of them changes afterwards: it costs a pointer
+/// for each chunk of members, and a change no more than one chunk, however long the list is
+/// (docs/adr/0008-lists-of-members-share.md).
 ///
-/// Thread safety: one thread makes, copies, changes and destroys all lists that share. Any other may look at a list
-/// meanwhile that is not changed any more: what it reads is never written, since a chunk that two lists have is changed
-/// by neither. Ownership: of its part in the chunks. REQUIRES of Member: trivial to copy, with a ConnectionSlot `slot`.
+/// Thread safety: one thread makes, copies, changes and destroys all lists that share. Any other
+/// may look at a list meanwhile that is not changed any more: what it reads is never written, since
+/// a chunk that two lists have is changed by neither. Ownership: of its part in the chunks.
+/// REQUIRES of Member: trivial to copy, with a ConnectionSlot `slot`.
 template <class Member>
 class MemberList {
  public:
@@ -81,7 +83,8 @@ class MemberList {
       return;
     }
     ++size_;
-    if (chunks_[at]->count < kChunkMembers) return own(at, chunks_[at]->count + 1).insert(place, member);
+    if (chunks_[at]->count < kChunkMembers)
+      return own(at, chunks_[at]->count + 1).insert(place, member);
     split(at, place, member);
   }
 
@@ -95,7 +98,8 @@ class MemberList {
     chunk.erase(place);
     if (chunk.count == 0) {
       drop(at);
-    } else if (at + 1 < chunks_.size() && chunk.count + chunks_[at + 1]->count <= kChunkMembers / 2) {
+    } else if (at + 1 < chunks_.size() &&
+               chunk.count + chunks_[at + 1]->count <= kChunkMembers / 2) {
       join(at);
     } else if (at > 0 && chunk.count + chunks_[at - 1]->count <= kChunkMembers / 2) {
       join(at - 1);
@@ -128,9 +132,10 @@ class MemberList {
 
     /// The first member whose slot is not below that one.
     [[nodiscard]] const Member* place_of(ConnectionSlot slot) const {
-      return std::lower_bound(begin(), end(), slot, [](const Member& member, ConnectionSlot wanted) {
-        return member.slot.value() < wanted.value();
-      });
+      return std::lower_bound(begin(), end(), slot,
+                              [](const Member& member, ConnectionSlot wanted) {
+                                return member.slot.value() < wanted.value();
+                              });
     }
     void insert(std::size_t place, const Member& member) {
       GIMNET_ASSERT(lists == 1 && count < room);
@@ -155,11 +160,13 @@ class MemberList {
     std::swap(size_, other.size_);
   }
 
-  /// The chunk in which that slot is, if it is in one; as many as there are if it would stand behind all.
+  /// The chunk in which that slot is, if it is in one; as many as there are if it would stand
+  /// behind all.
   [[nodiscard]] std::size_t chunk_of(ConnectionSlot slot) const {
-    const auto found = std::lower_bound(
-        chunks_.begin(), chunks_.end(), slot,
-        [](const Chunk* chunk, ConnectionSlot wanted) { return (chunk->end() - 1)->slot.value() < wanted.value(); });
+    const auto found = std::lower_bound(chunks_.begin(), chunks_.end(), slot,
+                                        [](const Chunk* chunk, ConnectionSlot wanted) {
+                                          return (chunk->end() - 1)->slot.value() < wanted.value();
+                                        });
     return static_cast<std::size_t>(found - chunks_.begin());
   }
 
@@ -174,8 +181,8 @@ class MemberList {
     return *chunk;
   }
 
-  /// Puts the member into a full chunk at that place. Who comes last begins a chunk, so that those before stay full:
-  /// slots are given out in this order.
+  /// Puts the member into a full chunk at that place. Who comes last begins a chunk, so that those
+  /// before stay full: slots are given out in this order.
   void split(std::size_t at, std::size_t place, const Member& member) {
     const bool is_last = at + 1 == chunks_.size() && place == kChunkMembers;
     const std::size_t from = is_last ? kChunkMembers : kChunkMembers / 2;

@@ -9,8 +9,9 @@
 
 namespace gimnet::hub {
 
-/// Where a node's session lives. A generation is never 0 for a session that exists; it is compared again when a
-/// waiting frame is sent, so that a frame for a node that left never reaches the next holder of its slot.
+/// Where a node's session lives. A generation is never 0 for a session that exists; it is compared
+/// again when a waiting frame is sent, so that a frame for a node that left never reaches the next
+/// holder of its slot.
 struct NodePlace {
   ShardIndex shard;
   ConnectionSlot slot;
@@ -27,9 +28,9 @@ inline constexpr std::uint32_t kSlotsMax = 1u << 24;
 /// The most shards that a hub can have: as many as bits in a set of them.
 inline constexpr std::size_t kShardsMax = 64;
 
-/// Node index to place, for the nodes of this hub: a flat array of 2^20 words, and a bit for each, in memory that the
-/// kernel hands out page by page. Thread safety: one writer (the conductor), any number of readers; reads are
-/// wait-free.
+/// Node index to place, for the nodes of this hub: a flat array of 2^20 words, and a bit for each,
+/// in memory that the kernel hands out page by page. Thread safety: one writer (the conductor), any
+/// number of readers; reads are wait-free.
 class NodeTable {
  public:
   NodeTable();
@@ -37,17 +38,18 @@ class NodeTable {
   NodeTable(const NodeTable&) = delete;
   NodeTable& operator=(const NodeTable&) = delete;
 
-  /// REQUIRES: index < 2^20, place.slot < kSlotsMax, place.shard < kShardsMax. A place with generation 0 clears the
-  /// entry, or says that the node was renumbered.
+  /// REQUIRES: index < 2^20, place.slot < kSlotsMax, place.shard < kShardsMax. A place with
+  /// generation 0 clears the entry, or says that the node was renumbered.
   void publish(std::uint32_t index, NodePlace place);
 
   /// REQUIRES: index < 2^20. Generation 0 when no session has that index.
   [[nodiscard]] NodePlace find(std::uint32_t index) const {
-    return unpack(words_[index].load(std::memory_order_acquire));  // pairs with the release store in publish()
+    return unpack(words_[index].load(
+        std::memory_order_acquire));  // pairs with the release store in publish()
   }
 
-  /// That node may be on its way back to a hub that was restarted: until it is there, or expect_nobody(), it is
-  /// `away`, not unknown. REQUIRES: 0 < index < 2^20.
+  /// That node may be on its way back to a hub that was restarted: until it is there, or
+  /// expect_nobody(), it is `away`, not unknown. REQUIRES: 0 < index < 2^20.
   void expect(std::uint32_t index);
   void expect_nobody();
   [[nodiscard]] bool may_return(std::uint32_t index) const {
@@ -57,7 +59,8 @@ class NodeTable {
 
   /// The shards (a bit set) on which a node lives.
   [[nodiscard]] std::uint64_t shards() const {
-    return shards_.load(std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
+    return shards_.load(
+        std::memory_order_relaxed);  // relaxed: a shard that is missed had no node a moment ago
   }
   /// How many nodes live on that shard.
   [[nodiscard]] std::uint32_t nodes_on(ShardIndex shard) const {

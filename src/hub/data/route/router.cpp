@@ -9,8 +9,8 @@
 namespace gimnet::hub {
 namespace {
 
-/// From so many recipients on a shard on, a reference each beats a copy each, however small the frames are
-/// (bench/hub/data/fanout/fanout_bench.cpp).
+/// From so many recipients on a shard on, a reference each beats a copy each, however small the
+/// frames are (bench/hub/data/fanout/fanout_bench.cpp).
 constexpr std::size_t kReferenceRecipients = 4;
 
 }  // namespace
@@ -48,7 +48,8 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, Arrival 
   }
 }
 
-Run Router::route_handed_over(const Run& frames, std::uint32_t length_max, std::uint64_t deliveries_end) {
+Run Router::route_handed_over(const Run& frames, std::uint32_t length_max,
+                              std::uint64_t deliveries_end) {
   fanout_.context().owner.check_here();
   const std::byte* next = frames.bytes;
   const std::byte* const end = frames.bytes + frames.size;
@@ -74,8 +75,8 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max, std::
   }
 }
 
-inline void Router::to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
-                             Arrival arrival) {
+inline void Router::to_place(const Run& run, const proto::FrameHeader& header,
+                             const NodePlace& place, Arrival arrival) {
   if (place.shard != fanout_.self()) {
     // A frame that was handed over here and would have to go on is for a node that left meanwhile.
     if (arrival.handed_over) return drop(run, proto::DropReason::no_such_node);
@@ -86,7 +87,8 @@ inline void Router::to_place(const Run& run, const proto::FrameHeader& header, c
   fanout_.deliver(*recipient, run, header, Handover{.shortest_bytes = arrival.shortest_bytes});
 }
 
-void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival) {
+void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node,
+                     Arrival arrival) {
   if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
   const NodePlace place = nodes_.find(index_of(node));
   if (!place.exists()) return drop(run, why_absent(node));
@@ -110,8 +112,8 @@ const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader&
   return members;
 }
 
-/// Does the frame come from the provider under another id than the group knows? Its session here has not heard of its
-/// new id yet, and neither has the node.
+/// Does the frame come from the provider under another id than the group knows? Its session here
+/// has not heard of its new id yet, and neither has the node.
 bool Router::provider_goes_by(const GroupMembers& members, NodeId source) const {
   const NodePlace& place = members.provider_place;
   if (members.ends() || place.shard != fanout_.self()) return false;
@@ -122,13 +124,16 @@ bool Router::provider_goes_by(const GroupMembers& members, NodeId source) const 
 void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
-  // What was handed over was looked at by the shard that took it in; its provider may have been renumbered since.
+  // What was handed over was looked at by the shard that took it in; its provider may have been
+  // renumbered since.
   if (!arrival.handed_over && members->provider != NodeId{header.src} &&
       !provider_goes_by(*members, NodeId{header.src})) {
-    return drop(run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
+    return drop(
+        run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients, .shortest_bytes = arrival.shortest_bytes};
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients,
+                          .shortest_bytes = arrival.shortest_bytes};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
   here.for_each([&](const GroupMember& member) {
@@ -160,10 +165,12 @@ std::uint32_t Router::to_members_elsewhere(const Run& run, const GroupMembers& m
   return outcomes;
 }
 
-/// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one without the other.
+/// The conductor publishes a group before it tells a shard of a pace, and this turn may see the one
+/// without the other.
 std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, Arrival arrival,
                                const MemberList<PacedMember>& here) {
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients, .shortest_bytes = arrival.shortest_bytes};
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients,
+                          .shortest_bytes = arrival.shortest_bytes};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
   here.for_each([&](const PacedMember& member) {
@@ -180,16 +187,18 @@ std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header,
   return outcomes;
 }
 
-void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes) {
+void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries,
+                             std::uint32_t& outcomes) {
   for (shards &= ~(std::uint64_t{1} << fanout_.self().value()); shards != 0; shards &= shards - 1) {
-    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(shards))}, run, deliveries);
+    fanout_.hand_over(ShardIndex{static_cast<std::uint8_t>(std::countr_zero(shards))}, run,
+                      deliveries);
     deliveries_ += deliveries;
     ++outcomes;
   }
 }
 
-/// By the provider's place: by its id a frame would be lost where this turn sees a group of before REASSIGN and the
-/// node table of after it, in whatever order the two are published.
+/// By the provider's place: by its id a frame would be lost where this turn sees a group of before
+/// REASSIGN and the node table of after it, in whatever order the two are published.
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
@@ -208,12 +217,14 @@ struct Router::Listed {
   const Run& run;
   const SharedList list;
   proto::FrameHeader local;  ///< as its recipients get it
-  Run shared;                ///< header and payload without the ids, one for all, made when the first one needs it
+  Run shared;  ///< header and payload without the ids, one for all, made when the first one needs
+               ///< it
 };
 
 void Router::to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   if (arrival.handed_over) return to_listed_here(run, header);
-  // Nobody else has the frame yet: it is told in it whose business each id is, for the other shards.
+  // Nobody else has the frame yet: it is told in it whose business each id is, for the other
+  // shards.
   std::byte* const frame = run.buffer->data + (run.bytes - run.buffer->data);
   std::byte* const ids = frame + proto::kHeaderSize;
   Listed listed(run, header, SharedList::find(ids, header.dst, hub_));
@@ -243,8 +254,8 @@ void Router::to_list(const Run& run, const proto::FrameHeader& header, Arrival a
   settle(run, outcomes);
 }
 
-/// The tables may have changed since another shard looked: what it left to this one is this one's to count, and
-/// nothing else.
+/// The tables may have changed since another shard looked: what it left to this one is this one's
+/// to count, and nothing else.
 void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
   const std::byte* const ids = run.bytes + proto::kHeaderSize;
   Listed listed(run, header, SharedList::unpack(header.dst));
@@ -265,9 +276,11 @@ inline void Router::to_listed(Listed& listed, NodeId node, const NodePlace& plac
   const bool here = place.exists() && place.shard == fanout_.self();
   Recipient* recipient = here ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
   if (recipient == nullptr) {
-    return drop_listed(listed, 1, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
+    return drop_listed(listed, 1,
+                       place.exists() ? proto::DropReason::no_such_node : why_absent(node));
   }
-  if (listed.shared.frames == 0) listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.list.bytes());
+  if (listed.shared.frames == 0)
+    listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.list.bytes());
   fanout_.deliver(*recipient, listed.shared, listed.local, Handover{.fan_out = true});
 }
 
@@ -278,7 +291,8 @@ void Router::drop_listed(const Listed& listed, std::uint32_t outcomes, proto::Dr
 
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const NodeId dst{header.dst};
-  if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub) return drop(run, proto::DropReason::no_route);
+  if (hub_of(dst) != hub_ && hub_of(dst) != kEveryHub)
+    return drop(run, proto::DropReason::no_route);
   if (index_of(dst) != kEveryIndex) return drop(run, proto::DropReason::no_such_node);
   std::uint32_t outcomes = 0;
   const std::size_t slots = fanout_.recipients().by_slot().size();

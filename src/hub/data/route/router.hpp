@@ -14,8 +14,8 @@
 
 namespace gimnet::hub {
 
-/// Decides where admitted frames go, by table look-up alone, and hands them on. Thread safety: one shard; the tables
-/// are published by the conductor.
+/// Decides where admitted frames go, by table look-up alone, and hands them on. Thread safety: one
+/// shard; the tables are published by the conductor.
 class Router {
  public:
   struct Parts {
@@ -33,8 +33,8 @@ class Router {
         pacer_(parts.pacer),
         retained_(parts.retained) {}
 
-  /// The usual case of small messages, made short: to a node here that got some with the same header in this turn.
-  /// False: nothing was done, route() them. REQUIRES: as route().
+  /// The usual case of small messages, made short: to a node here that got some with the same
+  /// header in this turn. False: nothing was done, route() them. REQUIRES: as route().
   [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
 #if defined(GIMNET_BUG_SLOW_ROUTER)
     asm volatile(".rept 7\n\tnop\n\t.endr");
@@ -57,24 +57,28 @@ class Router {
 
   /// Other bytes are looked at from here on than before.
   void begin_bytes() { recent_.forget(); }
-  /// Shorter still: frames from `begin` on that are like those that append() took from the same bytes, to different
-  /// nodes in turns. Returns what was done. REQUIRES: begin <= end; begin_bytes() was called for them.
+  /// Shorter still: frames from `begin` on that are like those that append() took from the same
+  /// bytes, to different nodes in turns. Returns what was done. REQUIRES: begin <= end;
+  /// begin_bytes() was called for them.
   [[nodiscard]] proto::RunView append_repeats(const std::byte* begin, const std::byte* end) {
     return recent_.append(begin, end, fanout_.context().tally);
   }
 
-  /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for the length, alone if
-  /// LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; none shorter than `shortest_bytes`.
-  void route(const Run& run, const proto::FrameHeader& header, std::uint32_t shortest_bytes = proto::kHeaderSize) {
+  /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for
+  /// the length, alone if LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; none shorter
+  /// than `shortest_bytes`.
+  void route(const Run& run, const proto::FrameHeader& header,
+             std::uint32_t shortest_bytes = proto::kHeaderSize) {
     dispatch(run, header, {false, shortest_bytes});
   }
 
-  /// Frames that another shard handed over, any mix: to their recipients on this shard, until deliveries() has come to
-  /// `deliveries_end`. Returns those that are left.
-  [[nodiscard]] Run route_handed_over(const Run& frames, std::uint32_t length_max, std::uint64_t deliveries_end);
+  /// Frames that another shard handed over, any mix: to their recipients on this shard, until
+  /// deliveries() has come to `deliveries_end`. Returns those that are left.
+  [[nodiscard]] Run route_handed_over(const Run& frames, std::uint32_t length_max,
+                                      std::uint64_t deliveries_end);
 
-  /// How many recipients frames to many were offered to, or are where they were handed over, since the start; a run
-  /// counts as one frame. Frames to one are bounded by what is read.
+  /// How many recipients frames to many were offered to, or are where they were handed over, since
+  /// the start; a run counts as one frame. Frames to one are bounded by what is read.
   [[nodiscard]] std::uint64_t deliveries() const { return deliveries_; }
 
   /// A frame that the hub itself made, to a node on whatever shard (a REPORT).
@@ -88,11 +92,12 @@ class Router {
   };
   void dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);
-  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place, Arrival arrival);
+  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
+                Arrival arrival);
   [[nodiscard]] bool provider_goes_by(const GroupMembers& members, NodeId source) const;
   void to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival);
-  [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header, Arrival arrival,
-                                       const MemberList<PacedMember>& here);
+  [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
+                                       Arrival arrival, const MemberList<PacedMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_listed_here(const Run& run, const proto::FrameHeader& header);
@@ -101,7 +106,8 @@ class Router {
   void drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason);
   void to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   /// deliveries: at each of them.
-  void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries, std::uint32_t& outcomes);
+  void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries,
+                       std::uint32_t& outcomes);
   [[nodiscard]] std::uint32_t to_members_elsewhere(const Run& run, const GroupMembers& members);
   [[nodiscard]] const GroupMembers* find_group(const Run& run, const proto::FrameHeader& header);
   /// REQUIRES: no session has that id.

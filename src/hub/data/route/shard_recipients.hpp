@@ -8,8 +8,8 @@
 
 namespace gimnet::hub {
 
-/// How many recipients a frame for another shard has there: what it counts as where that shard never gets it. Thread
-/// safety: one shard; the tables are published by the conductor.
+/// How many recipients a frame for another shard has there: what it counts as where that shard
+/// never gets it. Thread safety: one shard; the tables are published by the conductor.
 class ShardRecipients {
  public:
   ShardRecipients(HubId hub, const NodeTable& nodes, const GroupTable& groups)

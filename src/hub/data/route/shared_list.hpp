@@ -14,11 +14,12 @@
 
 namespace gimnet::hub {
 
-/// The ids of a LIST frame while it is shared with other shards. It says which nodes each of them is to see to, since
-/// the tables may change until they look: two of them would count a node then, or none. The shard that takes the frame
-/// in is the only one that has it, and so writes that into it, but so that it can still be told (by a REPORT) what the
-/// sender wrote: as that is ascending, the ids of this hub's nodes are neighbours. Which they are stands beside n in
-/// dst; an id among them that is another shard's has, in the place of this hub's number, one that tells the shard.
+/// The ids of a LIST frame while it is shared with other shards. It says which nodes each of them
+/// is to see to, since the tables may change until they look: two of them would count a node then,
+/// or none. The shard that takes the frame in is the only one that has it, and so writes that into
+/// it, but so that it can still be told (by a REPORT) what the sender wrote: as that is ascending,
+/// the ids of this hub's nodes are neighbours. Which they are stands beside n in dst; an id among
+/// them that is another shard's has, in the place of this hub's number, one that tells the shard.
 /// Thread safety: a value type and pure functions.
 struct SharedList {
   std::uint32_t size = 0;   ///< n, 1..1024
@@ -42,7 +43,9 @@ struct SharedList {
     return {(dst & kMask) + 1, (dst >> kBits) & kMask, ((dst >> (2 * kBits)) & kMask) + 1};
   }
   /// For dst. REQUIRES: count > 0.
-  [[nodiscard]] std::uint32_t pack() const { return (size - 1) | first << kBits | (count - 1) << (2 * kBits); }
+  [[nodiscard]] std::uint32_t pack() const {
+    return (size - 1) | first << kBits | (count - 1) << (2 * kBits);
+  }
 
   [[nodiscard]] std::uint32_t end() const { return first + count; }
   [[nodiscard]] std::uint32_t bytes() const { return size * kIdSize; }
@@ -72,9 +75,12 @@ struct SharedList {
     header.dst = size;
     proto::store_header(start.data(), header);
     std::byte* const ids = start.data() + proto::kHeaderSize;
-    std::memcpy(ids, frame + proto::kHeaderSize, std::min<std::size_t>(header.length, proto::kReportFollowingMax));
-    for (std::uint32_t i = first; i < std::min<std::uint32_t>(end(), proto::kReportFollowingMax / kIdSize); ++i) {
-      store_le(ids + std::size_t{kIdSize} * i, make_id<NodeId>(hub, index_of(id_at(ids, i))).value());
+    std::memcpy(ids, frame + proto::kHeaderSize,
+                std::min<std::size_t>(header.length, proto::kReportFollowingMax));
+    for (std::uint32_t i = first;
+         i < std::min<std::uint32_t>(end(), proto::kReportFollowingMax / kIdSize); ++i) {
+      store_le(ids + std::size_t{kIdSize} * i,
+               make_id<NodeId>(hub, index_of(id_at(ids, i))).value());
     }
     return start;
   }

@@ -60,7 +60,8 @@ class Conversation : public testing::Test {
     EXPECT_TRUE(frame.has_value());
     return frame ? taken_of(*frame) : Taken{};
   }
-  /// The next DATA. A stream that waits long enough for an ACK asks for it, at any place in between.
+  /// The next DATA. A stream that waits long enough for an ACK asks for it, at any place in
+  /// between.
   Taken next_data() {
     const auto frame = next_data_frame();
     return frame ? taken_of(*frame) : Taken{};
@@ -79,7 +80,9 @@ class Conversation : public testing::Test {
     const auto message = proto::gimi::parse_message(view.payload);
     EXPECT_TRUE(message.has_value());
     if (!message) return {};
-    return {message->header, {reinterpret_cast<const char*>(message->data.data()), message->data.size()}, frame.header};
+    return {message->header,
+            {reinterpret_cast<const char*>(message->data.data()), message->data.size()},
+            frame.header};
   }
 
   void answer(const proto::gimi::MessageHeader& header, std::span<const std::byte> data) {

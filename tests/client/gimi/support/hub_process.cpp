@@ -41,14 +41,16 @@ HubProcess::HubProcess(const std::vector<std::string>& arguments) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, pipe[1], STDOUT_FILENO);
-  if (::posix_spawn(&process_, GIMNET_TCPHUB, &actions, nullptr, pointers.data(), environ) != 0) process_ = -1;
+  if (::posix_spawn(&process_, GIMNET_TCPHUB, &actions, nullptr, pointers.data(), environ) != 0)
+    process_ = -1;
   posix_spawn_file_actions_destroy(&actions);
   ::close(pipe[1]);
   const std::string line = read_line(pipe[0]);
   ::close(pipe[0]);
   constexpr std::string_view kReady = "ready ";
   EXPECT_TRUE(line.starts_with(kReady)) << "tcphub said: " << line;
-  if (line.starts_with(kReady)) url_ = line.substr(kReady.size(), line.find(' ', kReady.size()) - kReady.size());
+  if (line.starts_with(kReady))
+    url_ = line.substr(kReady.size(), line.find(' ', kReady.size()) - kReady.size());
 }
 
 void HubProcess::kill() {

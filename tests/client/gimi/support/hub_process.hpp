@@ -11,7 +11,8 @@ namespace gimnet::test {
 /// How long a test waits for what must happen.
 inline constexpr std::chrono::seconds kPatience{20};
 
-/// A tcphub of its own on a free port of loopback, and wherever else `arguments` say. Ends with this.
+/// A tcphub of its own on a free port of loopback, and wherever else `arguments` say. Ends with
+/// this.
 class HubProcess {
  public:
   explicit HubProcess(const std::vector<std::string>& arguments = {});

@@ -30,8 +30,9 @@ inline Message make_message(std::string_view text, std::uint32_t sequence = 1, M
   proto::gimi::MessageView view;
   view.header.sequence = sequence;
   view.data = std::as_bytes(std::span(text.data(), text.size()));
-  return MessageAccess::make(in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service),
-                             reconnects);
+  return MessageAccess::make(
+      in, view, service.empty() ? nullptr : std::make_shared<const std::string>(service),
+      reconnects);
 }
 
 }  // namespace gimnet::test

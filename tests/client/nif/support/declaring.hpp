@@ -37,13 +37,16 @@ inline void answer_advertise(FakeConnection& hub, const std::string& name, std::
   ASSERT_TRUE(request);
   EXPECT_EQ(request->service, name);
   const proto::ControlHeader header{proto::ns::Advertise::kOperation, number};
-  hub.send_control(proto::Kind::ns, group != 0
-                                        ? proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number)
-                                        : proto::encode_refusal(header, {proto::Status::limit, "no more"}));
+  hub.send_control(proto::Kind::ns,
+                   group != 0
+                       ? proto::encode_answer(proto::ns::AdvertiseAnswer{GroupId{group}, 0}, number)
+                       : proto::encode_refusal(header, {proto::Status::limit, "no more"}));
 }
 
-/// The next request is ADVERTISE of `odom`, which had that group and shows that proof; `answer` is what it gets.
-inline void expect_claim(FakeConnection& hub, std::uint32_t group, const std::vector<std::byte>& proof,
+/// The next request is ADVERTISE of `odom`, which had that group and shows that proof; `answer` is
+/// what it gets.
+inline void expect_claim(FakeConnection& hub, std::uint32_t group,
+                         const std::vector<std::byte>& proof,
                          const proto::ns::AdvertiseAnswer& answer) {
   std::uint16_t number = 0;
   const auto request = hub.next_request<proto::ns::Advertise>(number);
@@ -114,9 +117,10 @@ inline void answer_withdraw(FakeConnection& hub, std::uint32_t group, bool known
   ASSERT_TRUE(request);
   EXPECT_EQ(request->group, GroupId{group});
   const proto::ControlHeader header{proto::ns::Withdraw::kOperation, number};
-  hub.send_control(proto::Kind::ns, known
-                                        ? proto::encode_answer(proto::ns::WithdrawAnswer{}, number)
-                                        : proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
+  hub.send_control(
+      proto::Kind::ns,
+      known ? proto::encode_answer(proto::ns::WithdrawAnswer{}, number)
+            : proto::encode_refusal(header, {proto::Status::not_found, "no such service"}));
 }
 
 /// The next request is SUBSCRIBE, of a service that nobody provides.
@@ -131,9 +135,10 @@ inline void answer_unsubscribe(FakeConnection& hub, bool known) {
   std::uint16_t number = 0;
   ASSERT_TRUE(hub.next_request<proto::ns::Unsubscribe>(number));
   const proto::ControlHeader header{proto::ns::Unsubscribe::kOperation, number};
-  hub.send_control(proto::Kind::ns,
-                   known ? proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number)
-                         : proto::encode_refusal(header, {proto::Status::not_found, "no such subscription"}));
+  hub.send_control(
+      proto::Kind::ns,
+      known ? proto::encode_answer(proto::ns::UnsubscribeAnswer{}, number)
+            : proto::encode_refusal(header, {proto::Status::not_found, "no such subscription"}));
 }
 
 /// Skips what was received before the next NIF_OWN_SERVICE_MOVED; returns the group.

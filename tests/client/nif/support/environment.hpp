@@ -8,7 +8,8 @@ namespace gimnet::nif::test {
 /// Sets a variable of the environment while it lives. REQUIRES: one thread.
 class Environment {
  public:
-  Environment(const char* name, const char* value) : name_(name), had_(std::getenv(name) != nullptr) {
+  Environment(const char* name, const char* value)
+      : name_(name), had_(std::getenv(name) != nullptr) {
     if (had_) former_ = std::getenv(name);
     ::setenv(name, value, 1);
   }

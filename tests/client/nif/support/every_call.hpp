@@ -12,9 +12,10 @@ namespace gimnet::nif::test {
 
 struct Call {
   std::string_view name;
-  nif_status (*sound)(nif_node* node);    ///< with arguments that are right; does not wait for long
-  nif_status (*unsound)(nif_node* node);  ///< with NULL for everything else; null: it takes nothing else
-  bool waits;                             ///< for an answer of the hub: not in the callback
+  nif_status (*sound)(nif_node* node);  ///< with arguments that are right; does not wait for long
+  nif_status (*unsound)(
+      nif_node* node);  ///< with NULL for everything else; null: it takes nothing else
+  bool waits;           ///< for an answer of the hub: not in the callback
 };
 
 // One part of a name, so that the checks of arguments are passed.
@@ -100,7 +101,8 @@ inline constexpr std::array<Call, 30> kCalls{{
      [](nif_node* node) { return nif_withdraw_service(node, nullptr, 0); }, true},
     {"nif_subscribe", [](nif_node* node) { return nif_subscribe(node, "a/b", nullptr, 0); },
      [](nif_node* node) { return nif_subscribe(node, nullptr, nullptr, 0); }, true},
-    {"nif_subscribe_paced", [](nif_node* node) { return nif_subscribe_paced(node, "a/b", nullptr, nullptr, 0); },
+    {"nif_subscribe_paced",
+     [](nif_node* node) { return nif_subscribe_paced(node, "a/b", nullptr, nullptr, 0); },
      [](nif_node* node) { return nif_subscribe_paced(node, nullptr, nullptr, nullptr, 0); }, true},
     {"nif_credit", [](nif_node* node) { return nif_credit(node, 7, 1, 1, 0); }, nullptr, false},
     {"nif_unsubscribe", [](nif_node* node) { return nif_unsubscribe(node, "a/b", 0); },
@@ -110,8 +112,12 @@ inline constexpr std::array<Call, 30> kCalls{{
        nif_reply* reply = nullptr;
        return nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 0, &reply, 0);
      },
-     [](nif_node* node) { return nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 5, nullptr, 0); }, true},
-    {"nif_ping_hub", [](nif_node* node) { return nif_ping_hub(node, nullptr, nullptr, 0); }, nullptr, true},
+     [](nif_node* node) {
+       return nif_request(node, NIF_CTRL, NIF_CTRL_HUB_INFO, nullptr, 5, nullptr, 0);
+     },
+     true},
+    {"nif_ping_hub", [](nif_node* node) { return nif_ping_hub(node, nullptr, nullptr, 0); },
+     nullptr, true},
     {"nif_register", [](nif_node* node) { return nif_register(node, "a", nullptr, 0); },
      [](nif_node* node) { return nif_register(node, nullptr, nullptr, 0); }, true},
     {"nif_unregister", [](nif_node* node) { return nif_unregister(node, 0); }, nullptr, true},
@@ -124,8 +130,10 @@ inline constexpr std::array<Call, 30> kCalls{{
     {"nif_watch_again", [](nif_node* node) { return nif_watch_again(node, 7, 0); }, nullptr, true},
     {"nif_watch_taken", [](nif_node* node) { return nif_watch_taken(node, 7); }, nullptr, false},
     {"nif_unwatch", [](nif_node* node) { return nif_unwatch(node, 7, 0); }, nullptr, true},
-    {"nif_id", [](nif_node* node) { return nif_id(node) == 0 ? NIF_CLOSED : NIF_OK; }, nullptr, false},
-    {"nif_event_fd", [](nif_node* node) { return nif_event_fd(node) < 0 ? NIF_CLOSED : NIF_OK; }, nullptr, false},
+    {"nif_id", [](nif_node* node) { return nif_id(node) == 0 ? NIF_CLOSED : NIF_OK; }, nullptr,
+     false},
+    {"nif_event_fd", [](nif_node* node) { return nif_event_fd(node) < 0 ? NIF_CLOSED : NIF_OK; },
+     nullptr, false},
 }};
 
 }  // namespace gimnet::nif::test

@@ -35,7 +35,9 @@ std::string Frame::payload() const {
   return {reinterpret_cast<const char*>(parsed.payload.data()), parsed.payload.size()};
 }
 
-std::optional<proto::flow::Message> Frame::flow() const { return proto::flow::decode(view().payload); }
+std::optional<proto::flow::Message> Frame::flow() const {
+  return proto::flow::decode(view().payload);
+}
 
 FakeConnection::FakeConnection(FakeConnection&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)), buffer_(std::move(other.buffer_)) {}
@@ -127,7 +129,8 @@ void FakeConnection::send(const proto::FrameParts& parts, std::string_view paylo
 
 void FakeConnection::send(const proto::flow::Message& message) {
   std::array<std::byte, proto::flow::kFrameSizeMax> frame;
-  send(std::span<const std::byte>(frame).first(proto::flow::encode_frame(message, NodeId{kHubNode}, frame)));
+  send(std::span<const std::byte>(frame).first(
+      proto::flow::encode_frame(message, NodeId{kHubNode}, frame)));
 }
 
 void FakeConnection::send_unicast(std::uint32_t from, std::uint32_t to, std::string_view payload) {

@@ -139,8 +139,10 @@ struct Connected {
   proto::Hello hello;
 };
 
-/// Connects a node to the hub; options.url is set here. A failure ends the test program's expectations, not its life.
-[[nodiscard]] Connected connect_to(FakeHub& hub, nif_options options, const proto::Welcome& welcome);
+/// Connects a node to the hub; options.url is set here. A failure ends the test program's
+/// expectations, not its life.
+[[nodiscard]] Connected connect_to(FakeHub& hub, nif_options options,
+                                   const proto::Welcome& welcome);
 [[nodiscard]] nif_options default_options(const char* name = nullptr);
 
 [[nodiscard]] nif_counters counters_of(nif_node* node);

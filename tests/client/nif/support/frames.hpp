@@ -39,7 +39,8 @@ inline void put_latest(SendQueue& queue, std::string_view payload, std::uint64_t
   header.flags = static_cast<std::uint8_t>(proto::Policy::latest);
   const auto frame = frame_of(header, payload);
   const auto stream = latest_stream_of(header, key);
-  std::memcpy(queue.append_latest(header.lane, frame.size(), stream).data(), frame.data(), frame.size());
+  std::memcpy(queue.append_latest(header.lane, frame.size(), stream).data(), frame.data(),
+              frame.size());
 }
 
 inline void put_control(SendQueue& queue, std::string_view payload) {
@@ -58,7 +59,8 @@ inline std::vector<std::byte> write_once(SendQueue& queue, std::size_t bytes_max
   std::vector<std::byte> written;
   for (const auto& piece : queue.gather()) {
     const std::size_t bytes = std::min(piece.size(), bytes_max - written.size());
-    written.insert(written.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(bytes));
+    written.insert(written.end(), piece.begin(),
+                   piece.begin() + static_cast<std::ptrdiff_t>(bytes));
   }
   queue.commit(written.size());
   return written;

@@ -14,7 +14,8 @@
 
 namespace gimnet::nif::test {
 
-/// The sending half of a node on a socket of its own, and that socket's other end. The test is the library's thread.
+/// The sending half of a node on a socket of its own, and that socket's other end. The test is the
+/// library's thread.
 struct Line {
   explicit Line(const Session& session = session_of(false)) { attach(session); }
 

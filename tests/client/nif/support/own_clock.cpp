@@ -28,7 +28,9 @@ extern "C" int clock_gettime(clockid_t clock, struct timespec* time) noexcept {
 
 namespace gimnet::nif::test {
 
-OwnClock::OwnClock(std::function<std::int64_t()> now_ns) : now_ns_(std::move(now_ns)) { t_clock = this; }
+OwnClock::OwnClock(std::function<std::int64_t()> now_ns) : now_ns_(std::move(now_ns)) {
+  t_clock = this;
+}
 
 OwnClock::~OwnClock() { t_clock = nullptr; }
 

@@ -5,7 +5,8 @@
 
 namespace gimnet::nif::test {
 
-/// While it lives, the monotonic clock of its thread says what `now_ns` answers. Not two at once in one thread.
+/// While it lives, the monotonic clock of its thread says what `now_ns` answers. Not two at once in
+/// one thread.
 class OwnClock {
  public:
   explicit OwnClock(std::function<std::int64_t()> now_ns);

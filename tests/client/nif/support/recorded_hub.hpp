@@ -18,7 +18,8 @@ namespace gimnet::nif::test {
 /// Says to one node what a hub said to it once, and expects of it what it said then.
 class RecordedHub {
  public:
-  RecordedHub(const std::vector<Connection>& connections, FakeHub& hub) : connections_(connections), hub_(hub) {}
+  RecordedHub(const std::vector<Connection>& connections, FakeHub& hub)
+      : connections_(connections), hub_(hub) {}
 
   /// The node has its WELCOME: what the hub said later may follow.
   void let_go_on() { welcomed_.release(); }
@@ -77,11 +78,12 @@ class RecordedHub {
   }
   void say(FakeConnection& connection, const Step& step) {
     Bytes bytes = step.bytes;
-    if (step.is_answer()) store_le(bytes.data() + proto::kHeaderSize + 2, numbers_.at(step.control().header.request));
+    if (step.is_answer())
+      store_le(bytes.data() + proto::kHeaderSize + 2, numbers_.at(step.control().header.request));
     connection.send(bytes);
   }
-  /// The same frame, apart from what the library words: numbers and contents of requests, the parts of a message, and
-  /// times.
+  /// The same frame, apart from what the library words: numbers and contents of requests, the parts
+  /// of a message, and times.
   void hear(FakeConnection& connection, const Step& step) {
     std::optional<Bytes> whole;
     if (!step.is_request_kind()) {

@@ -21,7 +21,8 @@
 
 namespace gimnet::nif::test {
 
-/// Does what a recorded node did, by the calls of the library, and expects to be told what it was told.
+/// Does what a recorded node did, by the calls of the library, and expects to be told what it was
+/// told.
 class RecordedNode {
  public:
   RecordedNode(const std::vector<Connection>& connections, nif_node* node, RecordedHub& hub)
@@ -80,7 +81,8 @@ class RecordedNode {
 
   static const Step& answer_to(const Step& question, const Connection& steps) {
     for (const Step& step : steps) {
-      if (step.is_answer() && step.control().header.request == question.control().header.request) return step;
+      if (step.is_answer() && step.control().header.request == question.control().header.request)
+        return step;
     }
     throw std::runtime_error("a request without an answer");
   }
@@ -91,7 +93,8 @@ class RecordedNode {
       ASSERT_EQ(nif_watch(node_, nullptr, NIF_WATCH_ALL, &watch, kPatienceMs), NIF_OK);
       EXPECT_EQ(watch, proto::decode<proto::ns::Watch>(payload)->watch);
     } else if (step.is_about<proto::ns::Unwatch>()) {
-      EXPECT_EQ(nif_unwatch(node_, proto::decode<proto::ns::Unwatch>(payload)->watch, kPatienceMs), NIF_OK);
+      EXPECT_EQ(nif_unwatch(node_, proto::decode<proto::ns::Unwatch>(payload)->watch, kPatienceMs),
+                NIF_OK);
     } else if (step.is_about<proto::ns::Subscribe>()) {
       subscribe(*proto::decode<proto::ns::Subscribe>(payload), answer);
     } else if (step.is_about<proto::ns::Unsubscribe>()) {
@@ -100,7 +103,9 @@ class RecordedNode {
     } else if (step.is_about<proto::ns::Advertise>()) {
       advertise(*proto::decode<proto::ns::Advertise>(payload), answer);
     } else if (step.is_about<proto::ns::Withdraw>()) {
-      EXPECT_EQ(nif_withdraw(node_, proto::decode<proto::ns::Withdraw>(payload)->group.value(), kPatienceMs), NIF_OK);
+      EXPECT_EQ(nif_withdraw(node_, proto::decode<proto::ns::Withdraw>(payload)->group.value(),
+                             kPatienceMs),
+                NIF_OK);
     } else {
       request(step, answer);
     }
@@ -113,7 +118,8 @@ class RecordedNode {
     pace.struct_size = sizeof pace;
     pace.window = wanted.window;
     pace.depth = wanted.depth;
-    ASSERT_EQ(nif_subscribe_paced(node_, wanted.name.c_str(), &pace, &subscription, kPatienceMs), NIF_OK);
+    ASSERT_EQ(nif_subscribe_paced(node_, wanted.name.c_str(), &pace, &subscription, kPatienceMs),
+              NIF_OK);
     EXPECT_EQ(subscription.group, said->group.value());
     EXPECT_EQ(subscription.message_type, said->message_type);
     EXPECT_EQ(subscription.window, said->window);
@@ -141,8 +147,8 @@ class RecordedNode {
   void request(const Step& step, const Step& answer) {
     nif_reply* reply = nullptr;
     const auto body = step.control().body;
-    ASSERT_EQ(nif_request(node_, static_cast<std::uint8_t>(step.header().kind), step.operation(), body.data(),
-                          body.size(), &reply, kPatienceMs),
+    ASSERT_EQ(nif_request(node_, static_cast<std::uint8_t>(step.header().kind), step.operation(),
+                          body.data(), body.size(), &reply, kPatienceMs),
               NIF_OK);
     EXPECT_EQ(reply->status, static_cast<std::uint16_t>(proto::peek_status(answer.view().payload)));
     const auto* content = static_cast<const std::byte*>(reply->content);
@@ -165,7 +171,8 @@ class RecordedNode {
     if (view.key) out.flags |= NIF_FLAG_KEYED;
     out.key = view.key.value_or(0);
     std::vector<std::uint32_t> recipients;
-    for (std::uint32_t i = 0; i < view.recipients.size(); ++i) recipients.push_back(view.recipients[i].value());
+    for (std::uint32_t i = 0; i < view.recipients.size(); ++i)
+      recipients.push_back(view.recipients[i].value());
     out.recipients = recipients.data();
     out.recipient_count = recipients.size();
     if (const auto age = proto::find_age(view.extensions)) out.age_ms_max = age->longest_ms;
@@ -183,7 +190,8 @@ class RecordedNode {
     switch (step.header().kind) {
       case proto::Kind::link:
         return expect(NIF_DISCONNECTED, [&](const nif_incoming& in) {
-          EXPECT_EQ(in.reason, static_cast<std::uint32_t>(proto::decode<proto::Goodbye>(step.view().payload)->code));
+          EXPECT_EQ(in.reason, static_cast<std::uint32_t>(
+                                   proto::decode<proto::Goodbye>(step.view().payload)->code));
         });
       case proto::Kind::flow:
         return be_told_flow(*proto::flow::decode(step.view().payload));
@@ -209,9 +217,11 @@ class RecordedNode {
       EXPECT_EQ(in.lane, view.header.lane);
       EXPECT_EQ(in.policy, static_cast<std::uint8_t>(view.header.policy()));
       EXPECT_EQ(in.key, view.key.value_or(0));
-      EXPECT_EQ(payload_of(in), std::string_view(reinterpret_cast<const char*>(whole->data()), whole->size()));
+      EXPECT_EQ(payload_of(in),
+                std::string_view(reinterpret_cast<const char*>(whole->data()), whole->size()));
       const auto* extensions = static_cast<const std::byte*>(in.extensions);
-      EXPECT_EQ(Bytes(extensions, extensions + in.extensions_size), gimnet::test::to_bytes(view.extensions));
+      EXPECT_EQ(Bytes(extensions, extensions + in.extensions_size),
+                gimnet::test::to_bytes(view.extensions));
     });
   }
   void be_told_report(const Step& step) {
@@ -235,7 +245,8 @@ class RecordedNode {
     } else if (std::holds_alternative<proto::flow::Pause>(message)) {
       ++pauses_;
       const auto end = std::chrono::steady_clock::now() + kPatience;
-      while (counters_of(node_).pauses < pauses_ && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+      while (counters_of(node_).pauses < pauses_ && std::chrono::steady_clock::now() < end)
+        std::this_thread::yield();
       EXPECT_EQ(counters_of(node_).pauses, pauses_);
     } else if (const auto* resume = std::get_if<proto::flow::Resume>(&message)) {
       send_again_to(resume->target);

@@ -19,8 +19,8 @@
 #include "proto/frame/frame_parser.hpp"
 #include "tests/vectors/vector_file.hpp"
 
-// Recorded conversations with a hub (tests/vectors/conversation; the form of the files is described in
-// tests/system/support/conversation.py).
+// Recorded conversations with a hub (tests/vectors/conversation; the form of the files is described
+// in tests/system/support/conversation.py).
 
 namespace gimnet::nif::test {
 
@@ -38,8 +38,12 @@ struct Step {
   [[nodiscard]] proto::FrameView view() const {
     return proto::parse_frame(bytes, from_hub ? proto::Origin::hub : proto::Origin::node).value();
   }
-  [[nodiscard]] bool is(proto::Kind kind) const { return !is_break() && !is_opening() && header().kind == kind; }
-  [[nodiscard]] bool is_request_kind() const { return is(proto::Kind::ns) || is(proto::Kind::ctrl); }
+  [[nodiscard]] bool is(proto::Kind kind) const {
+    return !is_break() && !is_opening() && header().kind == kind;
+  }
+  [[nodiscard]] bool is_request_kind() const {
+    return is(proto::Kind::ns) || is(proto::Kind::ctrl);
+  }
   [[nodiscard]] proto::ControlView control() const { return *proto::split_control(view().payload); }
   /// The operation of a control frame, without the bit of answers.
   [[nodiscard]] std::uint16_t operation() const {
@@ -52,9 +56,11 @@ struct Step {
   }
   /// Counts in a resume.
   [[nodiscard]] bool is_data() const {
-    return !is_break() && !is_opening() && header().kind != proto::Kind::flow && header().kind < proto::Kind::link;
+    return !is_break() && !is_opening() && header().kind != proto::Kind::flow &&
+           header().kind < proto::Kind::link;
   }
-  /// The library sees to these by itself, when it likes; what the hub answers to them is of no use to it then.
+  /// The library sees to these by itself, when it likes; what the hub answers to them is of no use
+  /// to it then.
   [[nodiscard]] bool is_of_the_library() const {
     if (is_about<proto::ns::WatchTaken>()) return true;
     return !from_hub && (is(proto::Kind::flow) || is(proto::Kind::taken));
@@ -68,7 +74,9 @@ struct Step {
 /// What was said on one connection, without openings: from the HELLO on.
 using Connection = std::vector<Step>;
 
-inline std::filesystem::path recordings_folder() { return std::filesystem::path(GIMNET_VECTORS_DIR) / "conversation"; }
+inline std::filesystem::path recordings_folder() {
+  return std::filesystem::path(GIMNET_VECTORS_DIR) / "conversation";
+}
 
 /// Hex digits, in which `00*500` stands for 500 such bytes.
 inline std::string spelled_out(const std::string& word) {
@@ -106,12 +114,15 @@ inline std::set<std::string> who_speaks_in(const std::string& name) {
 inline void lose_what_was_not_taken(Connection& broken, const proto::Hello& next) {
   if (broken.empty() || !broken.back().is_break()) return;
   std::uint64_t taken = 0;
-  std::erase_if(broken,
-                [&](const Step& step) { return step.from_hub && step.is_data() && ++taken > next.resume_taken; });
+  std::erase_if(broken, [&](const Step& step) {
+    return step.from_hub && step.is_data() && ++taken > next.resume_taken;
+  });
 }
 
-/// What was said on one connection after the other of a node. `who`: the node's names in the recording.
-inline std::vector<Connection> connections_of(const std::string& name, const std::vector<std::string>& who) {
+/// What was said on one connection after the other of a node. `who`: the node's names in the
+/// recording.
+inline std::vector<Connection> connections_of(const std::string& name,
+                                              const std::vector<std::string>& who) {
   std::vector<Connection> connections;
   for (const std::string& each : who) {
     Connection connection;
@@ -120,7 +131,8 @@ inline std::vector<Connection> connections_of(const std::string& name, const std
     });
     if (connection.empty()) throw std::runtime_error("nobody is called " + each + " in " + name);
     if (!connections.empty()) {
-      lose_what_was_not_taken(connections.back(), proto::decode<proto::Hello>(connection[0].view().payload).value());
+      lose_what_was_not_taken(connections.back(),
+                              proto::decode<proto::Hello>(connection[0].view().payload).value());
     }
     connections.push_back(std::move(connection));
   }

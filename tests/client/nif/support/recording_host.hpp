@@ -29,18 +29,31 @@ class RecordingHost final : public InboundHost {
     flows.push_back(message);
     return !std::holds_alternative<proto::flow::Confirm>(message);
   }
-  [[nodiscard]] std::vector<Item> on_answer(proto::Kind, const proto::ControlView& answer) override {
+  [[nodiscard]] std::vector<Item> on_answer(proto::Kind,
+                                            const proto::ControlView& answer) override {
     answers.push_back(answer.header.request);
     return {};
   }
-  [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved&) override { return moved_is_news; }
+  [[nodiscard]] bool on_service_moved(const proto::ns::ServiceMoved&) override {
+    return moved_is_news;
+  }
   [[nodiscard]] bool on_watch_events(const proto::ns::WatchEvents&) override { return true; }
-  void on_name_decided(const std::string& name, bool lost) override { decided = (lost ? "lost " : "kept ") + name; }
-  void on_taken(std::uint32_t, const proto::Taken& taken) override { taken_received.push_back(taken); }
+  void on_name_decided(const std::string& name, bool lost) override {
+    decided = (lost ? "lost " : "kept ") + name;
+  }
+  void on_taken(std::uint32_t, const proto::Taken& taken) override {
+    taken_received.push_back(taken);
+  }
   bool on_report(const proto::Report&) override { return false; }
-  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report&) override { return start; }
-  void send_taken(std::uint32_t, const proto::Taken& taken) override { taken_sent.push_back(taken); }
-  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override { return group == counted_group ? 1 : 0; }
+  [[nodiscard]] std::optional<ReportedMessages::Start> message_of(const proto::Report&) override {
+    return start;
+  }
+  void send_taken(std::uint32_t, const proto::Taken& taken) override {
+    taken_sent.push_back(taken);
+  }
+  [[nodiscard]] std::uint32_t epoch_for(std::uint32_t group) override {
+    return group == counted_group ? 1 : 0;
+  }
   void on_message_lost(std::uint32_t group) override { lost_groups.push_back(group); }
   void deliver(std::span<const Item> delivered) override {
     for (const Item& item : delivered) items.push_back(incoming_of(item));
@@ -55,8 +68,8 @@ class RecordingHost final : public InboundHost {
     return found;
   }
   [[nodiscard]] std::size_t gaps() const {
-    return static_cast<std::size_t>(
-        std::count_if(items.begin(), items.end(), [](const auto& in) { return in.type == NIF_GAP; }));
+    return static_cast<std::size_t>(std::count_if(
+        items.begin(), items.end(), [](const auto& in) { return in.type == NIF_GAP; }));
   }
 
   std::vector<nif_incoming> items;
@@ -73,7 +86,9 @@ class RecordingHost final : public InboundHost {
 
 /// A receiving half that is connected as kOwnId.
 struct Receiving {
-  explicit Receiving(const proto::ReassemblyLimits& limits = {}) : inbound(limits, host) { inbound.begin(session()); }
+  explicit Receiving(const proto::ReassemblyLimits& limits = {}) : inbound(limits, host) {
+    inbound.begin(session());
+  }
 
   [[nodiscard]] static Session session() {
     Session session;
@@ -98,13 +113,16 @@ struct Receiving {
   Inbound inbound;
 };
 
-inline void add_frame(std::vector<std::byte>& bytes, const proto::FrameParts& parts, std::string_view payload) {
+inline void add_frame(std::vector<std::byte>& bytes, const proto::FrameParts& parts,
+                      std::string_view payload) {
   const std::size_t at = bytes.size();
   bytes.resize(at + proto::prefix_size(parts) + payload.size());
-  static_cast<void>(proto::write_frame(parts, std::as_bytes(std::span(payload)), std::span(bytes).subspan(at)));
+  static_cast<void>(
+      proto::write_frame(parts, std::as_bytes(std::span(payload)), std::span(bytes).subspan(at)));
 }
 
-inline void add_control(std::vector<std::byte>& bytes, proto::Kind kind, const proto::Payload& payload) {
+inline void add_control(std::vector<std::byte>& bytes, proto::Kind kind,
+                        const proto::Payload& payload) {
   proto::FrameParts parts;
   parts.header.kind = kind;
   parts.header.src = kHubNode;

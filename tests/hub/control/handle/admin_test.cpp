@@ -59,7 +59,8 @@ TEST_F(AdminTest, TellsWhoWasRefusedInARecordOfItsOwn) {
   const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
   ASSERT_EQ(statistics.shards.size(), 3u);
   EXPECT_EQ(statistics.shards[2],
-            (ctrl::ShardRecord{ctrl::kConductorRecord, {{"refused.hub_full", 1}, {"refused.garbage", 3}}}));
+            (ctrl::ShardRecord{ctrl::kConductorRecord,
+                               {{"refused.hub_full", 1}, {"refused.garbage", 3}}}));
 }
 
 TEST_F(AdminTest, TellsWhatWasAskedAboutNames) {
@@ -69,7 +70,8 @@ TEST_F(AdminTest, TellsWhatWasAskedAboutNames) {
   const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
   ASSERT_EQ(statistics.shards.size(), 3u);
   EXPECT_EQ(statistics.shards[2],
-            (ctrl::ShardRecord{ctrl::kConductorRecord, {{"names.resolve", 2}, {"names.refused.not_found", 1}}}));
+            (ctrl::ShardRecord{ctrl::kConductorRecord,
+                               {{"names.resolve", 2}, {"names.refused.not_found", 1}}}));
 }
 
 TEST_F(AdminTest, TellsWhatWasAskedOfTheHub) {
@@ -78,16 +80,18 @@ TEST_F(AdminTest, TellsWhatWasAskedOfTheHub) {
   ASSERT_FALSE(ask<ctrl::DrainAnswer>(robot, ctrl::Drain{}, proto::Kind::ctrl));
   const auto statistics = ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
   ASSERT_EQ(statistics.shards.size(), 3u);
-  EXPECT_EQ(statistics.shards[2],
-            (ctrl::ShardRecord{ctrl::kConductorRecord,
-                               {{"ctrl.hub_info", 1}, {"ctrl.drain", 1}, {"ctrl.refused.denied", 1}}}));
+  EXPECT_EQ(
+      statistics.shards[2],
+      (ctrl::ShardRecord{ctrl::kConductorRecord,
+                         {{"ctrl.hub_info", 1}, {"ctrl.drain", 1}, {"ctrl.refused.denied", 1}}}));
 }
 
 TEST_F(AdminTest, StatisticsOfTheMostShardsFitInAFrame) {
   const Node robot = join("robot");
   counters[0].delivered.add(~std::uint64_t{0});
   ask_hub<ctrl::StatisticsAnswer>(robot, ctrl::Statistics{});
-  const std::size_t two_shards = std::get<SendControlCommand>(shards.sent.back().command).frame.size();
+  const std::size_t two_shards =
+      std::get<SendControlCommand>(shards.sent.back().command).frame.size();
   EXPECT_LE(two_shards / 2 * kShardCountMax, proto::kFrameLengthDefault);
 }
 
@@ -105,7 +109,8 @@ TEST_F(AdminTest, TellsWhereConnectionsAre) {
   EXPECT_TRUE(answer.connections[0].connected);
   EXPECT_EQ(answer.connections[1].shard, viewer.shard.value());
   EXPECT_FALSE(answer.connections[1].connected);
-  const auto rest = ask_hub<ctrl::ConnectionsAnswer>(robot, ctrl::Connections{.after = robot.id, .records_max = 1});
+  const auto rest = ask_hub<ctrl::ConnectionsAnswer>(
+      robot, ctrl::Connections{.after = robot.id, .records_max = 1});
   ASSERT_EQ(rest.connections.size(), 1u);
   EXPECT_EQ(rest.connections[0].node, viewer.id);
   EXPECT_FALSE(rest.more);

@@ -44,10 +44,12 @@ class FullDisk : public ::testing::Test, protected TestConductor {
     return admin;
   }
   auto reassign(std::uint32_t index) {
-    return ask<ctrl::ReassignAnswer>(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, index)},
-                                     proto::Kind::ctrl);
+    return ask<ctrl::ReassignAnswer>(
+        admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, index)}, proto::Kind::ctrl);
   }
-  auto kick() { return ask<ctrl::KickAnswer>(admin_, ctrl::Kick{robot_.id, ""}, proto::Kind::ctrl); }
+  auto kick() {
+    return ask<ctrl::KickAnswer>(admin_, ctrl::Kick{robot_.id, ""}, proto::Kind::ctrl);
+  }
 
   const Node admin_ = join_admin();
   const Node robot_ = join("robot");
@@ -97,7 +99,8 @@ TEST_F(FullDisk, AKickIsDoneAndSaysThatItMayBeForgotten) {
 }
 
 TEST_F(FullDisk, NewcomersAreToldWhatIsWrong) {
-  for (std::uint32_t left = IndexPool::kBlock - 2; left > 0; --left) ASSERT_FALSE(try_join({})) << left;
+  for (std::uint32_t left = IndexPool::kBlock - 2; left > 0; --left)
+    ASSERT_FALSE(try_join({})) << left;
   const auto refused = try_join({});
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->code, proto::GoodbyeCode::hub_full);

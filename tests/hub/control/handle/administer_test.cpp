@@ -87,8 +87,9 @@ struct AdministerTest::AnswerTo<ctrl::SetLogLevel> {
 
 TEST_F(AdministerTest, WhoIsNoAdministratorIsDeniedWithWords) {
   for (const proto::Refusal& refusal :
-       {refused(robot_, ctrl::Kick{admin_.id, ""}), refused(robot_, ctrl::Reassign{admin_.id, robot_.id}),
-        refused(robot_, ctrl::Drain{}), refused(robot_, ctrl::Reload{}), refused(robot_, ctrl::SetLogLevel{"off"})}) {
+       {refused(robot_, ctrl::Kick{admin_.id, ""}),
+        refused(robot_, ctrl::Reassign{admin_.id, robot_.id}), refused(robot_, ctrl::Drain{}),
+        refused(robot_, ctrl::Reload{}), refused(robot_, ctrl::SetLogLevel{"off"})}) {
     EXPECT_EQ(refusal.status, Status::denied);
     EXPECT_THAT(refusal.sentence, HasSubstr("Unix socket"));
   }
@@ -113,7 +114,8 @@ TEST_F(AdministerTest, ClosesBeforeItReleases) {
   std::vector<std::size_t> order;
   shards.on_send = [&](const ShardCommand& command) { order.push_back(command.index()); };
   ASSERT_TRUE(request(admin_, ctrl::Kick{robot_.id, ""}));
-  const std::vector<std::size_t> wanted{ShardCommand{CloseCommand{}}.index(), ShardCommand{ReleaseCommand{}}.index(),
+  const std::vector<std::size_t> wanted{ShardCommand{CloseCommand{}}.index(),
+                                        ShardCommand{ReleaseCommand{}}.index(),
                                         ShardCommand{SendControlCommand{}}.index()};
   EXPECT_EQ(order, wanted);
 }
@@ -126,7 +128,8 @@ TEST_F(AdministerTest, KicksWhoIsAway) {
 
 TEST_F(AdministerTest, KicksNobodyWhoIsNotThereNorItself) {
   EXPECT_EQ(refused(admin_, ctrl::Kick{make_id<NodeId>(kHub, 99), ""}).status, Status::not_found);
-  EXPECT_EQ(refused(admin_, ctrl::Kick{make_id<NodeId>(HubId{8}, 1), ""}).status, Status::not_found);
+  EXPECT_EQ(refused(admin_, ctrl::Kick{make_id<NodeId>(HubId{8}, 1), ""}).status,
+            Status::not_found);
   EXPECT_EQ(refused(admin_, ctrl::Kick{admin_.id, ""}).status, Status::bad_request);
 }
 
@@ -135,7 +138,8 @@ TEST_F(AdministerTest, ANodeGoesOnUnderAnotherId) {
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, wanted}));
   ASSERT_THAT(shards.all<RenumberCommand>(), SizeIs(1));
   EXPECT_EQ(shards.all<RenumberCommand>()[0]->node, wanted);
-  EXPECT_EQ(nodes.find(77), (NodePlace{robot_.shard, robot_.session.slot, robot_.session.generation}));
+  EXPECT_EQ(nodes.find(77),
+            (NodePlace{robot_.shard, robot_.session.slot, robot_.session.generation}));
   EXPECT_TRUE(nodes.find(index_of(robot_.id)).is_renumbered());
   // Its shard closed the connection, and said so under the id that it knew then.
   detach(robot_, false, proto::GoodbyeCode::renumbered);
@@ -184,23 +188,32 @@ TEST_F(AdministerTest, OnlyAFreeIdOfThisHubCanBeGiven) {
   EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, admin_.id}).status, Status::taken);
   const auto own = refused(admin_, ctrl::Reassign{robot_.id, robot_.id});
   EXPECT_EQ(own.status, Status::taken);
-  EXPECT_EQ(own.sentence, "this node has the id " + to_string(robot_.id) + " already; choose a free one");
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(HubId{8}, 5)}).status, Status::bad_request);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 0)}).status, Status::bad_request);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex)}).status, Status::bad_request);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{admin_.id, make_id<NodeId>(kHub, 9)}).status, Status::bad_request);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{make_id<NodeId>(kHub, 50), make_id<NodeId>(kHub, 51)}).status,
-            Status::not_found);
+  EXPECT_EQ(own.sentence,
+            "this node has the id " + to_string(robot_.id) + " already; choose a free one");
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(HubId{8}, 5)}).status,
+            Status::bad_request);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 0)}).status,
+            Status::bad_request);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex)}).status,
+            Status::bad_request);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{admin_.id, make_id<NodeId>(kHub, 9)}).status,
+            Status::bad_request);
+  EXPECT_EQ(
+      refused(admin_, ctrl::Reassign{make_id<NodeId>(kHub, 50), make_id<NodeId>(kHub, 51)}).status,
+      Status::not_found);
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, kEveryIndex - 1)}));
   // The former id rests; a node can be named by it all the same.
   const Node other = join("other");
   EXPECT_EQ(refused(admin_, ctrl::Reassign{other.id, robot_.id}).status, Status::taken);
   // Another id is for a node that knows the one that it has.
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status, Status::taken);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status,
+            Status::taken);
   detach(robot_, false, proto::GoodbyeCode::renumbered);
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status, Status::taken);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status,
+            Status::taken);
   const Node again = rejoin(robot_, "robot");
-  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status, Status::taken);
+  EXPECT_EQ(refused(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}).status,
+            Status::taken);
   hear(again);
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 500)}));
   EXPECT_TRUE(nodes.find(500).exists());
@@ -278,7 +291,8 @@ TEST_F(AdministerTest, ASubscriberThatIsRenumberedIsOneAllTheTime) {
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot_, ns::Advertise{.service = "odom"}));
   const Node viewer = join("viewer");
   const Node other = join("other");
-  for (const Node& node : {viewer, other}) ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"robot/odom"}));
+  for (const Node& node : {viewer, other})
+    ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"robot/odom"}));
   const auto told = [this] {
     std::vector<std::tuple<bool, NodeId, std::uint32_t>> found;
     for (const auto* command : shards.all<SendControlCommand>()) {
@@ -348,7 +362,8 @@ TEST_F(AdministerTest, ReloadSwapsLimitsHereAndOnEveryShard) {
   const auto answer = request(admin_, ctrl::Reload{});
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->changes,
-            (std::vector<ctrl::ChangeRecord>{{"limits.page_records", "256", "7", false}, {"shards", "2", "3", true}}));
+            (std::vector<ctrl::ChangeRecord>{{"limits.page_records", "256", "7", false},
+                                             {"shards", "2", "3", true}}));
   EXPECT_EQ(limits.page_records, 7u);
   ASSERT_THAT(shards.all<LimitsCommand>(), SizeIs(2));
   EXPECT_EQ(shards.all<LimitsCommand>()[1]->limits.page_records, 7u);
@@ -373,21 +388,25 @@ TEST_F(AdministerTest, ABadConfigurationChangesNothing) {
 TEST_F(AdministerTest, OfAConfigurationWithManyFaultsWholeOnesAreTold) {
   read_again = [] {
     Reloading reloading;
-    reloading.faults.assign(100, "hub.toml:3:10: shards cannot be '99': give a whole number from 1 to 16");
+    reloading.faults.assign(
+        100, "hub.toml:3:10: shards cannot be '99': give a whole number from 1 to 16");
     reloading.more_faults = true;
     return reloading;
   };
   const std::string said = refused(admin_, ctrl::Reload{}).sentence;
-  EXPECT_THAT(said, ::testing::MatchesRegex(
-                        ".* stays in force(\nhub.toml:3:10: shards cannot be '99': give a whole number from 1 to 16)+"
-                        "\nand at least [0-9]+ more faults: tcphub --check-config tells all of them"));
+  EXPECT_THAT(said,
+              ::testing::MatchesRegex(
+                  ".* stays in force(\nhub.toml:3:10: shards cannot be '99': give a whole number "
+                  "from 1 to 16)+"
+                  "\nand at least [0-9]+ more faults: tcphub --check-config tells all of them"));
 }
 
 TEST_F(AdministerTest, SetsTheLogLevelAndTellsTheOneBefore) {
   EXPECT_EQ(request(admin_, ctrl::SetLogLevel{"error"})->before, "off");
   EXPECT_EQ(log_level(), LogLevel::error);
   EXPECT_EQ(noted_level, LogLevel::error);
-  EXPECT_THAT(refused(admin_, ctrl::SetLogLevel{"eror"}).sentence, HasSubstr("did you mean error?"));
+  EXPECT_THAT(refused(admin_, ctrl::SetLogLevel{"eror"}).sentence,
+              HasSubstr("did you mean error?"));
   EXPECT_EQ(log_level(), LogLevel::error);
 }
 

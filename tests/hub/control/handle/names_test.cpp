@@ -44,9 +44,12 @@ TEST_F(NamesTest, ResolvesWhoIsAway) {
 TEST_F(NamesTest, ReversesIdsToNames) {
   const Node robot = join("robot");
   EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{robot.id})->name, "robot");
-  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, kHubIndex)})->name, "hub-7");
-  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, 99)}).error().status, Status::not_found);
-  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(HubId{8}, 1)}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, kHubIndex)})->name,
+            "hub-7");
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(kHub, 99)}).error().status,
+            Status::not_found);
+  EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{make_id<NodeId>(HubId{8}, 1)}).error().status,
+            Status::not_found);
 }
 
 TEST_F(NamesTest, ListsNodesWithAllThatIsKnown) {
@@ -81,7 +84,8 @@ TEST_F(NamesTest, ListsByPattern) {
   EXPECT_EQ(list(robot, ns::List{.pattern = "hall/*"}).size(), 2u);
   EXPECT_EQ(list(robot, ns::List{.pattern = "**/robot-1"}).size(), 2u);
   EXPECT_EQ(list(robot, ns::List{}).size(), 4u);
-  EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "a//b"}).error().status, Status::bad_request);
+  EXPECT_EQ(ask<ns::ListAnswer>(robot, ns::List{.pattern = "a//b"}).error().status,
+            Status::bad_request);
 }
 
 TEST_F(NamesTest, ListsInPages) {
@@ -93,7 +97,8 @@ TEST_F(NamesTest, ListsInPages) {
     const auto answer = ask<ns::ListAnswer>(first, ns::List{.after = after});
     ASSERT_TRUE(answer);
     ASSERT_LE(answer->nodes.size(), limits.page_records);
-    for (const ns::NodeRecord& record : answer->nodes) EXPECT_GT(record.node, std::exchange(after, record.node));
+    for (const ns::NodeRecord& record : answer->nodes)
+      EXPECT_GT(record.node, std::exchange(after, record.node));
     seen += answer->nodes.size();
     if (!answer->more) break;
   }
@@ -132,10 +137,12 @@ TEST_F(NamesTest, ANodeTakesAnotherNameAndGivesItBack) {
   EXPECT_FALSE(renamed->token.empty());
   EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"forklift"})->node, robot.id);
   EXPECT_EQ(ask<ns::ResolveAnswer>(viewer, ns::Resolve{"robot"}).error().status, Status::not_found);
-  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"viewer"}).error().status, Status::taken);
+  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"viewer"}).error().status,
+            Status::taken);
   ASSERT_TRUE(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}));
   EXPECT_EQ(ask<ns::ReverseAnswer>(viewer, ns::Reverse{robot.id})->name, "");
-  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status,
+            Status::not_found);
 }
 
 TEST_F(NamesTest, TheTokenOfANewNameBringsThatNameBack) {
@@ -155,12 +162,14 @@ TEST_F(NamesTest, AnUnreadableRequestIsABadOne) {
   payload.back() = std::byte{0xff};  // no UTF-8 any more
   send_frame(robot, proto::Kind::ns, payload);
   const auto& answer = std::get<SendControlCommand>(shards.sent.back().command);
-  EXPECT_EQ(proto::decode_answer<ns::ResolveAnswer>(payload_of(answer)).error().status, Status::bad_request);
+  EXPECT_EQ(proto::decode_answer<ns::ResolveAnswer>(payload_of(answer)).error().status,
+            Status::bad_request);
   EXPECT_TRUE(shards.all<CloseCommand>().empty());
 }
 
-/// Nothing but the listed characters makes a name: no other alphabet, no control character, no empty or dotted way up
-/// that could mean something else in a path, and nothing that a log line could not hold.
+/// Nothing but the listed characters makes a name: no other alphabet, no control character, no
+/// empty or dotted way up that could mean something else in a path, and nothing that a log line
+/// could not hold.
 TEST_F(NamesTest, NamesOutsideTheRulesAreRefusedInWords) {
   const Node robot = join("robot");
   const std::vector<std::string> bad{"",
@@ -195,7 +204,8 @@ TEST_F(NamesTest, NamesOutsideTheRulesAreRefusedInWords) {
     EXPECT_EQ(refused.error().sentence.find_first_of("\n\r\x1b"), std::string::npos) << name;
   }
   EXPECT_EQ(ask<ns::ReverseAnswer>(robot, ns::Reverse{robot.id})->name, "robot");
-  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{std::string(255, 'a')})) << "the longest";
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{std::string(255, 'a')}))
+      << "the longest";
 }
 
 TEST_F(NamesTest, ADeepNameIsRefusedHoweverDeep) {
@@ -203,22 +213,27 @@ TEST_F(NamesTest, ADeepNameIsRefusedHoweverDeep) {
   std::string name = "a";
   for (int i = 1; i < 16; ++i) name += "/a";
   EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name})) << "16 parts";
-  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name + "/a"}).error().status, Status::bad_request);
+  EXPECT_EQ(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{name + "/a"}).error().status,
+            Status::bad_request);
   proto::bitestream::Writer separators;
   separators.put_text(3, std::string(60'000, '/'));
-  send_frame(robot, proto::Kind::ns, proto::assemble_control({ns::RegisterName::kOperation, 7}, separators));
+  send_frame(robot, proto::Kind::ns,
+             proto::assemble_control({ns::RegisterName::kOperation, 7}, separators));
   const auto& answer = std::get<SendControlCommand>(shards.sent.back().command);
-  EXPECT_EQ(proto::decode_answer<ns::RegisterNameAnswer>(payload_of(answer)).error().status, Status::bad_request);
+  EXPECT_EQ(proto::decode_answer<ns::RegisterNameAnswer>(payload_of(answer)).error().status,
+            Status::bad_request);
 }
 
-/// Claims of one name, however they come: there is one holder at any time, and the other is told who it is.
+/// Claims of one name, however they come: there is one holder at any time, and the other is told
+/// who it is.
 TEST_F(NamesTest, OneOfTwoClaimantsHasTheName) {
   const Node first = join("first");
   const Node second = join("second");
   ASSERT_TRUE(ask<ns::RegisterNameAnswer>(first, ns::RegisterName{"robot"}));
   const auto refused = ask<ns::RegisterNameAnswer>(second, ns::RegisterName{"robot"});
   EXPECT_EQ(refused.error().status, Status::taken);
-  EXPECT_NE(refused.error().sentence.find("127.0.0.1:5000"), std::string::npos) << refused.error().sentence;
+  EXPECT_NE(refused.error().sentence.find("127.0.0.1:5000"), std::string::npos)
+      << refused.error().sentence;
   EXPECT_EQ(ask<ns::ResolveAnswer>(second, ns::Resolve{"robot"})->node, first.id);
   EXPECT_EQ(ask<ns::ResolveAnswer>(first, ns::Resolve{"second"})->node, second.id);
 }
@@ -268,7 +283,8 @@ TEST_F(NamesTest, AStormOfNamesIsRefusedByRateAndLeavesNothing) {
   const Node viewer = join("");
   std::map<Status, int> said;
   const auto change = [&](int i) {
-    const auto taken = ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot-" + std::to_string(i)});
+    const auto taken =
+        ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot-" + std::to_string(i)});
     const auto freed = ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{});
     ++said[taken ? Status::done : taken.error().status];
     ++said[freed ? Status::done : freed.error().status];
@@ -279,7 +295,8 @@ TEST_F(NamesTest, AStormOfNamesIsRefusedByRateAndLeavesNothing) {
   EXPECT_EQ(said[Status::rate], 100'000 - 1'024);
   EXPECT_EQ(said[Status::not_found], 100'000 - 1'024) << "there was nothing to give back";
   EXPECT_LE(conductor.membership().directory().size(), 1u) << "memory stays as it was";
-  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(viewer, ns::RegisterName{"viewer"})) << "others have rates of their own";
+  EXPECT_TRUE(ask<ns::RegisterNameAnswer>(viewer, ns::RegisterName{"viewer"}))
+      << "others have rates of their own";
   // As much as time gives, however long the storm lasts.
   said.clear();
   for (int second = 0; second < 10; ++second) {
@@ -293,9 +310,11 @@ TEST_F(NamesTest, WhatItHasAlreadyIsNoNewName) {
   limits.declarations_burst = 1;
   limits.services_per_node = limits.subscriptions_per_node = 0;
   const Node robot = join("robot");
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot"}));
+  for (int i = 0; i < 10; ++i)
+    ASSERT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"robot"}));
   EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"crane"}));
-  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status, Status::rate);
+  EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status,
+            Status::rate);
   EXPECT_EQ(conductor.membership().directory().find("crane"), index_of(robot.id));
 }
 

@@ -25,7 +25,9 @@ class ServiceRequestsTest : public ::testing::Test, protected TestConductor {
 TEST_F(ServiceRequestsTest, AServiceIsNamedAfterItsNode) {
   const Node robot = join("hall/robot");
   const auto advertised = ask<ns::AdvertiseAnswer>(
-      robot, ns::Advertise{.service = "odom", .message_type = 5, .instance = 6, .delivery = ns::Delivery::latest});
+      robot,
+      ns::Advertise{
+          .service = "odom", .message_type = 5, .instance = 6, .delivery = ns::Delivery::latest});
   ASSERT_TRUE(advertised);
   EXPECT_EQ(hub_of(advertised->group), kHub);
   const auto answer = ask<ns::ServicesAnswer>(robot, ns::Services{});
@@ -44,12 +46,14 @@ TEST_F(ServiceRequestsTest, AServiceIsNamedAfterItsNode) {
 
 TEST_F(ServiceRequestsTest, ANodeWithoutANameCannotAdvertise) {
   const Node nobody = join("");
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(nobody, ns::Advertise{.service = "odom"}).error().status, Status::bad_request);
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(nobody, ns::Advertise{.service = "odom"}).error().status,
+            Status::bad_request);
 }
 
 TEST_F(ServiceRequestsTest, SyncAndRetainAreShownAndKeptToTheirLimits) {
   const Node robot = join("robot");
-  ns::Advertise offer{.service = "map", .delivery = ns::Delivery::sync, .window = 1024, .retain = true};
+  ns::Advertise offer{
+      .service = "map", .delivery = ns::Delivery::sync, .window = 1024, .retain = true};
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
   const auto listed = ask<ns::ServicesAnswer>(robot, ns::Services{});
   ASSERT_TRUE(listed);
@@ -60,7 +64,8 @@ TEST_F(ServiceRequestsTest, SyncAndRetainAreShownAndKeptToTheirLimits) {
   offer.delivery = ns::Delivery::stream;
   offer.window = 1;
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, offer).error().status, Status::bad_request);
-  const ns::Advertise accepts{.service = "drive", .direction = ns::Direction::accepts, .retain = true};
+  const ns::Advertise accepts{
+      .service = "drive", .direction = ns::Direction::accepts, .retain = true};
   EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, accepts).error().status, Status::bad_request);
 }
 
@@ -73,15 +78,18 @@ TEST_F(ServiceRequestsTest, ASubscriberMayWantLess) {
   };
   EXPECT_EQ(wants({.window = 2})->window, 0u) << "nobody provides it yet";
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(
-      robot, ns::Advertise{.service = "map", .delivery = ns::Delivery::sync, .window = 4, .retain = true}));
+      robot, ns::Advertise{
+                 .service = "map", .delivery = ns::Delivery::sync, .window = 4, .retain = true}));
   EXPECT_EQ(wants({})->window, 4u);
   EXPECT_EQ(wants({.window = 3})->window, 3u);
-  EXPECT_EQ(wants({.window = 1024, .depth = 64, .rate_hz = 1000.0})->window, 4u) << "at most what the service allows";
+  EXPECT_EQ(wants({.window = 1024, .depth = 64, .rate_hz = 1000.0})->window, 4u)
+      << "at most what the service allows";
   EXPECT_TRUE(wants({})->retain);
   for (const ns::Subscribe& wrong :
        {ns::Subscribe{.window = 1025}, ns::Subscribe{.depth = 0}, ns::Subscribe{.depth = 65},
-        ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = HUGE_VAL}, ns::Subscribe{.rate_hz = NAN},
-        ns::Subscribe{.rate_hz = 0.0009}, ns::Subscribe{.rate_hz = -1.0}}) {
+        ns::Subscribe{.rate_hz = 1000.1}, ns::Subscribe{.rate_hz = HUGE_VAL},
+        ns::Subscribe{.rate_hz = NAN}, ns::Subscribe{.rate_hz = 0.0009},
+        ns::Subscribe{.rate_hz = -1.0}}) {
     const auto answer = wants(wrong);
     ASSERT_FALSE(answer);
     EXPECT_EQ(answer.error().status, Status::bad_request);
@@ -97,10 +105,14 @@ TEST_F(ServiceRequestsTest, BadTermsAreRefused) {
     EXPECT_EQ(answer.error().status, Status::bad_request);
   }
   const auto direction = static_cast<ns::Direction>(2);
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .direction = direction}).error().status,
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .direction = direction})
+                .error()
+                .status,
             Status::bad_request);
   const auto delivery = static_cast<ns::Delivery>(3);
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .delivery = delivery}).error().status,
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "a", .delivery = delivery})
+                .error()
+                .status,
             Status::bad_request);
 }
 
@@ -111,7 +123,8 @@ TEST_F(ServiceRequestsTest, AReturningNodeFindsItsServiceWhereItWas) {
   proto::Hello hello;
   hello.token = robot.welcome.token;
   const Node back = join(hello);
-  const auto after = ask<ns::AdvertiseAnswer>(back, ns::Advertise{.service = "odom", .former_group = before->group});
+  const auto after = ask<ns::AdvertiseAnswer>(
+      back, ns::Advertise{.service = "odom", .former_group = before->group});
   EXPECT_EQ(after->group, before->group) << "while the session is there nothing has to be proven";
 }
 
@@ -124,7 +137,8 @@ TEST_F(ServiceRequestsTest, AfterARestartAServiceGetsItsFormerGroupIfItProvesTha
   start.groups = {100, IndexPool::kBlock};
   TestConductor after(Placement::spread, start);
   const auto claim = [&](const Node& node, const char* service, const ns::AdvertiseAnswer& before) {
-    const ns::Advertise offer{.service = service, .former_group = before.group, .former_proof = before.proof};
+    const ns::Advertise offer{
+        .service = service, .former_group = before.group, .former_proof = before.proof};
     const auto answer = after.ask<ns::AdvertiseAnswer>(node, offer);
     EXPECT_TRUE(answer);
     return answer ? index_of(answer->group) : 0;
@@ -133,7 +147,8 @@ TEST_F(ServiceRequestsTest, AfterARestartAServiceGetsItsFormerGroupIfItProvesTha
   const Node robot = after.join("robot");
   EXPECT_EQ(claim(robot, "scan", *odom), 101u) << "another service";
   EXPECT_EQ(claim(robot, "map", {odom->group, 0}), 102u) << "no proof";
-  EXPECT_EQ(claim(robot, "odom", {make_id<GroupId>(HubId{8}, 1), 0, odom->proof}), 103u) << "another hub's group";
+  EXPECT_EQ(claim(robot, "odom", {make_id<GroupId>(HubId{8}, 1), 0, odom->proof}), 103u)
+      << "another hub's group";
   ASSERT_TRUE(after.ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(kHub, 103)}));
   EXPECT_EQ(claim(robot, "odom", *odom), 1u) << "no token is needed";
 }
@@ -192,7 +207,8 @@ TEST_F(ServiceRequestsTest, SubscribingTellsTheTerms) {
   const auto early = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"});
   ASSERT_TRUE(early);
   EXPECT_EQ(early->group, GroupId{});
-  const auto group = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom", .message_type = 5});
+  const auto group =
+      ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom", .message_type = 5});
   const auto later = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"});
   ASSERT_TRUE(later);
   EXPECT_EQ(later->group, group->group);
@@ -205,8 +221,10 @@ TEST_F(ServiceRequestsTest, SubscribersAreToldThatAServiceAcceptsData) {
   ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/drive"}));
   shards.sent.clear();
   for (const ns::Direction direction : {ns::Direction::accepts, ns::Direction::provides}) {
-    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "drive", .direction = direction}));
-    const auto told = proto::decode<ns::ServiceMoved>(payload_of(*shards.all<SendControlCommand>()[0]));
+    ASSERT_TRUE(
+        ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "drive", .direction = direction}));
+    const auto told =
+        proto::decode<ns::ServiceMoved>(payload_of(*shards.all<SendControlCommand>()[0]));
     ASSERT_TRUE(told);
     EXPECT_EQ(told->direction, direction);
     const auto answer = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/drive"});
@@ -221,15 +239,19 @@ TEST_F(ServiceRequestsTest, WithdrawingAndUnsubscribing) {
   const Node viewer = join("viewer");
   const auto group = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "odom"});
   ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"robot/odom"}));
-  EXPECT_EQ(ask<ns::WithdrawAnswer>(viewer, ns::Withdraw{group->group}).error().status, Status::denied);
+  EXPECT_EQ(ask<ns::WithdrawAnswer>(viewer, ns::Withdraw{group->group}).error().status,
+            Status::denied);
   ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}));
   EXPECT_EQ(events<ns::SubscriberLeft>().size(), 1u);
-  EXPECT_EQ(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}).error().status, Status::not_found);
+  EXPECT_EQ(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"robot/odom"}).error().status,
+            Status::not_found);
   ASSERT_TRUE(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}));
   EXPECT_EQ(groups.find(index_of(group->group)), nullptr);
-  EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}).error().status, Status::not_found);
-  EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(HubId{9}, 1)}).error().status,
+  EXPECT_EQ(ask<ns::WithdrawAnswer>(robot, ns::Withdraw{group->group}).error().status,
             Status::not_found);
+  EXPECT_EQ(
+      ask<ns::WithdrawAnswer>(robot, ns::Withdraw{make_id<GroupId>(HubId{9}, 1)}).error().status,
+      Status::not_found);
 }
 
 TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
@@ -237,10 +259,13 @@ TEST_F(ServiceRequestsTest, ServicesAreListedByPatternAndInPages) {
   const std::string metadata(proto::kMetadataBytesMax, 'm');
   for (int i = 0; i < 40; ++i) {
     const std::string name = "s" + std::to_string(i);
-    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = name, .metadata = metadata}));
+    ASSERT_TRUE(
+        ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = name, .metadata = metadata}));
   }
-  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/s7"})->services.size(), 1u);
-  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "**/"}).error().status, Status::bad_request);
+  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/s7"})->services.size(),
+            1u);
+  EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "**/"}).error().status,
+            Status::bad_request);
   std::size_t seen = 0;
   GroupId after{};
   for (int page = 0; page < 10; ++page) {
@@ -259,25 +284,31 @@ TEST_F(ServiceRequestsTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
   const Node robot = join("robot");
   EXPECT_TRUE(ask<ns::ServicesAnswer>(robot, ns::Services{})->services.empty());
   for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
-    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(i)})) << i;
+    ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s" + std::to_string(i)}))
+        << i;
     if (i + 1 == 1 || i + 1 == 100) {
-      EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/*"})->services.size(), i + 1);
+      EXPECT_EQ(ask<ns::ServicesAnswer>(robot, ns::Services{.pattern = "robot/*"})->services.size(),
+                i + 1);
     }
   }
   EXPECT_EQ(conductor.membership().services().services_of(index_of(robot.id)), 1'024u);
   const auto one_more = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "one-more"});
   ASSERT_FALSE(one_more);
   EXPECT_EQ(one_more.error().status, Status::limit);
-  EXPECT_NE(one_more.error().sentence.find("1024 services"), std::string::npos) << one_more.error().sentence;
-  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s7"})) << "one that is there already";
+  EXPECT_NE(one_more.error().sentence.find("1024 services"), std::string::npos)
+      << one_more.error().sentence;
+  EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s7"}))
+      << "one that is there already";
 }
 
 TEST_F(ServiceRequestsTest, SubscriptionsAreRefusedBeyondTheLimit) {
   const Node viewer = join("viewer");
   for (std::uint64_t i = 0; i < limits.subscriptions_per_node; ++i) {
-    ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)})) << i;
+    ASSERT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)}))
+        << i;
   }
-  EXPECT_EQ(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}).error().status, Status::limit);
+  EXPECT_EQ(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}).error().status,
+            Status::limit);
   ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(viewer, ns::Unsubscribe{"nobody/s0"}));
   EXPECT_TRUE(ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/one-more"}));
 }
@@ -286,18 +317,22 @@ TEST_F(ServiceRequestsTest, AllThatANodeMayHaveItMayDeclareAtOnceAndOneThingMore
   const Node robot = join("robot");
   const auto declare = [&](const Node& node) {
     for (std::uint64_t i = 0; i < limits.services_per_node; ++i) {
-      ASSERT_TRUE(ask<ns::AdvertiseAnswer>(node, ns::Advertise{.service = "s" + std::to_string(i)})) << i;
+      ASSERT_TRUE(ask<ns::AdvertiseAnswer>(node, ns::Advertise{.service = "s" + std::to_string(i)}))
+          << i;
     }
     for (std::uint64_t i = 0; i < limits.subscriptions_per_node; ++i) {
-      ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"nobody/s" + std::to_string(i)})) << i;
+      ASSERT_TRUE(ask<ns::SubscribeAnswer>(node, ns::Subscribe{"nobody/s" + std::to_string(i)}))
+          << i;
     }
   };
   declare(robot);
-  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(robot, ns::Unsubscribe{"nobody/s0"})) << "ending something is free";
+  ASSERT_TRUE(ask<ns::UnsubscribeAnswer>(robot, ns::Unsubscribe{"nobody/s0"}))
+      << "ending something is free";
   const auto more = ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"});
   ASSERT_FALSE(more);
   EXPECT_EQ(more.error().status, Status::rate);
-  EXPECT_NE(more.error().sentence.find("2048 at once and 500 a second"), std::string::npos) << more.error().sentence;
+  EXPECT_NE(more.error().sentence.find("2048 at once and 500 a second"), std::string::npos)
+      << more.error().sentence;
   now += 2ms;
   EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"}));
   // Whose connection flaps declares all of it each time, and that is free.
@@ -318,9 +353,13 @@ TEST_F(ServiceRequestsTest, LargerQuotasMakeTheBurstLarger) {
   // Other terms are another declaration, the same ones are none.
   EXPECT_TRUE(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s0"}));
   EXPECT_TRUE(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{"nobody/s0"}));
-  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s0", .metadata = "new"}).error().status,
+  EXPECT_EQ(ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "s0", .metadata = "new"})
+                .error()
+                .status,
             Status::rate);
-  EXPECT_EQ(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{.name = "nobody/s0", .depth = 2}).error().status,
+  EXPECT_EQ(ask<ns::SubscribeAnswer>(robot, ns::Subscribe{.name = "nobody/s0", .depth = 2})
+                .error()
+                .status,
             Status::rate);
 }
 
@@ -330,7 +369,8 @@ TEST_F(ServiceRequestsTest, AStormOfSubscriptionsEndsAtTheQuotaAndThenAtTheRate)
   const Node viewer = join("viewer");
   std::map<Status, int> said;
   for (int i = 0; i < 100'000; ++i) {
-    const auto answer = ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)});
+    const auto answer =
+        ask<ns::SubscribeAnswer>(viewer, ns::Subscribe{"nobody/s" + std::to_string(i)});
     ++said[answer ? Status::done : answer.error().status];
     shards.sent.clear();
   }

@@ -43,8 +43,8 @@ TEST_F(DirectoryTest, ALiveHolderKeepsItsName) {
   const auto refusal = directory_.refusal("robot", nullptr, sessions_, 12s);
   ASSERT_TRUE(refusal);
   EXPECT_EQ(refusal->code, proto::GoodbyeCode::name_taken);
-  EXPECT_THAT(refusal->sentence,
-              AllOf(HasSubstr("'robot'"), HasSubstr("7.1"), HasSubstr("127.0.0.1:5000"), HasSubstr("12 s")));
+  EXPECT_THAT(refusal->sentence, AllOf(HasSubstr("'robot'"), HasSubstr("7.1"),
+                                       HasSubstr("127.0.0.1:5000"), HasSubstr("12 s")));
 }
 
 TEST_F(DirectoryTest, AnAbsentHolderDoesNot) {
@@ -58,7 +58,9 @@ TEST_F(DirectoryTest, TheHolderItselfMayHaveIt) {
   EXPECT_FALSE(directory_.refusal("robot", &robot, sessions_, 0ms));
 }
 
-TEST_F(DirectoryTest, AFreeNameIsFree) { EXPECT_FALSE(directory_.refusal("robot", nullptr, sessions_, 0ms)); }
+TEST_F(DirectoryTest, AFreeNameIsFree) {
+  EXPECT_FALSE(directory_.refusal("robot", nullptr, sessions_, 0ms));
+}
 
 TEST_F(DirectoryTest, BadNamesAreToldWhichRuleTheyBreak) {
   const auto refusal = directory_.refusal("a b", nullptr, sessions_, 0ms);
@@ -70,7 +72,8 @@ TEST_F(DirectoryTest, BadNamesAreToldWhichRuleTheyBreak) {
   ASSERT_TRUE(id);
   EXPECT_EQ(id->code, proto::GoodbyeCode::bad_name);
   EXPECT_EQ(id->sentence,
-            "the name '7.1' cannot be taken: it reads as the id of a node does, NUMBER.NUMBER; choose another one");
+            "the name '7.1' cannot be taken: it reads as the id of a node does, NUMBER.NUMBER; "
+            "choose another one");
   const auto hostile = directory_.refusal("\x1b[2J", nullptr, sessions_, 0ms);
   ASSERT_TRUE(hostile);
   EXPECT_THAT(hostile->sentence, HasSubstr("\\x1b"));

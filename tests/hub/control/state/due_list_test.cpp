@@ -28,7 +28,8 @@ TEST(DueList, KeepsAsManyVoidNotesAsItMayAndForgetsThemWithOneMore) {
   for (int i = 0; i < kMost; ++i) notes.add(i, kValid, is_void);
   EXPECT_EQ(notes.size(), static_cast<std::size_t>(kMost));
   notes.add(kMost, kValid, is_void);
-  EXPECT_EQ(std::vector<int>(notes.begin(), notes.end()), (std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ(std::vector<int>(notes.begin(), notes.end()),
+            (std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
 }
 
 TEST(DueList, PutsAllOffInTheirOrderAndNoneTooFar) {

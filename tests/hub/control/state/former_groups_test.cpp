@@ -45,13 +45,14 @@ class FormerGroupsTest : public ::testing::Test {
     ASSERT_TRUE(keep().forgets_gone);
     ASSERT_EQ(forgettings_, before + 1);
   }
-  Services::Advertised advertise(std::uint32_t node, const std::string& name, std::uint32_t group = 0,
-                                 std::span<const std::byte> proof = {}) {
+  Services::Advertised advertise(std::uint32_t node, const std::string& name,
+                                 std::uint32_t group = 0, std::span<const std::byte> proof = {}) {
     const auto done = services_->advertise(node, name, {}, now_, effects_, {group, proof});
     EXPECT_TRUE(done);
     return done ? *done : Services::Advertised{};
   }
-  Services::Advertised come_back(std::uint32_t node, const std::string& name, const Services::Advertised& before) {
+  Services::Advertised come_back(std::uint32_t node, const std::string& name,
+                                 const Services::Advertised& before) {
     return advertise(node, name, before.group, before.proof);
   }
   void withdraw(std::uint32_t node, std::uint32_t group) {
@@ -81,8 +82,10 @@ TEST_F(FormerGroupsTest, TheOwnerHasItsGroupAndAThiefThatCameFirstAnother) {
   const auto others = advertise(kThief, "thief/odom");
   start(10'000);
   EXPECT_NE(advertise(kThief, "thief/a", mine.group).group, mine.group) << "no proof";
-  EXPECT_NE(advertise(kThief, "thief/odom", mine.group, others.proof).group, mine.group) << "that of its own group";
-  EXPECT_NE(advertise(kThief, "thief/b", mine.group, mine.proof).group, mine.group) << "another service's";
+  EXPECT_NE(advertise(kThief, "thief/odom", mine.group, others.proof).group, mine.group)
+      << "that of its own group";
+  EXPECT_NE(advertise(kThief, "thief/b", mine.group, mine.proof).group, mine.group)
+      << "another service's";
   EXPECT_EQ(come_back(kOwner, "robot/odom", mine).group, mine.group);
 }
 
@@ -139,7 +142,8 @@ TEST_F(FormerGroupsTest, AGroupThatNobodyGotSinceItWasForgottenIsNotGivenBackEit
   const auto old = advertise(kOwner, "robot/odom");
   withdraw(kOwner, old.group);
   forget();
-  EXPECT_NE(come_back(kOwner, "robot/odom", old).group, old.group) << "the disk may say that it is a newcomer's";
+  EXPECT_NE(come_back(kOwner, "robot/odom", old).group, old.group)
+      << "the disk may say that it is a newcomer's";
 }
 
 TEST_F(FormerGroupsTest, AProofCountsUntilTheSecondForgettingAndItsNextOneFurther) {

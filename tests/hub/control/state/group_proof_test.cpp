@@ -20,8 +20,8 @@ Secret secret_of(int value) {
   return secret;
 }
 
-// By another implementation, from what docs/protocol.md says: a hub that wrote other bytes after an update would take
-// their groups from all services.
+// By another implementation, from what docs/protocol.md says: a hub that wrote other bytes after an
+// update would take their groups from all services.
 TEST(GroupProof, IsWhatTheDocumentSays) {
   constexpr std::uint8_t kDue[] = {0x48, 0x9e, 0x85, 0xf2, 0x6b, 0x35, 0xf3, 0x25,
                                    0x37, 0x09, 0x1b, 0xea, 0x2e, 0x1f, 0x33, 0x00};

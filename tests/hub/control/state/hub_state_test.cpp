@@ -76,7 +76,8 @@ TEST(HubState, AnyChangedByteIsSeen) {
 
 TEST(HubState, AnyOtherLengthIsRefused) {
   const std::vector<std::byte> bytes = write_hub_state(some_state());
-  for (std::size_t size = 0; size < bytes.size(); ++size) EXPECT_NE(fault_of(std::span{bytes}.first(size)), "") << size;
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_NE(fault_of(std::span{bytes}.first(size)), "") << size;
   std::vector<std::byte> longer = bytes;
   longer.push_back(std::byte{});
   EXPECT_THAT(fault_of(longer), HasSubstr("length"));
@@ -118,7 +119,8 @@ TEST(HubState, SaysWhatIsWrong) {
   wrong[nodes_used] |= std::byte{1};  // index 0
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
   wrong = bytes;
-  wrong[wrong.size() - 33] = std::byte{0};  // the last byte of the groups that outlasted a forgetting
+  wrong[wrong.size() - 33] =
+      std::byte{0};  // the last byte of the groups that outlasted a forgetting
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
   wrong[wrong.size() - 33] = std::byte{32};  // 5, which is not used
   EXPECT_THAT(fault_of(sealed(wrong)), HasSubstr("numbers"));
@@ -135,7 +137,8 @@ TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
   EXPECT_EQ(start->nodes.count, IndexPool::kBlock + 1) << "one of them is used";
   EXPECT_EQ(start->nodes.used, some_state().nodes_used);
   EXPECT_EQ(start->state.node_mark, 8'194u + IndexPool::kBlock);
-  EXPECT_EQ(start->state.nodes_used.size(), 8'193u + IndexPool::kBlock) << "what is granted is kept as used";
+  EXPECT_EQ(start->state.nodes_used.size(), 8'193u + IndexPool::kBlock)
+      << "what is granted is kept as used";
   EXPECT_TRUE(start->state.nodes_used.contains(8'193 + IndexPool::kBlock));
   EXPECT_EQ(start->groups.first, 4'097u);
   EXPECT_EQ(start->groups.forgettings, 2u);
@@ -161,7 +164,8 @@ TEST(HubState, AStartThatHasComeRoundHandsOutNothingThatSomebodyMayHave) {
   state.node_mark = 1'048'574;
   const auto start = next_start(state, 0s);
   ASSERT_TRUE(start);
-  EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock) << "1'048'574, then what is above those used";
+  EXPECT_EQ(start->state.node_mark, 8'193u + IndexPool::kBlock)
+      << "1'048'574, then what is above those used";
   EXPECT_TRUE(start->state.nodes_used.contains(1'048'574));
 }
 
@@ -201,7 +205,8 @@ TEST(HubState, StartsAreCountedToTheEndAndNoFurther) {
   const auto beyond = next_start(state, 0s);
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().sentence,
-            "the hub was started as often as can be counted (16777215 times); move it away: the hub then begins anew, "
+            "the hub was started as often as can be counted (16777215 times); move it away: the "
+            "hub then begins anew, "
             "and nodes get new ids");
 }
 

@@ -81,7 +81,8 @@ TEST(IndexPool, GrantsABlockAheadAndSaysItIsUsed) {
   IndexPool pool(100'000, 0ms, {1, IndexPool::kBlock});
   for (std::uint32_t i = 0; i < IndexPool::kBlock / 2; ++i) ASSERT_TRUE(pool.take(0ms));
   EXPECT_FALSE(pool.keeping_due(0ms));
-  EXPECT_EQ(pool.next_grant(0ms).count, IndexPool::kBlock) << "asked for another reason, nothing more is granted";
+  EXPECT_EQ(pool.next_grant(0ms).count, IndexPool::kBlock)
+      << "asked for another reason, nothing more is granted";
   ASSERT_TRUE(pool.take(0ms));
   EXPECT_TRUE(pool.keeping_due(0ms));
   const IndexPool::Grant grant = keep(pool);

@@ -25,10 +25,12 @@ class ListingTest : public ::testing::Test {
   }
   /// All pieces, each of bounded work, with what `between` does between them.
   template <class Between>
-  std::vector<std::uint32_t> all(const char* pattern, std::size_t most, std::size_t work, Between between) {
+  std::vector<std::uint32_t> all(const char* pattern, std::size_t most, std::size_t work,
+                                 Between between) {
     const auto parsed = proto::Pattern::parse(pattern);
     std::vector<std::uint32_t> found;
-    ListingRequest request{.pattern = *pattern == '\0' ? nullptr : &*parsed, .most = most, .work = work};
+    ListingRequest request{
+        .pattern = *pattern == '\0' ? nullptr : &*parsed, .most = most, .work = work};
     for (int pieces = 0; pieces < 10'000; ++pieces) {
       const Listed listed = list_nodes(membership_, request);
       EXPECT_LE(listed.indices.size(), most);
@@ -41,7 +43,8 @@ class ListingTest : public ::testing::Test {
     ADD_FAILURE() << "no end";
     return found;
   }
-  std::vector<std::uint32_t> all(const char* pattern, std::size_t most = 10, std::size_t work = 64) {
+  std::vector<std::uint32_t> all(const char* pattern, std::size_t most = 10,
+                                 std::size_t work = 64) {
     return all(pattern, most, work, [] {});
   }
 
@@ -88,7 +91,8 @@ TEST_F(ListingTest, LooksAtNothingThatOnlyBeginsWithTheSameLetters) {
   const std::uint32_t arm = join("hall-3/robot/arm").index;
   for (int i = 0; i < 100; ++i) {
     // In the order of names, '-' and '.' stand before '/', digits and letters behind it.
-    for (const char* between : {"-", ".", "", "x"}) join("hall-3" + std::string{between} + std::to_string(i));
+    for (const char* between : {"-", ".", "", "x"})
+      join("hall-3" + std::string{between} + std::to_string(i));
     join("hall-3-" + std::to_string(i) + "/robot");
   }
   const auto few = [this](const std::string& pattern, std::size_t work) {
@@ -134,12 +138,16 @@ TEST_F(ListingTest, LeavesOutWhoIsAwayIfTold) {
   join("a");
   Session& away = join("b");
   membership_.connection_ended(away, {}, 0ms, effects_);
-  EXPECT_EQ(list_nodes(membership_, {.connected_only = true, .most = 10, .work = 64}).indices.size(), 1u);
-  EXPECT_EQ(list_nodes(membership_, {.connected_only = false, .most = 10, .work = 64}).indices.size(), 2u);
-  const auto pattern = proto::Pattern::parse("b");
   EXPECT_EQ(
-      list_nodes(membership_, {.pattern = &*pattern, .connected_only = true, .most = 10, .work = 64}).indices.size(),
-      0u);
+      list_nodes(membership_, {.connected_only = true, .most = 10, .work = 64}).indices.size(), 1u);
+  EXPECT_EQ(
+      list_nodes(membership_, {.connected_only = false, .most = 10, .work = 64}).indices.size(),
+      2u);
+  const auto pattern = proto::Pattern::parse("b");
+  EXPECT_EQ(list_nodes(membership_,
+                       {.pattern = &*pattern, .connected_only = true, .most = 10, .work = 64})
+                .indices.size(),
+            0u);
 }
 
 TEST_F(ListingTest, FindsServicesByTheirFullNames) {
@@ -149,15 +157,18 @@ TEST_F(ListingTest, FindsServicesByTheirFullNames) {
   ASSERT_TRUE(membership_.services().subscribe(1, "robot/nobody-offers-that", {}, effects_));
   const auto robot = proto::Pattern::parse("robot/*");
   const auto any = proto::Pattern::parse("**/pose");
-  EXPECT_EQ(list_services(membership_.services(), {.pattern = &*robot, .most = 10, .work = 64}).indices,
-            (std::vector{odom, pose}));
-  EXPECT_EQ(list_services(membership_.services(), {.pattern = &*any, .most = 10, .work = 64}).indices,
-            std::vector{pose});
+  EXPECT_EQ(
+      list_services(membership_.services(), {.pattern = &*robot, .most = 10, .work = 64}).indices,
+      (std::vector{odom, pose}));
+  EXPECT_EQ(
+      list_services(membership_.services(), {.pattern = &*any, .most = 10, .work = 64}).indices,
+      std::vector{pose});
   const Listed first = list_services(membership_.services(), {.most = 1, .work = 64});
   EXPECT_EQ(first.indices, std::vector{odom});
   EXPECT_TRUE(first.more);
-  EXPECT_EQ(list_services(membership_.services(), {.after = first.next, .most = 1, .work = 64}).indices,
-            std::vector{pose});
+  EXPECT_EQ(
+      list_services(membership_.services(), {.after = first.next, .most = 1, .work = 64}).indices,
+      std::vector{pose});
 }
 
 }  // namespace

@@ -26,7 +26,9 @@ class MembershipTest : public ::testing::Test {
     const auto joined = membership_.join(request(name), now, effects_);
     return joined ? joined->session : nullptr;
   }
-  std::vector<std::byte> token_of(const Session& session) { return membership_.sessions().token_of(session); }
+  std::vector<std::byte> token_of(const Session& session) {
+    return membership_.sessions().token_of(session);
+  }
   GoodbyeCode refused(const JoinRequest& wanted, std::chrono::milliseconds now = 0ms) {
     const auto joined = membership_.join(wanted, now, effects_);
     return joined ? GoodbyeCode::done : joined.error().code;
@@ -36,8 +38,9 @@ class MembershipTest : public ::testing::Test {
   }
   template <class Kind>
   std::size_t count() const {
-    return static_cast<std::size_t>(std::count_if(
-        effects_.begin(), effects_.end(), [](const Effect& effect) { return std::holds_alternative<Kind>(effect); }));
+    return static_cast<std::size_t>(
+        std::count_if(effects_.begin(), effects_.end(),
+                      [](const Effect& effect) { return std::holds_alternative<Kind>(effect); }));
   }
 
   Limits limits_;
@@ -182,7 +185,8 @@ TEST_F(MembershipTest, AGoodbyeWithAReasonKeepsTheGraceTime) {
 
 TEST_F(MembershipTest, HowTheHubClosedIsRemembered) {
   Session* robot = join("robot");
-  membership_.connection_ended(*robot, {false, GoodbyeCode::slow_consumer, "took too little"}, 1s, effects_);
+  membership_.connection_ended(*robot, {false, GoodbyeCode::slow_consumer, "took too little"}, 1s,
+                               effects_);
   ASSERT_NE(robot->closing, nullptr);
   EXPECT_EQ(robot->closing->code, GoodbyeCode::slow_consumer);
   EXPECT_EQ(robot->closing->sentence, "took too little");
@@ -252,7 +256,8 @@ TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
   admin.identity = "uid 1000";
   const auto by_socket = membership_.join(admin, 0ms, effects_);
   ASSERT_FALSE(by_socket);
-  EXPECT_THAT(by_socket.error().sentence, ::testing::HasSubstr("this is uid 1000; run the command as one of them"));
+  EXPECT_THAT(by_socket.error().sentence,
+              ::testing::HasSubstr("this is uid 1000; run the command as one of them"));
   admin.may_administer = true;
   EXPECT_EQ(refused(admin), GoodbyeCode::done);
   JoinRequest unknown = request("");
@@ -266,8 +271,8 @@ TEST_F(MembershipTest, AFullHubSaysSo) {
 }
 
 TEST_F(MembershipTest, ANamelessNodeClosedForWhatItSentIsForgottenAtOnce) {
-  for (const GoodbyeCode code :
-       {GoodbyeCode::malformed, GoodbyeCode::wrong_source, GoodbyeCode::not_allowed, GoodbyeCode::too_many_requests}) {
+  for (const GoodbyeCode code : {GoodbyeCode::malformed, GoodbyeCode::wrong_source,
+                                 GoodbyeCode::not_allowed, GoodbyeCode::too_many_requests}) {
     effects_.clear();
     membership_.connection_ended(*join(""), {false, code, "why"}, 1s, effects_);
     EXPECT_EQ(count<SessionEnded>(), 1u);
@@ -277,9 +282,11 @@ TEST_F(MembershipTest, ANamelessNodeClosedForWhatItSentIsForgottenAtOnce) {
 }
 
 TEST_F(MembershipTest, OthersWhoWereClosedKeepTheirGraceTime) {
-  membership_.connection_ended(*join("robot"), {false, GoodbyeCode::malformed, "why"}, 1s, effects_);
+  membership_.connection_ended(*join("robot"), {false, GoodbyeCode::malformed, "why"}, 1s,
+                               effects_);
   membership_.connection_ended(*join(""), {false, GoodbyeCode::silent, "why"}, 1s, effects_);
-  membership_.connection_ended(*join(""), {true, GoodbyeCode::malformed, "your frame"}, 1s, effects_);
+  membership_.connection_ended(*join(""), {true, GoodbyeCode::malformed, "your frame"}, 1s,
+                               effects_);
   EXPECT_EQ(membership_.sessions().all().size(), 3u);
 }
 
@@ -370,7 +377,8 @@ TEST_F(MembershipTest, OneHubDecidesOnNamesAtOnce) {
   Session* robot = join("robot");
   EXPECT_FALSE(membership_.directory().is_provisional("robot"));
   effects_.clear();
-  membership_.name_decided(*robot, {.confirmed = false, .holder = NodeId{9}, .sentence = "late"}, 1s, effects_);
+  membership_.name_decided(*robot, {.confirmed = false, .holder = NodeId{9}, .sentence = "late"},
+                           1s, effects_);
   EXPECT_TRUE(effects_.empty()) << "final is final";
   EXPECT_EQ(robot->name, "robot");
 }
@@ -386,7 +394,8 @@ TEST_F(MembershipTest, AProvisionalNameIsConfirmedOrLost) {
   ASSERT_EQ(effects_.size(), 1u);
   EXPECT_TRUE(std::get<NameDecided>(effects_[0]).confirmed);
   effects_.clear();
-  membership_.name_decided(*rival, {.confirmed = false, .holder = NodeId{9}, .sentence = "it was first"}, 1s, effects_);
+  membership_.name_decided(
+      *rival, {.confirmed = false, .holder = NodeId{9}, .sentence = "it was first"}, 1s, effects_);
   EXPECT_EQ(rival->name, "") << "it goes on, by its id";
   EXPECT_FALSE(membership_.directory().find("rival"));
   const auto& lost = std::get<NameDecided>(effects_.back());

@@ -23,7 +23,8 @@ TEST(Records, TellAllThatIsKnown) {
   terms.instance = 4;
   terms.direction = proto::ns::Direction::accepts;
   terms.metadata = "x y";
-  const auto service = membership.services().advertise(session.index, "robot/odom", terms, 1s, effects);
+  const auto service =
+      membership.services().advertise(session.index, "robot/odom", terms, 1s, effects);
   ASSERT_TRUE(service);
   ASSERT_TRUE(membership.services().subscribe(session.index, "robot/odom", {}, effects));
 
@@ -39,7 +40,8 @@ TEST(Records, TellAllThatIsKnown) {
   node.services = 1;
   EXPECT_EQ(record_of(title, session, membership.services(), 3s), node);
 
-  const ns::ServiceRecord record = record_of(title, *membership.services().find_group(service->group));
+  const ns::ServiceRecord record =
+      record_of(title, *membership.services().find_group(service->group));
   EXPECT_EQ(record.group, make_id<GroupId>(HubId{7}, service->group));
   EXPECT_EQ(record.name, "robot/odom");
   EXPECT_EQ(record.node, node.node);

@@ -35,7 +35,8 @@ class RestartTest : public ::testing::Test {
     if (boot > 1) options.returns_until = std::chrono::milliseconds{limits_.grace_ms};
     return std::make_unique<Membership>(options, limits_);
   }
-  static Node join(Membership& hub, const std::string& name, std::span<const std::byte> token = {}) {
+  static Node join(Membership& hub, const std::string& name,
+                   std::span<const std::byte> token = {}) {
     JoinRequest request;
     request.name = name;
     request.identity = "open";
@@ -77,7 +78,8 @@ TEST_F(RestartTest, ATokenOfAnEarlierHolderDoesNotClaimAnIdThatWasGivenOn) {
   const auto after = start(1, 2);
   Effects effects;
   ASSERT_EQ(join(*after, "Z").first, old.first);
-  after->connection_ended(*after->sessions().find(old.first), {false, GoodbyeCode::silent, ""}, 0ms, effects);
+  after->connection_ended(*after->sessions().find(old.first), {false, GoodbyeCode::silent, ""}, 0ms,
+                          effects);
   after->tick(std::chrono::milliseconds{limits_.grace_ms}, effects);
   ASSERT_EQ(after->sessions().find(old.first), nullptr);
   EXPECT_NE(join(*after, "old", old.second).first, old.first);
@@ -102,7 +104,8 @@ TEST_F(RestartTest, NoIdIsGivenAwayThatANodeMayComeBackUnder) {
   const auto refused = after->renumber(other, absent.first, over - 1ms, effects);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->status, proto::Status::taken);
-  EXPECT_NE(refused->sentence.find("has not come back yet; try again in 1 s"), std::string::npos) << refused->sentence;
+  EXPECT_NE(refused->sentence.find("has not come back yet; try again in 1 s"), std::string::npos)
+      << refused->sentence;
   EXPECT_TRUE(effects.empty());
   EXPECT_EQ(join(*after, "absent", absent.second).first, absent.first);
   const auto held = after->renumber(other, absent.first, over - 1ms, effects);
@@ -110,14 +113,16 @@ TEST_F(RestartTest, NoIdIsGivenAwayThatANodeMayComeBackUnder) {
   EXPECT_NE(held->sentence.find("another node 'absent'"), std::string::npos) << held->sentence;
   Session& third = *after->sessions().find(join(*after, "third").first);
   EXPECT_FALSE(after->renumber(third, 500'000, over - 1ms, effects)) << "nobody had it";
-  EXPECT_FALSE(after->renumber(other, absent.first + 1, over, effects)) << "nobody is expected any more";
+  EXPECT_FALSE(after->renumber(other, absent.first + 1, over, effects))
+      << "nobody is expected any more";
 }
 
 TEST_F(RestartTest, AnIdThatAnAdministratorGaveIsNoNewcomers) {
   const auto before = start(1, 1);
   const Node robot = join(*before, "robot");
   Effects effects;
-  const std::uint32_t given = before->durable(0ms).nodes.mark;  // what the next start hands out first
+  const std::uint32_t given =
+      before->durable(0ms).nodes.mark;  // what the next start hands out first
   ASSERT_FALSE(before->renumber(*before->sessions().find(robot.first), given, 0ms, effects));
   EXPECT_TRUE(std::holds_alternative<StateDue>(effects.front())) << "a crash must not forget it";
   const std::vector<std::byte> token = before->sessions().token_of(*before->sessions().find(given));
@@ -137,7 +142,8 @@ TEST_F(RestartTest, WhereEachIdMayBeSomebodysNewcomersWait) {
   const auto refused = hub->join(request, over - 1ms, effects);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, GoodbyeCode::hub_full);
-  EXPECT_NE(refused.error().sentence.find("try again in 1 s"), std::string::npos) << refused.error().sentence;
+  EXPECT_NE(refused.error().sentence.find("try again in 1 s"), std::string::npos)
+      << refused.error().sentence;
   EXPECT_TRUE(effects.empty());
   EXPECT_TRUE(hub->keeping_due(over));
   hub->state_kept(hub->durable(over));

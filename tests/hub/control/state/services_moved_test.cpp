@@ -17,13 +17,15 @@ constexpr std::uint32_t kOther = 4;
 class ServicesMovedTest : public ::testing::Test {
  protected:
   /// Another message type, and so another group.
-  std::uint32_t advertise(std::uint32_t type, const std::string& name = "robot/odom", std::uint32_t former_group = 0) {
+  std::uint32_t advertise(std::uint32_t type, const std::string& name = "robot/odom",
+                          std::uint32_t former_group = 0) {
     ServiceTerms terms;
     terms.message_type = type;
     terms.delivery = proto::ns::Delivery::sync;
     terms.window = 3;
     const GroupProof proof = write_group_proof({HubId{7}, former_group, name}, {});
-    const auto done = services_.advertise(kRobot, name, terms, now_, effects_, {former_group, proof});
+    const auto done =
+        services_.advertise(kRobot, name, terms, now_, effects_, {former_group, proof});
     EXPECT_TRUE(done);
     return done ? done->group : 0;
   }
@@ -39,7 +41,8 @@ class ServicesMovedTest : public ::testing::Test {
   std::uint64_t last_move() const {
     std::uint64_t move = 0;
     for (const Effect& effect : effects_) {
-      if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) move = std::max(move, moved->move);
+      if (const auto* moved = std::get_if<ServiceMovedDue>(&effect))
+        move = std::max(move, moved->move);
     }
     return move;
   }

@@ -32,20 +32,23 @@ std::vector<std::string> words(const Effects& effects) {
     if (const auto* group = std::get_if<GroupChanged>(&effect)) {
       result.push_back("group " + std::to_string(group->index));
     } else if (const auto* member = std::get_if<MemberChanged>(&effect)) {
-      result.push_back("member " + std::to_string(member->subscriber) + " of " + std::to_string(member->group));
+      result.push_back("member " + std::to_string(member->subscriber) + " of " +
+                       std::to_string(member->group));
     } else if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
-      result.push_back("moved " + std::to_string(moved->subscriber) + ": " + std::to_string(moved->old_group) + "->" +
-                       std::to_string(moved->new_group));
+      result.push_back("moved " + std::to_string(moved->subscriber) + ": " +
+                       std::to_string(moved->old_group) + "->" + std::to_string(moved->new_group));
     } else if (const auto* change = std::get_if<SubscriberDue>(&effect)) {
-      result.push_back((change->joined ? "joined " : "left ") + std::to_string(change->subscriber) + " of " +
-                       std::to_string(change->group) + ": " + std::to_string(change->subscribers_now));
+      result.push_back((change->joined ? "joined " : "left ") + std::to_string(change->subscriber) +
+                       " of " + std::to_string(change->group) + ": " +
+                       std::to_string(change->subscribers_now));
     } else if (const auto* pace = std::get_if<PaceDue>(&effect)) {
-      result.push_back("pace " + std::to_string(pace->subscriber) + " of " + std::to_string(pace->group) + ": " +
-                       std::to_string(pace->terms.window) + "/" + std::to_string(pace->terms.depth) +
-                       (pace->retained ? " retained" : "") + (pace->was_plain ? ", once plain" : ""));
+      result.push_back(
+          "pace " + std::to_string(pace->subscriber) + " of " + std::to_string(pace->group) + ": " +
+          std::to_string(pace->terms.window) + "/" + std::to_string(pace->terms.depth) +
+          (pace->retained ? " retained" : "") + (pace->was_plain ? ", once plain" : ""));
     } else if (const auto* ended = std::get_if<PaceEnded>(&effect)) {
-      result.push_back("no pace " + std::to_string(ended->subscriber) + " of " + std::to_string(ended->group) +
-                       (ended->group_gone ? ", gone" : ""));
+      result.push_back("no pace " + std::to_string(ended->subscriber) + " of " +
+                       std::to_string(ended->group) + (ended->group_gone ? ", gone" : ""));
     } else if (const auto* forgotten = std::get_if<RetainedDropped>(&effect)) {
       result.push_back("forget " + std::to_string(forgotten->group));
     } else if (!std::holds_alternative<ServiceNoted>(effect)) {  // those are for watches_test.cpp
@@ -61,7 +64,8 @@ class ServicesTest : public ::testing::Test {
     limits_.services_per_node = 2;
     limits_.subscriptions_per_node = 2;
   }
-  std::uint32_t advertise(std::uint32_t node, const std::string& name, const ServiceTerms& terms = odometry()) {
+  std::uint32_t advertise(std::uint32_t node, const std::string& name,
+                          const ServiceTerms& terms = odometry()) {
     const auto done = services_.advertise(node, name, terms, now_, effects_);
     return done ? done->group : 0;
   }
@@ -218,7 +222,8 @@ TEST_F(ServicesTest, WhoLeavesTakesEverythingAlong) {
   subscribe(kRobot, "viewer/view");
   take_words();
   services_.node_left(kRobot, now_, effects_);
-  EXPECT_THAT(take_words(), ElementsAre("member 1 of 2", "left 1 of 2: 0", "group 1", "moved 2: 1->0"));
+  EXPECT_THAT(take_words(),
+              ElementsAre("member 1 of 2", "left 1 of 2: 0", "group 1", "moved 2: 1->0"));
   services_.node_left(kViewer, now_, effects_);
   EXPECT_EQ(services_.topics(), 0u);
   EXPECT_TRUE(services_.groups().empty());
@@ -278,20 +283,26 @@ TEST_F(ServicesTest, AGroupIsPublishedBeforeItsMembersArePaced) {
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), 1u);
   EXPECT_THAT(take_words(), ElementsAre("moved 2: 0->1", "group 1", "pace 2 of 1: 2/3 retained"));
   EXPECT_EQ(subscribe(kLogger, "robot/map"), Status::done);
-  EXPECT_THAT(take_words(), ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "joined 3 of 1: 2"));
+  EXPECT_THAT(take_words(),
+              ElementsAre("member 3 of 1", "pace 3 of 1: 4/1 retained", "joined 3 of 1: 2"));
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", wanted, effects_));
   EXPECT_THAT(take_words(), IsEmpty()) << "declared again, the same";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/map", {.window = 9}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 4/1 retained")) << "at most what the service allows";
+  EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 4/1 retained"))
+      << "at most what the service allows";
   EXPECT_FALSE(services_.unsubscribe(kLogger, "robot/map", effects_));
   EXPECT_THAT(take_words(), ElementsAre("member 3 of 1", "no pace 3 of 1", "left 3 of 1: 1"));
-  // In the table first: a frame that is read before the last message is forgotten must not make it anew.
+  // In the table first: a frame that is read before the last message is forgotten must not make it
+  // anew.
   EXPECT_EQ(advertise(kRobot, "robot/map"), 2u);
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1, gone", "forget 1", "moved 2: 1->2", "group 2"));
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "no pace 2 of 1, gone", "forget 1",
+                                        "moved 2: 1->2", "group 2"));
   EXPECT_EQ(advertise(kRobot, "robot/map", map_in_sync()), 3u);
-  EXPECT_THAT(take_words(), ElementsAre("group 2", "moved 2: 2->3", "group 3", "pace 2 of 3: 4/1 retained"));
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 2", "moved 2: 2->3", "group 3", "pace 2 of 3: 4/1 retained"));
   EXPECT_FALSE(services_.withdraw(kRobot, 3, now_, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 3", "no pace 2 of 3, gone", "forget 3", "moved 2: 3->0"));
+  EXPECT_THAT(take_words(),
+              ElementsAre("group 3", "no pace 2 of 3, gone", "forget 3", "moved 2: 3->0"));
 }
 
 TEST_F(ServicesTest, WhoSubscribesToItselfIsNotToldOfItsNewIdBeforeItKnowsIt) {
@@ -324,10 +335,12 @@ TEST_F(ServicesTest, ASubscriberThatIsRenumberedKeepsItsTerms) {
 TEST_F(ServicesTest, ASubscriberOfAStreamIsPacedOnlyIfItWantsARate) {
   EXPECT_EQ(advertise(kRobot, "robot/odom"), 1u);
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.window = 2, .depth = 3}, effects_));
-  EXPECT_THAT(take_words(), ElementsAre("group 1", "member 2 of 1", "joined 2 of 1: 1")) << "a window is of sync(n)";
+  EXPECT_THAT(take_words(), ElementsAre("group 1", "member 2 of 1", "joined 2 of 1: 1"))
+      << "a window is of sync(n)";
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {.interval_us = 1000}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("member 2 of 1", "pace 2 of 1: 0/1, once plain"));
-  EXPECT_THAT(services_.find_group(1)->once_plain, ElementsAre(kViewer)) << "until then it gets everything";
+  EXPECT_THAT(services_.find_group(1)->once_plain, ElementsAre(kViewer))
+      << "until then it gets everything";
   // It stays paced: what is held for it goes before what comes.
   EXPECT_TRUE(services_.subscribe(kViewer, "robot/odom", {}, effects_));
   EXPECT_THAT(take_words(), ElementsAre("pace 2 of 1: 0/1, once plain"));

@@ -51,9 +51,9 @@ TEST_F(SessionsTest, TakesAsManyAsTheLimitAndNotOneMore) {
   const auto refused = sessions_.create(std::nullopt, 0ms);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, proto::GoodbyeCode::hub_full);
-  EXPECT_EQ(
-      refused.error().sentence,
-      "this hub has as many nodes as it takes (3); connect to another one, or start it with a larger --limit nodes");
+  EXPECT_EQ(refused.error().sentence,
+            "this hub has as many nodes as it takes (3); connect to another one, or start it with "
+            "a larger --limit nodes");
   sessions_.end(last, 0ms);
   EXPECT_TRUE(sessions_.create(std::nullopt, 0ms));
 }
@@ -91,7 +91,8 @@ TEST_F(SessionsTest, AForgedTokenClaimsNothing) {
   EXPECT_EQ(claim(longer), nullptr);
 }
 
-// Whoever cannot prove a token learns nothing by showing it: not whether it has expired, nor whether its session lives.
+// Whoever cannot prove a token learns nothing by showing it: not whether it has expired, nor
+// whether its session lives.
 TEST_F(SessionsTest, WhateverIsWrongWithATokenTheAnswerIsTheSame) {
   Session& live = create();
   Session& gone = create();
@@ -110,7 +111,9 @@ TEST_F(SessionsTest, WhateverIsWrongWithATokenTheAnswerIsTheSame) {
   const std::vector<std::byte> right = sessions_.token_of(gone);
   sessions_.end(gone, 0ms);
   ASSERT_TRUE(sessions_.claim({right, "", "open", 0ms}).token);
-  const auto is_nothing = [](const Sessions::Claim& claim) { return claim.session == nullptr && !claim.token; };
+  const auto is_nothing = [](const Sessions::Claim& claim) {
+    return claim.session == nullptr && !claim.token;
+  };
   for (const std::vector<std::byte>& token : wrong) {
     for (const std::chrono::milliseconds wall : {0ms, expired}) {
       EXPECT_TRUE(is_nothing(sessions_.claim({token, "", "open", wall}))) << token.size();
@@ -257,7 +260,8 @@ TEST_F(SessionsTest, AnIndexRestsForGraceAndTheLongestWait) {
   const auto second = sessions.create(std::nullopt, 1ms);
   ASSERT_TRUE(second);
   EXPECT_EQ((*second)->index, 2u);
-  EXPECT_EQ((*second)->place.slot, place.slot);  // slots are free at once, told apart by their generation
+  EXPECT_EQ((*second)->place.slot,
+            place.slot);  // slots are free at once, told apart by their generation
   EXPECT_NE((*second)->place.generation, place.generation);
 }
 

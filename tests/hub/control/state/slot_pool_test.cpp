@@ -9,7 +9,8 @@ namespace {
 
 TEST(SlotPool, SpreadsEvenlyInTurns) {
   SlotPool pool(3);
-  for (std::uint8_t i = 0; i < 9; ++i) EXPECT_EQ(pool.take().shard, ShardIndex{static_cast<std::uint8_t>(i % 3)});
+  for (std::uint8_t i = 0; i < 9; ++i)
+    EXPECT_EQ(pool.take().shard, ShardIndex{static_cast<std::uint8_t>(i % 3)});
   for (std::uint8_t i = 0; i < 3; ++i) EXPECT_EQ(pool.load(ShardIndex{i}), 3u);
 }
 

@@ -28,7 +28,8 @@ class StoodStill : public ::testing::Test {
     return joined ? joined->session->index : 0;
   }
   void lose(std::uint32_t index, std::chrono::milliseconds now) {
-    membership_.connection_ended(*membership_.sessions().find(index), {false, GoodbyeCode::done, ""}, now, effects_);
+    membership_.connection_ended(*membership_.sessions().find(index),
+                                 {false, GoodbyeCode::done, ""}, now, effects_);
   }
   bool is_member(std::uint32_t index, std::chrono::milliseconds now) {
     membership_.tick(now, effects_);
@@ -66,7 +67,8 @@ TEST_F(StoodStill, WhoCameBackHasItsTimeToDeclare) {
   const std::uint32_t robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot, "robot/odom", {}, 0ms, effects_));
   JoinRequest again = request("robot");
-  const std::vector<std::byte> token = membership_.sessions().token_of(*membership_.sessions().find(robot));
+  const std::vector<std::byte> token =
+      membership_.sessions().token_of(*membership_.sessions().find(robot));
   again.token = token;
   lose(robot, 1s);
   ASSERT_TRUE(membership_.join(again, 2s, effects_));

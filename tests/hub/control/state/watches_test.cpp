@@ -22,7 +22,8 @@ TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
   Session& robot = join("hall/robot");
   advertise(robot, "odom");
   ASSERT_EQ(watch(viewer, {.watch = 3}), Status::done);
-  EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present hall/robot", "present hall/robot/odom", "end"}));
+  EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present hall/robot",
+                                 "present hall/robot/odom", "end"}));
   EXPECT_EQ(take(viewer), Texts{});
   const std::uint32_t group = advertise(robot, "pose", "x y");
   advertise(robot, "pose", "x y theta");
@@ -31,8 +32,9 @@ TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
   ASSERT_FALSE(membership.services().withdraw(robot.index, group, now, effects));
   note(effects);
   end(join("late"), true);
-  EXPECT_EQ(take(viewer), (Texts{"advertised hall/robot/pose", "changed hall/robot/pose", "away hall/robot",
-                                 "withdrawn hall/robot/pose", "joined late", "left late"}));
+  EXPECT_EQ(take(viewer),
+            (Texts{"advertised hall/robot/pose", "changed hall/robot/pose", "away hall/robot",
+                   "withdrawn hall/robot/pose", "joined late", "left late"}));
 }
 
 TEST_F(WatchesTest, KeepNothingBeforeSomebodyWatches) {
@@ -55,7 +57,8 @@ TEST_F(WatchesTest, TellOnlyWhatThePatternAndTheSubjectsSay) {
   join("");
   ASSERT_EQ(watch(viewer, {.watch = 1, .pattern = "hall/*"}), Status::done);
   EXPECT_EQ(take(viewer), (Texts{"begin", "present hall/robot", "end"}));
-  ASSERT_EQ(watch(viewer, {.watch = 2, .pattern = "**", .subjects = ns::kWatchServices}), Status::done);
+  ASSERT_EQ(watch(viewer, {.watch = 2, .pattern = "**", .subjects = ns::kWatchServices}),
+            Status::done);
   EXPECT_EQ(take(viewer), (Texts{"begin", "present hall/robot/odom", "end"}));
   join("yard/robot");
   advertise(robot, "pose");
@@ -108,27 +111,31 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
   bool complete = false;
   for (int step = 0; !complete; ++step) {
     ASSERT_LT(step, 1'000);
-    static_cast<void>(watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
-      const auto events = proto::decode<ns::WatchEvents>(payload);
-      ASSERT_TRUE(events);
-      for (const Change& change : events->changes) {
-        complete |= change.kind == ChangeKind::end;
-        const std::string name = change.node ? change.node->name : change.service ? change.service->name : "";
-        if (name.empty()) continue;
-        const bool gone = change.kind == ChangeKind::left || change.kind == ChangeKind::withdrawn;
-        if (gone) {
-          EXPECT_EQ(known.erase(name), 1u) << name << " left, and was never shown";
-        } else if (change.kind == ChangeKind::present || change.kind == ChangeKind::joined ||
-                   change.kind == ChangeKind::advertised) {
-          EXPECT_TRUE(known.insert(name).second) << name << " was shown twice";
-        }
-      }
-    }));
+    static_cast<void>(
+        watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
+          const auto events = proto::decode<ns::WatchEvents>(payload);
+          ASSERT_TRUE(events);
+          for (const Change& change : events->changes) {
+            complete |= change.kind == ChangeKind::end;
+            const std::string name = change.node      ? change.node->name
+                                     : change.service ? change.service->name
+                                                      : "";
+            if (name.empty()) continue;
+            const bool gone =
+                change.kind == ChangeKind::left || change.kind == ChangeKind::withdrawn;
+            if (gone) {
+              EXPECT_EQ(known.erase(name), 1u) << name << " left, and was never shown";
+            } else if (change.kind == ChangeKind::present || change.kind == ChangeKind::joined ||
+                       change.kind == ChangeKind::advertised) {
+              EXPECT_TRUE(known.insert(name).second) << name << " was shown twice";
+            }
+          }
+        }));
     watches.taken(viewer.index, {1, 1});
     if (!robots.empty()) {
       end(*robots[(static_cast<std::size_t>(step) * 7919) % robots.size()], true);
-      robots.erase(robots.begin() +
-                   static_cast<std::ptrdiff_t>((static_cast<std::size_t>(step) * 7919) % robots.size()));
+      robots.erase(robots.begin() + static_cast<std::ptrdiff_t>(
+                                        (static_cast<std::size_t>(step) * 7919) % robots.size()));
     }
     advertise(join("new-" + std::to_string(step)), "pose");
   }
@@ -138,8 +145,10 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
     if (text.starts_with("joined") || text.starts_with("advertised")) known.insert(name);
   }
   std::set<std::string> expected;
-  for (const auto& [index, session] : membership.sessions().all()) expected.insert(session.name.str());
-  for (const auto& [group, topic] : membership.services().groups()) expected.insert(std::string{topic->full_name});
+  for (const auto& [index, session] : membership.sessions().all())
+    expected.insert(session.name.str());
+  for (const auto& [group, topic] : membership.services().groups())
+    expected.insert(std::string{topic->full_name});
   EXPECT_EQ(known, expected);
 }
 
@@ -182,7 +191,8 @@ TEST_F(WatchesTest, AtMostAWindowOfOneWatchIsUnderWay) {
 TEST_F(WatchesTest, AtMostAWindowOfANodesWatchesIsUnderWay) {
   limits.watch_window_per_node = 3;
   Session& viewer = join("viewer");
-  for (const std::uint32_t number : {1u, 2u}) ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
+  for (const std::uint32_t number : {1u, 2u})
+    ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
   for (int i = 0; i < 10; ++i) {
     join("robot-" + std::to_string(i));
     serve();
@@ -219,7 +229,8 @@ TEST_F(WatchesTest, EventsAreAsLargeAsTheLimitSays) {
 
 TEST_F(WatchesTest, NoWatchOfANodeWaitsForAnother) {
   Session& viewer = join("viewer");
-  for (std::uint32_t number = 1; number <= 16; ++number) ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
+  for (std::uint32_t number = 1; number <= 16; ++number)
+    ASSERT_EQ(watch(viewer, {.watch = number}), Status::done);
   for (int i = 0; i < 20; ++i) {
     join("robot-" + std::to_string(i));
     serve();
@@ -268,10 +279,12 @@ TEST_F(WatchesTest, GoOnWhereTheWatcherWasIfTheChangesAreStillThere) {
   join("robot");
   ASSERT_EQ(watch(viewer, {.watch = 1, .epoch = kEpoch, .version = before}), Status::done);
   EXPECT_EQ(take(viewer), Texts{"joined robot"});
-  const auto other_life = watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch + 1, .version = before});
+  const auto other_life =
+      watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch + 1, .version = before});
   EXPECT_TRUE(other_life->snapshot);
   EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present robot", "end"}));
-  const auto future = watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch, .version = before + 1'000});
+  const auto future =
+      watches.watch(viewer.index, {.watch = 1, .epoch = kEpoch, .version = before + 1'000});
   EXPECT_TRUE(future->snapshot);
 }
 
@@ -336,11 +349,12 @@ TEST_F(WatchesTest, FewThatBeginAsThePatternDoesAreNotLookedForAmongAll) {
             Status::done);
   int pieces = 0;
   for (; told[ChangeKind::end] == 0 && pieces < 1'000; ++pieces) {
-    static_cast<void>(watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
-      const auto events = proto::decode<ns::WatchEvents>(payload);
-      ASSERT_TRUE(events);
-      for (const Change& change : events->changes) ++told[change.kind];
-    }));
+    static_cast<void>(
+        watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
+          const auto events = proto::decode<ns::WatchEvents>(payload);
+          ASSERT_TRUE(events);
+          for (const Change& change : events->changes) ++told[change.kind];
+        }));
     watches.taken(viewer.index, {1, 4});
   }
   EXPECT_EQ(told[ChangeKind::begin], 1);

@@ -42,11 +42,13 @@ class Peer {
     int ends[2] = {-1, -1};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends), 0);
     descriptor_ = ends[0];
-    near_.transport = std::make_unique<SocketTransport>(ends[1], SocketTransport::Family::unix_socket, limits);
+    near_.transport =
+        std::make_unique<SocketTransport>(ends[1], SocketTransport::Family::unix_socket, limits);
     near_.peer = PeerInfo{"unix", "pid 1 uid 2"};
   }
   ~Peer() { close(); }
-  Peer(Peer&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)), near_(std::move(other.near_)) {}
+  Peer(Peer&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)), near_(std::move(other.near_)) {}
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
@@ -54,7 +56,8 @@ class Peer {
   Stranger take_stranger() { return std::move(near_); }
 
   void send(std::span<const std::byte> bytes) {
-    EXPECT_EQ(::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+    EXPECT_EQ(::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(bytes.size()));
   }
   void send(std::string_view text) { send(std::as_bytes(std::span{text})); }
 

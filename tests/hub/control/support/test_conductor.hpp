@@ -79,23 +79,27 @@ class TestConductor {
     hello.name = name;
     return join(hello);
   }
-  void detach(const Node& node, bool said_by_peer = false, proto::GoodbyeCode code = {}, std::string sentence = {}) {
-    conductor.on_event(
-        {node.shard, DetachedEvent{node.session, node.attachment, node.id, said_by_peer, code, std::move(sentence)}},
-        now);
+  void detach(const Node& node, bool said_by_peer = false, proto::GoodbyeCode code = {},
+              std::string sentence = {}) {
+    conductor.on_event({node.shard, DetachedEvent{node.session, node.attachment, node.id,
+                                                  said_by_peer, code, std::move(sentence)}},
+                       now);
   }
   void hear(const Node& node) {
     conductor.on_event({node.shard, HeardEvent{node.session, node.attachment, node.id}}, now);
   }
-  void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload, NodeId dst = {}) {
+  void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload,
+                  NodeId dst = {}) {
     conductor.on_event({node.shard, ControlFrameEvent{node.session, node.attachment, node.id,
                                                       control_frame(kind, dst, kHub, payload)}},
                        now);
   }
 
-  /// Asks for something and returns the answer, which is the last thing that the node's shard is told.
+  /// Asks for something and returns the answer, which is the last thing that the node's shard is
+  /// told.
   template <class Answer, class Message>
-  Result<Answer, proto::Refusal> ask(const Node& node, const Message& message, proto::Kind kind = proto::Kind::ns) {
+  Result<Answer, proto::Refusal> ask(const Node& node, const Message& message,
+                                     proto::Kind kind = proto::Kind::ns) {
     send_frame(node, kind, proto::encode(message, ++requests));
     const auto* answer = std::get_if<SendControlCommand>(&shards.sent.back().command);
     EXPECT_NE(answer, nullptr);
@@ -113,7 +117,8 @@ class TestConductor {
   std::vector<Event> events() const {
     std::vector<Event> found;
     for (const auto* command : shards.all<SendControlCommand>()) {
-      if (proto::split_control(payload_of(*command))->header.operation != Event::kOperation) continue;
+      if (proto::split_control(payload_of(*command))->header.operation != Event::kOperation)
+        continue;
       EXPECT_EQ(command->answers, 0u);
       found.push_back(*proto::decode<Event>(payload_of(*command)));
     }

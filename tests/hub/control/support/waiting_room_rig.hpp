@@ -18,7 +18,10 @@ class WaitingRoomTest : public ::testing::Test {
  protected:
   WaitingRoomTest()
       : room_(
-            limits_, [this](Stranger& stranger, const proto::Hello& hello) { return judge(stranger, hello); },
+            limits_,
+            [this](Stranger& stranger, const proto::Hello& hello) {
+              return judge(stranger, hello);
+            },
             refusals_) {}
 
   std::optional<proto::Goodbye> judge(Stranger& stranger, const proto::Hello& hello) {
@@ -32,7 +35,8 @@ class WaitingRoomTest : public ::testing::Test {
     room_.enter(peers_.back()->take_stranger(), now);
     return *peers_.back();
   }
-  Peer& enter_from(const std::string& address, std::chrono::milliseconds now = std::chrono::milliseconds{0}) {
+  Peer& enter_from(const std::string& address,
+                   std::chrono::milliseconds now = std::chrono::milliseconds{0}) {
     peers_.push_back(std::make_unique<Peer>(limits_));
     Stranger stranger = peers_.back()->take_stranger();
     stranger.peer = PeerInfo{"tcp", address + ":" + std::to_string(40'000 + peers_.size())};

@@ -32,12 +32,13 @@ class WatchedHub {
     membership.connection_ended(session, {for_good, proto::GoodbyeCode::done, ""}, now, effects);
     note(effects);
   }
-  std::uint32_t advertise(const Session& session, const std::string& service, const std::string& metadata = {}) {
+  std::uint32_t advertise(const Session& session, const std::string& service,
+                          const std::string& metadata = {}) {
     Effects effects;
     ServiceTerms terms;
     terms.metadata = metadata;
-    const auto done =
-        membership.services().advertise(session.index, session.name.str() + "/" + service, terms, now, effects);
+    const auto done = membership.services().advertise(
+        session.index, session.name.str() + "/" + service, terms, now, effects);
     EXPECT_TRUE(done);
     note(effects);
     return done->group;
@@ -45,7 +46,8 @@ class WatchedHub {
   void note(const Effects& effects) {
     for (const Effect& effect : effects) {
       if (const auto* node = std::get_if<NodeNoted>(&effect)) watches.note(*node, membership, now);
-      if (const auto* service = std::get_if<ServiceNoted>(&effect)) watches.note(*service, membership, now);
+      if (const auto* service = std::get_if<ServiceNoted>(&effect))
+        watches.note(*service, membership, now);
     }
   }
   proto::Status watch(const Session& session, const proto::ns::Watch& wanted) {
@@ -53,12 +55,13 @@ class WatchedHub {
     return answer ? proto::Status::done : answer.error().status;
   }
   void serve() {
-    while (watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
-      EXPECT_LE(payload.size(), limits.watch_event_bytes);
-      const auto events = proto::decode<proto::ns::WatchEvents>(payload);
-      ASSERT_TRUE(events) << events.error().sentence;
-      waiting[node].push_back(*events);
-    })) {
+    while (
+        watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
+          EXPECT_LE(payload.size(), limits.watch_event_bytes);
+          const auto events = proto::decode<proto::ns::WatchEvents>(payload);
+          ASSERT_TRUE(events) << events.error().sentence;
+          waiting[node].push_back(*events);
+        })) {
     }
   }
   /// What a node was told and has not taken yet, as "kind name"; it takes all of it.
@@ -73,17 +76,18 @@ class WatchedHub {
     return told;
   }
   static std::string text_of(const proto::ns::Change& change) {
-    static const std::map<proto::ns::ChangeKind, std::string> kKinds{{proto::ns::ChangeKind::begin, "begin"},
-                                                                     {proto::ns::ChangeKind::present, "present"},
-                                                                     {proto::ns::ChangeKind::end, "end"},
-                                                                     {proto::ns::ChangeKind::joined, "joined"},
-                                                                     {proto::ns::ChangeKind::left, "left"},
-                                                                     {proto::ns::ChangeKind::away, "away"},
-                                                                     {proto::ns::ChangeKind::back, "back"},
-                                                                     {proto::ns::ChangeKind::renamed, "renamed"},
-                                                                     {proto::ns::ChangeKind::changed, "changed"},
-                                                                     {proto::ns::ChangeKind::advertised, "advertised"},
-                                                                     {proto::ns::ChangeKind::withdrawn, "withdrawn"}};
+    static const std::map<proto::ns::ChangeKind, std::string> kKinds{
+        {proto::ns::ChangeKind::begin, "begin"},
+        {proto::ns::ChangeKind::present, "present"},
+        {proto::ns::ChangeKind::end, "end"},
+        {proto::ns::ChangeKind::joined, "joined"},
+        {proto::ns::ChangeKind::left, "left"},
+        {proto::ns::ChangeKind::away, "away"},
+        {proto::ns::ChangeKind::back, "back"},
+        {proto::ns::ChangeKind::renamed, "renamed"},
+        {proto::ns::ChangeKind::changed, "changed"},
+        {proto::ns::ChangeKind::advertised, "advertised"},
+        {proto::ns::ChangeKind::withdrawn, "withdrawn"}};
     std::string text = kKinds.at(change.kind);
     if (change.node) text += " " + change.node->name;
     if (change.service) text += " " + change.service->name;

@@ -51,7 +51,8 @@ TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
 TEST(DropBook, CountsAFrameForEachOfItsRecipients) {
   Tally tally;
   DropBook book(tally, 10, 4'096);
-  auto start = EgressRig::bytes(std::string(proto::kReportFollowingMax, 'x'), {.flags = proto::kFlagReport});
+  auto start =
+      EgressRig::bytes(std::string(proto::kReportFollowingMax, 'x'), {.flags = proto::kFlagReport});
   store_le(start.data(), std::uint32_t{1'000'000});  // most of it is somewhere else
   book.drop_start(start.data(), 3, DropReason::shard_full);
   EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::shard_full)], 3u);
@@ -131,7 +132,8 @@ TEST(DropBook, ReportsAsManySendersAndReasonsAsItIsTold) {
     const auto sent = flush(book, 1'000);
     ASSERT_EQ(sent.size(), notes_max);
     EXPECT_EQ(proto::decode_report(sent[0].payload)->count, 2u);
-    EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::away)], notes_max + 2) << "counted all the same";
+    EXPECT_EQ(tally.dropped[static_cast<std::size_t>(DropReason::away)], notes_max + 2)
+        << "counted all the same";
   }
 }
 

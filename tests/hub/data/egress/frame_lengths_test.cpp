@@ -29,7 +29,8 @@ hub::Run run_of(EgressRig& rig, const std::vector<std::uint32_t>& sizes) {
 hub::Run unreadable_run(EgressRig& rig, std::uint32_t frames, std::uint32_t frame_size) {
   hub::Run run = run_of(rig, std::vector<std::uint32_t>(frames, frame_size));
   for (std::uint32_t frame = 1; frame < frames; ++frame) {
-    store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * frame_size, ~std::uint32_t{0});
+    store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * frame_size,
+             ~std::uint32_t{0});
   }
   return run;
 }
@@ -111,15 +112,18 @@ TEST(FrameLengths, KnowingMoreChangesNothing) {
     std::mt19937 random(seed);
     std::vector<std::uint32_t> sizes(1 + random() % (seed % 10 == 0 ? 80 : 20));
     const auto spread = static_cast<std::uint32_t>(1 + random() % 3);
-    for (std::uint32_t& size : sizes) size = kHeader + 4 + static_cast<std::uint32_t>(random() % spread);
+    for (std::uint32_t& size : sizes)
+      size = kHeader + 4 + static_cast<std::uint32_t>(random() % spread);
     const hub::Run run = run_of(rig, sizes);
     const auto found = proto::next_run(run.bytes, run.bytes + run.size, proto::kFrameLengthDefault);
     ASSERT_EQ(found.run.frames, run.frames);
     EXPECT_EQ(found.shortest_bytes, *std::min_element(sizes.begin(), sizes.end()));
     for (std::uint32_t bytes = 1; bytes < run.size + 30; ++bytes) {
       const std::uint32_t known = found.shortest_bytes;
-      EXPECT_EQ(told(leading_from(run, known, bytes, starts)), told(leading_from(run, kHeader, bytes, starts)));
-      EXPECT_EQ(told(leading_within(run, known, bytes, starts)), told(leading_within(run, kHeader, bytes, starts)));
+      EXPECT_EQ(told(leading_from(run, known, bytes, starts)),
+                told(leading_from(run, kHeader, bytes, starts)));
+      EXPECT_EQ(told(leading_within(run, known, bytes, starts)),
+                told(leading_within(run, kHeader, bytes, starts)));
       EXPECT_EQ(told(leading_frames_of(run, known, bytes, starts)),
                 told(leading_frames_of(run, kHeader, bytes, starts)));
       EXPECT_EQ(told(leading_up_to(run, known, bytes)), told(leading_up_to(run, kHeader, bytes)));

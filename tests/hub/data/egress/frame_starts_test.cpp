@@ -69,7 +69,8 @@ TEST_F(FrameStartsTest, KnowsWhatIsLeftOfARun) {
   ASSERT_NE(known, nullptr);
   EXPECT_EQ(known->leading_frames(middle, 3).size, 17u + 18u + 16u);
   EXPECT_EQ(known->leading_from(middle, 18).size, 17u + 18u);
-  EXPECT_EQ(known->leading_from(middle, middle.size - 1).size, middle.size) << "the next frame is not one of it";
+  EXPECT_EQ(known->leading_from(middle, middle.size - 1).size, middle.size)
+      << "the next frame is not one of it";
   EXPECT_EQ(known->leading_within(middle, middle.size - 1).frames, 59u);
   EXPECT_EQ(known->last(middle), middle.bytes + middle.size - 16);
   EXPECT_EQ(starts.find(front), nullptr) << "not worth it";
@@ -97,7 +98,8 @@ TEST_F(FrameStartsTest, ForgetsTheOldestOfManyRuns) {
     ASSERT_NE(starts.find(runs.back()), nullptr);
   }
   for (std::size_t i = 1; i < runs.size(); ++i) make_unreadable(runs[i]);
-  for (std::size_t i = 1; i < runs.size(); ++i) EXPECT_EQ(starts.find(runs[i])->leading_from(runs[i], 17).size, 33u);
+  for (std::size_t i = 1; i < runs.size(); ++i)
+    EXPECT_EQ(starts.find(runs[i])->leading_from(runs[i], 17).size, 33u);
   EXPECT_EQ(starts.find(runs[0])->leading_from(runs[0], 17).size, 33u) << "looked at again";
 }
 

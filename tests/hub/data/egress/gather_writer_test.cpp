@@ -35,7 +35,8 @@ TEST(GatherWriter, GoesOnAtEveryByteOfAPartialWrite) {
   for (std::size_t cut = 1; cut < total; ++cut) {
     EgressRig rig;
     TestConnection connection(rig);
-    ASSERT_TRUE(connection.outbox.push_control(EgressRig::bytes("control", {.kind = Kind::ns}), rig.context));
+    ASSERT_TRUE(connection.outbox.push_control(EgressRig::bytes("control", {.kind = Kind::ns}),
+                                               rig.context));
     rig.push(connection.outbox, "0", {.lane = 0});
     const hub::Run run = rig.run({"one", "", "two of lane 1"});
     connection.outbox.push(run, run.header(), {}, rig.context);
@@ -62,7 +63,8 @@ TEST(GatherWriter, WhatComesLaterGoesBehindTheFrameThatWasBegunOnly) {
   connection.flush();
   EXPECT_TRUE(connection.writer.in_frame());
   rig.push(connection.outbox, "real-time", {.lane = 0});
-  ASSERT_TRUE(connection.outbox.push_control(EgressRig::bytes("control", {.kind = Kind::ns}), rig.context));
+  ASSERT_TRUE(
+      connection.outbox.push_control(EgressRig::bytes("control", {.kind = Kind::ns}), rig.context));
   EXPECT_EQ(connection.flush(), Flush::emptied);
   EXPECT_THAT(connection.take(), ElementsAre("bulk one", "control", "real-time", "bulk two"));
 }
@@ -72,8 +74,10 @@ TEST(GatherWriter, AWaitingLaneGetsASixteenthOfTheBytes) {
   TestConnection connection(rig);
   connection.peer.set_room(0);
   for (int i = 0; i < 100; ++i) {
-    rig.push(connection.outbox, std::string(4'080, '0'), {.lane = 0, .src = static_cast<std::uint32_t>(i % 2)});
-    rig.push(connection.outbox, std::string(4'080, '3'), {.lane = 3, .src = static_cast<std::uint32_t>(i % 2)});
+    rig.push(connection.outbox, std::string(4'080, '0'),
+             {.lane = 0, .src = static_cast<std::uint32_t>(i % 2)});
+    rig.push(connection.outbox, std::string(4'080, '3'),
+             {.lane = 3, .src = static_cast<std::uint32_t>(i % 2)});
   }
   connection.flush();
   connection.peer.set_room(200 * 1'024);
@@ -108,11 +112,13 @@ TEST(GatherWriter, KeepsAnyOrderOfShortWritesLegal) {
     std::array<std::vector<std::string>, 4> sent;
     std::array<std::vector<std::string>, 4> got;
     const auto take = [&] {
-      for (const std::string& text : connection.take()) got[static_cast<std::size_t>(text[0] - '0')].push_back(text);
+      for (const std::string& text : connection.take())
+        got[static_cast<std::size_t>(text[0] - '0')].push_back(text);
     };
     for (int i = 0; i < 300; ++i) {
       const std::uint32_t lane = static_cast<std::uint32_t>(random() % 4);
-      std::string text = std::to_string(lane) + "." + std::to_string(i) + std::string(random() % 300, '.');
+      std::string text =
+          std::to_string(lane) + "." + std::to_string(i) + std::string(random() % 300, '.');
       rig.push(connection.outbox, text, {.lane = static_cast<std::uint8_t>(lane)});
       sent[lane].push_back(std::move(text));
       if (random() % 3 == 0) connection.flush();
@@ -169,7 +175,8 @@ TEST(GatherWriter, TellsOfAFailure) {
   TestConnection connection(rig);
   rig.push(connection.outbox, "one");
   connection.peer.reset();
-  EXPECT_EQ(connection.writer.flush(connection.outbox, nullptr, *connection.transport, rig.context), Flush::failed);
+  EXPECT_EQ(connection.writer.flush(connection.outbox, nullptr, *connection.transport, rig.context),
+            Flush::failed);
   EXPECT_EQ(rig.tally.queued, 1);
 }
 
@@ -177,7 +184,8 @@ TEST(GatherWriter, WritesNoMoreThanItsShareOfATurn) {
   EgressRig rig;
   TestConnection connection(rig);
   for (int i = 0; i < 60; ++i) {
-    rig.push(connection.outbox, std::string(60'000, 'b'), {.lane = static_cast<std::uint8_t>(i % 4), .src = 5});
+    rig.push(connection.outbox, std::string(60'000, 'b'),
+             {.lane = static_cast<std::uint8_t>(i % 4), .src = 5});
   }
   EXPECT_EQ(connection.flush(), Flush::more);
   EXPECT_LE(connection.peer.readable(), 5u * (256 + 64) * 1'024);

@@ -12,7 +12,8 @@ using testing::EgressRig;
 
 std::string bytes_of(const KeptMessage& message) {
   std::string all;
-  message.for_each([&](const hub::Run& run) { all.append(reinterpret_cast<const char*>(run.bytes), run.size); });
+  message.for_each(
+      [&](const hub::Run& run) { all.append(reinterpret_cast<const char*>(run.bytes), run.size); });
   return all;
 }
 

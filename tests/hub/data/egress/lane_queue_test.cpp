@@ -130,7 +130,8 @@ TEST_F(LaneQueueTest, FindsMessagesHoweverManyAreInterleaved) {
       lane.append_fragment(*found, rig.run({"the end"}, {.src = 1 + number % 2}), true, rig.pieces);
       EXPECT_EQ(find(number), nullptr) << "complete";
     }
-    EXPECT_EQ(lane.capacity_bytes() > lane.entries().capacity_bytes(), messages > 64) << "an index is counted";
+    EXPECT_EQ(lane.capacity_bytes() > lane.entries().capacity_bytes(), messages > 64)
+        << "an index is counted";
     // A number that is used again is the newer message's.
     lane.push(part(5, false));
     ASSERT_NE(find(5), nullptr);
@@ -166,7 +167,8 @@ TEST_F(LaneQueueTest, ReplacesAllThatCameBefore) {
   const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
   constexpr std::size_t kStreams = 100;
   for (std::size_t i = 0; i < 10 * kStreams; ++i) {
-    lane.push(entry("stream" + std::to_string(10 + i % kStreams).substr(0, 2) + std::to_string(i), latest));
+    lane.push(entry("stream" + std::to_string(10 + i % kStreams).substr(0, 2) + std::to_string(i),
+                    latest));
     lane.push(entry("plain", {.src = static_cast<std::uint32_t>(2 + i % 2)}));
   }
   Entry part = entry("part", {.src = 9});
@@ -185,7 +187,8 @@ TEST_F(LaneQueueTest, ReplacesAllThatCameBefore) {
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 9}, 77), &lane.entries().back());
   std::uint64_t bytes = 0;
   std::uint64_t latest_bytes = 0;
-  for (std::uint64_t number = lane.entries().first_number(); number != lane.entries().end_number(); ++number) {
+  for (std::uint64_t number = lane.entries().first_number(); number != lane.entries().end_number();
+       ++number) {
     const Entry& each = lane.entries().at(number);
     bytes += each.size;
     if (!each.latest) continue;

@@ -13,7 +13,8 @@ using ::testing::ElementsAre;
 using testing::TestConnection;
 using testing::TestFrame;
 
-/// An outbox to which frames are offered as a router offers them: what append() takes, and what it leaves to push().
+/// An outbox to which frames are offered as a router offers them: what append() takes, and what it
+/// leaves to push().
 class OpenRunTest : public ::testing::Test {
  protected:
   void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
@@ -47,7 +48,8 @@ TEST_F(OpenRunTest, FramesLikeTheLastOneAreAppended) {
   EXPECT_EQ(connection.outbox.lane(1).bytes(), 0u);
 }
 
-// Nobody looks at their lengths while they come: together these are as large as three like the first one.
+// Nobody looks at their lengths while they come: together these are as large as three like the
+// first one.
 TEST_F(OpenRunTest, AppendedFramesMayHaveAnyLength) {
   const TestFrame to_group{.kind = proto::Kind::group};
   const hub::Run first = rig.run({"four"}, to_group);
@@ -65,7 +67,8 @@ TEST_F(OpenRunTest, EverySizeIsCopiedWhole) {
   std::vector<std::string> sent;
   for (std::uint32_t size = 0; size < 200; ++size) {
     std::string payload;
-    for (std::uint32_t i = 0; i < size; ++i) payload += static_cast<char>('a' + (i * 7 + size) % 26);
+    for (std::uint32_t i = 0; i < size; ++i)
+      payload += static_cast<char>('a' + (i * 7 + size) % 26);
     offer({payload});
     sent.push_back(payload);
     if (size % 8 != 7) continue;
@@ -81,8 +84,8 @@ TEST_F(OpenRunTest, AnotherHeaderIsNot) {
   EXPECT_FALSE(offer({"another sender"}, {.src = 2}));
   EXPECT_FALSE(offer({"other flags"}, {.flags = 1, .src = 2}));
   EXPECT_FALSE(offer({"another kind"}, {.kind = proto::Kind::service, .flags = 1, .src = 2}));
-  EXPECT_THAT(flush_and_take(),
-              ElementsAre("one", "one", "another sender", "other flags", "another kind", "another lane"));
+  EXPECT_THAT(flush_and_take(), ElementsAre("one", "one", "another sender", "other flags",
+                                            "another kind", "another lane"));
 }
 
 TEST_F(OpenRunTest, BlockIsCountedAsWhatItIs) {

@@ -17,7 +17,9 @@ using testing::TestConnection;
 constexpr std::uint32_t kKiB = 1024;
 
 /// A payload that makes a frame of exactly `size` bytes.
-std::string sized(std::uint32_t size, char fill) { return std::string(size - proto::kHeaderSize, fill); }
+std::string sized(std::uint32_t size, char fill) {
+  return std::string(size - proto::kHeaderSize, fill);
+}
 
 TEST(Outbox, ControlGoesFirstAndIsBounded) {
   Limits limits;
@@ -58,7 +60,8 @@ TEST(Outbox, WhatANewConnectionGetsFirstDoesNotCountAgainstTheBoundOfControl) {
   EXPECT_EQ(texts[100][0], 'c');
   EXPECT_EQ(texts[116], "data");
   for (int i = 0; i < 16; ++i) EXPECT_TRUE(connection.outbox.push_control(control, rig.context));
-  EXPECT_FALSE(connection.outbox.push_control(control, rig.context)) << "what left makes no room twice";
+  EXPECT_FALSE(connection.outbox.push_control(control, rig.context))
+      << "what left makes no room twice";
 }
 
 TEST(Outbox, WhatAConnectionWasToGetFirstGoesWithIt) {
@@ -72,7 +75,8 @@ TEST(Outbox, WhatAConnectionWasToGetFirstGoesWithIt) {
   EXPECT_TRUE(connection.outbox.empty());
   const auto control = EgressRig::bytes(sized(16 * kKiB, 'c'), {.kind = Kind::ns});
   EXPECT_TRUE(connection.outbox.push_control(control, rig.context));
-  EXPECT_FALSE(connection.outbox.push_control(EgressRig::bytes("x", {.kind = Kind::ns}), rig.context));
+  EXPECT_FALSE(
+      connection.outbox.push_control(EgressRig::bytes("x", {.kind = Kind::ns}), rig.context));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Random messages to a full outbox, from a seed: what a run does to it at once is what its frames do one by one. Once
-// against the rule of docs/protocol.md, section 5, written down frame by frame; and once, with everything else that
-// happens to an outbox between them, against an outbox that gets each frame alone.
+// Random messages to a full outbox, from a seed: what a run does to it at once is what its frames
+// do one by one. Once against the rule of docs/protocol.md, section 5, written down frame by frame;
+// and once, with everything else that happens to an outbox between them, against an outbox that
+// gets each frame alone.
 
 #include <gtest/gtest.h>
 
@@ -59,7 +60,8 @@ class Dice {
     const std::uint32_t base = below(8) == 0 ? below(1'500) : below(60);
     const std::uint32_t spread = below(2) == 0 ? 1 : 1 + below(below(4) == 0 ? 1'200 : 40);
     const std::uint32_t frames = 1 + below(base > 100 ? 4 : 50);
-    for (std::uint32_t i = 0; i < frames; ++i) burst.payloads.push_back(payload(base + below(spread)));
+    for (std::uint32_t i = 0; i < frames; ++i)
+      burst.payloads.push_back(payload(base + below(spread)));
     return burst;
   }
 
@@ -105,10 +107,11 @@ struct Side {
   }
   std::string seen() {
     LaneQueue& lane = connection.outbox.lane(kLane);
-    std::string all = "queued " + std::to_string(rig.tally.queued) + " bytes " + std::to_string(lane.bytes()) +
-                      " block " + std::to_string(lane.block_bytes()) + " whole " + std::to_string(lane.holds_whole()) +
-                      " lost " + std::to_string(counted.lost) + " dropped " + std::to_string(counters.dropped.value()) +
-                      " received " + std::to_string(received.size());
+    std::string all =
+        "queued " + std::to_string(rig.tally.queued) + " bytes " + std::to_string(lane.bytes()) +
+        " block " + std::to_string(lane.block_bytes()) + " whole " +
+        std::to_string(lane.holds_whole()) + " lost " + std::to_string(counted.lost) + " dropped " +
+        std::to_string(counters.dropped.value()) + " received " + std::to_string(received.size());
     for (const std::uint64_t dropped : rig.tally.dropped) all += " " + std::to_string(dropped);
     for (const std::string& said : rig.signals.take()) all += " " + said;
     return all;
@@ -130,7 +133,8 @@ struct Side {
   std::uint64_t now_ms = 0;
 };
 
-// ---- against the rule, frame by frame --------------------------------------------------------------------------
+// ---- against the rule, frame by frame
+// --------------------------------------------------------------------------
 
 /// One lane of an outbox that writes nothing: a message at a time, and dropped one at a time.
 class Rule {
@@ -164,7 +168,8 @@ class Rule {
     std::string payload;
   };
   bool drop_oldest() {
-    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(), [](const Waiting& each) { return !each.block; });
+    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(),
+                                     [](const Waiting& each) { return !each.block; });
     if (oldest == waiting_.end()) return false;
     bytes_ -= oldest->size;
     waiting_.erase(oldest);
@@ -185,20 +190,24 @@ void run_against_the_rule(std::uint32_t seed) {
     const std::string rest(dice.below(dice.below(2) == 0 ? 100 : 1'500), 'r');
     side.rig.push_fragment(side.connection.outbox, 1, 0, 100'000, "begin", {.lane = kLane});
     side.rig.push_fragment(side.connection.outbox, 1, 5, 100'000, rest, {.lane = kLane});
-    under_way = proto::kHeaderSize + proto::kFragmentHeaderSize + static_cast<std::uint32_t>(rest.size());
+    under_way =
+        proto::kHeaderSize + proto::kFragmentHeaderSize + static_cast<std::uint32_t>(rest.size());
   } else {
     side.rig.push(side.connection.outbox, "begun", {.lane = kLane});
   }
   side.drain(1);
   Rule rule(under_way);
   for (int i = 0; i < 20; ++i) {
-    const std::uint8_t policy = dice.below(8) == 0 ? kBlock : dice.below(3) == 0 ? kDrop : std::uint8_t{0};
+    const std::uint8_t policy = dice.below(8) == 0   ? kBlock
+                                : dice.below(3) == 0 ? kDrop
+                                                     : std::uint8_t{0};
     const Burst burst = dice.burst(Kind::group, policy);
     for (const std::string& payload : burst.payloads) {
       rule.come(static_cast<std::uint32_t>(proto::kHeaderSize + payload.size()), payload, policy);
     }
     side.push_whole(burst, dice.below(2) == 0, dice.below(4) != 0);
-    ASSERT_EQ(side.rig.dropped(DropReason::queue_full), rule.dropped) << "seed " << seed << ", operation " << i;
+    ASSERT_EQ(side.rig.dropped(DropReason::queue_full), rule.dropped)
+        << "seed " << seed << ", operation " << i;
     ASSERT_EQ(side.counted.lost, rule.dropped);
   }
   side.connection.peer.set_room(MemoryPeer::kAll);
@@ -211,10 +220,12 @@ void run_against_the_rule(std::uint32_t seed) {
 }
 
 TEST(FullOutboxProperty, ARunFollowsTheRuleFrameByFrame) {
-  for (std::uint32_t seed = 1; seed <= kSeeds && !::testing::Test::HasFailure(); ++seed) run_against_the_rule(seed);
+  for (std::uint32_t seed = 1; seed <= kSeeds && !::testing::Test::HasFailure(); ++seed)
+    run_against_the_rule(seed);
 }
 
-// ---- against an outbox that gets each frame alone ---------------------------------------------------------------
+// ---- against an outbox that gets each frame alone
+// ---------------------------------------------------------------
 
 class Pair {
  public:
@@ -287,9 +298,11 @@ class Pair {
     singly_.push_singly(burst, fan_out);
   }
   void latest() {
-    const std::string payload = "key____" + std::to_string(dice_.below(3)) + dice_.payload(dice_.below(300));
+    const std::string payload =
+        "key____" + std::to_string(dice_.below(3)) + dice_.payload(dice_.below(300));
     both([&](Side& side) {
-      side.rig.push(side.connection.outbox, payload, {.kind = Kind::group, .flags = kLatest, .lane = kLane});
+      side.rig.push(side.connection.outbox, payload,
+                    {.kind = Kind::group, .flags = kLatest, .lane = kLane});
     });
   }
   /// Messages in three parts, of which now and then a part is missing.
@@ -298,9 +311,10 @@ class Pair {
     const std::uint32_t part = part_++ % 3;
     const std::string payload(100, static_cast<char>('a' + part));
     both([&](Side& side) {
-      side.rig.push_fragment(
-          side.connection.outbox, message_, 100 * part, 300, payload,
-          {.kind = Kind::group, .flags = message_ % 2 == 0 ? kDrop : std::uint8_t{0}, .lane = kLane});
+      side.rig.push_fragment(side.connection.outbox, message_, 100 * part, 300, payload,
+                             {.kind = Kind::group,
+                              .flags = message_ % 2 == 0 ? kDrop : std::uint8_t{0},
+                              .lane = kLane});
     });
     if (part == 2) ++message_;
   }
@@ -314,7 +328,8 @@ class Pair {
     payload.append(reinterpret_cast<const char*>(writer.written().data()), writer.written().size());
     payload += dice_.payload(dice_.below(50));
     both([&](Side& side) {
-      side.rig.push(side.connection.outbox, payload, {.kind = Kind::group, .flags = proto::kFlagExt, .lane = kLane});
+      side.rig.push(side.connection.outbox, payload,
+                    {.kind = Kind::group, .flags = proto::kFlagExt, .lane = kLane});
       side.rig.context.now_wall_ns += 10'000'000;
     });
   }

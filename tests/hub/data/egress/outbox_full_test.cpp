@@ -31,7 +31,9 @@ Limits small_limits() {
 }
 
 /// A payload that makes a frame of exactly `size` bytes.
-std::string sized(std::uint32_t size, char fill = 'x') { return std::string(size - proto::kHeaderSize, fill); }
+std::string sized(std::uint32_t size, char fill = 'x') {
+  return std::string(size - proto::kHeaderSize, fill);
+}
 
 /// The connection takes nothing, and what is in the outbox waits.
 void block(TestConnection& connection) {
@@ -59,7 +61,8 @@ TEST(FullOutbox, WhatIsRefusedTakesNoMemory) {
     EgressRig rig(small_limits());
     TestConnection connection(rig);
     block(connection);
-    while (rig.dropped(DropReason::queue_full) == 0) rig.push(connection.outbox, sized(size), {.flags = kDrop});
+    while (rig.dropped(DropReason::queue_full) == 0)
+      rig.push(connection.outbox, sized(size), {.flags = kDrop});
     connection.outbox.settle(rig.context);
     const std::uint64_t copied = rig.tally.copied_bytes;
     const std::uint64_t pinned = rig.pool.pinned_bytes();
@@ -113,7 +116,8 @@ TEST(FullOutbox, GroupDropsTheOldestForTheNewest) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  for (char c = 'a'; c < 'a' + 16; ++c) rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group});
+  for (char c = 'a'; c < 'a' + 16; ++c)
+    rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
   rig.push(connection.outbox, sized(2 * kKiB, 'z'), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "as many of the oldest as it takes";
@@ -133,13 +137,15 @@ TEST(FullOutbox, OldestNeverDropsBlock) {
   block(connection);
   for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'b'), {.flags = kBlock});
   rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "the new one, since there is no older one to drop";
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u)
+      << "the new one, since there is no older one to drop";
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
   for (const std::string& text : connection.take()) EXPECT_NE(text[0], 'g');
 }
 
-// Frames of a message under way wait in the order in which they came: others are not held up until it ends.
+// Frames of a message under way wait in the order in which they came: others are not held up until
+// it ends.
 TEST(FullOutbox, WhatCameBeforeTheRestOfAMessageUnderWayGoesBeforeIt) {
   EgressRig rig;
   TestConnection connection(rig);
@@ -161,9 +167,10 @@ TEST(FullOutbox, WhatCameBeforeTheRestOfAMessageUnderWayGoesBeforeIt) {
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
   const std::string ten(10, 'a');
-  EXPECT_THAT(connection.take(),
-              ElementsAre("1:0:" + ten, "1:10:" + ten, "1:20:" + ten, "behind a message that was not begun", "one",
-                          "1:30:" + ten, "1:40:" + ten, "two", "1:50:" + ten, "first"));
+  EXPECT_THAT(
+      connection.take(),
+      ElementsAre("1:0:" + ten, "1:10:" + ten, "1:20:" + ten, "behind a message that was not begun",
+                  "one", "1:30:" + ten, "1:40:" + ten, "two", "1:50:" + ten, "first"));
   EXPECT_TRUE(rig.ledger_exact());
 }
 
@@ -182,7 +189,8 @@ TEST(FullOutbox, TheRestOfAMessageUnderWayPausesItsSenderBeyondTheLimit) {
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1", "pause 2", "hold 1", "hold 2"));
 }
 
-// Each of many senders is held in time, but all of them together had more under way than any reserve.
+// Each of many senders is held in time, but all of them together had more under way than any
+// reserve.
 TEST(FullOutbox, BlockOfManySendersIsKept) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
@@ -201,7 +209,9 @@ TEST(FullOutbox, BlockOfASenderThatComesThoughHeldIsDroppedBeyondWhatWasUnderWay
   EgressRig rig(limits);
   TestConnection connection(rig);
   block(connection);
-  const auto push = [&](std::uint32_t sender) { rig.push(connection.outbox, sized(kKiB), {.src = sender}); };
+  const auto push = [&](std::uint32_t sender) {
+    rig.push(connection.outbox, sized(kKiB), {.src = sender});
+  };
   for (int i = 0; i < 16 + 16; ++i) push(1);
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1")) << "within the reserve";
   for (int i = 0; i < 512 + 64 + 8 * 16; ++i) push(1);
@@ -224,11 +234,13 @@ TEST(FullOutbox, TheRestOfEveryMessageThatFoundNoRoomIsRefused) {
   for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.flags = kDrop});
   constexpr std::uint32_t kMany = 1'000;
   for (std::uint32_t number = 1; number <= kMany; ++number) {
-    rig.push_fragment(connection.outbox, number, 0, 2'000, std::string(1'000, 'a'), {.flags = kDrop});
+    rig.push_fragment(connection.outbox, number, 0, 2'000, std::string(1'000, 'a'),
+                      {.flags = kDrop});
   }
   EXPECT_EQ(rig.dropped(DropReason::queue_full), kMany);
   for (std::uint32_t number = 1; number <= kMany; ++number) {
-    rig.push_fragment(connection.outbox, number, 1'000, 2'000, std::string(1'000, 'a'), {.flags = kDrop, .lane = 2});
+    rig.push_fragment(connection.outbox, number, 1'000, 2'000, std::string(1'000, 'a'),
+                      {.flags = kDrop, .lane = 2});
   }
   EXPECT_EQ(rig.dropped(DropReason::cut_message), kMany);
   EXPECT_TRUE(rig.ledger_exact());
@@ -270,9 +282,9 @@ TEST(FullOutbox, TheNewestOfMessagesLargerThanTheirLaneWaitsBehindTheOneBeingWri
     const auto texts = connection.take();
     ASSERT_THAT(texts, SizeIs(8)) << int{flags};
     EXPECT_EQ(texts[4].substr(0, 2), flags == kDrop ? "2:" : "3:") << int{flags};
-    EXPECT_EQ(
-        rig.dropped(DropReason::cut_message) + rig.dropped(DropReason::replaced) + rig.dropped(DropReason::queue_full),
-        4u);
+    EXPECT_EQ(rig.dropped(DropReason::cut_message) + rig.dropped(DropReason::replaced) +
+                  rig.dropped(DropReason::queue_full),
+              4u);
     EXPECT_TRUE(rig.ledger_exact());
   }
 }
@@ -285,7 +297,8 @@ TEST(FullOutbox, ARestWithoutABeginningIsRefused) {
   EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u) << "where nothing waits, too";
   block(connection);
   for (std::uint32_t number = 1; number <= 100; ++number) {
-    rig.push_fragment(connection.outbox, number, 1'000, 1 << 30, std::string(1'000, 'a'), {.flags = kDrop});
+    rig.push_fragment(connection.outbox, number, 1'000, 1 << 30, std::string(1'000, 'a'),
+                      {.flags = kDrop});
   }
   EXPECT_EQ(rig.dropped(DropReason::cut_message), 101u);
   EXPECT_EQ(connection.outbox.lane(1).bytes(), 0u);
@@ -326,11 +339,13 @@ TEST(FullOutbox, TheBudgetBoundsContinuedMessagesToo) {
   block(connection);
   for (std::uint32_t round = 0; round < 10; ++round) {
     for (std::uint32_t number = 1; number <= 100; ++number) {
-      rig.push_fragment(connection.outbox, number, 60'000 + round, 1 << 30, std::string(30'000, 'a'), {.flags = kDrop});
+      rig.push_fragment(connection.outbox, number, 60'000 + round, 1 << 30,
+                        std::string(30'000, 'a'), {.flags = kDrop});
       connection.flush();
     }
   }
-  EXPECT_EQ(rig.dropped(DropReason::over_budget), 100u) << "of each message that goes on what comes then";
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 100u)
+      << "of each message that goes on what comes then";
   EXPECT_GT(rig.dropped(DropReason::cut_message), 700u) << "and its rest";
   EXPECT_LE(rig.pool.pinned_bytes(), (4u << 20) + 400'000u);
   EXPECT_TRUE(rig.ledger_exact());

@@ -30,7 +30,9 @@ Limits small_limits() {
 }
 
 /// A payload that makes a frame of exactly `size` bytes.
-std::string sized(std::uint32_t size, char fill = 'x') { return std::string(size - proto::kHeaderSize, fill); }
+std::string sized(std::uint32_t size, char fill = 'x') {
+  return std::string(size - proto::kHeaderSize, fill);
+}
 
 /// The connection takes nothing, and what is in the outbox waits.
 void block(TestConnection& connection) {
@@ -110,12 +112,14 @@ TEST(Outbox, LatestReplacesInPlace) {
   EXPECT_EQ(rig.dropped(DropReason::replaced), 2u);
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
-  EXPECT_THAT(connection.take(), ElementsAre("key____1 newest", "key____2 other key", "key____1 other source",
-                                             "key____1 other lane", "first"));
+  EXPECT_THAT(connection.take(),
+              ElementsAre("key____1 newest", "key____2 other key", "key____1 other source",
+                          "key____1 other lane", "first"));
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-// While the connection takes all that comes nobody looks for older ones; once it does not, the newest are what waits.
+// While the connection takes all that comes nobody looks for older ones; once it does not, the
+// newest are what waits.
 TEST(Outbox, LatestOfOneBurstIsReplacedWhenItHasToWait) {
   EgressRig rig;
   TestConnection connection(rig);
@@ -135,8 +139,8 @@ TEST(Outbox, LatestOfOneBurstIsReplacedWhenItHasToWait) {
   EXPECT_EQ(rig.dropped(DropReason::replaced), 3u);
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
-  EXPECT_THAT(connection.take(), ElementsAre("key____1 begun", "key____1 newest", "key____2 new", "plain",
-                                             "plain again", "key____1 other lane"));
+  EXPECT_THAT(connection.take(), ElementsAre("key____1 begun", "key____1 newest", "key____2 new",
+                                             "plain", "plain again", "key____1 other lane"));
   EXPECT_TRUE(rig.ledger_exact());
   EXPECT_EQ(rig.tally.queued, 0);
 }
@@ -196,7 +200,8 @@ TEST(Outbox, LatestOfAMessageUnderWayIsNotReplaced) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-// What replaced an older message waits like it: counted against the budget, and out of its slab if it is small.
+// What replaced an older message waits like it: counted against the budget, and out of its slab if
+// it is small.
 TEST(Outbox, WhatReplacedAnOlderMessageIsSettledToo) {
   EgressRig rig;
   TestConnection connection(rig);
@@ -219,14 +224,18 @@ TEST(Outbox, FragmentsOfOneMessageAreDroppedTogether) {
   TestConnection connection(rig);
   block(connection);
   rig.push_fragment(connection.outbox, 1, 0, 9'000, std::string(3'000, 'a'), {.kind = Kind::group});
-  rig.push_fragment(connection.outbox, 1, 3'000, 9'000, std::string(3'000, 'a'), {.kind = Kind::group});
+  rig.push_fragment(connection.outbox, 1, 3'000, 9'000, std::string(3'000, 'a'),
+                    {.kind = Kind::group});
   for (int i = 0; i < 11; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "both fragments that wait";
-  rig.push_fragment(connection.outbox, 1, 6'000, 9'000, std::string(3'000, 'a'), {.kind = Kind::group});
+  rig.push_fragment(connection.outbox, 1, 6'000, 9'000, std::string(3'000, 'a'),
+                    {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u) << "and the one that comes";
   // The number is free again.
-  rig.push_fragment(connection.outbox, 1, 0, 20, std::string(10, 'n'), {.kind = Kind::group, .lane = 2});
-  rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'n'), {.kind = Kind::group, .lane = 2});
+  rig.push_fragment(connection.outbox, 1, 0, 20, std::string(10, 'n'),
+                    {.kind = Kind::group, .lane = 2});
+  rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'n'),
+                    {.kind = Kind::group, .lane = 2});
   EXPECT_EQ(rig.dropped(DropReason::cut_message), 1u);
   EXPECT_TRUE(rig.ledger_exact());
 }
@@ -239,8 +248,10 @@ TEST(Outbox, ANewMessageUnderTheNumberOfACutOneArrives) {
   rig.push_fragment(connection.outbox, 1, 0, 9'000, std::string(3'000, 'a'), {.kind = Kind::group});
   for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
   EXPECT_GE(rig.dropped(DropReason::queue_full), 1u);
-  rig.push_fragment(connection.outbox, 1, 0, 20, std::string(10, 'n'), {.kind = Kind::group, .lane = 2});
-  rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'n'), {.kind = Kind::group, .lane = 2});
+  rig.push_fragment(connection.outbox, 1, 0, 20, std::string(10, 'n'),
+                    {.kind = Kind::group, .lane = 2});
+  rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'n'),
+                    {.kind = Kind::group, .lane = 2});
   EXPECT_EQ(rig.dropped(DropReason::cut_message), 0u);
 }
 
@@ -251,7 +262,8 @@ TEST(Outbox, AMessageUnderWayIsFinishedOverItsLimit) {
   rig.push_fragment(connection.outbox, 1, 0, 40'000, std::string(8'000, 'a'), {.flags = kDrop});
   connection.flush();
   for (std::uint32_t offset = 8'000; offset < 40'000; offset += 8'000) {
-    rig.push_fragment(connection.outbox, 1, offset, 40'000, std::string(8'000, 'a'), {.flags = kDrop});
+    rig.push_fragment(connection.outbox, 1, offset, 40'000, std::string(8'000, 'a'),
+                      {.flags = kDrop});
   }
   EXPECT_EQ(rig.tally.any_dropped, false);
   connection.peer.set_room(MemoryPeer::kAll);
@@ -305,7 +317,8 @@ TEST(Outbox, SmallWaitingFramesLeaveTheirSlab) {
   block(connection);
   rig.push(connection.outbox, sized(6 * kKiB));
   EXPECT_EQ(connection.outbox.lane(1).front().run.buffer->kind, BufferKind::slab);
-  rig.push(connection.outbox, sized(6 * kKiB), {.lane = 0});  // so that the first is not the last entry
+  rig.push(connection.outbox, sized(6 * kKiB),
+           {.lane = 0});  // so that the first is not the last entry
   connection.flush();
   rig.push(connection.outbox, sized(6 * kKiB), {.src = 2});
   connection.flush();

@@ -27,7 +27,8 @@ TEST_F(PiecePoolTest, GivesTheSameMemoryAgain) {
   EXPECT_EQ(pool.kept(), 0u);
 }
 
-// As many as a hostile node can make wait: given back one after the other, not one inside the other.
+// As many as a hostile node can make wait: given back one after the other, not one inside the
+// other.
 TEST_F(PiecePoolTest, TakesBackAMillionThatHangTogether) {
   PieceRef first = pool.take(hub::Run{});
   MorePieces* last = first.get();

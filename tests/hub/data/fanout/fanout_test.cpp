@@ -43,7 +43,8 @@ std::vector<std::vector<std::string>> entries_of(RouteRig& rig) {
         std::vector<std::string>& payloads = entries.emplace_back();
         for (std::uint32_t done = 0; done < mail.size;) {
           const proto::FrameHeader header = proto::load_header(mail.bytes + done);
-          payloads.emplace_back(reinterpret_cast<const char*>(mail.bytes) + done + proto::kHeaderSize, header.length);
+          payloads.emplace_back(
+              reinterpret_cast<const char*>(mail.bytes) + done + proto::kHeaderSize, header.length);
           done += static_cast<std::uint32_t>(header.frame_size());
         }
         EXPECT_EQ(payloads.size(), mail.frames);
@@ -160,18 +161,21 @@ TEST(Fanout, KeepsTheOrderOfWhatIsNotTooLarge) {
   RouteRig rig;
   Recipient& a = rig.add_here(2);
   a.frame_bytes = 2;
-  const hub::Run run = rig.egress.run({"lll", "a", "b", "lll", "lll", "cc", "lll"}, {.flags = kDrop});
+  const hub::Run run =
+      rig.egress.run({"lll", "a", "b", "lll", "lll", "cc", "lll"}, {.flags = kDrop});
   rig.fanout.deliver(a, run, run.header(), {});
   EXPECT_EQ(rig.egress.dropped(DropReason::too_large), 4u);
   ASSERT_EQ(a.outbox.lane(1).front().frames, 3u);
-  EXPECT_EQ(std::memcmp(a.outbox.lane(1).front().run.bytes + 2 * 17 + proto::kHeaderSize, "cc", 2), 0);
+  EXPECT_EQ(std::memcmp(a.outbox.lane(1).front().run.bytes + 2 * 17 + proto::kHeaderSize, "cc", 2),
+            0);
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-/// A run of so many frames of 20 bytes. Only the first one can be read: the others say nonsense about their length.
+/// A run of so many frames of 20 bytes. Only the first one can be read: the others say nonsense
+/// about their length.
 hub::Run unreadable_run(RouteRig& rig, std::uint32_t frames, std::uint32_t dst) {
-  hub::Run run =
-      rig.make_run(dst, std::vector<std::string>(frames, "four"), {.kind = Kind::group, .flags = proto::kFlagReport});
+  hub::Run run = rig.make_run(dst, std::vector<std::string>(frames, "four"),
+                              {.kind = Kind::group, .flags = proto::kFlagReport});
   for (std::uint32_t frame = 1; frame < frames; ++frame) {
     store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * 20, ~std::uint32_t{0});
   }
@@ -188,7 +192,8 @@ struct CountedLosses final : CountedGroups {
   std::uint64_t lost = 0;
 };
 
-// One publisher of small messages would hold up a shard for as long as it likes by subscribers that read nothing.
+// One publisher of small messages would hold up a shard for as long as it likes by subscribers that
+// read nothing.
 TEST(Fanout, ARunToFullQueuesIsNotTakenApartFrameByFrame) {
   constexpr std::uint32_t kMembers = 50;
   constexpr std::uint32_t kFrames = 1'000;

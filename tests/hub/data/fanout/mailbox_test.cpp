@@ -117,8 +117,8 @@ TEST(Mailbox, WakesOnlyASleeper) {
   EXPECT_TRUE(mailbox.post(ShardIndex{0}, frames(1)));
 }
 
-// Provable: what each sender posts arrives once, in its order; the bounds hold at every moment, as the sender sees
-// them; a sender that waits for room is told, so nobody waits for ever.
+// Provable: what each sender posts arrives once, in its order; the bounds hold at every moment, as
+// the sender sees them; a sender that waits for room is told, so nobody waits for ever.
 TEST(Mailbox, KeepsOrderAndBoundsUnderThreads) {
   constexpr std::size_t kSenders = 2;
   constexpr std::uint32_t kMails = 30'000;
@@ -131,7 +131,8 @@ TEST(Mailbox, KeepsOrderAndBoundsUnderThreads) {
     senders.emplace_back([&, s] {
       const ShardIndex self{static_cast<std::uint8_t>(s)};
       for (std::uint32_t i = 0; i < kMails; ++i) {
-        // As a shard does: it goes on reading only when its mailboxes are not crowded, or it was told.
+        // As a shard does: it goes on reading only when its mailboxes are not crowded, or it was
+        // told.
         while (mailbox.crowded(self)) {
           while (!room[s].exchange(false)) std::this_thread::yield();
         }
@@ -145,8 +146,8 @@ TEST(Mailbox, KeepsOrderAndBoundsUnderThreads) {
   }
   std::uint32_t next[kSenders] = {};
   while (next[0] + next[1] < kSenders * kMails) {
-    std::size_t waiting =
-        mailbox.drain(1'000, [] {}, [&](const Mail& mail) { ASSERT_EQ(mail.frames, next[mail.node.value()]++); });
+    std::size_t waiting = mailbox.drain(
+        1'000, [] {}, [&](const Mail& mail) { ASSERT_EQ(mail.frames, next[mail.node.value()]++); });
     ASSERT_LE(waiting, 1'000u);
     mailbox.tell_room([&](ShardIndex sender) { room[sender.value()] = true; });
   }

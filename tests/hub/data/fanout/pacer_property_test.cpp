@@ -1,6 +1,6 @@
-// Random messages to a paced subscription, from a seed, with everything else that happens to one between them: what a
-// run does to it at once is what its frames do one by one. One side gets each burst as the run that it is, the other
-// one each of its frames alone.
+// Random messages to a paced subscription, from a seed, with everything else that happens to one
+// between them: what a run does to it at once is what its frames do one by one. One side gets each
+// burst as the run that it is, the other one each of its frames alone.
 
 #include <gtest/gtest.h>
 
@@ -91,12 +91,14 @@ struct Side {
     }
   }
   std::string seen() {
-    std::string all = "queued " + std::to_string(rig.egress.tally.queued) + " held " + std::to_string(one->held()) +
-                      " of " + std::to_string(one->held_bytes()) + " uncredited " + std::to_string(one->uncredited()) +
-                      " space " + std::to_string(one->space()) + " due " + std::to_string(one->due_us()) + " next " +
-                      std::to_string(rig.pacer.next_due_ms()) + " dropped " + std::to_string(counters.dropped.value()) +
-                      " taken " + std::to_string(taken);
-    for (const std::uint64_t dropped : rig.egress.tally.dropped) all += " " + std::to_string(dropped);
+    std::string all = "queued " + std::to_string(rig.egress.tally.queued) + " held " +
+                      std::to_string(one->held()) + " of " + std::to_string(one->held_bytes()) +
+                      " uncredited " + std::to_string(one->uncredited()) + " space " +
+                      std::to_string(one->space()) + " due " + std::to_string(one->due_us()) +
+                      " next " + std::to_string(rig.pacer.next_due_ms()) + " dropped " +
+                      std::to_string(counters.dropped.value()) + " taken " + std::to_string(taken);
+    for (const std::uint64_t dropped : rig.egress.tally.dropped)
+      all += " " + std::to_string(dropped);
     return all;
   }
   /// What was received, however it was cut into runs.
@@ -107,10 +109,11 @@ struct Side {
   }
   std::string reports() {
     std::string all;
-    rig.egress.drops.flush(reported_ms += 10'000, [&](NodeId sender, std::span<const std::byte> report) {
-      all += std::to_string(sender.value()) + ":" +
-             std::string(reinterpret_cast<const char*>(report.data()), report.size()) + "\n";
-    });
+    rig.egress.drops.flush(
+        reported_ms += 10'000, [&](NodeId sender, std::span<const std::byte> report) {
+          all += std::to_string(sender.value()) + ":" +
+                 std::string(reinterpret_cast<const char*>(report.data()), report.size()) + "\n";
+        });
     return all;
   }
 
@@ -195,14 +198,16 @@ class Pair {
   }
   void burst() {
     Burst burst{{.kind = Kind::group, .flags = below(3) == 0 ? kDrop : std::uint8_t{0}}, {}};
-    // Not that of the fragments: one that is given up makes room for what is held, once all of the run is.
+    // Not that of the fragments: one that is given up makes room for what is held, once all of the
+    // run is.
     burst.frame.lane = below(8) == 0 ? 3 : 1;
     burst.frame.src = 1 + below(2);
     if (below(2) == 0) burst.frame.flags |= proto::kFlagReport;
     const std::uint32_t base = below(8) == 0 ? below(1'500) : below(30);
     const std::uint32_t spread = below(2) == 0 ? 1 : 1 + below(below(4) == 0 ? 1'200 : 30);
     const std::uint32_t frames = 1 + below(base > 100 ? 4 : 120);
-    for (std::uint32_t i = 0; i < frames; ++i) burst.payloads.push_back(payload(base + below(spread)));
+    for (std::uint32_t i = 0; i < frames; ++i)
+      burst.payloads.push_back(payload(base + below(spread)));
     if (used_up_) {
       // Where nothing waits, a run that does not fit is refused as one thing.
       both([](Side& side) { side.drain(); });
@@ -218,7 +223,8 @@ class Pair {
     if (below(12) == 0) ++message_;
     const std::uint32_t part = part_++ % 3;
     std::string bytes(proto::kFragmentHeaderSize, '\0');
-    proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()), {message_, 100 * part, 300});
+    proto::store_fragment_header(reinterpret_cast<std::byte*>(bytes.data()),
+                                 {message_, 100 * part, 300});
     bytes += std::string(100, static_cast<char>('a' + part));
     const Burst burst{{.kind = Kind::group, .flags = proto::kFlagFragment, .lane = 2}, {bytes}};
     both([&](Side& side) { side.offer_singly(burst, false); });
@@ -226,8 +232,10 @@ class Pair {
   }
   /// So many as it took, or some of them.
   void credit() {
-    const std::uint64_t total = whole_.taken - below(2) * std::min<std::uint64_t>(whole_.taken, below(3));
-    both([&](Side& side) { std::ignore = side.rig.pacer.on_credit(side.recipient, kGroup, total); });
+    const std::uint64_t total =
+        whole_.taken - below(2) * std::min<std::uint64_t>(whole_.taken, below(3));
+    both(
+        [&](Side& side) { std::ignore = side.rig.pacer.on_credit(side.recipient, kGroup, total); });
   }
   void pass_time() {
     const std::uint64_t ms = below(4) == 0 ? 1'000 : below(12);
@@ -273,7 +281,8 @@ TEST(PacerProperty, ARunIsTakenAsItsFramesAre) {
   }
 }
 
-// Of messages that are to be dropped where there is no room, those that are as long as one that had none go with it.
+// Of messages that are to be dropped where there is no room, those that are as long as one that had
+// none go with it.
 TEST(PacerProperty, AShorterOneStillGoesBehindThoseThatHaveNoRoom) {
   std::vector<std::string> payloads(50, "12345");
   payloads.insert(payloads.end(), {"1234", "12345"});
@@ -283,7 +292,8 @@ TEST(PacerProperty, AShorterOneStillGoesBehindThoseThatHaveNoRoom) {
   for (Side* side : {&whole, &singly}) {
     side->subscribe({});
     // All but the 20 bytes of the short one.
-    side->offer_singly({{.kind = Kind::group}, {std::string(kLaneBytes - 20 - proto::kHeaderSize, 'x')}}, false);
+    side->offer_singly(
+        {{.kind = Kind::group}, {std::string(kLaneBytes - 20 - proto::kHeaderSize, 'x')}}, false);
     side->subscribe({.window = 2});
   }
   whole.offer_whole(burst, false, true);

@@ -22,20 +22,24 @@ class PacerTest : public ::testing::Test {
   PacerTest() { rig.egress.context.now_ms = kStartMs; }
   void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
 
-  PacedSubscription& subscribe(const PaceTerms& terms) { return rig.pacer.subscribe(recipient, kGroup, terms); }
-  void offer(PacedSubscription& subscription, const std::vector<std::string>& texts, std::uint8_t lane = 1) {
-    const hub::Run run = rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group, .lane = lane});
+  PacedSubscription& subscribe(const PaceTerms& terms) {
+    return rig.pacer.subscribe(recipient, kGroup, terms);
+  }
+  void offer(PacedSubscription& subscription, const std::vector<std::string>& texts,
+             std::uint8_t lane = 1) {
+    const hub::Run run =
+        rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group, .lane = lane});
     EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
   }
-  hub::Run fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total, const std::string& text,
-                    std::uint8_t lane) {
+  hub::Run fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total,
+                    const std::string& text, std::uint8_t lane) {
     std::string all(proto::kFragmentHeaderSize, '\0');
     proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
     const TestFrame frame{.kind = proto::Kind::group, .flags = proto::kFlagFragment, .lane = lane};
     return rig.make_run(kGroup.value(), {all + text}, frame);
   }
-  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset, std::uint32_t total,
-                      const std::string& text, std::uint8_t lane = 1) {
+  void offer_fragment(PacedSubscription& subscription, std::uint32_t number, std::uint32_t offset,
+                      std::uint32_t total, const std::string& text, std::uint8_t lane = 1) {
     const hub::Run run = fragment(number, offset, total, text, lane);
     EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
   }
@@ -50,7 +54,8 @@ class PacerTest : public ::testing::Test {
           for (hub::Run rest = entry.run.share(); rest.frames != 0; rest.skip_frame()) {
             std::size_t skip = proto::kHeaderSize;
             if (rest.header().has(proto::kFlagFragment)) skip += proto::kFragmentHeaderSize;
-            texts.emplace_back(reinterpret_cast<const char*>(rest.bytes) + skip, rest.header().frame_size() - skip);
+            texts.emplace_back(reinterpret_cast<const char*>(rest.bytes) + skip,
+                               rest.header().frame_size() - skip);
           }
         } while (entry.next_piece());
         rig.egress.tally.queued -= entry.frames;
@@ -305,11 +310,12 @@ TEST_F(PacerTest, HoldsWithinTheLaneAndTheBudget) {
   rig.egress.lease.give_back(rig.egress.limits.budget_bytes);
 }
 
-// Only the first frame of what is dropped is looked at, and what is held: the others say nonsense about
-// their length.
+// Only the first frame of what is dropped is looked at, and what is held: the others say nonsense
+// about their length.
 TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {
   constexpr std::uint32_t kFrames = 1'000;
-  for (const PaceTerms& terms : {PaceTerms{.window = 1, .depth = 2}, PaceTerms{.depth = 2, .interval_us = 1'000'000}}) {
+  for (const PaceTerms& terms :
+       {PaceTerms{.window = 1, .depth = 2}, PaceTerms{.depth = 2, .interval_us = 1'000'000}}) {
     PacedSubscription& one = subscribe(terms);
     offer(one, {"open"});
     EXPECT_THAT(sent(), ElementsAre("open"));

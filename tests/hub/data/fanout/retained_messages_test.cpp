@@ -31,10 +31,12 @@ class RetainedMessagesTest : public ::testing::Test {
     rig.send(provider, HubRig::group(1), text, {.kind = Kind::group});
     rig.turn();
   }
-  void publish_fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total, const std::string& text) {
+  void publish_fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total,
+                        const std::string& text) {
     std::string all(proto::kFragmentHeaderSize, '\0');
     proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
-    rig.send(provider, HubRig::group(1), all + text, {.kind = Kind::group, .flags = proto::kFlagFragment});
+    rig.send(provider, HubRig::group(1), all + text,
+             {.kind = Kind::group, .flags = proto::kFlagFragment});
     rig.turn();
   }
   FakeNode& subscriber(std::size_t shard, const PaceTerms& terms = {}) {
@@ -48,7 +50,8 @@ class RetainedMessagesTest : public ::testing::Test {
     rig.settle();
     Texts texts;
     for (const auto& frame : node.frames) {
-      const std::size_t skip = frame.header.has(proto::kFlagFragment) ? proto::kFragmentHeaderSize : 0;
+      const std::size_t skip =
+          frame.header.has(proto::kFlagFragment) ? proto::kFragmentHeaderSize : 0;
       texts.push_back(frame.text().substr(skip));
     }
     node.frames.clear();
@@ -91,7 +94,8 @@ TEST_F(RetainedMessagesTest, NoneThereIsNoneGiven) {
 TEST_F(RetainedMessagesTest, NeverOneThatWasUnderWayBefore) {
   FakeNode& early = subscriber(1);
   EXPECT_EQ(got(early), Texts{});
-  // "one" waits in the other shard's mailbox when the late one is published and its shard has not heard of it.
+  // "one" waits in the other shard's mailbox when the late one is published and its shard has not
+  // heard of it.
   rig.send(provider, HubRig::group(1), "one", {.kind = Kind::group});
   rig.turn_shard(0);
   FakeNode& late = subscriber(1);
@@ -130,7 +134,8 @@ TEST_F(RetainedMessagesTest, WhatIsTooLargeIsNotKeptNorIsAnOlderOne) {
   EXPECT_EQ(got(subscriber(1)).size(), 2u) << "at the limit";
 }
 
-// The conductor publishes a new id of the provider, then that the former one is nobody's, then the group.
+// The conductor publishes a new id of the provider, then that the former one is nobody's, then the
+// group.
 TEST_F(RetainedMessagesTest, IsGivenWhileTheProviderIsRenumbered) {
   publish("1");
   FakeNode& late = subscriber(1);
@@ -201,7 +206,9 @@ TEST(RetainedMessages, KeepsNothingOfAProviderThatLeft) {
   testing::RouteRig rig;
   std::map<std::uint32_t, std::uint32_t> provider_of;
   std::mt19937 random(1);  // NOLINT(cert-msc51-cpp): the same on every run
-  const auto below = [&random](std::uint32_t bound) { return static_cast<std::uint32_t>(random() % bound); };
+  const auto below = [&random](std::uint32_t bound) {
+    return static_cast<std::uint32_t>(random() % bound);
+  };
   const auto node = [](std::uint32_t index) { return make_id<NodeId>(HubId{7}, index); };
   std::uint32_t newest = 20;
   for (int step = 0; step < 5'000; ++step) {
@@ -254,17 +261,20 @@ TEST_F(RetainedMessagesTest, AfterABreakWithoutResumeTheLastComesAgain) {
   EXPECT_EQ(got(node), Texts{"four"});
 }
 
-// The ledger has it as a copy, made when it was handed to the subscriber's shard, and there it ends: once.
+// The ledger has it as a copy, made when it was handed to the subscriber's shard, and there it
+// ends: once.
 TEST_F(RetainedMessagesTest, IsACopyThatIsDroppedWhereTheSubscriberIsGone) {
   publish("one");
-  const std::uint64_t dropped = rig.dropped(proto::DropReason::no_subscriber);  // nobody had subscribed
+  const std::uint64_t dropped =
+      rig.dropped(proto::DropReason::no_subscriber);  // nobody had subscribed
   for (const std::size_t shard : {1u, 0u}) {
     FakeNode& node = rig.join(shard);
     const std::uint64_t copies = rig.ledger().copies;
     rig.pace(node, 1, {}, true);
     rig.turn_shard(shard);  // asks the provider's shard
     rig.command(shard, EndPaceCommand{node.session, GroupId{HubRig::group(1)}, false});
-    EXPECT_EQ(got(node), shard == 0 ? Texts{"one"} : Texts{}) << "on the provider's own shard it waits for nothing";
+    EXPECT_EQ(got(node), shard == 0 ? Texts{"one"} : Texts{})
+        << "on the provider's own shard it waits for nothing";
     EXPECT_EQ(rig.ledger().copies, copies + 1);
   }
   EXPECT_EQ(rig.dropped(proto::DropReason::no_subscriber), dropped + 1);

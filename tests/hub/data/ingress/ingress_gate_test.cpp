@@ -56,7 +56,8 @@ TEST_F(IngressGateTest, RefusesFlagsWithWhichARequestWouldBeMisread) {
   EXPECT_EQ(admit(nothing + "x", {.kind = Kind::ns, .flags = proto::kFlagExt}), Admission::control);
   EXPECT_EQ(admit("\x05", {.kind = Kind::ns, .flags = proto::kFlagExt}), Admission::malformed);
   EXPECT_EQ(state.error, proto::FrameError::ext_too_short);
-  EXPECT_EQ(admit(nothing + "x", {.kind = Kind::flow, .flags = proto::kFlagExt}), Admission::malformed);
+  EXPECT_EQ(admit(nothing + "x", {.kind = Kind::flow, .flags = proto::kFlagExt}),
+            Admission::malformed);
   EXPECT_EQ(admit("x", {.kind = Kind::ctrl, .flags = 3 | proto::kFlagReport}), Admission::control);
 }
 
@@ -91,7 +92,8 @@ TEST_F(IngressGateTest, OnlyFlowAndLinkMayGoWithoutASource) {
 
 // Found by fuzzing: these bits stood for "nothing admitted yet", and so passed.
 TEST_F(IngressGateTest, RefusesAFrameOfAllOnes) {
-  EXPECT_EQ(admit("x", {.kind = static_cast<Kind>(255), .flags = 0xFF, .lane = 0xFF}), Admission::malformed);
+  EXPECT_EQ(admit("x", {.kind = static_cast<Kind>(255), .flags = 0xFF, .lane = 0xFF}),
+            Admission::malformed);
   auto bytes = EgressRig::bytes("x", {.kind = static_cast<Kind>(255), .flags = 0xFF, .lane = 0xFF});
   bytes[14] = std::byte{0xFF};
   EXPECT_EQ(admit(bytes), Admission::malformed);
@@ -144,7 +146,8 @@ class RealTimeFragmentTest : public IngressGateTest {
     std::vector<std::byte> header(proto::kFragmentHeaderSize);
     proto::store_fragment_header(header.data(), {message, offset, total});
     const std::string text(reinterpret_cast<const char*>(header.data()), header.size());
-    EXPECT_EQ(admit(text + std::string(size, 'x'), {.flags = proto::kFlagFragment, .lane = 0}), Admission::data);
+    EXPECT_EQ(admit(text + std::string(size, 'x'), {.flags = proto::kFlagFragment, .lane = 0}),
+              Admission::data);
     return static_cast<int>(last[15]);
   }
   void spend_all() {
@@ -184,7 +187,8 @@ TEST_F(RealTimeFragmentTest, FragmentsWithoutABeginningCountLikeOtherFrames) {
 
 TEST_F(RealTimeFragmentTest, MessagesThatNeverEndKeepNobodysPlace) {
   spend_all();
-  for (std::uint32_t i = 0; i < 2 * RealTimeMessages::kMessagesMax; ++i) EXPECT_EQ(lane(i, 0, 900, 100), 1);
+  for (std::uint32_t i = 0; i < 2 * RealTimeMessages::kMessagesMax; ++i)
+    EXPECT_EQ(lane(i, 0, 900, 100), 1);
   for (std::uint32_t i = 100; i < 110; ++i) {
     EXPECT_EQ(lane(i, 0, 200, 100), 1);
     EXPECT_EQ(lane(i, 100, 200, 100), 1);

@@ -38,8 +38,9 @@ class ReceiveBufferTest : public ::testing::Test {
       }
       for (std::uint32_t done = 0; done < found.run.size;) {
         const proto::FrameHeader header = proto::load_header(found.run.bytes + done);
-        reading.got.emplace_back(reinterpret_cast<const char*>(found.run.bytes + done + proto::kHeaderSize),
-                                 header.length);
+        reading.got.emplace_back(
+            reinterpret_cast<const char*>(found.run.bytes + done + proto::kHeaderSize),
+            header.length);
         done += static_cast<std::uint32_t>(header.frame_size());
         if (reading.got.size() % 10 == 0) reading.kept.push_back(buffer.buffer().share());
       }
@@ -72,7 +73,8 @@ TEST_F(ReceiveBufferTest, GivesTheSameFramesForAnySplit) {
       const std::size_t connection = random() % kConnections;
       const std::size_t piece = random() % 2 == 0 ? 1 + random() % 300'000 : 1 + random() % 3'000;
       if (done[connection] == streams[connection].size()) continue;
-      done[connection] += read(readings[connection], std::span(streams[connection]).subspan(done[connection]), piece);
+      done[connection] += read(readings[connection],
+                               std::span(streams[connection]).subspan(done[connection]), piece);
       if (done[connection] == streams[connection].size()) ++finished;
       if (random() % 4 == 0) readings[connection].kept.clear();
     }
@@ -151,7 +153,8 @@ TEST_F(ReceiveBufferTest, TheLargestFrameMayBeginAtTheLastByteThatIsReadInto) {
     stream.insert(stream.end(), filler.begin(), filler.end());
     const auto largest = EgressRig::bytes(std::string(65'536, 'c'));
     stream.insert(stream.end(), largest.begin(), largest.end());
-    for (std::size_t done = 0; done < stream.size();) done += read(reading, std::span(stream).subspan(done), 1 << 20);
+    for (std::size_t done = 0; done < stream.size();)
+      done += read(reading, std::span(stream).subspan(done), 1 << 20);
     EXPECT_EQ(reading.got.back(), std::string(65'536, 'c'));
   }
 }

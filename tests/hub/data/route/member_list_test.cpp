@@ -15,7 +15,9 @@ namespace {
 using List = MemberList<GroupMember>;
 using Reference = std::map<std::uint32_t, std::uint32_t>;  ///< slot to generation
 
-GroupMember member(std::uint32_t slot, std::uint32_t generation) { return {ConnectionSlot{slot}, generation}; }
+GroupMember member(std::uint32_t slot, std::uint32_t generation) {
+  return {ConnectionSlot{slot}, generation};
+}
 
 Reference content(const List& list) {
   Reference found;

@@ -9,7 +9,8 @@ namespace {
 
 TEST(NodeTable, IsEmptyAtFirst) {
   const NodeTable table;
-  for (const std::uint32_t index : {0u, 1u, 1'000u, kEveryIndex}) EXPECT_FALSE(table.find(index).exists());
+  for (const std::uint32_t index : {0u, 1u, 1'000u, kEveryIndex})
+    EXPECT_FALSE(table.find(index).exists());
   EXPECT_EQ(table.shards(), 0u);
 }
 
@@ -51,7 +52,8 @@ TEST(NodeTable, KnowsWhoMayComeBack) {
   EXPECT_FALSE(table.may_return(1));
   for (const std::uint32_t index : expected) table.expect(index);
   for (const std::uint32_t index : expected) EXPECT_TRUE(table.may_return(index)) << index;
-  for (const std::uint32_t index : {0u, 2u, 62u, 65u, 4'095u, 4'097u, 899'999u, kEveryIndex - 2, kEveryIndex}) {
+  for (const std::uint32_t index :
+       {0u, 2u, 62u, 65u, 4'095u, 4'097u, 899'999u, kEveryIndex - 2, kEveryIndex}) {
     EXPECT_FALSE(table.may_return(index)) << index;
   }
   table.expect_nobody();

@@ -47,7 +47,9 @@ class RecentRecipientsTest : public ::testing::Test {
     rig.egress.accepted += appended.frames;
     return appended;
   }
-  std::uint32_t appended(const std::vector<Frame>& frames) { return append(bytes_of(frames)).frames; }
+  std::uint32_t appended(const std::vector<Frame>& frames) {
+    return append(bytes_of(frames)).frames;
+  }
 
   RouteRig rig;
   Recipient& a = rig.add_here(2);
@@ -134,7 +136,8 @@ TEST_F(RecentRecipientsTest, WhoTakesOnlySmallFramesIsAsked) {
 TEST_F(RecentRecipientsTest, FromTheSizeOnThatIsCheaperToReferenceNothingIsAppended) {
   note(2);
   const std::string most(Outbox::kAppendBytesMax - proto::kHeaderSize - 1, 'x');
-  for (int i = 0; i < 8; ++i) route({2, most});  // until there is a chunk with room for more of them
+  for (int i = 0; i < 8; ++i)
+    route({2, most});  // until there is a chunk with room for more of them
   EXPECT_EQ(appended({{2, most}}), 1u);
   EXPECT_EQ(appended({{2, most + "x"}}), 0u);
 }

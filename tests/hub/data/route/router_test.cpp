@@ -43,7 +43,8 @@ TEST_F(RouterTest, UnicastThere) {
 TEST_F(RouterTest, SmallFramesLikeTheLastOnesAreAppended) {
   Recipient& a = rig.add_here(2);
   rig.add_there(3);
-  const auto append = [this](std::uint32_t dst, const std::string& payload, const testing::TestFrame& frame = {}) {
+  const auto append = [this](std::uint32_t dst, const std::string& payload,
+                             const testing::TestFrame& frame = {}) {
     const hub::Run run = rig.make_run(dst, {payload}, frame);
     if (rig.router.append(run.bytes, run.size, run.frames)) return true;
     rig.router.route(run, run.header());
@@ -265,7 +266,8 @@ TEST_F(RouterTest, LeavesWhatWasHandedOverBeyondItsEnd) {
   rig.publish_group(5, 1, {2, 3}, {});
   hub::Run frames = rig.make_run(kHub | 5, {"one"}, {.kind = Kind::group});
   for (const auto lane : {std::uint8_t{2}, std::uint8_t{1}, std::uint8_t{2}}) {
-    ASSERT_TRUE(frames.extend(rig.make_run(kHub | 5, {"more", "and more"}, {.kind = Kind::group, .lane = lane})));
+    ASSERT_TRUE(frames.extend(
+        rig.make_run(kHub | 5, {"more", "and more"}, {.kind = Kind::group, .lane = lane})));
   }
   rig.egress.tally.queued += 7;
   const hub::Run rest = rig.router.route_handed_over(frames, 65'536, rig.router.deliveries() + 3);
@@ -283,8 +285,8 @@ TEST_F(RouterTest, OfAListEachShardCountsWhatWasLeftToIt) {
   std::string ids(12, '\0');
   const std::uint32_t all[] = {kHub | 2, kHub | 3, kHub | 4};
   std::memcpy(ids.data(), all, sizeof all);
-  // Shard 0 takes the frame in, and what it hands over comes back to it as if it were shard 1, where one has left and
-  // another has come.
+  // Shard 0 takes the frame in, and what it hands over comes back to it as if it were shard 1,
+  // where one has left and another has come.
   const hub::Run taken_in = rig.make_run(3, {ids + "payload"}, {.kind = Kind::list});
   rig.nodes.publish(2, {ShardIndex{1}, ConnectionSlot{2}, 2});
   rig.nodes.publish(3, {ShardIndex{1}, ConnectionSlot{3}, 3});
@@ -328,7 +330,8 @@ TEST_F(RouterTest, ReportsAListAsItWasSent) {
     EXPECT_EQ(reports, expected);
     rig.egress.drops.flush(2'000, [](NodeId, std::span<const std::byte>) {});
   };
-  const hub::Run run = rig.make_run(4, {ids + "payload"}, {.kind = Kind::list, .flags = proto::kFlagReport});
+  const hub::Run run =
+      rig.make_run(4, {ids + "payload"}, {.kind = Kind::list, .flags = proto::kFlagReport});
   rig.router.route(run, run.header());
   rig.fanout.post_all();
   EXPECT_EQ(dropped(DropReason::no_route), 1u);

@@ -41,7 +41,9 @@ class ShardRecipientsTest : public ::testing::Test {
     limits.mailbox_entries = 2;
     return limits;
   }
-  std::uint64_t dropped(DropReason reason = DropReason::shard_full) { return rig.egress.dropped(reason); }
+  std::uint64_t dropped(DropReason reason = DropReason::shard_full) {
+    return rig.egress.dropped(reason);
+  }
   RouteRig rig{few_entries()};
 };
 
@@ -73,7 +75,8 @@ TEST_F(ShardRecipientsTest, ABroadcastIsDroppedForEachNode) {
 
 TEST_F(ShardRecipientsTest, AListIsDroppedForEachOfItsNodesThere) {
   rig.add_here(2);
-  rig.route(5, {with_ids({6u << 20 | 10, kHub | 2, kHub | 10, kHub | 12, kHub | 99}, "x")}, {.kind = Kind::list});
+  rig.route(5, {with_ids({6u << 20 | 10, kHub | 2, kHub | 10, kHub | 12, kHub | 99}, "x")},
+            {.kind = Kind::list});
   EXPECT_EQ(dropped(), 2u);
   EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
   EXPECT_EQ(dropped(DropReason::no_route), 1u);

@@ -24,7 +24,8 @@ SharedList find(const std::vector<NodeId>& nodes, HubId hub = kHub) {
 TEST(SharedList, FindsTheNodesOfThisHub) {
   EXPECT_EQ(find({node(7, 1)}), (SharedList{1, 0, 1}));
   EXPECT_EQ(find({node(7, 0), node(7, kIndexMask)}), (SharedList{2, 0, 2}));
-  EXPECT_EQ(find({node(0, 1), node(6, 9), node(7, 1), node(7, 2), node(8, 1)}), (SharedList{5, 2, 2}));
+  EXPECT_EQ(find({node(0, 1), node(6, 9), node(7, 1), node(7, 2), node(8, 1)}),
+            (SharedList{5, 2, 2}));
   EXPECT_EQ(find({node(6, 9), node(7, 3)}), (SharedList{2, 1, 1}));
   EXPECT_EQ(find({node(7, 3), node(4095, 1)}), (SharedList{2, 0, 1}));
   EXPECT_EQ(find({node(6, 1), node(8, 1)}).count, 0u);
@@ -33,18 +34,21 @@ TEST(SharedList, FindsTheNodesOfThisHub) {
 }
 
 TEST(SharedList, FitsIntoDst) {
-  for (const SharedList& list : {SharedList{1, 0, 1}, SharedList{1024, 0, 1024}, SharedList{1024, 1023, 1},
-                                 SharedList{1024, 1, 1023}, SharedList{5, 2, 2}}) {
+  for (const SharedList& list :
+       {SharedList{1, 0, 1}, SharedList{1024, 0, 1024}, SharedList{1024, 1023, 1},
+        SharedList{1024, 1, 1023}, SharedList{5, 2, 2}}) {
     EXPECT_EQ(SharedList::unpack(list.pack()), list);
   }
 }
 
 TEST(SharedList, NoMarkIsTheIdOfAnotherShardOrOfNone) {
-  for (const std::uint16_t number : {std::uint16_t{1}, std::uint16_t{7}, std::uint16_t{4031}, kHubIdMax}) {
+  for (const std::uint16_t number :
+       {std::uint16_t{1}, std::uint16_t{7}, std::uint16_t{4031}, kHubIdMax}) {
     const NodeId unmarked = node(number, kIndexMask);
     std::vector<NodeId> all{unmarked};
     for (std::size_t shard = 0; shard < kShardsMax; ++shard) {
-      const NodeId marked = SharedList::marked(unmarked, ShardIndex{static_cast<std::uint8_t>(shard)});
+      const NodeId marked =
+          SharedList::marked(unmarked, ShardIndex{static_cast<std::uint8_t>(shard)});
       EXPECT_EQ(index_of(marked), index_of(unmarked));
       for (const NodeId other : all) EXPECT_NE(marked, other);
       all.push_back(marked);
@@ -76,7 +80,8 @@ TEST(SharedList, CountsThoseOfAShard) {
   const SharedList list = SharedList::unpack(proto::load_header(frame.data()).dst);
   EXPECT_EQ(list.count_of(ShardIndex{0}, ids, kHub), 1u);
   EXPECT_EQ(list.count_of(ShardIndex{1}, ids, kHub), 2u);
-  EXPECT_EQ(list.count_of(ShardIndex{2}, ids, kHub), 0u) << "7.x marked for it would look like 10.x";
+  EXPECT_EQ(list.count_of(ShardIndex{2}, ids, kHub), 0u)
+      << "7.x marked for it would look like 10.x";
 }
 
 TEST(SharedList, TellsWhatTheSenderWrote) {

@@ -18,7 +18,9 @@ struct FakeSignals final : SenderSignals {
   void resume(NodeId sender, const proto::flow::Target&) override { say("resume ", sender); }
   void hold(NodeId sender) override { say("hold ", sender); }
   void release(NodeId sender) override { say("release ", sender); }
-  void say(const char* what, NodeId sender) { said.push_back(what + std::to_string(index_of(sender))); }
+  void say(const char* what, NodeId sender) {
+    said.push_back(what + std::to_string(index_of(sender)));
+  }
   std::vector<std::string> take() { return std::exchange(said, {}); }
   std::vector<std::string> said;
 };
@@ -45,7 +47,8 @@ class EgressRig {
   static std::vector<std::byte> bytes(const std::string& payload, const TestFrame& frame = {}) {
     proto::FrameHeader header;
     header.length = static_cast<std::uint32_t>(payload.size());
-    const bool for_this_connection = frame.kind == proto::Kind::flow || frame.kind == proto::Kind::link;
+    const bool for_this_connection =
+        frame.kind == proto::Kind::flow || frame.kind == proto::Kind::link;
     header.dst = for_this_connection ? 0 : 7u << 20 | 99;
     header.src = 7u << 20 | frame.src;
     header.kind = frame.kind;
@@ -53,7 +56,8 @@ class EgressRig {
     header.lane = frame.lane;
     std::vector<std::byte> all(header.frame_size());
     proto::store_header(all.data(), header);
-    if (!payload.empty()) std::memcpy(all.data() + proto::kHeaderSize, payload.data(), payload.size());
+    if (!payload.empty())
+      std::memcpy(all.data() + proto::kHeaderSize, payload.data(), payload.size());
     return all;
   }
   /// Frames with one header, one behind the other in a slab.
@@ -71,14 +75,16 @@ class EgressRig {
     std::memcpy(place, all.data(), all.size());
     used_ += static_cast<std::uint32_t>(all.size());
     accepted += payloads.size();
-    return {slab_.share(), place, static_cast<std::uint32_t>(all.size()), static_cast<std::uint32_t>(payloads.size())};
+    return {slab_.share(), place, static_cast<std::uint32_t>(all.size()),
+            static_cast<std::uint32_t>(payloads.size())};
   }
-  void push(Outbox& outbox, const std::string& payload, const TestFrame& frame = {}, bool fan_out = false) {
+  void push(Outbox& outbox, const std::string& payload, const TestFrame& frame = {},
+            bool fan_out = false) {
     const Run one = run({payload}, frame);
     outbox.push(one, one.header(), Handover{fan_out}, context);
   }
-  void push_fragment(Outbox& outbox, std::uint32_t number, std::uint32_t offset, std::uint32_t total,
-                     const std::string& payload, TestFrame frame = {}) {
+  void push_fragment(Outbox& outbox, std::uint32_t number, std::uint32_t offset,
+                     std::uint32_t total, const std::string& payload, TestFrame frame = {}) {
     std::string all(proto::kFragmentHeaderSize, '\0');
     proto::store_fragment_header(reinterpret_cast<std::byte*>(all.data()), {number, offset, total});
     frame.flags |= proto::kFlagFragment;
@@ -131,7 +137,8 @@ struct TestConnection {
     outbox.signal_room(rig.context);
     return result;
   }
-  /// The payloads that arrived since the last call, of whole frames. Fragments show as "number:offset:payload".
+  /// The payloads that arrived since the last call, of whole frames. Fragments show as
+  /// "number:offset:payload".
   std::vector<std::string> take() {
     peer.read(stream);
     std::vector<std::string> texts;

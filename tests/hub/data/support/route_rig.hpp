@@ -9,14 +9,16 @@
 
 namespace gimnet::hub::testing {
 
-/// The routing side of shard 0 of a hub with two shards: recipients without connections, and the other shard's mailbox.
+/// The routing side of shard 0 of a hub with two shards: recipients without connections, and the
+/// other shard's mailbox.
 class RouteRig {
  public:
   explicit RouteRig(Limits limits = {})
       : egress(limits),
         mailbox_here(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         mailbox_there(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
-        fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context, {HubId{7}, nodes, groups}),
+        fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context,
+               {HubId{7}, nodes, groups}),
         pacer(fanout),
         retained(groups, fanout, pacer),
         router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
@@ -39,26 +41,33 @@ class RouteRig {
     recipients_made.push_back(std::move(recipient));
     return *recipients_made.back();
   }
-  void add_there(std::uint32_t index) { nodes.publish(index, {ShardIndex{1}, ConnectionSlot{index}, index}); }
+  void add_there(std::uint32_t index) {
+    nodes.publish(index, {ShardIndex{1}, ConnectionSlot{index}, index});
+  }
 
-  void publish_group(std::uint32_t index, std::uint32_t provider, const std::vector<std::uint32_t>& here,
+  void publish_group(std::uint32_t index, std::uint32_t provider,
+                     const std::vector<std::uint32_t>& here,
                      const std::vector<std::uint32_t>& there, bool accepts = false) {
     members.accepts = accepts;
     members.provider = make_id<NodeId>(HubId{7}, provider);
     members.provider_place = nodes.find(provider);
     members.by_shard.assign(2, {});
-    for (const std::uint32_t member : here) members.by_shard[0].put({ConnectionSlot{member}, member});
-    for (const std::uint32_t member : there) members.by_shard[1].put({ConnectionSlot{member}, member});
+    for (const std::uint32_t member : here)
+      members.by_shard[0].put({ConnectionSlot{member}, member});
+    for (const std::uint32_t member : there)
+      members.by_shard[1].put({ConnectionSlot{member}, member});
     static_cast<void>(groups.exchange(index, &members));
   }
 
   /// A run of frames with that destination from node 1, counted as taken in.
-  void route(std::uint32_t dst, const std::vector<std::string>& payloads, const TestFrame& frame = {}) {
+  void route(std::uint32_t dst, const std::vector<std::string>& payloads,
+             const TestFrame& frame = {}) {
     hub::Run run = make_run(dst, payloads, frame);
     router.route(run, run.header());
     fanout.post_all();
   }
-  hub::Run make_run(std::uint32_t dst, const std::vector<std::string>& payloads, const TestFrame& frame = {}) {
+  hub::Run make_run(std::uint32_t dst, const std::vector<std::string>& payloads,
+                    const TestFrame& frame = {}) {
     hub::Run run = egress.run(payloads, frame);
     auto* bytes = const_cast<std::byte*>(run.bytes);
     for (std::uint32_t done = 0; done < run.size;) {

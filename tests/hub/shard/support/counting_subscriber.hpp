@@ -19,12 +19,13 @@ struct CountingSubscriber {
   bool subscribed = false;
   bool known = false;  ///< its hub counts for it
   PaceTerms terms;
-  std::uint64_t ended = 0;                     ///< messages of the group that ended at it in this epoch
-  std::uint64_t credited = 0;                  ///< of them, told to the hub
+  std::uint64_t ended = 0;     ///< messages of the group that ended at it in this epoch
+  std::uint64_t credited = 0;  ///< of them, told to the hub
   std::map<std::uint8_t, std::uint64_t> last;  ///< by lane: sequence of the last whole message
-  std::uint64_t first_at_least = 0;            ///< of the first message of this subscription; 0: it came
-  bool fresh = true;                           ///< nothing of an earlier subscription can be on its way
-  /// Up to this one the last message may come again: the subscription, or what its connection counts, began anew.
+  std::uint64_t first_at_least = 0;  ///< of the first message of this subscription; 0: it came
+  bool fresh = true;                 ///< nothing of an earlier subscription can be on its way
+  /// Up to this one the last message may come again: the subscription, or what its connection
+  /// counts, began anew.
   std::uint64_t repeats_up_to = 0;
   std::map<std::uint8_t, std::uint32_t> next_offset;  ///< by lane, of the message that is coming
   bool checks_repeats = true;                         ///< a message comes once, whatever happened

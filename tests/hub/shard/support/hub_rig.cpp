@@ -10,7 +10,8 @@ namespace gimnet::hub::testing {
 void FakeNode::on_frame(const GotFrame& frame) {
   kinds.push_back(frame.header.kind);
   const bool is_data = static_cast<std::uint8_t>(frame.header.kind) < proto::kFirstControlKind &&
-                       frame.header.kind != proto::Kind::flow && frame.header.kind != proto::Kind::report;
+                       frame.header.kind != proto::Kind::flow &&
+                       frame.header.kind != proto::Kind::report;
   if (is_data) {
     frames.push_back(frame);
     ++data_frames;
@@ -37,7 +38,8 @@ void FakeNode::read(std::size_t most) {
   pipe.read(stream, most);
   std::size_t begin = 0;
   if (!opened && stream.size() >= proto::kOpeningSize) {
-    if (!std::equal(proto::kOpening.begin(), proto::kOpening.end(), stream.begin())) ADD_FAILURE() << "no opening";
+    if (!std::equal(proto::kOpening.begin(), proto::kOpening.end(), stream.begin()))
+      ADD_FAILURE() << "no opening";
     opened = true;
     begin = proto::kOpeningSize;
   }
@@ -88,7 +90,8 @@ HubRig::HubRig(std::size_t shards, Limits limits)
   std::vector<SessionGauges*> sessions;
   for (std::size_t i = 0; i < shards; ++i) {
     wakers_.push_back(std::make_unique<Waker>());
-    mailboxes_.push_back(std::make_unique<Mailbox>(shards, Mailbox::bounds_from(limits_), *wakers_.back()));
+    mailboxes_.push_back(
+        std::make_unique<Mailbox>(shards, Mailbox::bounds_from(limits_), *wakers_.back()));
     counters_.push_back(std::make_unique<ShardCounters>());
     wakers.push_back(wakers_.back().get());
     mailboxes.push_back(mailboxes_.back().get());
@@ -96,11 +99,11 @@ HubRig::HubRig(std::size_t shards, Limits limits)
     sessions_.push_back(std::make_unique<SessionGauges>(kGaugedSlots));
     sessions.push_back(sessions_.back().get());
   }
-  shared_.emplace(
-      HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_, mailboxes, wakers, counters, sessions});
+  shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_,
+                            mailboxes, wakers, counters, sessions});
   for (std::size_t i = 0; i < shards; ++i) {
-    shards_.push_back(
-        std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_, IoShard::Options{}));
+    shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_,
+                                                IoShard::Options{}));
   }
 }
 
@@ -170,7 +173,8 @@ void HubRig::command(std::size_t shard, ShardCommand command) {
   shards_[shard]->send(std::move(command));
 }
 
-void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members, bool accepts) {
+void HubRig::publish_group(std::uint32_t index, NodeId provider,
+                           const std::vector<FakeNode*>& members, bool accepts) {
   auto group = std::make_unique<GroupMembers>();
   group->provider = provider;
   group->accepts = accepts;
@@ -181,15 +185,16 @@ void HubRig::publish_group(std::uint32_t index, NodeId provider, const std::vect
   publish(index, std::move(group));
 }
 
-void HubRig::publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced, bool retain,
-                                 bool was_plain) {
+void HubRig::publish_paced_group(std::uint32_t index, NodeId provider,
+                                 const std::vector<FakeNode*>& paced, bool retain, bool was_plain) {
   auto group = std::make_unique<GroupMembers>();
   group->provider = provider;
   group->retain = retain;
   group->by_shard.resize(shards_.size());
   group->paced_by_shard.resize(shards_.size());
   for (const FakeNode* member : paced) {
-    group->paced_by_shard[member->shard.value()].put({member->session.slot, member->session.generation, was_plain});
+    group->paced_by_shard[member->shard.value()].put(
+        {member->session.slot, member->session.generation, was_plain});
   }
   publish(index, std::move(group));
 }
@@ -200,14 +205,18 @@ void HubRig::publish(std::uint32_t index, std::unique_ptr<GroupMembers> group) {
   members_.push_back(std::move(group));
 }
 
-void HubRig::withdraw_group(std::uint32_t index) { static_cast<void>(groups_.exchange(index, nullptr)); }
-
-void HubRig::pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained, bool was_plain) {
-  command(node.shard.value(), PaceCommand{node.session, GroupId{group(index)}, terms, retained, was_plain});
+void HubRig::withdraw_group(std::uint32_t index) {
+  static_cast<void>(groups_.exchange(index, nullptr));
 }
 
-std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,
-                                     const FrameSpec& spec) {
+void HubRig::pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained,
+                  bool was_plain) {
+  command(node.shard.value(),
+          PaceCommand{node.session, GroupId{group(index)}, terms, retained, was_plain});
+}
+
+std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst,
+                                     const std::string& payload, const FrameSpec& spec) {
   proto::FrameHeader header;
   header.length = static_cast<std::uint32_t>(payload.size());
   header.dst = dst;
@@ -217,11 +226,13 @@ std::vector<std::byte> HubRig::frame(const FakeNode& from, std::uint32_t dst, co
   header.lane = spec.lane;
   std::vector<std::byte> bytes(header.frame_size());
   proto::store_header(bytes.data(), header);
-  if (!payload.empty()) std::memcpy(bytes.data() + proto::kHeaderSize, payload.data(), payload.size());
+  if (!payload.empty())
+    std::memcpy(bytes.data() + proto::kHeaderSize, payload.data(), payload.size());
   return bytes;
 }
 
-void HubRig::send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec) {
+void HubRig::send(FakeNode& from, std::uint32_t dst, const std::string& payload,
+                  const FrameSpec& spec) {
   write(from, frame(from, dst, payload, spec));
 }
 
@@ -237,7 +248,8 @@ std::vector<Ready> HubRig::ready(std::size_t shard) {
     if (node.shard.value() != shard || node.attachment == 0) continue;
     const Connection* connection = state(shard).find(node.session);
     if (connection == nullptr || !connection->connected) continue;
-    ready.push_back({connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
+    ready.push_back(
+        {connection->token(), node.pipe.transport_readable(), node.pipe.transport_writable()});
   }
   return ready;
 }
@@ -245,18 +257,21 @@ std::vector<Ready> HubRig::ready(std::size_t shard) {
 void HubRig::turn_shard(std::size_t shard) {
   shards_[shard]->turn(ready(shard), now_ms);
   const Ledger sums = ledger();
-  EXPECT_TRUE(sums.exact()) << "accepted " << sums.accepted << " + copies " << sums.copies << " != delivered "
-                            << sums.delivered << " + dropped " << sums.dropped << " + queued " << sums.queued;
+  EXPECT_TRUE(sums.exact()) << "accepted " << sums.accepted << " + copies " << sums.copies
+                            << " != delivered " << sums.delivered << " + dropped " << sums.dropped
+                            << " + queued " << sums.queued;
   if (!released_ && next_index_ <= kGaugedSlots) check_sessions(sums);
 }
 
-/// What the sessions came to is what the shards came to, but for drops of which nobody knows for whom the frame was.
+/// What the sessions came to is what the shards came to, but for drops of which nobody knows for
+/// whom the frame was.
 void HubRig::check_sessions(const Ledger& sums) const {
   SessionCounts all;
   for (std::size_t shard = 0; shard < shards_.size(); ++shard) {
     for (const auto& connection : shards_[shard]->state().connections) {
       if (connection == nullptr) continue;
-      const SessionCounts counts = sessions_[shard]->counts(connection->slot, connection->generation);
+      const SessionCounts counts =
+          sessions_[shard]->counts(connection->slot, connection->generation);
       all.accepted += counts.accepted;
       all.received_bytes += counts.received_bytes;
       all.delivered += counts.delivered;
@@ -276,8 +291,8 @@ void HubRig::check_sessions(const Ledger& sums) const {
     known += dropped(reason);
   }
   // Of these, only those for a session that is there, or that waited for it.
-  const std::uint64_t perhaps =
-      dropped(DropReason::away) + dropped(DropReason::no_subscriber) + dropped(DropReason::link_lost);
+  const std::uint64_t perhaps = dropped(DropReason::away) + dropped(DropReason::no_subscriber) +
+                                dropped(DropReason::link_lost);
   EXPECT_GE(all.dropped, known);
   EXPECT_LE(all.dropped, known + perhaps);
 }
@@ -289,8 +304,9 @@ void HubRig::turn() {
 std::uint64_t HubRig::activity() const {
   std::uint64_t sum = 0;
   for (const auto& counters : counters_) {
-    sum += counters->received_bytes.value() + counters->sent_bytes.value() + counters->mailbox_entries.value() +
-           counters->connections.value() + counters->reports.value();
+    sum += counters->received_bytes.value() + counters->sent_bytes.value() +
+           counters->mailbox_entries.value() + counters->connections.value() +
+           counters->reports.value();
   }
   const Ledger sums = ledger();
   return sum + sums.accepted + sums.delivered + 3 * sums.dropped;
@@ -354,7 +370,8 @@ Ledger HubRig::ledger() const {
 
 std::uint64_t HubRig::dropped(proto::DropReason reason) const {
   std::uint64_t sum = 0;
-  for (const auto& counters : counters_) sum += counters->dropped[static_cast<std::size_t>(reason)].value();
+  for (const auto& counters : counters_)
+    sum += counters->dropped[static_cast<std::size_t>(reason)].value();
   return sum;
 }
 

@@ -22,7 +22,9 @@ namespace gimnet::hub::testing {
 struct GotFrame {
   proto::FrameHeader header;
   std::vector<std::byte> body;  ///< everything after the header
-  [[nodiscard]] std::string text() const { return {reinterpret_cast<const char*>(body.data()), body.size()}; }
+  [[nodiscard]] std::string text() const {
+    return {reinterpret_cast<const char*>(body.data()), body.size()};
+  }
 };
 
 struct FrameSpec {
@@ -88,7 +90,8 @@ struct Ledger {
   [[nodiscard]] bool exact() const { return accepted + copies == delivered + dropped + queued; }
 };
 
-/// The shards of a hub without threads, sockets or a conductor: a test plays all of these, by turns and a fake clock.
+/// The shards of a hub without threads, sockets or a conductor: a test plays all of these, by turns
+/// and a fake clock.
 class HubRig {
  public:
   explicit HubRig(std::size_t shards = 1, Limits limits = {});
@@ -100,24 +103,30 @@ class HubRig {
   FakeNode& join(std::size_t shard, const JoinSpec& spec = {});
   /// Another connection for its session; its counts tell what it took so far.
   void rejoin(FakeNode& node, const JoinSpec& spec = {});
-  /// A node that a test had attached by itself, with the far end of its connection. The reference stays good.
+  /// A node that a test had attached by itself, with the far end of its connection. The reference
+  /// stays good.
   FakeNode& adopt(FakeNode node) { return nodes_played_.emplace_back(std::move(node)); }
   void release(FakeNode& node);
   /// Gives the node another id. Its connection is closed in the next turn.
   void renumber(FakeNode& node, std::uint32_t index);
   void command(std::size_t shard, ShardCommand command);
   /// Makes `provider` the owner of a group with these members. `accepts`: it takes data.
-  void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members, bool accepts = false);
+  void publish_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& members,
+                     bool accepts = false);
   /// The same with members that are paced: each needs pace() too.
-  void publish_paced_group(std::uint32_t index, NodeId provider, const std::vector<FakeNode*>& paced,
-                           bool retain = false, bool was_plain = false);
+  void publish_paced_group(std::uint32_t index, NodeId provider,
+                           const std::vector<FakeNode*>& paced, bool retain = false,
+                           bool was_plain = false);
   void withdraw_group(std::uint32_t index);
-  void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false, bool was_plain = false);
+  void pace(FakeNode& node, std::uint32_t index, const PaceTerms& terms, bool retained = false,
+            bool was_plain = false);
 
   void write(FakeNode& node, std::span<const std::byte> bytes) { node.pipe.write(bytes); }
-  void send(FakeNode& from, std::uint32_t dst, const std::string& payload, const FrameSpec& spec = {});
+  void send(FakeNode& from, std::uint32_t dst, const std::string& payload,
+            const FrameSpec& spec = {});
   void send_flow(FakeNode& from, const proto::flow::Message& message);
-  [[nodiscard]] static std::vector<std::byte> frame(const FakeNode& from, std::uint32_t dst, const std::string& payload,
+  [[nodiscard]] static std::vector<std::byte> frame(const FakeNode& from, std::uint32_t dst,
+                                                    const std::string& payload,
                                                     const FrameSpec& spec = {});
 
   /// What a poller would say of the connections of that shard.
@@ -145,12 +154,16 @@ class HubRig {
   [[nodiscard]] SessionCounts counts(const FakeNode& node) const {
     return sessions_[node.shard.value()]->counts(node.session.slot, node.session.generation);
   }
-  [[nodiscard]] Connection* connection(const FakeNode& node) { return state(node.shard.value()).find(node.session); }
+  [[nodiscard]] Connection* connection(const FakeNode& node) {
+    return state(node.shard.value()).find(node.session);
+  }
   [[nodiscard]] HubId hub() const { return HubId{7}; }
   [[nodiscard]] NodeTable& nodes() { return nodes_; }
   [[nodiscard]] GroupTable& groups() { return groups_; }
   [[nodiscard]] Quiescence& quiescence() { return quiescence_; }
-  [[nodiscard]] static std::uint32_t group(std::uint32_t index) { return make_id<GroupId>(HubId{7}, index).value(); }
+  [[nodiscard]] static std::uint32_t group(std::uint32_t index) {
+    return make_id<GroupId>(HubId{7}, index).value();
+  }
 
   std::uint64_t now_ms = 1'000'000;
 
