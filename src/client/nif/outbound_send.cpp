@@ -55,9 +55,9 @@ void Outbound::count_appended(std::size_t bytes) {
 bool Outbound::gather_burst() {
   if (quick_sends_ < kQuickSends || queue_.unsent_bytes() >= kBurstBytes || waiting_ > 0)
     return false;
-  const std::uint64_t appended =
-      appended_bytes_.load(std::memory_order_relaxed);  // see count_appended()
-  const std::uint64_t enough = appended + kBurstBytes - queue_.unsent_bytes();
+  // relaxed: see count_appended()
+  const std::uint64_t gathered = appended_bytes_.load(std::memory_order_relaxed);
+  const std::uint64_t enough = gathered + kBurstBytes - queue_.unsent_bytes();
   mutex_.unlock();
   std::uint64_t appended = 0;
   const std::int64_t begin = steady_now_ns();
