@@ -227,6 +227,10 @@ def count_instructions(arguments: argparse.Namespace) -> int:
         say(f"error: {error}")
         return 1
     say("\n".join(["instructions per frame:", *map(str, verdicts)]))
+    if any(verdict.is_above_base for verdict in verdicts):
+        say("all changes together take too much more than perf/instructions/base.json: make something cheaper,\n"
+            "or name the script there, with what it is allowed and why")
+        return 1
     if arguments.update:
         instructions.update_budget(made_by, verdicts)
         return 0

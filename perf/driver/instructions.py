@@ -15,7 +15,10 @@ from dataclasses import dataclass
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "scripts.cpp"
 BUDGET = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "budget.json"
-TOLERANCE = 0.02
+TOLERANCE = 0.02  # of one change, against the budget
+# Many small changes, each within the tolerance, must not add up: all together, against the base.
+BASE = pathlib.Path(__file__).resolve().parent.parent / "instructions" / "base.json"
+BASE_TOLERANCE = 0.03
 SECONDS_MAX = 250  # of one program: what takes longer hangs, however loaded the machine is
 # The function below which counting is on (perf/instructions/*.cpp).
 COUNTED = "counted"
@@ -41,6 +44,12 @@ class Verdict:
     script: str
     counted: float
     budget: float | None
+    base: float | None = None
+    base_tolerance: float = BASE_TOLERANCE
+
+    @property
+    def is_above_base(self) -> bool:
+        return self.base is not None and self.counted > self.base * (1 + self.base_tolerance)
 
     @property
     def change(self) -> float | None:
@@ -58,7 +67,11 @@ class Verdict:
         if self.budget is None:
             return f"{self.script:22} {self.counted:8.1f}  has no budget: ./dev perf --instructions --update"
         word = "SLOWER" if self.is_slower else "faster" if self.is_faster else ""
-        return f"{self.script:22} {self.counted:8.1f}  budget {self.budget:8.1f}  {self.change:+7.2%}  {word}".rstrip()
+        base = f"  base {self.base:8.1f}  {self.counted / self.base - 1:+7.2%}" if self.base else ""
+        if self.is_above_base:
+            word = f"{word}  ABOVE THE BASE (at most {self.base_tolerance:+.0%})"
+        return (f"{self.script:22} {self.counted:8.1f}  budget {self.budget:8.1f}  {self.change:+7.2%}{base}"
+                f"  {word}").rstrip()
 
 
 @dataclass(frozen=True)
@@ -163,9 +176,16 @@ def require_script(script: str, scripts: list[str]) -> None:
         raise CountingError(f"there is no script '{script}'; give one of {', '.join(scripts)}")
 
 
+def load_base() -> dict:
+    """{"instructions_per_frame": {script: count}, "allowed": {script: {"tolerance": part, "why": sentence}}}"""
+    return json.loads(BASE.read_text())
+
+
 def measure(program: pathlib.Path, scripts: list[str], budget: dict) -> list[Verdict]:
-    known = budget["instructions_per_frame"]
-    return [Verdict(script, round(count(program, script)[0], 2), known.get(script)) for script in scripts]
+    known, base = budget["instructions_per_frame"], load_base()
+    return [Verdict(script, round(count(program, script)[0], 2), known.get(script),
+                    base["instructions_per_frame"].get(script),
+                    base["allowed"].get(script, {}).get("tolerance", BASE_TOLERANCE)) for script in scripts]
 
 
 def update_budget(made_by: dict, verdicts: list[Verdict]) -> None:

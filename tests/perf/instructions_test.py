@@ -117,6 +117,23 @@ class Judging(unittest.TestCase):
 
     def test_a_script_without_a_budget_fails(self):
         self.assertTrue(Verdict("parser", 90, None).is_slower)
+
+    def test_small_changes_do_not_add_up_beyond_the_base(self):
+        self.assertFalse(Verdict("parser", 103.0, 102.0, base=100.0).is_above_base)
+        above = Verdict("parser", 103.01, 102.0, base=100.0)
+        self.assertTrue(above.is_above_base and not above.is_slower)
+        self.assertIn("ABOVE THE BASE", str(above))
+        self.assertFalse(Verdict("parser", 110.0, 109.0, base=100.0, base_tolerance=0.1).is_above_base)
+        self.assertFalse(Verdict("new", 110.0, 109.0).is_above_base)
+
+    def test_what_a_script_is_allowed_beyond_the_base_has_a_reason(self):
+        base = instructions.load_base()
+        self.assertGreater(len(base["instructions_per_frame"]), 10)
+        for script, allowed in base["allowed"].items():
+            self.assertIn(script, base["instructions_per_frame"])
+            self.assertTrue(allowed["why"] and allowed["tolerance"] > instructions.BASE_TOLERANCE, script)
+
+    def test_a_script_without_budget_is_told(self):
         self.assertIn("--update", str(Verdict("parser", 90, None)))
 
     def test_another_compiler_is_not_compared(self):
