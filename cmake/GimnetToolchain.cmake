@@ -1,8 +1,12 @@
 # Warnings, sanitizers and build accelerators that every target shares.
 
+option(GIMNET_WARNINGS_AS_ERRORS "Stop at the first warning: on in this project's own presets" OFF)
+option(GIMNET_CCACHE "Compile through ccache" "$ENV{GIMNET_CCACHE}")
+option(GIMNET_MOLD "Link with mold" "$ENV{GIMNET_MOLD}")
+
 add_library(gimnet_options INTERFACE)
 target_compile_options(gimnet_options INTERFACE
-  -Wall -Wextra -Wshadow -Wconversion -Werror
+  -Wall -Wextra -Wshadow -Wconversion $<$<BOOL:${GIMNET_WARNINGS_AS_ERRORS}>:-Werror>
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>
   $<$<AND:$<CXX_COMPILER_ID:Clang>,$<COMPILE_LANGUAGE:CXX>>:-Wthread-safety -Wglobal-constructors
     -Wno-unused-command-line-argument>)
@@ -30,12 +34,10 @@ if(GIMNET_FUZZ)
   target_compile_options(gimnet_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-find_program(GIMNET_CCACHE ccache)
 if(GIMNET_CCACHE)
-  set(CMAKE_C_COMPILER_LAUNCHER ${GIMNET_CCACHE})
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${GIMNET_CCACHE})
+  set(CMAKE_C_COMPILER_LAUNCHER ccache)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ccache)
 endif()
-find_program(GIMNET_MOLD mold)
 if(GIMNET_MOLD)
   add_link_options(-fuse-ld=mold)
 endif()
