@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMANDS = ("build", "test", "demo", "perf", "bench", "sim", "stress", "fuzz", "lint", "format", "asan", "tsan")
+COMMANDS = ("build", "check", "test", "demo", "perf", "bench", "sim", "stress", "fuzz", "lint", "format", "asan", "tsan", "boost174")
 # All that changes a machine or a tree.
 PROGRAMS = ("apt-get", "sudo", "env", "sh", "cmake", "ctest", "clang-format-19", "shellcheck", "rm", "mkdir")
 CALLED = '#!/bin/sh\necho "${0##*/} $*" >>"$DEV_TEST_CALLS"\n'
@@ -140,8 +140,20 @@ class Door(unittest.TestCase):
         self.assertEqual(process.returncode, 0, process.stderr)
         installs = [call for call in calls if " install " in call]
         self.assertEqual(len(installs), 1, calls)
-        self.assertRegex(installs[0], r"--no-remove .*-- .*\blibboost1\.81-dev\b")
+        self.assertRegex(installs[0], r"--no-remove .*-- .*\blibjemalloc-dev\b")
         self.assertTrue([call for call in calls if call.startswith("cmake --build")], calls)
+
+    def test_takes_any_boost_that_is_there(self):
+        for found, expected in (("", True), ("/usr/include/boost/version.hpp", False)):
+            with self.subTest(found=found):
+                self.put_program("find", f"#!/bin/sh\necho {found}\n" if found else "#!/bin/sh\n")
+                process, calls = self.dev("build")
+                self.assertEqual(process.returncode, 0, process.stderr)
+                self.assertEqual(any(" libboost-dev" in call for call in calls), expected, calls)
+
+    def test_builds_the_product_alone_unless_told(self):
+        _, calls = self.dev("build")
+        self.assertEqual([call.split("--target ")[1] for call in calls if call.startswith("cmake --build")], ["product"])
 
 
 if __name__ == "__main__":
