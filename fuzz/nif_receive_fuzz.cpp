@@ -1,7 +1,7 @@
 // The receiving side of NIF against a hub that sends anything: the same bytes give the same
 // messages however they are split, nothing that is another node's or larger than allowed comes out,
-// and nothing breaks. Input: a byte that chooses handshake or connection and the size of the
-// pieces, then the hub's bytes.
+// and nothing breaks. Frames of other nodes do not even end the connection. Input: a byte that
+// chooses handshake or connection and the size of the pieces, then the hub's bytes.
 
 #include <algorithm>
 #include <cstddef>
@@ -150,6 +150,36 @@ void check_connection(std::span<const std::byte> bytes, std::size_t step) {
   static_cast<void>(feed(whole, bytes, step));
 }
 
+/// Gives every frame a kind that another node may send, and cuts what follows a frame of a size
+/// that no hub passes on.
+std::vector<std::byte> as_of_strangers(std::span<const std::byte> bytes) {
+  std::vector<std::byte> frames(bytes.begin(), bytes.end());
+  std::size_t at = 0;
+  while (frames.size() - at >= proto::kHeaderSize) {
+    std::byte& kind = frames[at + proto::kKindOffset];
+    kind &= std::byte{15};
+    if (kind == static_cast<std::byte>(proto::Kind::report) ||
+        kind == static_cast<std::byte>(proto::Kind::flow))
+      kind = static_cast<std::byte>(proto::Kind::taken);
+    const proto::FrameHeader header = proto::load_header(frames.data() + at);
+    if (header.length > proto::kFrameLengthDefault || header.frame_size() > frames.size() - at)
+      break;
+    at += header.frame_size();
+  }
+  frames.resize(at);
+  return frames;
+}
+
+/// Frames of other nodes never end a connection, whatever is in them.
+void check_strangers(std::span<const std::byte> bytes, std::size_t step) {
+  Session session;
+  session.id = kOwnId;
+  Witness witness;
+  Inbound inbound(kLimits, witness);
+  inbound.begin(session);
+  FUZZ_MUST(feed(inbound, as_of_strangers(bytes), step) == Inbound::Verdict::going);
+}
+
 Handshake::State shake(Handshake& handshake, std::span<const std::byte> bytes, std::size_t step) {
   auto state = Handshake::State::need_more;
   while (state == Handshake::State::need_more && !bytes.empty()) {
@@ -186,6 +216,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check_handshake(bytes, step);
   } else {
     check_connection(bytes, step);
+    check_strangers(bytes, step);
   }
   return 0;
 }

@@ -226,9 +226,10 @@ struct LostCounts {
   std::uint64_t frames_broken_off = 0;
   /// Messages of a group that is none of a service this node subscribed, nor lately was.
   std::uint64_t unknown_service = 0;
+  std::uint64_t unreadable = 0;  ///< frames of other nodes that break the protocol
   /// How many losses are known: messages, and frames where only those are.
   [[nodiscard]] std::uint64_t all() const {
-    return incomplete + too_large + frames_broken_off + unknown_service;
+    return incomplete + too_large + frames_broken_off + unknown_service + unreadable;
   }
 };
 

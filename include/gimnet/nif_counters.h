@@ -39,6 +39,9 @@ typedef struct nif_counters {
    * them: over nif_options.last_message_bytes or, with those of the other services, over 64 MiB; or
    * no memory. */
   uint64_t last_messages_not_kept;
+  /** Frames of other nodes that could not be read, and were dropped: a header, extension or TAKEN
+   * that docs/protocol.md does not allow. */
+  uint64_t frames_unreadable;
 } nif_counters;
 
 /** Fills *counters, as much of it as struct_size says. Does not wait. NIF_BAD_ARGUMENT: NULL, or

@@ -153,6 +153,7 @@ nif_status Core::connect(const NodeOptions& options) {
 void Core::close() {
   if (closed_.exchange(true)) return;
   clerk_.stop();
+  static_cast<void>(lost());  // NIF tells nothing of a handle that was closed
   {
     // Whoever waits and leaves now may ask what had become of the connection.
     NodeState state = state_now();
@@ -178,6 +179,17 @@ NodeState Core::state() const {
     if (closed_state_) return *closed_state_;
   }
   return state_now();
+}
+
+LostCounts Core::lost() const {
+  LostCounts counts = losses_.counts();
+  nif_counters counters{};
+  counters.struct_size = sizeof counters;
+  // A number by itself.
+  if (nif_get_counters(node(), &counters) == NIF_OK)
+    unreadable_.store(counters.frames_unreadable, std::memory_order_relaxed);
+  counts.unreadable = unreadable_.load(std::memory_order_relaxed);  // as above
+  return counts;
 }
 
 NodeState Core::state_now() const {

@@ -38,7 +38,7 @@ class Core {
   [[nodiscard]] StreamTable& streams() { return streams_; }
   [[nodiscard]] ServiceTable& services() { return services_; }
   [[nodiscard]] WatchTable& watches() { return watches_; }
-  [[nodiscard]] LostCounts lost() const { return losses_.counts(); }
+  [[nodiscard]] LostCounts lost() const;
   [[nodiscard]] Outcome<std::int64_t> ping(Peer to, Timeout timeout, Lane lane, BytesView echo);
 
  private:
@@ -71,6 +71,7 @@ class Core {
   WatchTable watches_;
   PingTable pings_;
   LossTally losses_;
+  mutable std::atomic<std::uint64_t> unreadable_{0};  ///< as NIF counted when it was asked last
   Clerk clerk_;
   std::uint32_t reconnects_ =
       0;  ///< the library's thread: as the messages that come now count them

@@ -8,8 +8,8 @@
 
 namespace gimnet::gimi {
 
-/// What was on its way to this node and was lost, by why. Thread safety: add() from the library's
-/// thread, counts() from any.
+/// Counts messages that were lost on their way to this node, by reason. NIF counts the unreadable
+/// ones. Thread safety: add() from the library's thread, counts() from any.
 class LossTally {
  public:
   /// `count` as NIF_GAP has it: messages, or frames that went with a connection.
@@ -31,7 +31,7 @@ class LossTally {
     return {incomplete_.load(std::memory_order_relaxed),
             too_large_.load(std::memory_order_relaxed),  // see add()
             frames_broken_off_.load(std::memory_order_relaxed),
-            unknown_service_.load(std::memory_order_relaxed)};
+            unknown_service_.load(std::memory_order_relaxed), 0};
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client/nif/event_record.hpp"
 #include "client/nif/message_assembler.hpp"
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/session.hpp"
@@ -57,9 +58,10 @@ class InboundHost {
 };
 
 /// The receiving half of a node: bytes of the hub in, messages and events out. The hub is not
-/// trusted: whatever it sends either is taken or ends the connection with a sentence. Thread
-/// safety: the library's thread; no sockets, no clocks. Memory: the read buffer, and unfinished
-/// messages within the reassembly limits.
+/// trusted: whatever it sends either is taken or ends the connection with a sentence. A frame that
+/// another node wrote never ends the connection: if it cannot be read, it is dropped and counted.
+/// Thread safety: the library's thread; no sockets, no clocks. Memory: the read buffer, and
+/// unfinished messages within the reassembly limits.
 class Inbound {
  public:
   enum class Verdict : std::uint8_t {
@@ -102,6 +104,7 @@ class Inbound {
     std::uint64_t messages_lost = 0;
     std::uint64_t gaps = 0;
     std::uint64_t ignored = 0;
+    std::uint64_t unreadable = 0;  ///< frames of other nodes
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -111,6 +114,7 @@ class Inbound {
 
   [[nodiscard]] Verdict malformed(std::string why);
   [[nodiscard]] Verdict take_run(const proto::RunView& run);
+  void drop_unreadable(const std::byte* frame);
   [[nodiscard]] Verdict take_frame(const proto::FrameView& view, const std::byte* frame);
   [[nodiscard]] Verdict take_data(const proto::FrameView& view, const std::byte* frame);
   [[nodiscard]] Verdict take_message(const proto::FrameView& view, const std::byte* frame);
@@ -143,6 +147,8 @@ class Inbound {
   Slab* slab_ = nullptr;
   std::size_t filled_ = 0;
   std::size_t parsed_ = 0;
+  std::size_t charged_ = 0;          ///< up to here slab_ is in the size of items
+  std::size_t uncharged_bytes_ = 0;  ///< of former slabs that items keep
   std::uint32_t id_ = 0;
   /// The last ids before id_: frames which waited while the node was given another one are for
   /// them.
@@ -156,9 +162,5 @@ class Inbound {
   std::string fault_;
   Counts counts_;
 };
-
-/// A record that only says something happened. `text` is copied.
-[[nodiscard]] Record* make_event(nif_incoming_type type, std::string text);
-[[nodiscard]] Item item_of(Record* record, std::size_t bytes);
 
 }  // namespace gimnet::nif

@@ -316,6 +316,7 @@ nif_counters Node::counters() {
     whole.messages_lost = inbound_counts_.messages_lost;
     whole.gaps = inbound_counts_.gaps;
     whole.frames_ignored = inbound_counts_.ignored;
+    whole.frames_unreadable = inbound_counts_.unreadable;
     whole.bytes_received = bytes_received_;
     whole.read_calls = read_calls_;
   }

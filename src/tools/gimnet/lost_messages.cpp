@@ -35,6 +35,8 @@ std::vector<std::string> LostMessages::rest() {
       {"frame", "on the way when the connection broke, and a large message has many frames"});
   add_sentence(sentences, counts_.unknown_service, told_.unknown_service,
                {"message", "of a service that this end does not know to have subscribed"});
+  add_sentence(sentences, counts_.unreadable, told_.unreadable,
+               {"frame", "another node broke the protocol"});
   told_ = counts_;
   return sentences;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "proto/control/ns.hpp"
+#include "proto/frame/taken.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
 // What becomes of those who wait when no connection will come any more.
@@ -178,6 +179,21 @@ TEST_F(Lost, MessagesAreCountedByWhy) {
   EXPECT_EQ(node_->lost().incomplete, 2u) << "each was followed by something else";
   EXPECT_EQ(node_->lost().too_large, 1u);
   EXPECT_EQ(node_->lost().frames_broken_off, 0u);
+}
+
+TEST_F(Lost, FramesOfOtherNodesThatCannotBeReadAreCounted) {
+  proto::FrameParts taken;
+  taken.header.kind = proto::Kind::taken;
+  taken.header.src = nif::test::kPeerId;
+  taken.header.dst = nif::test::kOwnId;
+  hub_.send(taken, std::string(proto::kTakenSize - 1, 'x'));
+  const std::string text = "x";
+  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  ASSERT_TRUE(node_->receive());
+  EXPECT_EQ(node_->lost().unreadable, 1u);
+  EXPECT_EQ(node_->lost().all(), 1u);
+  node_->close();
+  EXPECT_EQ(node_->lost().unreadable, 1u);
 }
 
 TEST_F(Lost, MessagesOfNoSubscriptionAreCounted) {

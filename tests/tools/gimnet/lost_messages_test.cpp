@@ -17,8 +17,12 @@ TEST(LostMessages, NothingIsSaidOfNothing) {
 
 TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
   LostMessages lost;
-  lost.take({.incomplete = 1, .too_large = 2, .frames_broken_off = 3, .unknown_service = 4});
-  EXPECT_EQ(lost.all(), 10u);
+  lost.take({.incomplete = 1,
+             .too_large = 2,
+             .frames_broken_off = 3,
+             .unknown_service = 4,
+             .unreadable = 5});
+  EXPECT_EQ(lost.all(), 15u);
   EXPECT_EQ(
       lost.rest(),
       (Sentences{
@@ -26,9 +30,14 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
           "2 messages were lost: larger than this end takes",
           "3 frames were lost: on the way when the connection broke, and a large message has many "
           "frames",
-          "4 messages were lost: of a service that this end does not know to have subscribed"}));
+          "4 messages were lost: of a service that this end does not know to have subscribed",
+          "5 frames were lost: another node broke the protocol"}));
   EXPECT_EQ(lost.rest(), Sentences{});
-  lost.take({.incomplete = 4, .too_large = 2, .frames_broken_off = 3, .unknown_service = 4});
+  lost.take({.incomplete = 4,
+             .too_large = 2,
+             .frames_broken_off = 3,
+             .unknown_service = 4,
+             .unreadable = 5});
   EXPECT_EQ(lost.rest(),
             Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
 }

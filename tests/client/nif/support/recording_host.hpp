@@ -56,7 +56,10 @@ class RecordingHost final : public InboundHost {
   }
   void on_message_lost(std::uint32_t group) override { lost_groups.push_back(group); }
   void deliver(std::span<const Item> delivered) override {
-    for (const Item& item : delivered) items.push_back(incoming_of(item));
+    for (const Item& item : delivered) {
+      items.push_back(incoming_of(item));
+      item_bytes += item.bytes;
+    }
   }
 
   /// The payloads of all messages.
@@ -73,6 +76,7 @@ class RecordingHost final : public InboundHost {
   }
 
   std::vector<nif_incoming> items;
+  std::size_t item_bytes = 0;  ///< as the receive queue counts them
   std::vector<proto::flow::Message> flows;
   std::vector<std::uint16_t> answers;
   std::vector<std::uint32_t> lost_groups;

@@ -1,0 +1,80 @@
+// Frames of another node, which the hub only passes on: they cost their reader nothing.
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "client/nif/inbound.hpp"
+#include "tests/client/nif/support/fake_hub.hpp"
+#include "tests/client/nif/support/recording_host.hpp"
+
+namespace gimnet::nif::test {
+namespace {
+
+proto::FrameParts from_peer(proto::Kind kind = proto::Kind::unicast) {
+  proto::FrameParts parts;
+  parts.header.kind = kind;
+  parts.header.src = kPeerId;
+  parts.header.dst = kOwnId;
+  return parts;
+}
+
+TEST(HostileNode, SendsFramesThatAreDroppedAndCounted) {
+  proto::FrameHeader lane;
+  lane.lane = 4;
+  proto::FrameHeader extensions;
+  extensions.flags = proto::kFlagExt;
+  proto::FrameHeader fragment;
+  fragment.flags = proto::kFlagFragment;
+  proto::FrameHeader key;
+  key.flags = proto::kFlagKeyed;
+  proto::FrameHeader list;
+  list.kind = proto::Kind::list;
+  list.dst = 1;
+  list.length = 3;
+  proto::FrameHeader taken;
+  taken.kind = proto::Kind::taken;
+  taken.length = proto::kTakenSize - 1;
+  for (proto::FrameHeader header : {lane, extensions, fragment, key, list, taken}) {
+    Receiving receiving;
+    header.src = kPeerId;
+    if (header.kind != proto::Kind::list) header.dst = kOwnId;
+    std::vector<std::byte> bytes(header.frame_size());
+    proto::store_header(bytes.data(), header);
+    add_frame(bytes, from_peer(), "behind it");
+    EXPECT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+    EXPECT_EQ(receiving.host.texts(), std::vector<std::string>{"behind it"});
+    EXPECT_TRUE(receiving.host.taken_received.empty());
+    EXPECT_EQ(receiving.inbound.counts().unreadable, 1u);
+    EXPECT_EQ(receiving.inbound.counts().frames, 2u);
+    EXPECT_EQ(receiving.inbound.taken(), 2u) << "the hub counts it for resume";
+  }
+}
+
+TEST(HostileNode, PaysForTheBytesThatItsMessagesKeep) {
+  constexpr std::size_t kRounds = 40;
+  Receiving receiving;
+  const std::string waste(60'000, 'x');
+  std::vector<std::byte> round;
+  add_frame(round, from_peer(), "m");
+  for (int i = 0; i < 9; ++i)  // two slabs
+    add_frame(round, from_peer(static_cast<proto::Kind>(9)), waste);
+  for (std::size_t i = 0; i < kRounds; ++i)
+    ASSERT_EQ(receiving.feed(round), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.host.texts().size(), kRounds);
+  // Each message keeps a slab; the last one has not paid for the bytes behind it.
+  EXPECT_GE(receiving.host.item_bytes,
+            (kRounds - 1) * (Slab::kBytes - 2 * proto::kHeaderSize - waste.size()));
+  receiving.host.item_bytes = 0;
+  std::vector<std::byte> small;
+  for (int i = 0; i < 100; ++i) add_frame(small, from_peer(), "m");
+  ASSERT_EQ(receiving.feed(small), Inbound::Verdict::going);
+  EXPECT_LE(receiving.host.item_bytes, 2 * Slab::kBytes + small.size());
+  receiving.host.item_bytes = 0;
+  ASSERT_EQ(receiving.feed(small), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.host.item_bytes, small.size());
+}
+
+}  // namespace
+}  // namespace gimnet::nif::test
