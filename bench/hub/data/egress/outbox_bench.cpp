@@ -3,6 +3,10 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "bench/hub/data/support/null_transport.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
 
@@ -45,6 +49,32 @@ void into_a_full_lane(benchmark::State& state, const TestFrame& frame) {
 BENCHMARK_CAPTURE(into_a_full_lane, drop, TestFrame{.flags = 2});
 BENCHMARK_CAPTURE(into_a_full_lane, oldest, TestFrame{.kind = proto::Kind::group});
 BENCHMARK_CAPTURE(into_a_full_lane, latest, TestFrame{.flags = 3 | proto::kFlagKeyed});
+
+/// Bursts of LATEST messages for a peer that comes too late for most: `range(0)` streams, each
+/// replaced once, then all are written.
+void bursts_of_streams(benchmark::State& state) {
+  EgressRig rig;
+  Outbox outbox;
+  GatherWriter writer;
+  benchmarks::NullTransport transport;
+  std::vector<hub::Run> runs;
+  for (std::int64_t key = 0; key < state.range(0); ++key) {
+    std::string payload(200, 'k');
+    payload[0] = static_cast<char>(key % 128);
+    payload[1] = static_cast<char>(key / 128);
+    runs.push_back(rig.run({payload}, TestFrame{.flags = 3 | proto::kFlagKeyed}));
+  }
+  for (auto _ : state) {
+    for (int round = 0; round < 2; ++round) {
+      for (const hub::Run& run : runs) outbox.push(run, run.header(), {}, rig.context);
+      outbox.settle(rig.context);
+    }
+    benchmark::DoNotOptimize(writer.flush(outbox, nullptr, transport, rig.context));
+    outbox.on_emptied(rig.context);
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0) * 2);
+}
+BENCHMARK(bursts_of_streams)->Arg(10)->Arg(200);
 
 /// A message of 1 MiB in fragments of 8 KiB, as it comes in a few turns.
 void fragments(benchmark::State& state) {

@@ -1,7 +1,5 @@
 #include "hub/data/egress/lane_queue.hpp"
 
-#include <boost/container_hash/hash.hpp>
-
 #include <algorithm>
 
 #include "proto/frame/frame_parser.hpp"

@@ -3,9 +3,8 @@
 #include <cstdint>
 #include <memory>
 
-#include <boost/unordered/unordered_flat_map.hpp>
-
 #include "hub/data/egress/entry.hpp"
+#include "hub/data/flat_map.hpp"
 #include "hub/data/ring_queue.hpp"
 
 namespace gimnet::hub {
@@ -89,9 +88,8 @@ class LaneQueue {
   void trim();
 
  private:
-  using StreamIndex = boost::unordered_flat_map<LatestStream, std::uint64_t>;
-  using MessageIndex =
-      boost::unordered_flat_map<std::uint64_t, std::uint64_t>;  ///< sender and message to entry
+  using StreamIndex = FlatMap<LatestStream, std::uint64_t>;
+  using MessageIndex = FlatMap<std::uint64_t, std::uint64_t>;  ///< sender and message to entry
   /// A message among more entries than these is looked up; among fewer, looking through them is
   /// cheaper.
   static constexpr std::size_t kSearchMax = 64;

@@ -2,10 +2,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <unordered_map>
 #include <utility>
 #include <vector>
-
-#include <boost/unordered/unordered_flat_map.hpp>
 
 #include "hub/data/egress/counted_groups.hpp"
 #include "hub/data/fanout/paced_subscription.hpp"
@@ -64,7 +63,7 @@ class PacedBook final : public CountedGroups {
 
   Recipient& recipient_;
   std::vector<PacedSubscription*>& ripe_;
-  boost::unordered_flat_map<std::uint32_t, std::unique_ptr<PacedSubscription>> by_group_;
+  std::unordered_map<std::uint32_t, std::unique_ptr<PacedSubscription>> by_group_;
 };
 
 }  // namespace gimnet::hub

@@ -3,8 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-
-#include <boost/unordered/unordered_flat_map.hpp>
+#include <unordered_map>
 
 #include "hub/data/egress/kept_message.hpp"
 #include "hub/data/fanout/pacer.hpp"
@@ -79,10 +78,10 @@ class RetainedMessages {
   Pacer& pacer_;
   EgressContext& context_;
   std::uint32_t starts_ = 0;  ///< asked for
-  boost::unordered_flat_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
+  std::unordered_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
   /// The first entry of each provider: sessions end all the time, and most of them had provided
   /// nothing.
-  boost::unordered_flat_map<std::uint32_t, Entry*> first_of_;
+  std::unordered_map<std::uint32_t, Entry*> first_of_;
 };
 
 }  // namespace gimnet::hub
