@@ -226,10 +226,13 @@ struct LostCounts {
   std::uint64_t frames_broken_off = 0;
   /// Messages of a group that is none of a service this node subscribed, nor lately was.
   std::uint64_t unknown_service = 0;
-  std::uint64_t unreadable = 0;  ///< frames of other nodes that break the protocol
+  /// Frames of other nodes that break the protocol, and KEYED messages without a GIMI header.
+  std::uint64_t unreadable = 0;
+  /// Messages that came after their sender had begun the stream anew (Message::begins_stream()).
+  std::uint64_t outdated = 0;
   /// How many losses are known: messages, and frames where only those are.
   [[nodiscard]] std::uint64_t all() const {
-    return incomplete + too_large + frames_broken_off + unknown_service + unreadable;
+    return incomplete + too_large + frames_broken_off + unknown_service + unreadable + outdated;
   }
 };
 

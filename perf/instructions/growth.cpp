@@ -156,7 +156,8 @@ Work acks(std::size_t count) {
       const std::uint64_t key = i * kPlaces * kInverse;
       const gimi::StreamName sender{
           Peer{}, {static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32)}, 0};
-      if (!book.take(sender, 1) || book.acknowledge(sender).sequence != 1) wrong("it was due");
+      if (!book.take(sender, {.sequence = 1}) || book.acknowledge(sender).sequence != 1)
+        wrong("it was due");
     }
   };
 }

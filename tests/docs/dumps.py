@@ -56,7 +56,7 @@ class Vector:
         if kind in (LINK, NS, CTRL):
             operation = struct.unpack_from("<H", data, HEADER)[0]
         elif kind == FLOW or self.name.startswith("gimi/"):
-            operation = data[HEADER] if kind == FLOW else data[HEADER + 12]
+            operation = data[HEADER] if kind == FLOW else data[HEADER + 16]
         return (kind if not self.name.startswith("gimi/") else 0, operation & 0x7FFF, operation >> 15, self.name)
 
 

@@ -62,7 +62,7 @@ class Dumps(unittest.TestCase):
     def test_every_operation_has_a_dump(self):
         flow = {frame.data[dumps.HEADER] for frame in FRAMES if frame.data[12] == dumps.FLOW}
         self.assertEqual(flow, {int(code) for code, _ in named("4", r"^\| (\d+) \| ([A-Z]+) \|")})
-        gimi = {frame.data[dumps.HEADER + 12] for frame in FRAMES if frame.name.startswith("gimi/")}
+        gimi = {frame.data[dumps.HEADER + 16] for frame in FRAMES if frame.name.startswith("gimi/")}
         self.assertEqual(gimi, {int(code) for code, _ in named("7", r"^\| (\d) \| ([A-Z]+) \|")})
         link = {operation(frame) for frame in FRAMES if frame.data[12] == dumps.LINK}
         self.assertEqual(link, {int(code) for code in named("3", r"^[A-Z]+ \(operation (\d)\)")})

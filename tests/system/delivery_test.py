@@ -230,7 +230,7 @@ class Losses(unittest.TestCase):
         to = hub.wait_for_node("R")["id"].split(".")
         wait_until(lambda: json.loads(run_gimnet(hub, "services", "A/B", "--json").out)[0]["subscribers"] == 1,
                    "the subscriber")
-        data = bytes(8) + struct.pack("<IBBH", 1, 0, 0, 0) + b"whole"
+        data = bytes(8) + struct.pack("<IIBBH", 1, 1, 0, 0, 0) + b"whole"
         for dst, kind in ((int(to[0]) << 20 | int(to[1]), UNICAST), (group, GROUP)):
             piece = struct.pack("<III", kind + 1, 0, 20000) + bytes(8) + bytes(1000)
             provider.send(provider.frame(dst, piece, kind=kind, flags=FLAG_FRAGMENT | FLAG_KEYED))

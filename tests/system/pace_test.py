@@ -29,7 +29,7 @@ class Windows(unittest.TestCase):
             provider.publish(10)
 
         def take():
-            return struct.unpack_from("<I", client.next_where(lambda got: got.kind == GROUP).payload, 8)[0]
+            return struct.unpack_from("<I", client.next_where(lambda got: got.kind == GROUP).payload, 12)[0]
 
         self.assertEqual([take(), take()], [1, 2])
         wait_until(lambda: hub.counter("accepted") == 9, "all are at the hub")

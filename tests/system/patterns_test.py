@@ -46,7 +46,7 @@ class Provider:
         self._client.ask(NS, WITHDRAW, number(3, 4, self._group))
 
     def publish(self, sequence, payload=b"x"):
-        data = struct.pack("<IBBH", sequence, DATA, 0, 0) + payload
+        data = struct.pack("<IIBBH", 1, sequence, DATA, 0, 0) + payload
         self._client.send(self._client.frame(self._group, bytes(KEY) + data, kind=GROUP, flags=FLAG_KEYED))
 
 

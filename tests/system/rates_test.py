@@ -24,7 +24,7 @@ FULL = os.environ.get("GIMNET_STRESS") == "full"
 MESSAGES_PER_S = 200
 RATES_BITS_PER_S = (10e6, 1e6, 1e5)
 SIZE = 1000
-FRAME = HEADER + 16 + SIZE  # key and header of GIMI
+FRAME = HEADER + 20 + SIZE  # key and header of GIMI
 # What has left the hub's queue and not passed the proxy, at most: the small buffers of the kernel between the two, as the
 # kernel counts them, which is twice what was asked for at either end, a frame that overhangs them, and a piece in the proxy.
 HELD_BYTES = 24 * 1024
@@ -61,7 +61,7 @@ class Subscriber:
         try:
             while True:
                 got = self.client.next_where(lambda frame: frame.kind == GROUP)
-                self._note(struct.unpack_from("<I", got.payload, 8)[0])
+                self._note(struct.unpack_from("<I", got.payload, 12)[0])
                 if self.credits:
                     credit = struct.pack("<B3xIQ", CREDIT, self.group, len(self.got))
                     self.client.send(self.client.frame(0, credit, kind=FLOW))
@@ -179,7 +179,7 @@ class ChangedRates(unittest.TestCase):
         return sequence
 
     def expect(self, sequence):
-        self.assertEqual(struct.unpack_from("<I", self.client.next_data().payload, 8)[0], sequence)
+        self.assertEqual(struct.unpack_from("<I", self.client.next_data().payload, 12)[0], sequence)
 
     def test_a_higher_rate_is_in_force_at_once(self):
         subscribe(self.client, "A/B", rate_hz=self.SELDOM_HZ)

@@ -48,7 +48,7 @@ def is_served(client):
 
 def message(client, target, sequence, data):
     """A GIMI message without an ACK, as `gimnet recv` takes it."""
-    return client.frame(target, struct.pack("<IIIBBH", 0, 0, sequence, 0, 0, 0) + data, flags=FLAG_KEYED)
+    return client.frame(target, struct.pack("<IIIIBBH", 0, 0, 1, sequence, 0, 0, 0) + data, flags=FLAG_KEYED)
 
 
 class Restart(unittest.TestCase):

@@ -23,7 +23,7 @@ from support.wire import (DROP, FLAG_FRAGMENT, FLAG_KEYED, FLOW, GROUP, LATEST, 
 
 MEGABYTE = 1_000_000
 RECEIVE_BUFFER = 64 * 1024
-FRAGMENT_HEADER, KEY, GIMI_HEADER = 12, 8, 16
+FRAGMENT_HEADER, KEY, GIMI_HEADER = 12, 8, 20
 
 
 def is_connected(hub, name):
@@ -45,7 +45,7 @@ class Stream:
     def _run(self):
         while not self._stopping.wait(0.05):
             self.sent += 1
-            data = bytes(KEY) + struct.pack("<IBBH", self.sent, 0, 0, 0) + b"%d" % self.sent
+            data = bytes(KEY) + struct.pack("<IIBBH", 1, self.sent, 0, 0, 0) + b"%d" % self.sent
             self._client.send(self._client.frame(self._destination, data, kind=self._kind, flags=FLAG_KEYED))
 
 

@@ -92,6 +92,13 @@ class Message {
   /// Counted by the sender for each (destination, key) from 1, and by a publisher for all its
   /// subscribers; after 2^32 - 1 comes 0.
   [[nodiscard]] std::uint32_t sequence() const { return sequence_; }
+  /// Its sender has begun the stream anew since the message before it: the sender is another
+  /// process under the same id, say after `kill -9`. sequence() counts anew, and nothing was
+  /// missed.
+  [[nodiscard]] bool begins_stream() const { return begins_stream_; }
+  /// It was sent with NIF without a GIMI header: sequence() is 0, and so are type and instance of
+  /// key().
+  [[nodiscard]] bool plain() const { return plain_; }
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
   /// When it was read from the network, by this machine's clock in ns since 1970.
@@ -118,6 +125,8 @@ class Message {
   std::uint32_t sequence_ = 0;
   std::uint32_t reconnects_ = 0;
   Lane lane_ = Lane::normal;
+  bool begins_stream_ = false;
+  bool plain_ = false;
   std::uint32_t group_ = 0;
   std::uint32_t epoch_ = 0;  ///< of a message that counts in a window
 };

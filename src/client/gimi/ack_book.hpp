@@ -36,11 +36,12 @@ class AckBook {
  public:
   static constexpr std::size_t kStreamsMax = 65536;
 
-  /// A DATA that asked for an ACK was taken. True: the sender is due for an ACK, and was not
-  /// before.
-  bool take(const StreamName& sender, std::uint32_t sequence);
+  /// A DATA that asked for an ACK was taken; of another epoch it begins a new count. True: the
+  /// sender is due for an ACK, and was not before.
+  bool take(const StreamName& sender, const proto::gimi::MessageHeader& data);
 
   struct Entry {
+    std::uint32_t epoch = 0;
     std::uint32_t sequence = 0;
     std::uint64_t bitmap = 0;
     bool due = false;

@@ -33,28 +33,36 @@ void Clerk::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Clerk::take(const StreamName& sender, Lane lane, std::uint32_t sequence) {
+void Clerk::take(const StreamName& sender, Lane lane, const proto::gimi::MessageHeader& data) {
   {
     const MutexLock lock(mutex_);
-    if (!book_.take(sender, sequence)) return;
+    if (!book_.take(sender, data)) return;
     due_.push_back({sender, lane});
     if (due_.size() != 1) return;
   }
   work_.notify_one();
 }
 
-nif_status Clerk::acknowledge(const StreamName& sender, Lane lane, std::uint32_t pong) {
-  AckBook::Entry entry;
+nif_status Clerk::acknowledge(const StreamName& sender, Lane lane,
+                              const proto::gimi::MessageHeader& ping) {
+  AckBook::Entry taken;
   {
     const MutexLock lock(mutex_);
-    entry = book_.acknowledge(sender);
+    taken = book_.acknowledge(sender);
   }
+  // Nothing was taken of the epoch of which it asks.
+  if (taken.epoch != ping.epoch) taken = {.epoch = ping.epoch};
+  return send_ack(sender, lane, taken, ping.sequence);
+}
+
+nif_status Clerk::send_ack(const StreamName& sender, Lane lane, AckBook::Entry taken,
+                           std::uint32_t pong) const {
   std::array<std::byte, proto::gimi::kAckSizeMax> memory;
-  const std::size_t size = proto::gimi::encode_ack({entry.bitmap, pong, sender.group}, memory);
+  const std::size_t size = proto::gimi::encode_ack({taken.bitmap, pong, sender.group}, memory);
   const std::span<const std::byte> data = std::span(memory).first(size);
   const Envelope envelope{sender.peer.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, sender.key, 0, 0};
-  return uplink_.transmit(envelope, {entry.sequence, proto::gimi::Operation::ack, 0, 0}, false,
-                          data, 0);
+  return uplink_.transmit(
+      envelope, {taken.sequence, proto::gimi::Operation::ack, 0, 0, taken.epoch}, false, data, 0);
 }
 
 void Clerk::attend(bool at_once) {
@@ -111,8 +119,14 @@ void Clerk::run() {
 }
 
 void Clerk::send_due(std::vector<Due>& due) {
-  std::erase_if(
-      due, [this](const Due& ack) { return acknowledge(ack.sender, ack.lane, 0) != NIF_TIMEOUT; });
+  std::erase_if(due, [this](const Due& ack) {
+    AckBook::Entry taken;
+    {
+      const MutexLock lock(mutex_);
+      taken = book_.acknowledge(ack.sender);
+    }
+    return send_ack(ack.sender, ack.lane, taken, 0) != NIF_TIMEOUT;
+  });
 }
 
 }  // namespace gimnet::gimi

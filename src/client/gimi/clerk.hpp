@@ -24,10 +24,12 @@ class Clerk {
   void stop() GIMNET_EXCLUDES(mutex_);
 
   /// A DATA that asked for an ACK is in its queue.
-  void take(const StreamName& sender, Lane lane, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
-  /// Sends the ACK that goes before the PONG with that number, from the thread of the caller. Does
-  /// not wait.
-  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane, std::uint32_t pong)
+  void take(const StreamName& sender, Lane lane, const proto::gimi::MessageHeader& data)
+      GIMNET_EXCLUDES(mutex_);
+  /// Sends the ACK that goes before the PONG for that PING, from the thread of the caller. Does not
+  /// wait.
+  [[nodiscard]] nif_status acknowledge(const StreamName& sender, Lane lane,
+                                       const proto::gimi::MessageHeader& ping)
       GIMNET_EXCLUDES(mutex_);
   /// Streams want to be looked after, soon or at once.
   void attend(bool at_once) GIMNET_EXCLUDES(mutex_);
@@ -38,6 +40,9 @@ class Clerk {
     Lane lane;
   };
   void run();
+  /// `pong`: the number of the PONG that follows, or 0.
+  [[nodiscard]] nif_status send_ack(const StreamName& sender, Lane lane, AckBook::Entry taken,
+                                    std::uint32_t pong) const;
   /// `paused`: an ACK is to be tried again.
   void wait_for_work(std::int64_t& tick_at, bool paused) GIMNET_REQUIRES(mutex_);
   /// Keeps in `due` what could not be sent because the hub has paused its way.

@@ -63,18 +63,19 @@ nif_verdict verdict_of(ServiceTable::Place place) {
 /// The ACK of a message becomes due before the program can take the message and leave.
 class AckReceipt final : public Receipt {
  public:
-  AckReceipt(Clerk& clerk, const StreamName& sender, Lane lane, std::uint32_t sequence)
-      : clerk_(clerk), sender_(sender), lane_(lane), sequence_(sequence) {}
-  void on_kept() override { clerk_.take(sender_, lane_, sequence_); }
+  AckReceipt(Clerk& clerk, const StreamName& sender, Lane lane,
+             const proto::gimi::MessageHeader& data)
+      : clerk_(clerk), sender_(sender), lane_(lane), data_(data) {}
+  void on_kept() override { clerk_.take(sender_, lane_, data_); }
 
  private:
   Clerk& clerk_;
   const StreamName& sender_;
   const Lane lane_;
-  const std::uint32_t sequence_;
+  const proto::gimi::MessageHeader data_;
 };
 
-/// The GIMI header in the 16 bytes that a report repeats: behind the key, where nothing stands
+/// The GIMI header in the 20 bytes that a report repeats: behind the key, where nothing stands
 /// before it. NIF takes the fragment header away of what it remembers.
 std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
   const auto bytes = payload_of(in);
@@ -188,7 +189,7 @@ LostCounts Core::lost() const {
   // A number by itself.
   if (nif_get_counters(node(), &counters) == NIF_OK)
     unreadable_.store(counters.frames_unreadable, std::memory_order_relaxed);
-  counts.unreadable = unreadable_.load(std::memory_order_relaxed);  // as above
+  counts.unreadable += unreadable_.load(std::memory_order_relaxed);  // as above
   return counts;
 }
 
@@ -224,8 +225,9 @@ Outcome<std::int64_t> Core::ping(Peer to, Timeout timeout, Lane lane, BytesView 
   const std::uint32_t number = uplink_.next_ping();
   pings_.expect(number, to);
   const Envelope envelope{to.id, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, {}, 0, NIF_FLAG_REPORT};
-  const nif_status status = uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0},
-                                             false, data, nif_timeout(timeout));
+  const nif_status status =
+      uplink_.transmit(envelope, {number, proto::gimi::Operation::ping, 0, 0, ping_epoch_}, false,
+                       data, nif_timeout(timeout));
   if (status == NIF_OK) return pings_.wait(number, deadline, timeout);
   pings_.forget(number);
   return failure_of(status, "ping " + to.text());
@@ -274,10 +276,10 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
 
 nif_verdict Core::on_message(const nif_incoming& in) {
   using proto::gimi::Operation;
-  const auto view =
-      (in.flags & NIF_FLAG_KEYED) != 0 ? proto::gimi::parse_message(payload_of(in)) : std::nullopt;
+  if ((in.flags & NIF_FLAG_KEYED) == 0) return on_plain(in);
+  const auto view = proto::gimi::parse_message(payload_of(in));
   if (!view) {
-    inbox_.count_dropped();
+    losses_.add_unreadable();
     return NIF_DONE;
   }
   switch (view->header.operation) {
@@ -293,7 +295,7 @@ nif_verdict Core::on_message(const nif_incoming& in) {
       on_ping(in, *view);
       return NIF_DONE;
     case Operation::pong:
-      pings_.on_pong(view->header.sequence, Peer{in.from});
+      if (view->header.epoch == ping_epoch_) pings_.on_pong(view->header.sequence, Peer{in.from});
       return NIF_DONE;
     default:
       inbox_.count_dropped();
@@ -305,12 +307,47 @@ nif_verdict Core::on_data(const nif_incoming& in, const proto::gimi::MessageView
   if (view.data.size() > message_bytes_max_) return refuse(in, view);
   if (in.kind == NIF_GROUP) return on_group_data(in, view);
   const StreamName name = received_stream_of(in);
+  StreamEpochs& epochs = received_.find({name.peer, in.kind, name.group, name.key});
+  const StreamEpochs::Step step = epochs.look(view.header.epoch);
+  if (step == StreamEpochs::Step::former) return drop_outdated();
   Message message = MessageAccess::make(in, view, nullptr, reconnects_);
-  AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header.sequence);
+  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
+  AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header);
   const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
-  if (inbox_.put(name.key, message, wanted ? &receipt : nullptr)) return NIF_KEEP;
+  if (!inbox_.put(name.key, message, wanted ? &receipt : nullptr)) {
+    MessageAccess::disown(message);
+    return NIF_NOT_NOW;
+  }
+  epochs.take(view.header.epoch);
+  return NIF_KEEP;
+}
+
+nif_verdict Core::on_plain(const nif_incoming& in) {
+  const auto data = payload_of(in);
+  if (data.size() > message_bytes_max_) {
+    losses_.add(proto::DropReason::too_large, 1);
+    return NIF_DONE;
+  }
+  MessageQueue* queue = nullptr;
+  std::shared_ptr<const std::string> service_name;
+  if (in.kind == NIF_GROUP) {
+    const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+    if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
+    if (service == nullptr) return verdict_of(place);
+    queue = &service->queue();
+    service_name = service->shared_name();
+  }
+  Message message = MessageAccess::make_plain(in, data, std::move(service_name), reconnects_);
+  const bool taken = queue != nullptr ? inbox_.put(*queue, message, nullptr)
+                                      : inbox_.put(MessageKey{}, message, nullptr);
+  if (taken) return NIF_KEEP;
   MessageAccess::disown(message);
   return NIF_NOT_NOW;
+}
+
+nif_verdict Core::drop_outdated() {
+  losses_.add_outdated();
+  return NIF_DONE;
 }
 
 nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -319,13 +356,19 @@ nif_verdict Core::on_group_data(const nif_incoming& in, const proto::gimi::Messa
   if (service == nullptr) return verdict_of(place);
   // After a break the hub gives the last message of a retained service again: it does not know who
   // had it.
-  if (service->is_repeated(in.from, view.header.sequence)) return NIF_DONE;
+  const StreamName name = stream_of(in, in.from, 0);
+  const SubscribedService::Position position{name.peer, name.key, view.header.epoch,
+                                             view.header.sequence};
+  if (service->is_repeated(position)) return NIF_DONE;
+  const StreamEpochs::Step step = service->look(position);
+  if (step == StreamEpochs::Step::former) return drop_outdated();
   Message message = MessageAccess::make(in, view, service->shared_name(), reconnects_);
+  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
   if (!inbox_.put(service->queue(), message, nullptr)) {
     MessageAccess::disown(message);
     return NIF_NOT_NOW;
   }
-  service->on_message(in.from, view.header.sequence);
+  service->on_message(position);
   return NIF_KEEP;
 }
 
@@ -341,9 +384,9 @@ nif_verdict Core::refuse(const nif_incoming& in, const proto::gimi::MessageView&
       in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
   // Where there is no room for it, the sender learns from the next PONG that the message is not
   // here.
-  static_cast<void>(
-      uplink_.transmit(envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0}, false,
-                       proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
+  static_cast<void>(uplink_.transmit(
+      envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
+      false, proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
   return NIF_DONE;
 }
 
@@ -351,13 +394,13 @@ void Core::on_error(const nif_incoming& in, const proto::gimi::MessageView& view
   const auto failure = proto::gimi::decode_failure(view.data);
   if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
   streams_.on_refused(
-      stream_of(in, in.from, failure->group), view.header.sequence,
+      stream_of(in, in.from, failure->group), view.header,
       {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
 }
 
 void Core::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
   const auto ack = proto::gimi::decode_ack(view.data);
-  if (ack) streams_.on_ack(stream_of(in, in.from, ack->group), view.header.sequence, *ack);
+  if (ack) streams_.on_ack(stream_of(in, in.from, ack->group), view.header, *ack);
 }
 
 void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view) {
@@ -366,12 +409,13 @@ void Core::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view)
   const auto lane = static_cast<Lane>(in.lane);
   // Both fit or neither arrives: whoever misses them asks again.
   if (view.header.has(proto::gimi::kFlagAckWanted) &&
-      clerk_.acknowledge(name, lane, view.header.sequence) != NIF_OK) {
+      clerk_.acknowledge(name, lane, view.header) != NIF_OK) {
     return;
   }
   const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
   static_cast<void>(uplink_.transmit(
-      envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0}, false, view.data, 0));
+      envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0, view.header.epoch},
+      false, view.data, 0));
 }
 
 void Core::on_report(const nif_incoming& in) {
@@ -382,10 +426,12 @@ void Core::on_report(const nif_incoming& in) {
   const bool to_service = in.kind == NIF_SERVICE;
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
   const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;
-  StreamTable::Report report{name, keyed, in.reason, in.count, 0, in.text};
-  if (header && header->operation == proto::gimi::Operation::data)
+  StreamTable::Report report{name, keyed, in.reason, in.count, 0, 0, in.text};
+  if (header && header->operation == proto::gimi::Operation::data) {
     report.sequence = header->sequence;
-  if (header && header->operation == proto::gimi::Operation::ping) {
+    report.epoch = header->epoch;
+  }
+  if (header && header->operation == proto::gimi::Operation::ping && header->epoch == ping_epoch_) {
     pings_.on_lost(header->sequence, report_words(report.text));
   }
   streams_.on_report(report);

@@ -11,6 +11,7 @@
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/ping_table.hpp"
+#include "client/gimi/received_streams.hpp"
 #include "client/gimi/service_table.hpp"
 #include "client/gimi/stream_table.hpp"
 #include "client/gimi/uplink.hpp"
@@ -50,8 +51,12 @@ class Core {
   [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  /// A message without a GIMI header.
+  [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
   [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
                                           const proto::gimi::MessageView& view);
+  /// Of a stream that its sender has begun anew since.
+  [[nodiscard]] nif_verdict drop_outdated();
   void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
   void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
   /// A message that is larger than this node takes: its sender is told.
@@ -70,6 +75,8 @@ class Core {
   ServiceTable services_;
   WatchTable watches_;
   PingTable pings_;
+  const std::uint32_t ping_epoch_ = Uplink::draw_epoch();
+  ReceivedStreams received_;  ///< the library's thread
   LossTally losses_;
   mutable std::atomic<std::uint64_t> unreadable_{0};  ///< as NIF counted when it was asked last
   Clerk clerk_;

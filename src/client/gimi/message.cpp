@@ -31,6 +31,8 @@ void Message::swap(Message& other) noexcept {
   std::swap(sequence_, other.sequence_);
   std::swap(reconnects_, other.reconnects_);
   std::swap(lane_, other.lane_);
+  std::swap(begins_stream_, other.begins_stream_);
+  std::swap(plain_, other.plain_);
   std::swap(group_, other.group_);
   std::swap(epoch_, other.epoch_);
 }
@@ -51,6 +53,17 @@ Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageVi
   message.lane_ = static_cast<Lane>(in.lane);
   message.group_ = in.to;
   message.epoch_ = in.epoch;
+  return message;
+}
+
+Message MessageAccess::make_plain(const nif_incoming& in, std::span<const std::byte> data,
+                                  std::shared_ptr<const std::string> service,
+                                  std::uint32_t reconnects) {
+  proto::gimi::MessageView view;
+  view.data = data;
+  Message message = make(in, view, std::move(service), reconnects);
+  message.key_ = {};
+  message.plain_ = true;
   return message;
 }
 

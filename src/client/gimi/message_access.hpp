@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "gimnet/gimi/message.hpp"
@@ -15,6 +17,11 @@ struct MessageAccess {
   [[nodiscard]] static Message make(const nif_incoming& in, const proto::gimi::MessageView& view,
                                     std::shared_ptr<const std::string> service,
                                     std::uint32_t reconnects);
+  /// As make(), of bytes without a GIMI header.
+  [[nodiscard]] static Message make_plain(const nif_incoming& in, std::span<const std::byte> data,
+                                          std::shared_ptr<const std::string> service,
+                                          std::uint32_t reconnects);
+  static void begin_stream(Message& message) { message.begins_stream_ = true; }
   /// The group and epoch in which it counts; epoch 0: in none.
   [[nodiscard]] static std::uint32_t group_of(const Message& message) { return message.group_; }
   [[nodiscard]] static std::uint32_t epoch_of(const Message& message) { return message.epoch_; }

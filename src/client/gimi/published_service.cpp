@@ -35,8 +35,8 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
     sending_ = true;
   }
   const nif_status status =
-      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0}, options_.timestamp,
-                       data, nif_timeout_until(deadline));
+      uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0, epoch_},
+                       options_.timestamp, data, nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name());
   const MutexLock lock(mutex_);
   sending_ = false;

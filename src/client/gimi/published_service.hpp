@@ -53,6 +53,7 @@ class PublishedService {
   Uplink& uplink_;
   const std::string name_;
   const PublishOptions options_;
+  const std::uint32_t epoch_ = Uplink::draw_epoch();  ///< of its stream
 
   Mutex mutex_;
   Condition changed_;

@@ -10,10 +10,6 @@ namespace {
 
 using proto::gimi::Operation;
 
-proto::gimi::MessageHeader header_of(Operation operation, std::uint32_t number) {
-  return {number, operation, 0, 0};
-}
-
 Loss withdrawn() { return {LossReason::service_gone, "the service was withdrawn"}; }
 
 }  // namespace
@@ -30,8 +26,8 @@ Outcome<void> SendStream::send(BytesView data, Timeout timeout, More more) {
     sequence = window_.open(data.size(), steady_now_ns());
     to = destination_;
   }
-  const nif_status status =
-      transmit(to, header_of(Operation::data, sequence), data, more, nif_timeout_until(deadline));
+  const nif_status status = transmit(to, {sequence, Operation::data, 0, 0, epoch_}, data, more,
+                                     nif_timeout_until(deadline));
   auto failure = status == NIF_OK ? Failure{} : failure_of(status, "send to " + target());
   bool unwatched = false;
   {
@@ -113,7 +109,7 @@ nif_status SendStream::transmit(const Destination& to, const proto::gimi::Messag
 nif_status SendStream::transmit_ping(const Destination& to, std::uint32_t number) const {
   std::array<std::byte, proto::gimi::kPingTimeSize> sent;
   store_le(sent.data(), wall_now_ns());
-  return transmit(to, header_of(Operation::ping, number), sent, More::no, 0);
+  return transmit(to, {number, Operation::ping, 0, 0, epoch_}, sent, More::no, 0);
 }
 
 /// True: somebody should watch over the stream. Another thread may have left a message to be held
@@ -269,7 +265,7 @@ bool SendStream::tick(std::int64_t now_ns) {
   }
   if (data) {
     const nif_status status =
-        transmit(to, header_of(Operation::data, sequence), *data, More::no, 0);
+        transmit(to, {sequence, Operation::data, 0, 0, epoch_}, *data, More::no, 0);
     const MutexLock lock(mutex_);
     static_cast<void>(finish(sequence, status, More::no));
     // Before the turn is anybody else's, whose message is newer.

@@ -63,6 +63,8 @@ class SendStream {
   [[nodiscard]] Peer to() const { return to_; }
   /// "" of a stream to a node.
   [[nodiscard]] const std::string& service() const { return service_; }
+  /// Drawn when the stream is made; tells it from those of a former process under the same id.
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
 
   /// True: a message that is held can go; tick() sends it.
   [[nodiscard]] bool on_ack(std::uint32_t sequence, const proto::gimi::Ack& ack)
@@ -113,6 +115,7 @@ class SendStream {
   const Peer to_;
   const std::string service_;
   const SendOptions options_;
+  const std::uint32_t epoch_ = Uplink::draw_epoch();
 
   Mutex mutex_;
   Condition changed_;

@@ -95,14 +95,17 @@ std::vector<SendStream*> StreamTable::all() {
   return streams;
 }
 
-void StreamTable::on_ack(const StreamName& name, std::uint32_t sequence,
+void StreamTable::on_ack(const StreamName& name, const proto::gimi::MessageHeader& header,
                          const proto::gimi::Ack& ack) {
   SendStream* stream = find(name);
-  if (stream != nullptr && stream->on_ack(sequence, ack)) attend_(true);
+  if (stream == nullptr || stream->epoch() != header.epoch) return;
+  if (stream->on_ack(header.sequence, ack)) attend_(true);
 }
 
-void StreamTable::on_refused(const StreamName& name, std::uint32_t sequence, const Loss& why) {
-  if (SendStream* stream = find(name); stream != nullptr) stream->on_lost(sequence, why);
+void StreamTable::on_refused(const StreamName& name, const proto::gimi::MessageHeader& header,
+                             const Loss& why) {
+  SendStream* stream = find(name);
+  if (stream != nullptr && stream->epoch() == header.epoch) stream->on_lost(header.sequence, why);
 }
 
 void StreamTable::on_report(const Report& report) {
@@ -124,7 +127,7 @@ void StreamTable::on_report(const Report& report) {
     return attend_(true);
   }
   SendStream* stream = find(report.name);
-  if (stream == nullptr) return;
+  if (stream == nullptr || (report.sequence != 0 && report.epoch != stream->epoch())) return;
   if (report.sequence != 0) stream->on_lost(report.sequence, why);
   if (report.sequence != 0 && report.count == 1) return;
   stream->on_doubt(why);

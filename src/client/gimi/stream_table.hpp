@@ -37,11 +37,11 @@ class StreamTable final : public StreamKeeper {
   void on_service_moved(const std::string& full_name, const ServicePlace& place)
       GIMNET_EXCLUDES(mutex_);
 
-  void on_ack(const StreamName& name, std::uint32_t sequence, const proto::gimi::Ack& ack)
-      GIMNET_EXCLUDES(mutex_);
-
-  /// The receiver says that it did not take that DATA, and why.
-  void on_refused(const StreamName& name, std::uint32_t sequence, const Loss& why)
+  /// `header`: of the answer. One of another epoch is not for this process and changes nothing.
+  void on_ack(const StreamName& name, const proto::gimi::MessageHeader& header,
+              const proto::gimi::Ack& ack) GIMNET_EXCLUDES(mutex_);
+  /// The receiver says that it did not take that DATA, and why. `header`: as on_ack().
+  void on_refused(const StreamName& name, const proto::gimi::MessageHeader& header, const Loss& why)
       GIMNET_EXCLUDES(mutex_);
 
   /// What the hub says of a frame of this node that it could not deliver.
@@ -51,6 +51,7 @@ class StreamTable final : public StreamKeeper {
     std::uint32_t reason = 0;
     std::uint64_t count = 1;
     std::uint32_t sequence = 0;  ///< of the DATA; 0: not known
+    std::uint32_t epoch = 0;     ///< of the DATA, if the sequence is known
     std::string text;
   };
   void on_report(const Report& report) GIMNET_EXCLUDES(mutex_);

@@ -1,5 +1,6 @@
 #include "client/gimi/subscribed_service.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "client/gimi/deadline.hpp"
@@ -50,18 +51,38 @@ bool SubscribedService::is_refused() {
   return refusal_.has_value();
 }
 
-bool SubscribedService::is_repeated(std::uint32_t from, std::uint32_t sequence) {
+bool SubscribedService::is_repeated(const Position& message) {
   const MutexLock lock(mutex_);
-  return from == provider_ && sequence == sequence_ && sequence != 0;
+  return message.sequence != 0 && message.from == last_.from && message.epoch == last_.epoch &&
+         message.sequence == last_.sequence;
 }
 
-void SubscribedService::on_message(std::uint32_t from, std::uint32_t sequence) {
+SubscribedService::Stream* SubscribedService::find(const Position& message) {
+  const auto found = std::ranges::find_if(streams_, [&message](const Stream& each) {
+    return each.from == message.from && each.key == message.key;
+  });
+  return found == streams_.end() ? nullptr : &*found;
+}
+
+StreamEpochs::Step SubscribedService::look(const Position& message) {
   const MutexLock lock(mutex_);
-  const auto step = static_cast<std::int32_t>(sequence - sequence_);
-  // The first of a provider says where it stands; a provider that began again counts from 1.
-  if (from == provider_ && step > 0) missed_ += static_cast<std::uint32_t>(step - 1);
-  provider_ = from;
-  sequence_ = sequence;
+  const Stream* stream = find(message);
+  return stream == nullptr ? StreamEpochs::Step::first : stream->epochs.look(message.epoch);
+}
+
+void SubscribedService::on_message(const Position& message) {
+  const MutexLock lock(mutex_);
+  const auto step = static_cast<std::int32_t>(message.sequence - last_.sequence);
+  // The first of a provider, or of an epoch, says where it stands.
+  if (message.from == last_.from && message.epoch == last_.epoch && step > 0)
+    missed_ += static_cast<std::uint32_t>(step - 1);
+  last_ = message;
+  Stream* stream = find(message);
+  if (stream == nullptr) {
+    if (streams_.size() == kProvidersMax) streams_.erase(streams_.begin());
+    stream = &streams_.emplace_back(Stream{message.from, message.key, {}});
+  }
+  stream->epochs.take(message.epoch);
 }
 
 void SubscribedService::on_place(const ServicePlace& now) {

@@ -11,6 +11,7 @@
 #include "client/gimi/ending.hpp"
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/message_queue.hpp"
+#include "client/gimi/received_streams.hpp"
 #include "client/gimi/send_stream.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -42,11 +43,19 @@ class SubscribedService {
   /// The hub did not take the subscription again, and was not asked since.
   [[nodiscard]] bool is_refused() GIMNET_EXCLUDES(mutex_);
 
-  /// The message that came last from that provider comes once more.
-  [[nodiscard]] bool is_repeated(std::uint32_t from, std::uint32_t sequence)
-      GIMNET_EXCLUDES(mutex_);
-  /// One of its messages is in the queue.
-  void on_message(std::uint32_t from, std::uint32_t sequence) GIMNET_EXCLUDES(mutex_);
+  /// One of its messages, as far as it says where it stands.
+  struct Position {
+    Peer from;
+    MessageKey key;
+    std::uint32_t epoch = 0;
+    std::uint32_t sequence = 0;
+  };
+  /// The message that came last comes once more.
+  [[nodiscard]] bool is_repeated(const Position& message) GIMNET_EXCLUDES(mutex_);
+  /// What a message would be. Changes nothing.
+  [[nodiscard]] StreamEpochs::Step look(const Position& message) GIMNET_EXCLUDES(mutex_);
+  /// One of its messages is in the queue. REQUIRES: look() is not `former`.
+  void on_message(const Position& message) GIMNET_EXCLUDES(mutex_);
   void on_place(const ServicePlace& now) GIMNET_EXCLUDES(mutex_);
   /// The hub did not take the subscription again; until on_place().
   void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
@@ -66,6 +75,15 @@ class SubscribedService {
   std::vector<std::uint32_t> groups;
 
  private:
+  /// Providers of which the epochs are remembered: the name goes from one to another seldom.
+  static constexpr std::size_t kProvidersMax = 8;
+  struct Stream {
+    Peer from;
+    MessageKey key;
+    StreamEpochs epochs;
+  };
+  [[nodiscard]] Stream* find(const Position& message) GIMNET_REQUIRES(mutex_);
+
   const std::shared_ptr<const std::string> name_;
   MessageQueue& queue_;
 
@@ -74,8 +92,8 @@ class SubscribedService {
   bool exists_ GIMNET_GUARDED_BY(mutex_) = false;
   bool accepts_ GIMNET_GUARDED_BY(mutex_) = false;
   std::optional<Failure> refusal_ GIMNET_GUARDED_BY(mutex_);
-  std::uint32_t provider_ GIMNET_GUARDED_BY(mutex_) = 0;
-  std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
+  Position last_ GIMNET_GUARDED_BY(mutex_);                ///< from nobody: nothing came yet
+  std::vector<Stream> streams_ GIMNET_GUARDED_BY(mutex_);  ///< the one that began last is the last
   std::uint64_t missed_ GIMNET_GUARDED_BY(mutex_) = 0;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };

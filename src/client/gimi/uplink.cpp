@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "base/clock.hpp"
+#include "base/random.hpp"
 
 namespace gimnet::gimi {
 
@@ -107,5 +108,7 @@ std::uint32_t Uplink::next_ping() {
   while (number == 0) number = ++pings_;
   return number;
 }
+
+std::uint32_t Uplink::draw_epoch() { return static_cast<std::uint32_t>(random_bits()); }
 
 }  // namespace gimnet::gimi

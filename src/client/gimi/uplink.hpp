@@ -45,6 +45,8 @@ class Uplink {
 
   /// A number for a PING; never 0.
   [[nodiscard]] std::uint32_t next_ping();
+  /// For a stream that begins: 32 random bits (docs/protocol.md, section 7).
+  [[nodiscard]] static std::uint32_t draw_epoch();
 
  private:
   std::atomic<nif_node*> node_{nullptr};

@@ -12,7 +12,8 @@
 
 namespace gimnet::proto {
 
-inline constexpr std::size_t kReportFollowingMax = 16;
+/// A key and a GIMI header.
+inline constexpr std::size_t kReportFollowingMax = 20;
 inline constexpr std::size_t kReportSizeMin = 8 + kHeaderSize;
 inline constexpr std::size_t kReportSizeMax = kReportSizeMin + kReportFollowingMax;
 
@@ -20,14 +21,14 @@ struct Report {
   DropReason reason = DropReason::none;  ///< none: a reason that this version does not know
   std::uint32_t count = 0;               ///< frames, 0 only from a broken hub
   FrameHeader header;                    ///< of the last of them
-  /// The first bytes after that header, at most 16. Valid until: the decoded payload changes.
+  /// The first bytes after that header, at most 20. Valid until: the decoded payload changes.
   std::span<const std::byte> following;
 };
 
 /// Nothing: too short. Bytes after the layout are skipped.
 [[nodiscard]] std::optional<Report> decode_report(std::span<const std::byte> payload);
 
-/// Writes the payload and returns its size. Of `following` the first 16 bytes count.
+/// Writes the payload and returns its size. Of `following` the first 20 bytes count.
 std::size_t encode_report(const Report& report, std::span<std::byte, kReportSizeMax> payload);
 
 }  // namespace gimnet::proto

@@ -7,15 +7,17 @@
 namespace gimnet::proto::gimi {
 
 MessageHeader load_message_header(const std::byte* bytes) {
-  return {load_le<std::uint32_t>(bytes), static_cast<Operation>(bytes[4]),
-          static_cast<std::uint8_t>(bytes[5]), load_le<std::uint16_t>(bytes + 6)};
+  return {load_le<std::uint32_t>(bytes + 4), static_cast<Operation>(bytes[8]),
+          static_cast<std::uint8_t>(bytes[9]), load_le<std::uint16_t>(bytes + 10),
+          load_le<std::uint32_t>(bytes)};
 }
 
 void store_message_header(std::byte* bytes, const MessageHeader& header) {
-  store_le(bytes, header.sequence);
-  bytes[4] = static_cast<std::byte>(header.operation);
-  bytes[5] = static_cast<std::byte>(header.flags);
-  store_le(bytes + 6, header.extension_bytes);
+  store_le(bytes, header.epoch);
+  store_le(bytes + 4, header.sequence);
+  bytes[8] = static_cast<std::byte>(header.operation);
+  bytes[9] = static_cast<std::byte>(header.flags);
+  store_le(bytes + 10, header.extension_bytes);
 }
 
 std::optional<MessageView> parse_message(std::span<const std::byte> payload) {

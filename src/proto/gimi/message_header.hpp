@@ -12,7 +12,7 @@
 
 namespace gimnet::proto::gimi {
 
-inline constexpr std::size_t kMessageHeaderSize = 8;
+inline constexpr std::size_t kMessageHeaderSize = 12;
 inline constexpr std::size_t kTimestampSize = 8;
 inline constexpr std::size_t kAckSize = 12;
 inline constexpr std::size_t kAckSizeMax = 16;
@@ -46,18 +46,21 @@ enum class Operation : std::uint8_t {
 inline constexpr std::uint8_t kFlagAckWanted = 0x01;
 inline constexpr std::uint8_t kFlagTimestamp = 0x02;
 
+/// On the wire: epoch, sequence, operation, flags, extension_bytes.
 struct MessageHeader {
   std::uint32_t sequence = 0;
   Operation operation = Operation::data;
   std::uint8_t flags = 0;
   std::uint16_t extension_bytes = 0;
+  /// Of the sending stream; of an answer that of the message that it answers.
+  std::uint32_t epoch = 0;
   [[nodiscard]] constexpr bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   friend constexpr bool operator==(const MessageHeader&, const MessageHeader&) = default;
 };
 
-/// REQUIRES: 8 readable bytes.
+/// REQUIRES: 12 readable bytes.
 [[nodiscard]] MessageHeader load_message_header(const std::byte* bytes);
-/// REQUIRES: 8 writable bytes.
+/// REQUIRES: 12 writable bytes.
 void store_message_header(std::byte* bytes, const MessageHeader& header);
 
 /// A message taken apart. Valid until: its bytes change.
@@ -73,7 +76,7 @@ struct MessageView {
 [[nodiscard]] std::optional<MessageView> parse_message(std::span<const std::byte> payload);
 
 /// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it.
-/// Sets the flag and `extension_bytes` of the header. Returns the size, 8 or 16.
+/// Sets the flag and `extension_bytes` of the header. Returns the size, 12 or 20.
 inline constexpr std::size_t kMessagePrefixMax = kMessageHeaderSize + kTimestampSize;
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
                                  std::span<std::byte, kMessagePrefixMax> bytes);

@@ -36,7 +36,9 @@ std::vector<std::string> LostMessages::rest() {
   add_sentence(sentences, counts_.unknown_service, told_.unknown_service,
                {"message", "of a service that this end does not know to have subscribed"});
   add_sentence(sentences, counts_.unreadable, told_.unreadable,
-               {"frame", "another node broke the protocol"});
+               {"frame", "another node broke the protocol, or sent a key without a GIMI header"});
+  add_sentence(sentences, counts_.outdated, told_.outdated,
+               {"message", "its sender had been started again, and had sent newer ones"});
   told_ = counts_;
   return sentences;
 }

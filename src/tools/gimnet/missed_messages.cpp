@@ -19,7 +19,9 @@ std::uint64_t MissedMessages::take(const Message& message) {
       found != services_.end() ? found->second : services_[std::string(message.service())];
   const auto step = static_cast<std::int32_t>(message.sequence() - service.sequence);
   // The first of a provider says where it stands; a provider that began again counts from 1.
-  if (message.from().id == service.provider && step > 0) {
+  if (message.begins_stream() || message.plain()) {
+    // Nothing is known to be missing.
+  } else if (message.from().id == service.provider && step > 0) {
     if (step > 1) count(service, static_cast<std::uint32_t>(step - 1), message);
   } else if (take_lateness_ && take_lateness_(message.service()) && message.sequence() > 1) {
     const std::uint32_t early = message.sequence() - 1;
@@ -48,7 +50,8 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
 }
 
 void MissedMessages::take_lost(const LostCounts& counts) {
-  const std::uint64_t lost = counts.incomplete + counts.too_large + counts.unknown_service;
+  const std::uint64_t lost =
+      counts.incomplete + counts.too_large + counts.unknown_service + counts.outdated;
   told_as_lost_ += lost - lost_;
   lost_ = lost;
 }

@@ -8,6 +8,10 @@ namespace {
 constexpr StreamName kSender{Peer{1}, {2, 3}};
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
+proto::gimi::MessageHeader data(std::uint32_t sequence, std::uint32_t epoch = 1) {
+  return {sequence, proto::gimi::Operation::data, 0, 0, epoch};
+}
+
 TEST(AckBook, KnowsNothingOfAStranger) {
   AckBook book;
   EXPECT_EQ(book.acknowledge(kSender).sequence, 0u);
@@ -16,75 +20,83 @@ TEST(AckBook, KnowsNothingOfAStranger) {
 
 TEST(AckBook, IsDueOnceUntilItIsAcknowledged) {
   AckBook book;
-  EXPECT_TRUE(book.take(kSender, 1));
-  EXPECT_FALSE(book.take(kSender, 2));
+  EXPECT_TRUE(book.take(kSender, data(1)));
+  EXPECT_FALSE(book.take(kSender, data(2)));
   EXPECT_EQ(book.acknowledge(kSender).sequence, 2u);
-  EXPECT_TRUE(book.take(kSender, 3));
+  EXPECT_TRUE(book.take(kSender, data(3)));
 }
 
 TEST(AckBook, RemembersTheSixtyFourBeforeTheHighest) {
   AckBook book;
-  for (std::uint32_t sequence = 1; sequence <= 65; ++sequence) book.take(kSender, sequence);
+  for (std::uint32_t sequence = 1; sequence <= 65; ++sequence) book.take(kSender, data(sequence));
   EXPECT_EQ(book.acknowledge(kSender).bitmap, kAll);
-  book.take(kSender, 67);
+  book.take(kSender, data(67));
   EXPECT_EQ(book.acknowledge(kSender).sequence, 67u);
   EXPECT_EQ(book.acknowledge(kSender).bitmap, kAll << 1) << "66 did not come";
-  book.take(kSender, 66);
+  book.take(kSender, data(66));
   EXPECT_EQ(book.acknowledge(kSender).bitmap, kAll);
 }
 
 TEST(AckBook, ForgetsWhatIsFartherBack) {
   AckBook book;
-  book.take(kSender, 1);
-  book.take(kSender, 65);
+  book.take(kSender, data(1));
+  book.take(kSender, data(65));
   EXPECT_EQ(book.acknowledge(kSender).bitmap, std::uint64_t{1} << 63);
-  book.take(kSender, 66);
+  book.take(kSender, data(66));
   EXPECT_EQ(book.acknowledge(kSender).bitmap, 1u);
-  book.take(kSender, 1000);
+  book.take(kSender, data(1000));
   EXPECT_EQ(book.acknowledge(kSender).bitmap, 0u);
 }
 
-TEST(AckBook, BeginsAgainWithASenderThatDoes) {
+TEST(AckBook, BeginsAgainWithAnotherEpoch) {
   AckBook book;
-  for (std::uint32_t sequence = 1; sequence <= 5; ++sequence) book.take(kSender, sequence);
-  book.take(kSender, 1);
-  EXPECT_EQ(book.acknowledge(kSender).sequence, 1u);
+  for (std::uint32_t sequence = 1; sequence <= 5; ++sequence) book.take(kSender, data(sequence));
+  book.take(kSender, data(3, 2));
+  const AckBook::Entry taken = book.acknowledge(kSender);
+  EXPECT_EQ(taken.epoch, 2u);
+  EXPECT_EQ(taken.sequence, 3u);
+  EXPECT_EQ(taken.bitmap, 0u);
+}
+
+TEST(AckBook, AnOldSequenceOfTheSameEpochChangesNothing) {
+  AckBook book;
+  book.take(kSender, data(500));
+  book.take(kSender, data(400));
+  EXPECT_EQ(book.acknowledge(kSender).sequence, 500u);
   EXPECT_EQ(book.acknowledge(kSender).bitmap, 0u);
-  book.take(kSender, 500);
-  book.take(kSender, 400);
-  EXPECT_EQ(book.acknowledge(kSender).sequence, 400u);
 }
 
 TEST(AckBook, CountsOnPastTheLargestNumber) {
   AckBook book;
-  book.take(kSender, UINT32_MAX);
-  book.take(kSender, 0);
+  book.take(kSender, data(UINT32_MAX));
+  book.take(kSender, data(0));
   EXPECT_EQ(book.acknowledge(kSender).sequence, 0u);
   EXPECT_EQ(book.acknowledge(kSender).bitmap, 1u);
 }
 
 TEST(AckBook, KeepsStreamsApart) {
   AckBook book;
-  book.take(kSender, 7);
-  book.take({Peer{1}, {2, 4}}, 9);
+  book.take(kSender, data(7));
+  book.take({Peer{1}, {2, 4}}, data(9));
   EXPECT_EQ(book.acknowledge(kSender).sequence, 7u);
 }
 
 TEST(AckBook, IsBounded) {
   AckBook book;
-  for (std::uint32_t peer = 1; peer <= AckBook::kStreamsMax; ++peer) book.take({Peer{peer}, {}}, 1);
+  for (std::uint32_t peer = 1; peer <= AckBook::kStreamsMax; ++peer)
+    book.take({Peer{peer}, {}}, data(1));
   EXPECT_EQ(book.size(), AckBook::kStreamsMax);
-  book.take({Peer{AckBook::kStreamsMax + 1}, {}}, 1);
+  book.take({Peer{AckBook::kStreamsMax + 1}, {}}, data(1));
   EXPECT_EQ(book.size(), AckBook::kStreamsMax);
 }
 
 TEST(AckBook, WhoBeginsTooManyStreamsLosesItsOwn) {
   AckBook book;
   const StreamName last{Peer{9}, {2, 3}};
-  book.take(kSender, 7);
-  book.take(last, 8);
+  book.take(kSender, data(7));
+  book.take(last, data(8));
   for (std::uint32_t key = 0; key < 2 * AckBook::kStreamsMax; ++key)
-    book.take({Peer{5}, {key, 0}}, 1);
+    book.take({Peer{5}, {key, 0}}, data(1));
   EXPECT_EQ(book.size(), AckBook::kStreamsMax);
   EXPECT_EQ(book.acknowledge(kSender).sequence, 7u);
   EXPECT_EQ(book.acknowledge(last).sequence, 8u);

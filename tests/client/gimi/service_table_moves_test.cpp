@@ -104,8 +104,8 @@ class MovedServices : public Conversation, public testing::WithParamInterface<co
     parts.header.dst = group;
     parts.header.src = kPeerId;
     parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
-    std::string header(8, '\0');
-    header[0] = static_cast<char>(++sequence_);
+    std::string header(proto::gimi::kMessageHeaderSize, '\0');
+    header[4] = static_cast<char>(++sequence_);
     hub_.send(parts, header + text);
     settle_down();
   }

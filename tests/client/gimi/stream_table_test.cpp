@@ -103,9 +103,13 @@ TEST_F(StreamTableTest, AnAckThatNamesTheGroupFreesAndOneToTheNodeDoesNot) {
   const Sender drive = to_service(1);
   const Sender direct = sender(1);
   drive.send("to the service").or_throw();
-  direct.send("to the node").or_throw();
+  static_cast<void>(next_data());
   acknowledge(1, kAll, 0, kGroup);
   drive.settle().or_throw();
+  direct.send("to the node").or_throw();
+  static_cast<void>(next_data());
+  acknowledge(1, kAll, 0, kGroup);
+  settle_down();
   EXPECT_EQ(direct.counts().acknowledged, 0u)
       << "another stream, though key and receiver are the same";
   acknowledge(1, kAll);
@@ -231,9 +235,9 @@ TEST_F(StreamTableTest, AcknowledgesWhatCameForAServiceInItsName) {
   parts.header.dst = kGroup;
   parts.header.src = kPeerId;
   parts.key = proto::gimi::StreamKey{kKey.type, kKey.instance}.value();
-  std::string payload(8, '\0');
-  payload[0] = 1;                                               // sequence 1
-  payload[5] = static_cast<char>(proto::gimi::kFlagAckWanted);  // of DATA
+  std::string payload(proto::gimi::kMessageHeaderSize, '\0');
+  payload[4] = 1;                                               // sequence 1
+  payload[9] = static_cast<char>(proto::gimi::kFlagAckWanted);  // of DATA
   hub_.send(parts, payload + "go");
   const Taken ack = next();
   EXPECT_EQ(ack.header.operation, Operation::ack);

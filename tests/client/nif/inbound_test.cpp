@@ -302,7 +302,7 @@ TEST(Inbound, AReportOfAFragmentSaysWhichMessageItWas) {
   const nif_incoming& known = receiving.host.items[1];
   EXPECT_EQ(known.flags, NIF_FLAG_KEYED);
   EXPECT_EQ(known.key, 9u);
-  ASSERT_EQ(known.size, 32u);
+  ASSERT_EQ(known.size, 36u);
   const std::string_view whole = payload_of(known);
   EXPECT_EQ(whole[13], static_cast<char>(proto::kFlagKeyed)) << "as if it had come in one frame";
   EXPECT_EQ(whole[24], 'x');

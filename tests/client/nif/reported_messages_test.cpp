@@ -59,8 +59,9 @@ TEST(ReportedMessages, TellsHowTheMessageOfAFragmentBegan) {
   messages.remember(1, keyed.outgoing);
   messages.remember(2, plain.outgoing);
   ASSERT_TRUE(messages.find(keyed.report));
-  EXPECT_EQ(text_of(*messages.find(keyed.report)), std::string("\0\1\2\3\4\5\6\7", 8) + "1.......");
-  EXPECT_EQ(text_of(*messages.find(plain.report)), "2...............");
+  EXPECT_EQ(text_of(*messages.find(keyed.report)),
+            std::string("\0\1\2\3\4\5\6\7", 8) + "1...........");
+  EXPECT_EQ(text_of(*messages.find(plain.report)), "2...................");
 }
 
 TEST(ReportedMessages, OneMoreThanItRemembersReplacesTheFirst) {

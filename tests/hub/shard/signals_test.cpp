@@ -135,7 +135,7 @@ TEST_P(SignalsAcross, ReportsToASenderThatAskedForIt) {
   HubRig rig(2);
   FakeNode& a = rig.join(GetParam());
   const std::uint32_t nobody = 7u << 20 | 999;
-  rig.send(a, nobody, "0123456789abcdefXYZ", {.flags = proto::kFlagReport});
+  rig.send(a, nobody, "0123456789abcdefghijXYZ", {.flags = proto::kFlagReport});
   rig.send(a, nobody, "not asked for");
   rig.settle();
   ASSERT_THAT(a.reports(), SizeIs(1));
@@ -143,7 +143,7 @@ TEST_P(SignalsAcross, ReportsToASenderThatAskedForIt) {
   EXPECT_EQ(report.reason, DropReason::no_such_node);
   EXPECT_EQ(report.count, 1u);
   EXPECT_EQ(report.header.dst, nobody);
-  EXPECT_EQ(report.following.size(), 16u);
+  EXPECT_EQ(report.following.size(), proto::kReportFollowingMax);
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 2u);
 }
 

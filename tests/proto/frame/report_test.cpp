@@ -36,8 +36,8 @@ TEST(Report, IsDecodedAndWrittenAsTheVectorSays) {
   EXPECT_EQ(Bytes(memory.begin(), memory.begin() + static_cast<std::ptrdiff_t>(size)), payload);
 }
 
-TEST(Report, CarriesAtMost16BytesOfTheFrame) {
-  const Bytes many(17, std::byte{1});
+TEST(Report, CarriesAtMost20BytesOfTheFrame) {
+  const Bytes many(21, std::byte{1});
   Report report;
   report.following = many;
   std::array<std::byte, kReportSizeMax> memory{};

@@ -29,7 +29,7 @@ TEST(GimiMessage, HasATimeStamp) {
   const auto message = parse_message(payload);
   ASSERT_TRUE(message);
   EXPECT_EQ(message->header,
-            (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8}));
+            (MessageHeader{1, Operation::data, kFlagAckWanted | kFlagTimestamp, 8, 0x5eed0001}));
   EXPECT_EQ(message->timestamp_ns, kNewYear);
   EXPECT_EQ(to_bytes(message->data), to_bytes("hi"));
 }
@@ -62,11 +62,11 @@ TEST(GimiMessage, RefusesWhatDoesNotFit) {
   EXPECT_FALSE(parse_message(std::span(payload).first(kMessageHeaderSize - 1)));
   EXPECT_FALSE(parse_message(std::span(payload).first(kMessagePrefixMax - 1)));
   EXPECT_TRUE(parse_message(std::span(payload).first(kMessagePrefixMax)));
-  payload[6] = std::byte{7};
+  payload[10] = std::byte{7};
   EXPECT_FALSE(parse_message(payload)) << "a time stamp has 8 bytes";
-  payload[5] = std::byte{0};
+  payload[9] = std::byte{0};
   EXPECT_TRUE(parse_message(payload));
-  payload[4] = std::byte{7};
+  payload[8] = std::byte{7};
   EXPECT_FALSE(parse_message(payload)) << "operation 7";
 }
 

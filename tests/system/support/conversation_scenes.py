@@ -92,7 +92,7 @@ announced, and the sender of what waited meanwhile is paused.""", resume,
                     (">FLOW, PING", "<FLOW, PONG", ">FLOW, CONFIRM", "<FLOW, PAUSE", "<FLOW, RESUME", "<FLOW, SKIP"),
                     ("--limit", "resume_bytes=4096", "--limit", "lane1_bytes=16384")),
     "data": Scene("""Lane 0, extensions, what is too old, and a message in parts with its progress.""", data,
-                  ("<UNICAST, 7 bytes", "<TAKEN, 12 bytes", "<REPORT, 40 bytes")),
+                  ("<UNICAST, 7 bytes", "<TAKEN, 12 bytes", "<REPORT, 44 bytes")),
     "end": Scene("""A name that is held, and a hub that an administrator has drain.""", end,
                  ("<LINK, GOODBYE", ">CTRL, DRAIN, request 1", "<CTRL, answer to DRAIN, request 1")),
 }

@@ -34,7 +34,7 @@ def subscribe(client, name, **pace):
 
 def message(sequence, content=b""):
     """A DATA message of GIMI with key 0."""
-    return bytes(8) + struct.pack("<IBBH", sequence, 0, 0, 0) + content
+    return bytes(8) + struct.pack("<IIBBH", 1, sequence, 0, 0, 0) + content
 
 
 class Provider:

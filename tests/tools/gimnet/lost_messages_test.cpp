@@ -21,8 +21,9 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
              .too_large = 2,
              .frames_broken_off = 3,
              .unknown_service = 4,
-             .unreadable = 5});
-  EXPECT_EQ(lost.all(), 15u);
+             .unreadable = 5,
+             .outdated = 6});
+  EXPECT_EQ(lost.all(), 21u);
   EXPECT_EQ(
       lost.rest(),
       (Sentences{
@@ -31,13 +32,16 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
           "3 frames were lost: on the way when the connection broke, and a large message has many "
           "frames",
           "4 messages were lost: of a service that this end does not know to have subscribed",
-          "5 frames were lost: another node broke the protocol"}));
+          "5 frames were lost: another node broke the protocol, or sent a key without a GIMI "
+          "header",
+          "6 messages were lost: its sender had been started again, and had sent newer ones"}));
   EXPECT_EQ(lost.rest(), Sentences{});
   lost.take({.incomplete = 4,
              .too_large = 2,
              .frames_broken_off = 3,
              .unknown_service = 4,
-             .unreadable = 5});
+             .unreadable = 5,
+             .outdated = 6});
   EXPECT_EQ(lost.rest(),
             Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
 }

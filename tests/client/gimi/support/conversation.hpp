@@ -74,18 +74,21 @@ class Conversation : public testing::Test {
     }
   }
 
-  static Taken taken_of(const Frame& frame) {
+  Taken taken_of(const Frame& frame) {
     const auto view = frame.view();
     EXPECT_TRUE(view.key.has_value());
     const auto message = proto::gimi::parse_message(view.payload);
     EXPECT_TRUE(message.has_value());
     if (!message) return {};
+    epoch_ = message->header.epoch;
     return {message->header,
             {reinterpret_cast<const char*>(message->data.data()), message->data.size()},
             frame.header};
   }
 
-  void answer(const proto::gimi::MessageHeader& header, std::span<const std::byte> data) {
+  /// A DATA, or the answer to what came last.
+  void answer(proto::gimi::MessageHeader header, std::span<const std::byte> data) {
+    if (header.operation != Operation::data && header.epoch == 0) header.epoch = epoch_;
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
     const std::size_t size = proto::gimi::write_message_prefix(header, std::nullopt, prefix);
     std::string payload(reinterpret_cast<const char*>(prefix.data()), size);
@@ -106,7 +109,7 @@ class Conversation : public testing::Test {
   void report(proto::DropReason reason, std::uint32_t count, const Frame& frame) {
     std::string payload{static_cast<char>(reason), 0, 0, 0};
     payload.append(reinterpret_cast<const char*>(&count), sizeof count);
-    const std::size_t size = std::min<std::size_t>(frame.bytes.size(), 32);
+    const std::size_t size = std::min<std::size_t>(frame.bytes.size(), 36);
     payload.append(reinterpret_cast<const char*>(frame.bytes.data()), size);
     proto::FrameParts parts;
     parts.header.kind = proto::Kind::report;
@@ -115,6 +118,7 @@ class Conversation : public testing::Test {
     hub_.send(parts, payload);
   }
 
+  std::uint32_t epoch_ = 0;  ///< of the stream of what came last
   FakeHub fake_;
   FakeConnection hub_{-1};
   std::optional<Node> node_;
