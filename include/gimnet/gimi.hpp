@@ -16,8 +16,8 @@
 // GIMI: how programs use GIMnet. Only the standard library is needed. docs/gimi.md explains it with
 // examples.
 //
-//     gimnet::Node node("robot");                             // joins by the hub of this machine,
-//     or of GIMNET_HUB auto odometry = node.advertise("odom").or_throw();      // robot/odom
+//     gimnet::Node node("robot");  // joins by the hub of this machine, or of GIMNET_HUB
+//     auto odometry = node.advertise("odom").or_throw();  // robot/odom
 //     odometry.publish("x 1.0 y 2.0").or_throw();
 //
 //     gimnet::Node node("viewer");

@@ -264,7 +264,8 @@ Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout 
     service = entry(full_name, {1, AtFullQueue::overwrite_oldest});
   }
   const bool read = service->handles != 0;
-  if ((!read && !service->followed) || service->is_refused()) {
+  // Also one that is read: what the hub told of it last may still be under way.
+  if (!service->followed || service->is_refused()) {
     const nif_status status =
         ask(service, read ? service->pace : PaceOptions{}, nif_timeout(timeout));
     if (status != NIF_OK) {

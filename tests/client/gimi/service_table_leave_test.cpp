@@ -57,12 +57,17 @@ class LeftSubscriptions : public testing::Test {
                                 proto::encode_answer(ns::UnsubscribeAnswer{}, number));
     leaving.join();
   }
+  /// It is read with a window of 2.
   void follow() {
-    static_cast<void>(
-        table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
-          EXPECT_EQ(place.group, kGroup);
-          return Failure{Status::closed, "no stream is needed here"};
-        }));
+    std::thread asking([this] {
+      static_cast<void>(
+          table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
+            EXPECT_EQ(place.group, kGroup);
+            return Failure{Status::closed, "no stream is needed here"};
+          }));
+    });
+    answer_subscribe(2);
+    asking.join();
   }
 
   nif::test::FakeHub hub_;
