@@ -37,6 +37,7 @@ enum class Status : std::uint8_t {
   window_full,    ///< AtFullWindow::skip: nothing was sent.
   protocol,       ///< The peer sent bytes that docs/protocol.md forbids.
   system,         ///< The operating system refused, or memory is out.
+  forked,         ///< The node belongs to the parent process: after fork(), join anew in the child.
 };
 
 /// Why a message did not arrive.

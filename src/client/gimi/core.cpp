@@ -111,7 +111,11 @@ Core::Core(const NodeOptions& options)
 Core::~Core() { close(); }
 
 Outcome<std::shared_ptr<Core>> Core::join(const NodeOptions& options) {
-  std::shared_ptr<Core> core(new Core(options));
+  const std::shared_ptr<Core> core(new Core(options), [](Core* done) {
+    // In a child after fork() its threads are missing, and its locks may be held: it stays.
+    if (done->home().left()) return done->close();
+    delete done;
+  });
   const nif_status status = core->connect(options);
   if (status == NIF_OK) return core;
   core->closed_ = true;
@@ -153,6 +157,10 @@ nif_status Core::connect(const NodeOptions& options) {
 
 void Core::close() {
   if (closed_.exchange(true)) return;
+  if (home().left()) {
+    static_cast<void>(nif_close(node()));
+    return;
+  }
   clerk_.stop();
   static_cast<void>(lost());  // NIF tells nothing of a handle that was closed
   {

@@ -32,6 +32,7 @@ class Core {
   /// The node was given this name by the hub, "" for none.
   void on_renamed() { services_.on_renamed(state().name); }
 
+  [[nodiscard]] const Home& home() const { return uplink_.home(); }
   [[nodiscard]] nif_node* node() const { return uplink_.node(); }
   /// After close(): as it was then.
   [[nodiscard]] NodeState state() const GIMNET_EXCLUDES(mutex_);

@@ -1,6 +1,7 @@
 #include <array>
 
 #include "client/gimi/core.hpp"
+#include "client/gimi/home.hpp"
 #include "client/gimi/watch_table.hpp"
 #include "gimnet/gimi.hpp"
 
@@ -8,55 +9,94 @@
 
 namespace gimnet {
 
+using gimi::at_home;
+
 Outcome<Message> Queue::receive(Timeout timeout) const {
-  return queue_->inbox().receive(*queue_, timeout);
+  return at_home(queue_->inbox().home(), [&] { return queue_->inbox().receive(*queue_, timeout); });
 }
-std::optional<Message> Queue::try_receive() const { return queue_->inbox().try_receive(*queue_); }
-std::optional<Message> Queue::take_newest() const { return queue_->inbox().take_newest(*queue_); }
-void Queue::resize(std::size_t messages) const { queue_->inbox().resize(*queue_, messages); }
-std::size_t Queue::size() const { return queue_->inbox().counts(*queue_).size; }
-std::uint64_t Queue::received() const { return queue_->inbox().counts(*queue_).received; }
-std::uint64_t Queue::overwritten() const { return queue_->inbox().counts(*queue_).overwritten; }
+std::optional<Message> Queue::try_receive() const {
+  return at_home(queue_->inbox().home(), [&] { return queue_->inbox().try_receive(*queue_); });
+}
+std::optional<Message> Queue::take_newest() const {
+  return at_home(queue_->inbox().home(), [&] { return queue_->inbox().take_newest(*queue_); });
+}
+void Queue::resize(std::size_t messages) const {
+  if (!queue_->inbox().home().left()) queue_->inbox().resize(*queue_, messages);
+}
+std::size_t Queue::size() const {
+  return at_home(queue_->inbox().home(), [&] { return queue_->inbox().counts(*queue_).size; });
+}
+std::uint64_t Queue::received() const {
+  return at_home(queue_->inbox().home(), [&] { return queue_->inbox().counts(*queue_).received; });
+}
+std::uint64_t Queue::overwritten() const {
+  return at_home(queue_->inbox().home(),
+                 [&] { return queue_->inbox().counts(*queue_).overwritten; });
+}
 
 Outcome<void> Sender::send(BytesView data, Timeout timeout, More more) const {
-  return stream_->send(data, timeout, more);
+  return at_home(stream_->home(), [&] { return stream_->send(data, timeout, more); });
 }
-Outcome<void> Sender::settle(Timeout timeout) const { return stream_->settle(timeout); }
-SendCounts Sender::counts() const { return stream_->counts(); }
+Outcome<void> Sender::settle(Timeout timeout) const {
+  return at_home(stream_->home(), [&] { return stream_->settle(timeout); });
+}
+SendCounts Sender::counts() const {
+  return at_home(stream_->home(), [&] { return stream_->counts(); });
+}
 Peer Sender::peer() const { return stream_->to(); }
 const std::string& Sender::service() const { return stream_->service(); }
 
 Outcome<void> Publisher::publish(BytesView data, Timeout timeout, More more) const {
-  return service_->publish(data, timeout, more);
+  return at_home(service_->home(), [&] { return service_->publish(data, timeout, more); });
 }
-std::size_t Publisher::subscribers() const { return service_->subscribers(); }
+std::size_t Publisher::subscribers() const {
+  return at_home(service_->home(), [&] { return service_->subscribers(); });
+}
 Outcome<void> Publisher::wait_for_subscribers(std::size_t count, Timeout timeout) const {
-  return service_->wait_for_subscribers(count, timeout);
+  return at_home(service_->home(), [&] { return service_->wait_for_subscribers(count, timeout); });
 }
-std::string Publisher::name() const { return service_->full_name(); }
-std::uint64_t Publisher::published() const { return service_->published(); }
-Outcome<void> Publisher::standing() const { return service_->standing(); }
+std::string Publisher::name() const {
+  return at_home(service_->home(), [&] { return service_->full_name(); });
+}
+std::uint64_t Publisher::published() const {
+  return at_home(service_->home(), [&] { return service_->published(); });
+}
+Outcome<void> Publisher::standing() const {
+  return at_home(service_->home(), [&] { return service_->standing(); });
+}
 
 Outcome<Message> Subscription::receive(Timeout timeout) const {
   gimi::MessageQueue& queue = service_->queue();
-  return queue.inbox().receive(queue, timeout);
+  return at_home(queue.inbox().home(), [&] { return queue.inbox().receive(queue, timeout); });
 }
 std::optional<Message> Subscription::try_receive() const {
   gimi::MessageQueue& queue = service_->queue();
-  return queue.inbox().try_receive(queue);
+  return at_home(queue.inbox().home(), [&] { return queue.inbox().try_receive(queue); });
 }
 Queue Subscription::queue() const { return Queue({service_, &service_->queue()}); }
-bool Subscription::exists() const { return service_->exists(); }
-bool Subscription::accepts() const { return service_->accepts(); }
+bool Subscription::exists() const {
+  return at_home(service_->home(), [&] { return service_->exists(); });
+}
+bool Subscription::accepts() const {
+  return at_home(service_->home(), [&] { return service_->accepts(); });
+}
 Outcome<void> Subscription::wait_until_exists(Timeout timeout) const {
-  return service_->wait_until_exists(timeout);
+  return at_home(service_->home(), [&] { return service_->wait_until_exists(timeout); });
 }
 const std::string& Subscription::name() const { return service_->name(); }
-std::uint64_t Subscription::missed() const { return service_->missed(); }
-Outcome<void> Subscription::standing() const { return service_->standing(); }
+std::uint64_t Subscription::missed() const {
+  return at_home(service_->home(), [&] { return service_->missed(); });
+}
+Outcome<void> Subscription::standing() const {
+  return at_home(service_->home(), [&] { return service_->standing(); });
+}
 
-Outcome<WatchEvent> Watch::receive(Timeout timeout) const { return queue_->receive(timeout); }
-std::optional<WatchEvent> Watch::try_receive() const { return queue_->try_receive(); }
+Outcome<WatchEvent> Watch::receive(Timeout timeout) const {
+  return at_home(queue_->home(), [&] { return queue_->receive(timeout); });
+}
+std::optional<WatchEvent> Watch::try_receive() const {
+  return at_home(queue_->home(), [&] { return queue_->try_receive(); });
+}
 
 std::string_view change_text(Change change) {
   static constexpr std::array<std::string_view, 11> kTexts{

@@ -9,6 +9,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/home.hpp"
 #include "client/gimi/message_queue.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -42,6 +43,9 @@ class Inbox {
         on_room_(std::move(on_room)),
         on_taken_(std::move(on_taken)) {}
 
+  [[nodiscard]] const Home& home() const { return home_; }
+  /// In a child after fork() there is only this queue, which nobody fills.
+  [[nodiscard]] MessageQueue& empty_queue() { return empty_queue_; }
   /// The queue of a key, made if there is none; with `options` changed to them.
   MessageQueue& queue(MessageKey key, const QueueOptions* options) GIMNET_EXCLUDES(mutex_);
   /// A queue for a subscription, until remove().
@@ -94,6 +98,8 @@ class Inbox {
   [[nodiscard]] News news_of(MessageQueue& queue) GIMNET_REQUIRES(mutex_);
   void tell(const News& news) const GIMNET_EXCLUDES(mutex_);
 
+  const Home home_;
+  MessageQueue empty_queue_{*this, {}, 0};
   const std::size_t unasked_messages_;
   const std::size_t bytes_max_;
   const std::function<void()> on_room_;

@@ -10,6 +10,7 @@
 namespace gimnet {
 namespace {
 
+using gimi::at_home;
 using gimi::failure_of;
 using gimi::nif_timeout;
 
@@ -49,10 +50,12 @@ gimi::Core& Node::core() const {
 }
 
 Peer Node::peer() const { return Peer{nif_id(core().node())}; }
-NodeState Node::state() const { return core().state(); }
+NodeState Node::state() const {
+  return at_home(core().home(), [&] { return core().state(); });
+}
 
 Outcome<Sender> Node::sender(Peer to, const SendOptions& options) const {
-  auto stream = core().streams().stream(to, options);
+  auto stream = at_home(core().home(), [&] { return core().streams().stream(to, options); });
   if (!stream) return stream.failure();
   return Sender({core_, *stream});
 }
@@ -114,47 +117,58 @@ Outcome<void> Node::drain(Timeout timeout) const {
 }
 
 Queue Node::queue(MessageKey key, const QueueOptions& options) const {
-  return Queue({core_, &core().inbox().queue(key, &options)});
+  gimi::Inbox& inbox = core().inbox();
+  return Queue({core_, inbox.home().left() ? &inbox.empty_queue() : &inbox.queue(key, &options)});
 }
 
 Outcome<Message> Node::receive(MessageKey key, Timeout timeout) const {
-  return core().inbox().receive(core().inbox().queue(key, nullptr), timeout);
+  return at_home(core().home(), [&] {
+    return core().inbox().receive(core().inbox().queue(key, nullptr), timeout);
+  });
 }
 
 Outcome<Message> Node::receive(Timeout timeout) const {
-  return core().inbox().receive_any(timeout);
+  return at_home(core().home(), [&] { return core().inbox().receive_any(timeout); });
 }
-std::uint64_t Node::dropped() const { return core().inbox().dropped(); }
-LostCounts Node::lost() const { return core().lost(); }
+std::uint64_t Node::dropped() const {
+  return at_home(core().home(), [&] { return core().inbox().dropped(); });
+}
+LostCounts Node::lost() const {
+  return at_home(core().home(), [&] { return core().lost(); });
+}
 
 Outcome<Publisher> Node::advertise(std::string_view name, const PublishOptions& options,
                                    Timeout timeout) const {
-  auto service =
-      core().services().advertise(core().state().name, std::string(name), options, timeout);
+  auto service = at_home(core().home(), [&] {
+    return core().services().advertise(core().state().name, std::string(name), options, timeout);
+  });
   if (!service) return service.failure();
   return Publisher({*service, [core = core_](gimi::PublishedService* done) {
-                      core->services().withdraw(*done);
+                      if (!core->home().left()) core->services().withdraw(*done);
                     }});
 }
 
 Outcome<Queue> Node::accept(std::string_view name, const AcceptOptions& options,
                             Timeout timeout) const {
   Queue made = queue(options.key, options.queue);
-  auto accepted =
-      core().services().accept(core().state().name, std::string(name), options, timeout);
+  auto accepted = at_home(core().home(), [&] {
+    return core().services().accept(core().state().name, std::string(name), options, timeout);
+  });
   if (!accepted) return accepted.failure();
   return made;
 }
 
 Outcome<Subscription> Node::subscribe(std::string_view full_name, const QueueOptions& options,
                                       Timeout timeout, const PaceOptions& pace) const {
-  auto service = core().services().subscribe(std::string(full_name), options, pace, timeout);
+  auto service = at_home(core().home(), [&] {
+    return core().services().subscribe(std::string(full_name), options, pace, timeout);
+  });
   if (!service) return service.failure();
   gimi::ServiceTable::Subscribed subscribed = *service;
   gimi::SubscribedService* const handle = subscribed.get();
   return Subscription(
       {handle, [core = core_, subscribed = std::move(subscribed)](gimi::SubscribedService*) {
-         core->services().unsubscribe(subscribed);
+         if (!core->home().left()) core->services().unsubscribe(subscribed);
        }});
 }
 
@@ -176,10 +190,12 @@ Outcome<void> Node::give_name_back(Timeout timeout) const {
 
 Outcome<Watch> Node::watch(std::string_view pattern, const WatchOptions& options,
                            Timeout timeout) const {
-  auto begun = core().watches().watch(std::string(pattern), options, timeout);
+  auto begun = at_home(core().home(), [&] {
+    return core().watches().watch(std::string(pattern), options, timeout);
+  });
   if (!begun) return begun.failure();
   return Watch({begun->queue.get(), [core = core_, begun = *begun](gimi::WatchQueue*) {
-                  core->watches().unwatch(begun.number);
+                  if (!core->home().left()) core->watches().unwatch(begun.number);
                 }});
 }
 
@@ -239,7 +255,7 @@ Outcome<std::string> Node::set_hub_log_level(std::string_view level, Timeout tim
 }
 
 Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) const {
-  return core().ping(to, timeout, lane, echo);
+  return at_home(core().home(), [&] { return core().ping(to, timeout, lane, echo); });
 }
 
 }  // namespace gimnet

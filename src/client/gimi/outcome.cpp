@@ -42,6 +42,8 @@ std::string_view status_text(Status status) {
       return "protocol error";
     case Status::system:
       return "system error";
+    case Status::forked:
+      return "forked";
   }
   return "unknown status";
 }

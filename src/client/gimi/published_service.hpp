@@ -22,6 +22,7 @@ class PublishedService {
         name_(std::move(name)),
         options_(options),
         full_name_(std::move(full_name)) {}
+  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] const std::string& name() const { return name_; }
   /// As it is now; without the node's name while the node has none.

@@ -32,6 +32,7 @@ struct ServicePlace {
   std::uint32_t group = 0;  ///< 0: nobody has it at the moment
   MessageKey key;
   bool accepts = false;  ///< it takes data, and gives none
+  bool latest = false;   ///< of Delivery::latest
 };
 
 /// A stream of DATA with one key, to one node or to whoever accepts one service. Thread safety: any
@@ -54,6 +55,7 @@ class SendStream {
         options_(options),
         destination_{NIF_SERVICE, place.group, place.key},
         window_(options.window) {}
+  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] Outcome<void> send(BytesView data, Timeout timeout, More more)
       GIMNET_EXCLUDES(mutex_);

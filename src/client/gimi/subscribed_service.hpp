@@ -28,6 +28,7 @@ class SubscribedService {
   ~SubscribedService() { queue_.inbox().remove(queue_); }
   SubscribedService(const SubscribedService&) = delete;
   SubscribedService& operator=(const SubscribedService&) = delete;
+  [[nodiscard]] const Home& home() const { return queue_.inbox().home(); }
 
   [[nodiscard]] const std::shared_ptr<const std::string>& shared_name() const { return name_; }
   [[nodiscard]] const std::string& name() const { return *name_; }
@@ -65,6 +66,10 @@ class SubscribedService {
   std::size_t handles = 0;
   /// What those asked the hub for; guarded by the table's asking mutex.
   PaceOptions pace;
+  /// The queue that the program asked for last; guarded by the table's mutex.
+  QueueOptions chosen_queue;
+  /// What that is of the service as it is now. REQUIRES: the table's mutex.
+  [[nodiscard]] QueueOptions queue_options() const;
   /// A stream of this node leads there; guarded by the table's asking mutex.
   bool followed = false;
   /// What comes is for a queue of the program; guarded by the table's mutex.

@@ -51,9 +51,10 @@ Status status_of(nif_status status) {
     case NIF_NO_MEMORY:
     case NIF_SYSTEM:
       return Status::system;
+    case NIF_FORKED:
+      return Status::forked;
     case NIF_OK:
     case NIF_CLOSED:
-    case NIF_FORKED:
       break;
   }
   return Status::closed;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "client/gimi/home.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/nif.h"
@@ -33,6 +34,7 @@ struct Envelope {
 class Uplink {
  public:
   void open(nif_node* node) { node_.store(node); }
+  [[nodiscard]] const Home& home() const { return home_; }
   /// Null: not connected for the first time yet.
   [[nodiscard]] nif_node* node() const { return node_.load(); }
 
@@ -49,6 +51,7 @@ class Uplink {
   [[nodiscard]] static std::uint32_t draw_epoch();
 
  private:
+  const Home home_;
   std::atomic<nif_node*> node_{nullptr};
   std::atomic<std::uint32_t> pings_{0};
 };

@@ -19,6 +19,7 @@ namespace gimnet::gimi {
 class WatchQueue {
  public:
   explicit WatchQueue(Uplink& uplink) : uplink_(uplink) {}
+  [[nodiscard]] const Home& home() const { return uplink_.home(); }
 
   [[nodiscard]] Outcome<WatchEvent> receive(Timeout timeout) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::optional<WatchEvent> try_receive() GIMNET_EXCLUDES(mutex_);
