@@ -7,6 +7,7 @@
 
 #include "base/clock.hpp"
 #include "client/gimi/stream_table.hpp"
+#include "client/nif/platform.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -21,6 +22,7 @@ constexpr std::int64_t kLastAcksNs = 500'000'000;
 }  // namespace
 
 void Clerk::start() {
+  const nif::SignalsBlocked blocked;
   thread_ = std::thread([this] { run(); });
 }
 

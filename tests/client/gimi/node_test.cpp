@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <csignal>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -34,6 +38,35 @@ TEST_F(NodeTest, JoinsWithAName) {
   EXPECT_TRUE(state.connected);
   EXPECT_EQ(state.peer, node.peer());
   EXPECT_TRUE(node.peer());
+}
+
+// Signals belong to the program, which may wait for them with sigwait() in a thread of its own.
+TEST_F(NodeTest, ItsThreadsTakeNoSignals) {
+  const auto tasks = [] {
+    std::map<std::string, std::uint64_t> blocked;
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      std::ifstream status(task.path() / "status");
+      for (std::string line; std::getline(status, line);) {
+        if (line.starts_with("SigBlk:"))
+          blocked[task.path().filename()] = std::stoull(line.substr(7), nullptr, 16);
+      }
+    }
+    return blocked;
+  };
+  const auto before = tasks();
+  const Node node = join("robot");
+  const Node viewer = join();
+  viewer.sender("robot").or_throw().send("x").or_throw();
+  // All but SIGKILL, SIGSTOP, and the two that belong to the C library.
+  constexpr std::uint64_t kAll =
+      ~((1ull << (SIGKILL - 1)) | (1ull << (SIGSTOP - 1)) | (3ull << 31));
+  std::size_t threads = 0;
+  for (const auto& [task, blocked] : tasks()) {
+    if (before.contains(task)) continue;
+    ++threads;
+    EXPECT_EQ(blocked & kAll, kAll) << "thread " << task;
+  }
+  EXPECT_GE(threads, 4u) << "two for each node";
 }
 
 TEST_F(NodeTest, KeepsItsTokenWhileItLivesUnlessToldNotTo) {
