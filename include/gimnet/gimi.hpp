@@ -171,7 +171,8 @@ class Subscription {
   /// Waits until there is. Errors: timeout, closed.
   Outcome<void> wait_until_exists(Timeout timeout = kForever) const;
   [[nodiscard]] const std::string& name() const;  ///< in full
-  /// Messages of the provider that did not come, by their sequence.
+  /// Messages that this program does not get: those that did not come, by their sequence, and those
+  /// that the queue overwrote. Of Delivery::latest they were skipped for newer ones.
   [[nodiscard]] std::uint64_t missed() const;
   /// As Publisher::standing(), of the subscription; with or without a provider.
   [[nodiscard]] Outcome<void> standing() const;

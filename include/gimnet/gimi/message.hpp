@@ -99,6 +99,9 @@ class Message {
   /// It was sent with NIF without a GIMI header: sequence() is 0, and so are type and instance of
   /// key().
   [[nodiscard]] bool plain() const { return plain_; }
+  /// It was published with Delivery::latest: gaps in sequence() are what was skipped for newer
+  /// ones.
+  [[nodiscard]] bool latest() const { return latest_; }
   /// When it was sent, by the sender's clock in ns since 1970, if the sender stamped it.
   [[nodiscard]] std::optional<std::int64_t> sent_ns() const { return sent_ns_; }
   /// When it was read from the network, by this machine's clock in ns since 1970.
@@ -127,6 +130,7 @@ class Message {
   Lane lane_ = Lane::normal;
   bool begins_stream_ = false;
   bool plain_ = false;
+  bool latest_ = false;
   std::uint32_t group_ = 0;
   std::uint32_t epoch_ = 0;  ///< of a message that counts in a window
 };

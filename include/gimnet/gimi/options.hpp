@@ -77,7 +77,9 @@ enum class AtFullQueue : std::uint8_t {
 };
 
 struct QueueOptions {
-  std::size_t messages = kQueueMessagesDefault;  ///< 1..kQueueMessagesMax
+  /// 1..kQueueMessagesMax; 0: kQueueMessagesDefault, and 1 of a subscription to a service with
+  /// Delivery::latest.
+  std::size_t messages = 0;
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
 };
 

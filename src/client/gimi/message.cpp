@@ -33,6 +33,7 @@ void Message::swap(Message& other) noexcept {
   std::swap(lane_, other.lane_);
   std::swap(begins_stream_, other.begins_stream_);
   std::swap(plain_, other.plain_);
+  std::swap(latest_, other.latest_);
   std::swap(group_, other.group_);
   std::swap(epoch_, other.epoch_);
 }
@@ -51,6 +52,7 @@ Message MessageAccess::make(const nif_incoming& in, const proto::gimi::MessageVi
   message.sequence_ = view.header.sequence;
   message.reconnects_ = reconnects;
   message.lane_ = static_cast<Lane>(in.lane);
+  message.latest_ = in.policy == NIF_LATEST;
   message.group_ = in.to;
   message.epoch_ = in.epoch;
   return message;

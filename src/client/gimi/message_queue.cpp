@@ -11,7 +11,8 @@ namespace gimnet::gimi {
 void MessageQueue::set(const QueueOptions& options) {
   closed_ = false;
   options_ = options;
-  options_.messages = std::clamp<std::size_t>(options.messages, 1, kQueueMessagesMax);
+  options_.messages =
+      options.messages == 0 ? kQueueMessagesDefault : std::min(options.messages, kQueueMessagesMax);
   make_room(options_.messages);
 }
 

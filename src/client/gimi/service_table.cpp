@@ -136,6 +136,7 @@ void ServiceTable::set_place(const Subscribed& subscribed, const ServicePlace& p
   service.place = place;
   service.on_place(place);
   if (place.group == 0) return;
+  if (service.read) inbox_.set(service.queue(), service.queue_options());
   subscribed_by_group_[place.group] =
       subscribed;  // also a former one again, which was another service's meanwhile
   std::erase(service.groups, place.group);
@@ -158,8 +159,10 @@ nif_status ServiceTable::ask(const Subscribed& service, const PaceOptions& pace,
   const nif_status status =
       nif_subscribe_paced(uplink_.node(), service->name().c_str(), &wanted, &found, timeout_ms);
   if (status != NIF_OK) return status;
-  const ServicePlace place{
-      found.group, {found.message_type, found.instance}, found.direction == NIF_ACCEPTS};
+  const ServicePlace place{found.group,
+                           {found.message_type, found.instance},
+                           found.direction == NIF_ACCEPTS,
+                           found.delivery == NIF_LATEST_DELIVERY};
   const bool was_refused = service->is_refused();
   {
     const MutexLock lock(mutex_);
@@ -181,12 +184,11 @@ Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& ful
     const MutexLock lock(mutex_);
     service = entry(full_name, options);
     service->read = true;
+    service->chosen_queue = options;
+    inbox_.set(service->queue(), service->queue_options());
   }
   const bool first = service->handles == 0;
-  if (first) {
-    service->pace = pace;
-    inbox_.set(service->queue(), options);
-  }
+  if (first) service->pace = pace;
   if (first || service->is_refused()) {
     const nif_status status = ask(service, service->pace, nif_timeout(timeout));
     if (status != NIF_OK) {
@@ -195,7 +197,6 @@ Outcome<ServiceTable::Subscribed> ServiceTable::subscribe(const std::string& ful
       return failure;
     }
   }
-  if (!first) inbox_.set(service->queue(), options);
   ++service->handles;
   // It may have been subscribed before, to know where it is or when it was another one.
   if (!service->accepts()) return service;
@@ -314,8 +315,10 @@ std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
 
 ServiceTable::Place ServiceTable::on_service_moved(const nif_incoming& moved) {
   const std::string full_name = moved.text;
-  const ServicePlace place{
-      moved.group, {moved.message_type, moved.instance}, moved.direction == NIF_ACCEPTS};
+  const ServicePlace place{moved.group,
+                           {moved.message_type, moved.instance},
+                           moved.direction == NIF_ACCEPTS,
+                           moved.delivery == NIF_LATEST_DELIVERY};
   {
     const MutexLock lock(mutex_);
     if (open_ != 0) return Place::not_yet;

@@ -32,8 +32,15 @@ Outcome<void> SubscribedService::wait_until_exists(Timeout timeout) {
 }
 
 std::uint64_t SubscribedService::missed() {
+  const std::uint64_t overwritten = queue_.inbox().counts(queue_).overwritten;
   const MutexLock lock(mutex_);
-  return missed_;
+  return missed_ + overwritten;
+}
+
+QueueOptions SubscribedService::queue_options() const {
+  QueueOptions options = chosen_queue;
+  if (options.messages == 0 && place.latest) options.messages = 1;
+  return options;
 }
 
 Outcome<void> SubscribedService::standing() {

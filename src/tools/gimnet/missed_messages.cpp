@@ -5,12 +5,12 @@
 namespace gimnet::tool {
 
 void MissedMessages::add_sentence(std::vector<std::string>& sentences, Count& count,
-                                  const std::string& service, std::string_view why) {
+                                  const std::string& service, std::string_view what) {
   if (count.told == count.missed) return;
   count.told = count.missed;
   sentences.push_back(std::to_string(count.missed) +
                       (count.missed == 1 ? " message of " : " messages of ") + service +
-                      " did not come: " + std::string(why));
+                      std::string(what));
 }
 
 std::uint64_t MissedMessages::take(const Message& message) {
@@ -43,6 +43,11 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
     untold_ = true;
     return;
   }
+  if (message.latest()) {
+    service.skipped.missed += missed;
+    untold_ = true;
+    return;
+  }
   const std::uint64_t told = std::min(missed, told_as_lost_);
   told_as_lost_ -= told;
   service.unknown.missed += missed - told;
@@ -64,12 +69,16 @@ std::vector<std::string> MissedMessages::news(std::int64_t now_ns) {
 std::vector<std::string> MissedMessages::rest() {
   std::vector<std::string> sentences;
   for (auto& [name, service] : services_) {
-    add_sentence(sentences, service.early, name,
-                 "published before this node had heard of the service and subscribed to it");
-    add_sentence(sentences, service.broken, name, "the connection to the hub was broken");
+    add_sentence(
+        sentences, service.early, name,
+        " did not come: published before this node had heard of the service and subscribed to it");
+    add_sentence(sentences, service.broken, name,
+                 " did not come: the connection to the hub was broken");
+    add_sentence(sentences, service.skipped, name, " skipped for newer ones (delivery latest)");
     // Nobody tells a reader whether it or the sender was in the way.
     add_sentence(sentences, service.unknown, name,
-                 "this reader was too slow, or the sender's connection broke (`gimnet status` "
+                 " did not come: this reader was too slow, or the sender's connection broke "
+                 "(`gimnet status` "
                  "counts what the hub dropped)");
   }
   untold_ = false;

@@ -47,10 +47,11 @@ class MissedMessages {
     std::uint64_t missed = 0;
     Count early;    ///< before it was subscribed to
     Count broken;   ///< while the connection to the hub was
+    Count skipped;  ///< of Delivery::latest: for newer ones
     Count unknown;  ///< by all that happens elsewhere
   };
   static void add_sentence(std::vector<std::string>& sentences, Count& count,
-                           const std::string& service, std::string_view why);
+                           const std::string& service, std::string_view what);
   void count(Service& service, std::uint64_t missed, const Message& message);
 
   const TakeLateness take_lateness_;

@@ -54,8 +54,12 @@ TEST_F(MessageQueueTest, ChangesItsSizeWhileItRuns) {
     queue_.push(make_message("x", number), number);
   EXPECT_EQ(queue_.size(), 4u);
   EXPECT_EQ(queue_.pop()->sequence(), 2u);
+  queue_.resize(1);
+  EXPECT_EQ(queue_.size(), 1u);
   queue_.resize(0);
-  EXPECT_EQ(queue_.size(), 1u) << "a queue holds one at least";
+  for (std::uint32_t number = 6; number <= 5 + kQueueMessagesDefault; ++number)
+    queue_.push(make_message("x", number), number);
+  EXPECT_EQ(queue_.size(), kQueueMessagesDefault) << "0: as many as by default";
 }
 
 TEST_F(MessageQueueTest, RefusesAtItsLimitsIfItIsToldTo) {

@@ -44,6 +44,37 @@ TEST_F(Services, WhatIsPublishedComesToAllSubscribers) {
   }
 }
 
+TEST_F(Services, TheLatestWaitsAloneUnlessTheProgramChoseALength) {
+  const Node robot = join("robot");
+  const Node viewer = join();
+  const Node recorder = join();
+  PublishOptions options;
+  options.delivery = Delivery::latest;
+  const Subscription before = recorder.subscribe("robot/image").or_throw();
+  const Publisher images = robot.advertise("image", options).or_throw();
+  const Subscription newest = viewer.subscribe("robot/image").or_throw();
+  const Node archive = join();
+  const Subscription all = archive.subscribe("robot/image", {.messages = 64}).or_throw();
+  images.wait_for_subscribers(3, kWait).or_throw();
+  // One at a time: what is under way the hub may replace, too.
+  for (const std::string text : {"1", "2", "3"}) {
+    images.publish(text, kForever).or_throw();
+    EXPECT_TRUE(eventually([&] { return all.queue().received() == std::stoul(text); }));
+    EXPECT_TRUE(eventually([&] { return newest.queue().received() == std::stoul(text); }));
+    EXPECT_TRUE(eventually([&] { return before.queue().received() == std::stoul(text); }));
+  }
+  for (const Subscription& one : {newest, before}) {
+    const auto message = one.receive(kWait);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(message->text(), "3");
+    EXPECT_TRUE(message->latest());
+    EXPECT_FALSE(one.try_receive());
+    EXPECT_EQ(one.missed(), 2u) << "they were skipped";
+  }
+  for (const char* text : {"1", "2", "3"}) EXPECT_EQ(all.receive(kWait)->text(), text);
+  EXPECT_EQ(all.missed(), 0u);
+}
+
 TEST_F(Services, ASubscriptionMayComeFirst) {
   const Node viewer = join();
   const Subscription odometry = viewer.subscribe("robot/odom").or_throw();

@@ -91,6 +91,17 @@ TEST_F(MissedMessagesTest, WhoseFirstComesHasMissedNothing) {
   EXPECT_EQ(missed.rest(), Sentences{});
 }
 
+TEST_F(MissedMessagesTest, OfTheLatestTheyWereSkipped) {
+  const auto take_latest = [this](std::uint32_t sequence) {
+    return missed_.take(make_message("x", sequence, {}, "r/s", 0, NIF_LATEST));
+  };
+  take_latest(1);
+  EXPECT_EQ(take_latest(4), 2u);
+  EXPECT_EQ(missed_.rest(),
+            Sentences{"2 messages of r/s skipped for newer ones (delivery latest)"});
+  EXPECT_EQ(missed_.rest(), Sentences{}) << "once";
+}
+
 TEST_F(MissedMessagesTest, NumbersWrapAround) {
   take(0xFFFFFFFF);
   EXPECT_EQ(take(1), 1u);

@@ -21,11 +21,13 @@ inline Message make_counted(std::uint32_t group, std::uint32_t epoch) {
 
 /// A message that NIF knows nothing of, of a service if one is named. `text` must outlive it.
 inline Message make_message(std::string_view text, std::uint32_t sequence = 1, MessageKey key = {},
-                            const std::string& service = "", std::uint32_t reconnects = 0) {
+                            const std::string& service = "", std::uint32_t reconnects = 0,
+                            nif_policy policy = NIF_POLICY_DEFAULT) {
   nif_incoming in{};
   in.from = (7u << 20) | 5;
   in.key = key.type | (static_cast<std::uint64_t>(key.instance) << 32);
   in.lane = 2;
+  in.policy = static_cast<std::uint8_t>(policy);
   in.arrival_ns = 1000;
   proto::gimi::MessageView view;
   view.header.sequence = sequence;
