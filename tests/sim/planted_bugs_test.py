@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
-"""Each checker of the simulation has a planted bug that it must find:   planted_bugs_test.py PROGRAM PLANTED_BUGS"""
+"""Each checker of the simulation has a planted bug that it must find: planted_bugs_test.py PROGRAM FOLDER_OF_PLANTED"""
 
 import subprocess
 import sys
-from pathlib import Path
 
 
 def main():
-    program, planted = sys.argv[1:3]
+    program, folder = sys.argv[1:3]
+    sys.path.insert(0, folder)
+    import planted  # noqa: PLC0415: its folder is an argument
+
     answer = subprocess.run([program, "--checkers"], capture_output=True, text=True, check=True)
     checkers = set(answer.stdout.split())
-    lines = [line.split() for line in Path(planted).read_text(encoding="utf-8").splitlines()]
-    found = {words[2] for words in lines if words and not words[0].startswith("#")}
+    found = {bug.argument for bug in planted.load() if bug.program == "gimnet-sim"}
     for name in sorted(checkers - found):
         print(f"no bug is planted for the checker {name}")
     for name in sorted(found - checkers):

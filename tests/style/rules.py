@@ -1,8 +1,13 @@
 """The house rules that a machine can check. Each rule is a function from a Tree to sentences, one per violation."""
 
 import re
+import sys
+from pathlib import Path
 
 from tree import CODE_FOLDERS, CPP_SUFFIXES, HEADER_SUFFIXES, TEXT_FOLDERS
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "planted"))
+import planted  # noqa: E402
 
 FILE_LINES_MAX = 400
 # Grew beyond it when the columns went from 120 to 100; each leaves the list with its next change.
@@ -15,9 +20,7 @@ LINE_COLUMNS_MAX = 100
 FUNCTION_LINES_MAX = 59
 UNTESTED_LIST = "tests/style/untested_sources.txt"
 UNTESTED_MAX = 12
-PLANTED_LIST = "fuzz/planted_bugs.txt"
-SIMULATED_LIST = "tests/sim/planted_bugs.txt"
-PLANTED_SLOW_LIST = "perf/instructions/planted_bugs.txt"  # found by counting instructions, not by a fuzz target
+PLANTED_TABLE = "tests/planted/bugs.toml"
 REQUIREMENTS = "docs/requirements.md"
 
 # Who may include whom: the table of docs/architecture.md, "May include". Longest prefix wins.
@@ -80,7 +83,6 @@ _FRONT_ERASED = re.compile(r"\b(\w+)\.erase\(\1\.begin\(\)\)")
 _BOUND = re.compile(r"\bk\w*Max\b|\w+_max_?\b|\blimits_?\.\w+")
 _UNFINISHED = re.compile(r"\b(TODO|FIXME|HACK|XXX)\b|\bfor now\b", re.IGNORECASE)
 _MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home)/")
-_PLANTED = re.compile(r"\bGIMNET_BUG_([A-Z0-9_]+)\b")
 _REQUIREMENT = re.compile(r"^\| ([A-Z]-?\d+[a-z]?) \|.*\|([^|]*)\|$")
 _TEST_PATH = re.compile(r"\b(?:tests|perf|fuzz|bench)/[\w./-]+")
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -308,34 +310,33 @@ def tests_mirror_sources(tree):
             yield f"{file.path}: no {file.path.replace('src', 'tests', 1).rsplit('.', 1)[0]}_test.cpp"
 
 
-def planted_bugs_are_listed(tree):
-    listed, targets_with_bug = set(), set()
-    for number, line in _list_entries(tree, PLANTED_LIST):
-        words = line.split()
-        if len(words) < 2:
-            yield f"{PLANTED_LIST}:{number}: a line is BUG TARGET"
-            continue
-        listed.add(words[0])
-        targets_with_bug.add(words[1])
-    simulated = set()
-    for number, line in _list_entries(tree, SIMULATED_LIST):
-        words = line.split()
-        source = tree.file(f"src/hub/{words[1]}") if len(words) >= 3 else None
-        if source is None or words[0] not in _PLANTED.findall(source.text):
-            yield f"{SIMULATED_LIST}:{number}: a line is BUG SOURCE CHECKER, and SOURCE mentions GIMNET_BUG_<BUG>"
-        simulated.add(words[0])
-    planted = {bug for file in tree.files(("src", "include"), CPP_SUFFIXES) for bug in _PLANTED.findall(file.text)}
-    planted -= {line.split()[0] for _, line in _list_entries(tree, PLANTED_SLOW_LIST)}
+def planted_bugs_fit(tree):
+    """The table of planted bugs fits the sources, each fuzz target has one, and the product has none."""
+    for file in tree.files(("src", "include"), CPP_SUFFIXES):
+        if "GIMNET_BUG" in file.text:
+            yield f"{file.path}: planted bugs stand in {PLANTED_TABLE}, not in the product"
+    table = tree.file(PLANTED_TABLE)
+    try:
+        bugs = planted.load(table.text if table else "")
+    except (planted.Mistake, ValueError, TypeError) as mistake:
+        yield f"{PLANTED_TABLE}: {mistake}"
+        return
+    for mistake in planted.check(bugs, lambda path: _text_of(tree, path)):
+        yield f"{PLANTED_TABLE}: {mistake}"
     targets = {name for file in tree.files(("fuzz",), (".txt",)) if file.path.endswith("CMakeLists.txt")
                for name in _FUZZ_TARGET.findall(file.text)}
-    for bug in sorted(planted - listed - simulated):
-        yield f"{PLANTED_LIST}: GIMNET_BUG_{bug} is in the sources, but no target is said to find it"
-    for bug in sorted(listed - planted):
-        yield f"{PLANTED_LIST}: no source mentions GIMNET_BUG_{bug}"
-    for target in sorted(targets_with_bug - targets):
-        yield f"{PLANTED_LIST}: there is no fuzz target {target}"
-    for target in sorted(targets - targets_with_bug):
-        yield f"{PLANTED_LIST}: the fuzz target {target} has no bug that it must find"
+    with_bug = {bug.program for bug in bugs if bug.program.endswith("_fuzz")}
+    for target in sorted(with_bug - targets):
+        yield f"{PLANTED_TABLE}: there is no fuzz target {target}"
+    for target in sorted(targets - with_bug):
+        yield f"{PLANTED_TABLE}: the fuzz target {target} has no bug that it must find"
+
+
+def _text_of(tree, path):
+    file = tree.file(path)
+    if file is None:
+        raise planted.Mistake("there is no such file")
+    return file.text
 
 
 def requirements_name_tests_that_exist(tree):
@@ -380,7 +381,7 @@ RULES = (
     no_machine_paths,
     nothing_left_for_later,
     tests_mirror_sources,
-    planted_bugs_are_listed,
+    planted_bugs_fit,
     requirements_name_tests_that_exist,
     links_resolve,
 )

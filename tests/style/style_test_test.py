@@ -15,6 +15,11 @@ def long_function(lines, head="int f(int a) {"):
     return head + "\n" + "  a();\n" * (lines - 2) + "}\n"
 
 
+def planted_table(program, find):
+    return (f'[[bug]]\nname = "A"\nbreaks = "b"\nprogram = "{program}"\n'
+            f'[[bug.edit]]\nfile = "src/a.cpp"\nfind = "{find}"\nreplace = "c"\n')
+
+
 # rule: (innocent trees, trees with exactly one violation); a tree is {path: text}.
 CASES = {
     rules.include_arrows: (
@@ -217,19 +222,21 @@ CASES = {
             | {f"src/a{n}.cpp": "" for n in range(rules.UNTESTED_MAX + 1)},
         ],
     ),
-    rules.planted_bugs_are_listed: (
-        [{"src/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.PLANTED_LIST: "# list\nA a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(b/a_fuzz.cpp DEPENDS c)\n"},
-         {"src/a.cpp": "#ifdef GIMNET_BUG_SLOW_A\n", rules.PLANTED_SLOW_LIST: "SLOW_A parser\n"},
-         {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A control/a.cpp names\n"}],
+    rules.planted_bugs_fit: (
+        [{"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("a_fuzz", "a=1"),
+          "fuzz/CMakeLists.txt": "gimnet_fuzz(b/a_fuzz.cpp DEPENDS c)\n"},
+         {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "int  a")}],
         [
-            {"src/hub/control/a.cpp": "", rules.SIMULATED_LIST: "A control/a.cpp names\n"},
-            {"src/hub/control/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.SIMULATED_LIST: "A control/b.cpp names\nA control/a.cpp names\n"},
-            {"src/a.cpp": "#ifdef GIMNET_BUG_SLOW_A\n", rules.PLANTED_SLOW_LIST: "SLOW_B parser\n"},
             {"src/a.cpp": "#ifdef GIMNET_BUG_A\n"},
-            {rules.PLANTED_LIST: "A a_fuzz\n", "fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},
-            {"src/a.cpp": "#ifdef GIMNET_BUG_A\n", rules.PLANTED_LIST: "A a_fuzz\n"},
+            {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "b")},
+            {"src/a.cpp": "int a = 1, aa = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "a = 1")},
+            {"src/b.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("gimnet-sim", "a = 1")},
+            {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: planted_table("a_fuzz", "a = 1")},
             {"fuzz/CMakeLists.txt": "gimnet_fuzz(a_fuzz.cpp)\n"},
-            {rules.PLANTED_LIST: "A\n"},
+            {"src/a.cpp": "int a = 1;\n", rules.PLANTED_TABLE: 2 * planted_table("gimnet-sim", "a = 1")},
+            {rules.PLANTED_TABLE: "[[bug]\n"},
+            {rules.PLANTED_TABLE: '[[bug]]\nname = "A"\n'},
+            {rules.PLANTED_TABLE: '[[bug]]\nname = "A"\nbreaks = "b"\nprogram = "gimnet-sim"\n'},
         ],
     ),
     rules.links_resolve: (

@@ -143,10 +143,8 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
   unconfirmed_bytes_ += view.header.frame_size();
   switch (view.header.kind) {
     case proto::Kind::unicast:
-#if !defined(GIMNET_BUG_NIF_TAKES_ALL_UNICAST)
       // Never to another node than the one addressed, whatever the hub thinks.
       if (!is_for_this_node(view.header.dst)) break;
-#endif
       return take_message(view, frame);
     case proto::Kind::group:
     case proto::Kind::list:
@@ -159,11 +157,7 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
       if (taken) {
         host_.on_taken(view.header.src, *taken);
       } else {
-#if defined(GIMNET_BUG_NIF_TAKEN_ENDS_CONNECTION)
-        return malformed("TAKEN is too short");
-#else
         ++counts_.unreadable;
-#endif
       }
       return Verdict::going;
     }

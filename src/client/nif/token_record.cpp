@@ -65,12 +65,8 @@ std::optional<TokenRecord> read_token_record(std::span<const std::byte> bytes) {
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     sizes[i] = load_le<std::uint16_t>(bytes.data() + kSizesAt + 2 * i);
   }
-#ifdef GIMNET_BUG_TOKEN_RECORD_SIZES_UNCHECKED
-  const std::span<const std::byte> rest{bytes.data() + kHeadSize, sizes[0] + sizes[1] + sizes[2]};
-#else
   const std::span<const std::byte> rest = bytes.subspan(kHeadSize);
   if (sizes[0] + sizes[1] + sizes[2] != rest.size()) return std::nullopt;
-#endif
   if (sizes[0] == 0 || sizes[0] > proto::kTokenBytesMax) return std::nullopt;
   TokenRecord record;
   const auto token = rest.first(sizes[0]);

@@ -371,9 +371,7 @@ std::string toml_quoted(std::string_view text) {
   for (const char c : text) {
     std::array<char, 8> code{};
     if (c == '"' || c == '\\') {
-#ifndef GIMNET_BUG_QUOTES_NOT_ESCAPED
       quoted += '\\';
-#endif
       quoted += c;
     } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
       std::snprintf(code.data(), code.size(), "\\u%04x",

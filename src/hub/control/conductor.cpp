@@ -20,9 +20,7 @@ using std::chrono::milliseconds;
 
 /// Was the request of no use to anybody?
 bool is_odd(proto::Status status) {
-#ifndef GIMNET_BUG_DENIED_IS_NOT_ODD
   if (status == proto::Status::denied) return true;
-#endif
   return status == proto::Status::bad_request || status == proto::Status::not_supported;
 }
 
@@ -81,10 +79,8 @@ Conductor::Conductor(HubFacts facts, Placement placement, Limits& limits, Wiring
 
 std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& hello,
                                         Moment moment) {
-#ifndef GIMNET_BUG_DRAINING_LETS_IN
   if (draining_)
     return Goodbye{GoodbyeCode::draining, "the hub is shutting down; connect to another one"};
-#endif
   JoinRequest request;
   request.role = hello.role;
   request.name = hello.name;
@@ -210,24 +206,13 @@ void Conductor::on_frame(const ControlFrameEvent& event, milliseconds now) {
   const proto::Payload answer = handle(context, request);
   const proto::Status status = proto::peek_status(answer);
   request_counters_.count(kind, view->header.operation, status);
-#ifndef GIMNET_BUG_ANSWER_BEFORE_TABLES
   runner_.carry_out(effects, now);
-#endif
   SendControlCommand command;
   command.session = event.session;
-#ifndef GIMNET_BUG_ANSWER_TO_ANY_CONNECTION
   command.attachment = event.attachment;
-#endif
   command.frame = control_frame(kind, event.node, facts_.id, answer);
-#ifdef GIMNET_BUG_ANSWER_NAMES_THE_SLOT
-  command.frame = control_frame(kind, make_id<NodeId>(facts_.id, event.session.slot.value() + 1),
-                                facts_.id, answer);
-#endif
   command.answers = 1;
   wiring_.shards.send(shard, std::move(command));
-#ifdef GIMNET_BUG_ANSWER_BEFORE_TABLES
-  runner_.carry_out(effects, now);
-#endif
   if (is_odd(status)) on_oddity(event, now);
 }
 
@@ -308,9 +293,6 @@ void Conductor::drain() {
   if (draining_) return;
   draining_ = true;
   shards_to_drain_ = facts_.shards;
-#ifdef GIMNET_BUG_DRAIN_FORGETS_A_SHARD
-  --shards_to_drain_;
-#endif
   for (std::size_t i = 0; i < shards_to_drain_; ++i) {
     wiring_.shards.send(ShardIndex{static_cast<std::uint8_t>(i)}, DrainCommand{limits_.drain_ms});
   }
@@ -324,9 +306,6 @@ Reloading Conductor::reload() {
   for (const std::string& fault : reloading.faults) log_error(fault);
   if (reloading.more_faults)
     log_error("there are more faults; tcphub --check-config tells all of them");
-#ifdef GIMNET_BUG_BAD_CONFIGURATION_TAKEN
-  if (!reloading.faults.empty()) limits_ = reloading.limits;
-#endif
   if (!reloading.faults.empty()) {
     log_error("the configuration was not read again: the former one stays in force, whole");
     return reloading;

@@ -96,9 +96,6 @@ void EffectRunner::run(const ServiceMovedDue& effect) {
 
 void EffectRunner::tell_again(const Session& session, AttachCommand& command) const {
   for (const ServiceMovedDue& untold : parts_.membership.services().untold_moves(session.index)) {
-#ifdef GIMNET_BUG_MOVES_NOT_TOLD_AGAIN
-    continue;
-#endif
     const auto frame =
         control_frame(proto::Kind::ns, command.node, parts_.facts.id, payload_of(untold));
     command.told.insert(command.told.end(), frame.begin(), frame.end());
@@ -125,11 +122,7 @@ proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
 void EffectRunner::run(const PaceDue& effect) {
   const Session* session = find(effect.subscriber);
   if (session == nullptr) return;
-#ifdef GIMNET_BUG_WINDOW_NOT_TOLD
-  const PaceTerms terms{0, effect.terms.depth, effect.terms.interval_us};
-#else
   const PaceTerms terms{effect.terms.window, effect.terms.depth, effect.terms.interval_us};
-#endif
   parts_.shards.send(session->place.shard,
                      PaceCommand{ref_of(session->place), group_id(effect.group), terms,
                                  effect.retained, effect.was_plain});
@@ -148,9 +141,6 @@ void EffectRunner::run(const PaceEnded& effect) {
 void EffectRunner::run(const RetainedDropped& effect) {
   const Session* session = find(effect.provider);
   if (session == nullptr) return;  // what its shard keeps of it ends with it
-#ifdef GIMNET_BUG_LAST_MESSAGE_STAYS
-  return;
-#endif
   parts_.shards.send(session->place.shard, ForgetRetainedCommand{group_id(effect.group)});
 }
 

@@ -21,10 +21,8 @@ std::string StateKeeper::keep_at_once(Membership& membership, milliseconds now) 
   HubState state = state_;
   state.node_mark = durable.nodes.mark;
   state.group_mark = durable.groups.mark;
-#ifndef GIMNET_BUG_USED_IDS_NOT_KEPT
   state.nodes_used = durable.nodes.used;
   state.groups_used = durable.groups.used;
-#endif
   state.group_forgettings = durable.groups.forgettings;
   state.groups_outlasting = durable.groups.outlasting;
   state.kicked = durable.kicked;

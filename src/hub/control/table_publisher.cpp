@@ -40,9 +40,7 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
     members->provider = make_id<NodeId>(hub_, topic->service->provider);
     members->provider_place = node_place(*provider);
     members->by_shard.resize(shards_);
-#ifndef GIMNET_BUG_RETAIN_NOT_PUBLISHED
     members->retain = topic->service->terms.retain;
-#endif
     members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
     for (const std::uint32_t subscriber : topic->subscribers) {
       const NodePlace place = place_of(subscriber, membership);
@@ -125,13 +123,8 @@ void TablePublisher::replace(std::uint32_t index, std::unique_ptr<const GroupMem
 }
 
 void TablePublisher::collect() {
-#ifdef GIMNET_BUG_LAST_LIST_IS_KEPT
-  while (garbage_.size() > 1 && tables_.quiescence.passed(garbage_.front().ticket))
-    garbage_.pop_front();
-#else
   while (!garbage_.empty() && tables_.quiescence.passed(garbage_.front().ticket))
     garbage_.pop_front();
-#endif
 }
 
 }  // namespace gimnet::hub

@@ -126,13 +126,6 @@ bool IoShard::room_came() {
 }
 
 void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
-#if defined(GIMNET_BUG_SLOW_TURN)
-  asm volatile(".rept 158\n\tnop\n\t.endr");
-#endif
-#if defined(GIMNET_BUG_SLOW_COPY)
-  static std::byte copies[2][1280];
-  asm volatile("" : : "r"(__builtin_memcpy(copies[0], copies[1], sizeof copies[0])) : "memory");
-#endif
   state_.egress.owner.check_here();
   state_.now_ms = state_.egress.now_ms = now_ms;
   state_.egress.now_wall_ns = wall_now_ns();

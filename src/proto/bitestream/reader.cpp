@@ -43,12 +43,7 @@ bool take_key(Cursor& cursor, bool is_text, bitestream_key* key) {
   if (!is_text) return cursor.take(kNumberKeySize, &key->number);
   if (!cursor.take(1, &key->text_size) || key->text_size == 0) return false;
   const unsigned char* text = cursor.at();
-#if defined(GIMNET_BUG_READER_KEY_PAST_END)
-  if (!cursor.skip(key->text_size - 1)) return false;
-  if (cursor.left() != 0 && !cursor.skip(1)) return false;
-#else
   if (!cursor.skip(key->text_size)) return false;
-#endif
   key->text = reinterpret_cast<const char*>(text);
   return valid_utf8(text, key->text_size);
 }
@@ -69,11 +64,7 @@ bool take_value(Cursor& cursor, bitestream_value* value) {
 /// What is decided by one look, so that a step stays O(1).
 bool legal_at_depth(const bitestream_value& value, std::uint32_t depth) {
   if (value.type == BITESTREAM_BOOL) return value.bytes[0] <= 1;
-#if defined(GIMNET_BUG_READER_DEPTH_UNBOUNDED)
-  return value.type != BITESTREAM_NESTED || depth < UINT32_MAX;
-#else
   return value.type != BITESTREAM_NESTED || depth < BITESTREAM_DEPTH_MAX;
-#endif
 }
 
 bool valid_content(const bitestream_value& value) {

@@ -243,11 +243,7 @@ void bitestream_end_nested(bitestream_writer* writer) {
   const std::size_t wider = length.size - 1;
   if (!make_room(writer, wider)) return;
   unsigned char* field = writer->bytes + content - 1;
-#if defined(GIMNET_BUG_NESTED_LENGTH_OVERWRITES)
-  if (wider == 3) std::memmove(field + 1 + wider, field + 1, size);
-#else
   if (wider != 0) std::memmove(field + 1 + wider, field + 1, size);
-#endif
   store(field, static_cast<std::uint32_t>(size), length.size);
   writer->bytes[start] = static_cast<unsigned char>(writer->bytes[start] | length.code);
   writer->size += wider;

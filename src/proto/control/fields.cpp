@@ -47,11 +47,7 @@ Fields::Fields(std::span<const std::byte> body, const char* message)
     const bitestream::Key key = next->key();
     if (key.is_text() || key.number() >= kKeysEnd) continue;
     auto& slot = values_[key.number()];
-#if defined(GIMNET_BUG_FIELDS_LAST_WINS)
-    slot = *next;
-#else
     if (!slot) slot = *next;
-#endif
   }
 }
 

@@ -86,9 +86,7 @@ class Fields {
       }
       Fields record(next->bytes(), message_);
       found.push_back(read(record));
-#if !defined(GIMNET_BUG_RECORD_FAULT_IGNORED)
       if (record.failed()) error_ = record.error_;
-#endif
     }
     return found;
   }

@@ -48,11 +48,7 @@ Pattern::States Pattern::step(States states, std::string_view name_part) const {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     if (((stars_ >> i) & 1u) != 0 || part(i) == name_part) next |= 1u << (i + 1);
   }
-#if defined(GIMNET_BUG_STARS_NEED_A_PART)
-  return next;
-#else
   return skip_many(next);
-#endif
 }
 
 }  // namespace gimnet::proto

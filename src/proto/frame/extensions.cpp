@@ -33,12 +33,10 @@ std::optional<Extension> ExtensionReader::next() {
     return std::nullopt;
   }
   const auto size = static_cast<std::size_t>(rest_[1]);
-#if !defined(GIMNET_BUG_EXTENSION_PAST_END)
   if (size > rest_.size() - kExtensionHeadSize) {
     failed_ = true;
     return std::nullopt;
   }
-#endif
   const Extension extension{static_cast<ExtensionType>(rest_[0]),
                             {rest_.data() + kExtensionHeadSize, size}};
   rest_ = {rest_.data() + kExtensionHeadSize + size, rest_.size() - kExtensionHeadSize - size};
@@ -96,11 +94,7 @@ bool fill_trace(std::span<std::byte> extensions, const TraceSlot& slot) {
     if (!is_trace(*extension)) continue;
     const auto used = static_cast<std::size_t>(extension->value[0]);
     std::byte* value = extensions.data() + (extension->value.data() - extensions.data());
-#if defined(GIMNET_BUG_TRACE_TRUSTS_COUNT)
-    if (used == 255) return false;
-#else
     if (used >= TraceView(extension->value).slots()) return false;
-#endif
     store_slot(value + kTraceHeadSize + used * kTraceSlotSize, slot);
     value[0] = static_cast<std::byte>(used + 1);
     return true;

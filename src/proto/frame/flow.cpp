@@ -105,12 +105,7 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
   if (payload.empty()) return std::nullopt;
   const auto operation = static_cast<Operation>(payload[0]);
   const std::size_t size = size_of(operation);
-#if defined(GIMNET_BUG_FLOW_SHORT_PONG)
-  if (size == 0 || payload.size() < (operation == Operation::pong ? kPingSize : size))
-    return std::nullopt;
-#else
   if (size == 0 || payload.size() < size) return std::nullopt;
-#endif
   const std::byte* bytes = payload.data();
   switch (operation) {
     case Operation::ping:

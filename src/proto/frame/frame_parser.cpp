@@ -38,11 +38,7 @@ FrameError take_recipients(Rest& rest, FrameView& view) {
   if (!rest.has(bytes)) return FrameError::list_too_short;
   const ListIds ids(rest.take(bytes).data(), view.header.dst);
   for (std::uint32_t i = 1; i < ids.size(); ++i) {
-#if defined(GIMNET_BUG_LIST_ALLOWS_REPEATS)
-    if (ids[i] < ids[i - 1]) return FrameError::list_not_ascending;
-#else
     if (ids[i] <= ids[i - 1]) return FrameError::list_not_ascending;
-#endif
   }
   view.recipients = ids;
   return FrameError::none;
@@ -70,11 +66,7 @@ FrameError take_fragment_and_key(Rest& rest, FrameView& view) {
 
 FrameError check_fragment(const FragmentHeader& fragment, std::size_t payload_size) {
   if (payload_size == 0) return FrameError::fragment_empty;
-#if defined(GIMNET_BUG_FRAGMENT_END_WRAPS)
-  const std::uint32_t end = fragment.offset + static_cast<std::uint32_t>(payload_size);
-#else
   const std::uint64_t end = std::uint64_t{fragment.offset} + payload_size;
-#endif
   return end > fragment.total ? FrameError::fragment_over_total : FrameError::none;
 }
 

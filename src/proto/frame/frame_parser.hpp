@@ -65,9 +65,6 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
 /// 2 only the length is checked: the caller checks one header per run. REQUIRES: begin <= end.
 [[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end,
                                       std::uint32_t max_length) {
-#if defined(GIMNET_BUG_SLOW_PARSER)
-  asm volatile("nop\n\tnop\n\tnop\n\tnop");
-#endif
   const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
   if (available < kHeaderSize)
     return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize), 0};
@@ -88,11 +85,7 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
       // Most frames are as long as the one before. Where the next one begins is then known without
       // waiting for what this one says, so that several are compared at a time: half the time of a
       // run of small frames.
-#if defined(GIMNET_BUG_PARSER_RUN_PAST_END)
-      while (available - size >= frame_size - 1 &&
-#else
       while (available - size >= frame_size &&
-#endif
              load_le<std::uint64_t>(begin + size) == length_and_dst &&
              load_le<std::uint64_t>(begin + size + kSrcOffset) == src_and_attributes) {
         size += frame_size;

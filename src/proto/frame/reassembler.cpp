@@ -26,11 +26,7 @@ Reassembled Reassembler::take(const FragmentStream& stream, const FragmentHeader
   Entry& entry = touch(stream);
   Reassembled result;
   if (entry.open && entry.message == fragment.message) {
-#if defined(GIMNET_BUG_REASSEMBLY_TAKES_GAPS)
-    const bool follows = fragment.offset >= entry.bytes.size() && fragment.total == entry.total;
-#else
     const bool follows = fragment.offset == entry.bytes.size() && fragment.total == entry.total;
-#endif
     result = follows ? append(entry, payload) : refuse(entry, fragment.message, State::lost);
   } else {
     lose(entry);

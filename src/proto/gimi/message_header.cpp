@@ -30,9 +30,7 @@ std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
   view.extension = rest.first(view.header.extension_bytes);
   view.data = rest.subspan(view.header.extension_bytes);
   if (view.header.has(kFlagTimestamp)) {
-#if !defined(GIMNET_BUG_TIMESTAMP_UNCHECKED)
     if (view.extension.size() < kTimestampSize) return std::nullopt;
-#endif
     view.timestamp_ns = load_le<std::int64_t>(view.extension.data());
   }
   return view;

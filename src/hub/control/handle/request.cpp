@@ -15,23 +15,11 @@ std::optional<proto::Refusal> count_declaration(HandlerContext& context, const S
   // All that a node may have it may also declare at once: it does after a restart of the hub.
   const std::uint64_t burst =
       std::max(limits.declarations_burst, limits.services_per_node + limits.subscriptions_per_node);
-#ifdef GIMNET_BUG_DECLARATIONS_NOT_COUNTED
-  return std::nullopt;
-#endif
-#ifdef GIMNET_BUG_DECLARATIONS_COUNT_FOR_ANOTHER
-  const std::uint32_t account =
-      std::min(session.index, context.membership.sessions().all().begin()->first);
-#else
   const std::uint32_t account = session.index;
-#endif
   Session& counted = *context.membership.sessions().find(account);
   if (counted.declarations.take({limits.declarations_per_s, burst}, context.now))
     return std::nullopt;
-#ifdef GIMNET_BUG_RATE_SAYS_LIMIT
-  constexpr proto::Status kStatus = proto::Status::limit;
-#else
   constexpr proto::Status kStatus = proto::Status::rate;
-#endif
   return proto::Refusal{
       kStatus,
       "this node began or changed more names, services and subscriptions than it may: " +

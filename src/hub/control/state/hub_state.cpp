@@ -177,11 +177,7 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   if (version < kVersionOfMarks || version > kVersion)
     return Error{"another version of tcphub wrote it"};
   const std::optional<Lengths> lengths = lengths_of(bytes, version);
-#ifdef GIMNET_BUG_STATE_LONGER_THAN_IT_SAYS
-  if (!lengths || bytes.size() < lengths->file()) return Error{"its length is not what it says"};
-#else
   if (!lengths || bytes.size() != lengths->file()) return Error{"its length is not what it says"};
-#endif
   const std::size_t end = bytes.size() - std::tuple_size_v<Digest>;
   if (!same_bytes(sha256(bytes.first(end)), bytes.subspan(end))) return Error{"it is damaged"};
   HubState state;
@@ -213,9 +209,6 @@ Result<HubStart> next_start(const HubState& found, std::chrono::milliseconds wal
   start.groups = begin(start.state.group_mark, start.state.groups_used);
   start.groups.forgettings = found.group_forgettings;
   start.groups.outlasting = found.groups_outlasting;
-#ifdef GIMNET_BUG_NEWCOMERS_BEGIN_AT_ONE
-  start.nodes = {1, IndexPool::kBlock};
-#endif
   std::erase_if(start.state.kicked,
                 [wall](const SessionToken& token) { return token.expiry <= wall; });
   return start;

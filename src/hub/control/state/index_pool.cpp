@@ -146,11 +146,7 @@ bool IndexPool::granted(std::uint32_t index) const {
 /// Early enough that a restart, after which nothing is forgotten for a time, finds many that are
 /// not used.
 bool IndexPool::forgetting_due(std::chrono::milliseconds now) const {
-#ifndef GIMNET_BUG_USED_FORGOTTEN_EARLY
   if (now < returns_until_) return false;
-#else
-  static_cast<void>(now);
-#endif
   if (2 * std::uint64_t{unused()} >= most_) return false;
   return used_.size() - taken_.size() >= worth_forgetting(most_);
 }

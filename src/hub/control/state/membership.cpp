@@ -139,11 +139,7 @@ void Membership::name_decided(Session& session, const NameDecision& decision, mi
 
 std::string Membership::kick(Session& session, const std::string& sentence, milliseconds now,
                              Effects& effects, const KeepNow& keep) {
-#ifndef GIMNET_BUG_KICKED_TOKEN_HONOURED
   const bool remembered = sessions_.remember_kicked(session);
-#else
-  constexpr bool remembered = true;
-#endif
   std::string failure;
   if (keep) {
     failure = keep();
@@ -196,12 +192,8 @@ std::optional<proto::Refusal> Membership::take_for(const Session& session, std::
                           "this node was given the id " + to_string(sessions_.node_id(session)) +
                               " and has not come back under it yet; try again when it has"};
   }
-#ifndef GIMNET_BUG_RETURNING_ID_GIVEN_AWAY
   const bool awaited = sessions_.find(index) == nullptr && sessions_.indices().used(index) &&
                        sessions_.returns_expected_for(now) > milliseconds{0};
-#else
-  const bool awaited = false;
-#endif
   const NodeId node = make_id<NodeId>(hub_of(sessions_.node_id(session)), index);
   IndexPool& indices = sessions_.indices();
   if (awaited || !indices.take_free(index, now))
@@ -233,9 +225,7 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
   // The new id leads to the node before the old one says that it moved. Its groups may be published
   // at any time: what is sent to them goes by places (docs/architecture.md, "Another id").
   effects.emplace_back(NodeChanged{index});
-#ifndef GIMNET_BUG_FORMER_ID_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{former});
-#endif
   // Who hears of the new id may send to it at once: by then no frame goes to the connection on
   // which the node has the old one.
   effects.emplace_back(RenumberDue{session.place, former, index,
@@ -346,9 +336,7 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
   const std::string former = std::exchange(session.name, CompactText(name)).str();
   if (!former.empty()) {
     services_.node_renamed(session.index, now, effects);
-#ifndef GIMNET_BUG_OLD_NAME_STAYS
     directory_.remove(former);
-#endif
   }
   if (!name.empty()) directory_.put(name, session.index, standing_);
   // A node that has not been attached yet has nothing to change: it will be told of as one that
@@ -361,12 +349,8 @@ void Membership::end(Session& session, milliseconds now, Effects& effects) {
   services_.node_left(session.index, now, effects);
   directory_.remove(session.name);
   const std::vector<std::uint32_t> former = sessions_.former_indices(session);
-#ifndef GIMNET_BUG_LEFT_NODE_STAYS_PUBLISHED
   effects.emplace_back(NodeChanged{session.index});
-#endif
-#ifndef GIMNET_BUG_SLOT_NOT_RELEASED
   effects.emplace_back(SessionEnded{session.place});
-#endif
   if (session.attachment > 0)
     effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name.str(), {}});
   for (const std::uint32_t index : former) effects.emplace_back(NodeChanged{index});

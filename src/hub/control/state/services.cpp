@@ -74,15 +74,11 @@ GroupGrant Services::grant_of(std::uint32_t group, std::string_view full_name) c
 /// forgetting: then nobody got it since. Any other one loses: another service may have got the
 /// group.
 bool Services::is_proven(const FormerGroup& former, std::string_view full_name) const {
-#ifdef GIMNET_BUG_FORMER_GROUP_UNPROVEN
-  return former.group != 0 && !full_name.empty();
-#else
   GroupGrant grant = grant_of(former.group, full_name);
   if (proves(former.proof, grant, secret_)) return true;
   if (grant.forgettings == 0 || !group_indices_.outlasted_forgetting(former.group)) return false;
   --grant.forgettings;
   return proves(former.proof, grant, secret_);
-#endif
 }
 
 std::optional<std::uint32_t> Services::take_group(const FormerGroup& former,
@@ -109,11 +105,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
                               "; choose another name"};
   }
   Node& node = nodes_[provider];
-#ifdef GIMNET_BUG_ONE_SERVICE_TOO_MANY
-  if (!provided && node.provides.size() > limits_.services_per_node) {
-#else
   if (!provided && node.provides.size() >= limits_.services_per_node) {
-#endif
     forget_if_idle(provider);
     return limit_reached("services", limits_.services_per_node, "services_per_node");
   }
@@ -368,17 +360,10 @@ void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effe
   GIMNET_CHECK(place != list.end() && *place == node);
   const bool paced = topic.pace_of(node).has_value();
   forget_subscriber(topic, node);
-#ifdef GIMNET_BUG_LEFT_COUNTS_ITSELF
-  const auto number = static_cast<std::uint32_t>(list.size());
-  list.erase(place);
-#else
   list.erase(place);
   const auto number = static_cast<std::uint32_t>(list.size());
-#endif
   if (topic.service) {
-#ifndef GIMNET_BUG_LEFT_NOT_PUBLISHED
     effects.emplace_back(MemberChanged{topic.service->group, node});
-#endif
     if (paced) effects.emplace_back(PaceEnded{node, topic.service->group, false});
     effects.emplace_back(
         SubscriberDue{topic.service->provider, topic.service->group, node, number, false});

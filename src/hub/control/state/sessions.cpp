@@ -61,9 +61,7 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
   // The proof comes first: what else is wrong with a token is nobody's business who cannot show
   // one.
   if (!is_genuine(presented.token, {hub_, name, presented.identity}, secret_)) return {};
-#ifndef GIMNET_BUG_TOKEN_NEVER_EXPIRES
   if (token->expiry <= presented.wall) return {};
-#endif
   if (token->number < floor_.at(token->index)) return {};
   if (holds) return {holder, std::nullopt};
   if (holder != nullptr || indices_.held(token->index)) return {};
@@ -149,10 +147,8 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
 
 void Sessions::stood_still(milliseconds time, milliseconds now) {
   const milliseconds latest = now + milliseconds{limits_.grace_ms};  // nothing began later than now
-#ifndef GIMNET_BUG_GRACE_GOES_ON_WITHOUT_THE_HUB
   away_named_.put_off(time, latest);
   away_nameless_.put_off(time, latest);
-#endif
   if (returns_until_) returns_until_ = std::min(*returns_until_ + time, latest);
   indices_.put_off_returns(time, latest);
 }
@@ -245,12 +241,8 @@ std::optional<milliseconds> Sessions::next_expiry() const {
 
 bool Sessions::still_away(const Away& away) const {
   const Session* session = find(away.index);
-#ifdef GIMNET_BUG_EARLIER_ABSENCE_COUNTS
-  return session != nullptr && !session->connected && session->place.generation == away.generation;
-#else
   return session != nullptr && !session->connected &&
          session->place.generation == away.generation && session->attachment == away.attachment;
-#endif
 }
 
 Session* Sessions::find(std::uint32_t index) {

@@ -324,11 +324,9 @@ proto::Payload Watches::finish(Watch& watch, Page page) const {
 bool Watches::wants(const Watch& watch, const Journal::Note& note) {
   if ((watch.subjects & (note.of_service ? ns::kWatchServices : ns::kWatchNodes)) == 0)
     return false;
-#ifndef GIMNET_BUG_WATCH_TELLS_TWICE
   // What the snapshot has yet to look at, it will show as it is then.
   if (watch.phase == Phase::nodes && (note.of_service || note.index > watch.cursor)) return false;
   if (watch.phase == Phase::services && note.of_service && note.index > watch.cursor) return false;
-#endif
   return fits(watch, note.name) || (!note.former_name.empty() && fits(watch, note.former_name));
 }
 

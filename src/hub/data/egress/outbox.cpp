@@ -97,9 +97,6 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
 
 void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover handover,
                   EgressContext& context) {
-#if defined(GIMNET_BUG_SLOW_OUTBOX)
-  asm volatile(".rept 98\n\tnop\n\t.endr");
-#endif
   context.owner.check_here();
   const std::size_t lane = header.lane & proto::kLaneMask;
   context.tally.queued += run.frames;

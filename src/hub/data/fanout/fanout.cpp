@@ -22,9 +22,6 @@ Fanout::Fanout(ShardIndex self, std::vector<Mailbox*> mailboxes, RecipientTable&
 
 void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
                      Handover handover) {
-#if defined(GIMNET_BUG_SLOW_FAN_OUT)
-  asm volatile(".rept 45\n\tnop\n\t.endr");
-#endif
   context_.owner.check_here();
   if (!recipient.connected && !recipient.waits_when_away) {
     lose(recipient, run, header, handover, proto::DropReason::away);

@@ -44,9 +44,6 @@ bool Mailbox::crowded(ShardIndex from) {
 }
 
 bool Mailbox::post(ShardIndex from, Mail mail) {
-#if defined(GIMNET_BUG_SLOW_MAILBOX)
-  asm volatile(".rept 10\n\tnop\n\t.endr");
-#endif
   Pair& pair = pairs_[from.value()];
   ++pair.sent_entries;
   pair.sent_bytes += mail.size;

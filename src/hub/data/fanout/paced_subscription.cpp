@@ -8,10 +8,8 @@
 namespace gimnet::hub {
 
 void PacedSubscription::set_terms(const PaceTerms& terms) {
-#ifndef GIMNET_BUG_HIGHER_RATE_WAITS
   // Without an interval this is when the last one that had one began.
   if (due_us_ != 0) due_us_ = due_us_ - terms_.interval_us + terms.interval_us;
-#endif
   terms_ = terms;
   terms_.depth = std::max(1u, terms.depth);
   std::vector<KeptMessage> ring(std::max<std::size_t>(terms_.depth, held_));
@@ -37,11 +35,7 @@ void PacedSubscription::on_begun(std::uint64_t now_us) {
 }
 
 void PacedSubscription::on_lost(std::uint64_t messages) {
-#ifdef GIMNET_BUG_LOST_KEEPS_ITS_PLACE
-  static_cast<void>(messages);
-#else
   lost_ += messages;
-#endif
   // A subscriber may have credited what never left: it counts once.
   credited_ = std::min(credited_, sent_ - lost_);
 }

@@ -51,11 +51,7 @@ Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunVi
                                std::uint64_t now_ms) {
   proto::FrameHeader header = proto::load_header(view.bytes);
   const auto attributes = load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset);
-#if defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
-  if (attributes != state.admitted_attributes) {
-#else
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
-#endif
     if (is_former(state, NodeId{header.src})) {
       header.src = state.node.value();
       write_source(run, view, header.src);

@@ -59,9 +59,7 @@ class IngressGate {
     // Most runs are like the one before.
     if (load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset) ==
             state.admitted_attributes &&
-#if !defined(GIMNET_BUG_GATE_REMEMBERS_THE_SOURCE)
         load_le<std::uint32_t>(view.bytes + proto::kSrcOffset) == state.node.value() &&
-#endif
         view.bytes[proto::kLaneOffset] != static_cast<std::byte>(proto::Lane::real_time)) {
       return Admission::data;
     }

@@ -52,9 +52,7 @@ class RecentRecipients {
       const std::byte* frame = begin + appended.size;
       Outbox* outbox = outboxes_[load_le<std::uint32_t>(frame + proto::kDstOffset) % kPlaces];
       if (outbox == before || outbox == nullptr) break;
-#if !defined(GIMNET_BUG_RECENT_TAKES_OTHER_SORTS)
       if (load_le<std::uint32_t>(frame + proto::kAttributesOffset) != attributes_) break;
-#endif
       const std::size_t size = proto::kHeaderSize + std::size_t{load_le<std::uint32_t>(frame)};
       if (size > available - appended.size ||
           !outbox->append(frame, static_cast<std::uint32_t>(size), 1))

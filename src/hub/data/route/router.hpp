@@ -36,9 +36,6 @@ class Router {
   /// The usual case of small messages, made short: to a node here that got some with the same
   /// header in this turn. False: nothing was done, route() them. REQUIRES: as route().
   [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
-#if defined(GIMNET_BUG_SLOW_ROUTER)
-    asm volatile(".rept 7\n\tnop\n\t.endr");
-#endif
     // Only of these is dst all that decides where they go.
     if (static_cast<proto::Kind>(frames[proto::kKindOffset]) != proto::Kind::unicast) return false;
     const NodeId node{load_le<std::uint32_t>(frames + proto::kDstOffset)};
