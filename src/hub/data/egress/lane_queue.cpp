@@ -46,11 +46,12 @@ bool is_plain(const Entry& entry) {
 }  // namespace
 
 std::size_t hash_value(const LatestStream& stream) {
-  std::size_t seed = 0;
-  boost::hash_combine(seed, stream.addresses);
-  boost::hash_combine(seed, stream.key);
-  boost::hash_combine(seed, stream.kind_and_keyed);
-  return seed;
+  constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15u;  // 2^64 divided by the golden ratio
+  std::uint64_t hash = stream.addresses;
+  for (const std::uint64_t word : {stream.key, std::uint64_t{stream.kind_and_keyed}}) {
+    hash = (hash ^ (hash >> 32)) * kGolden + word;
+  }
+  return hash ^ (hash >> 32);
 }
 
 LatestStream LaneQueue::stream_of(const Entry& entry) {
