@@ -27,7 +27,7 @@ struct Loss {
       Meaning{"no_route", "no hub of that id can be reached"},
       Meaning{"away", "its connection broke, and it has not come back yet"},
       Meaning{"queue_full", "it does not read as fast as is sent"},
-      Meaning{"over_budget", "the hub's memory for what waits is used up"},
+      Meaning{"over_budget", "the hub's memory for what waits is used up, or its share of it"},
       Meaning{"timed_out", "it took nothing for as long as the hub waits"},
       Meaning{"cut_message", "an earlier part of it was dropped"},
       Meaning{"renumbered", "that node has another id now: ask for it by its name"},

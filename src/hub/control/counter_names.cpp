@@ -46,6 +46,7 @@ constexpr std::array kCounters{
     GIMNET_COUNTER(lane0_demoted),
     GIMNET_COUNTER(bad_credits),
     GIMNET_COUNTER(not_retained),
+    GIMNET_COUNTER(scarce_turns),
     GIMNET_COUNTER(pinned_bytes),
     GIMNET_COUNTER(pinned_bytes_max),
     GIMNET_COUNTER(allocated_bytes),

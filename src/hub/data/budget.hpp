@@ -1,15 +1,18 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 
 namespace gimnet::hub {
 
-/// The bytes that all outboxes of the hub together may keep from being freed. Shards lease it in
-/// pieces, so that no frame touches a shared word. Thread safety: any thread.
+/// The bytes that waiting messages of the whole hub may keep from being freed (`budget_bytes`), and
+/// the number of connections that have data waiting. Shards lease bytes in pieces, so that no frame
+/// touches a shared word. Thread safety: any thread.
 class Budget {
  public:
-  explicit Budget(std::uint64_t bytes) : left_(static_cast<std::int64_t>(bytes)) {}
+  explicit Budget(std::uint64_t bytes)
+      : total_(static_cast<std::int64_t>(bytes)), left_(static_cast<std::int64_t>(bytes)) {}
 
   /// Leases `bytes`, or nothing if less is left.
   [[nodiscard]] bool lease(std::int64_t bytes) {
@@ -26,16 +29,41 @@ class Budget {
   }
   // relaxed: a count
   [[nodiscard]] std::int64_t left() const { return left_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::int64_t total() const { return total_; }
+
+  /// So many more connections have data waiting, or fewer.
+  void add_waiting(std::int64_t connections) {
+    waiting_.fetch_add(connections, std::memory_order_relaxed);  // relaxed: a count
+  }
+  // relaxed: a count
+  [[nodiscard]] std::int64_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
+  const std::int64_t total_;
   std::atomic<std::int64_t> left_;
+  std::atomic<std::int64_t> waiting_{0};
 };
 
-/// A shard's share of the budget. Thread safety: one shard.
+/// A shard's part of the budget, and the share of it that each connection has while memory is
+/// scarce. Thread safety: one shard.
 class BudgetLease {
  public:
+  /// Memory is scarce while less than this part of the budget is free. The shares of all
+  /// connections together are as much, so that they stay within the budget.
+  static constexpr std::int64_t kScarcePart = 3;
+  /// The least share: room for some small messages, however many connections wait.
+  static constexpr std::uint64_t kShareBytesMin = 4 * 1024;
+  /// The largest share: what one read brings. A connection for which more waits does not keep up.
+  static constexpr std::uint64_t kShareBytesMax = 256 * 1024;
+  /// Shards tell each other this often how many of their connections wait. In that time a shard
+  /// reads some MiB at most, which is little beside a third of the budget.
+  static constexpr std::uint64_t kTellMs = 10;
+
   explicit BudgetLease(Budget& budget) : budget_(budget) {}
-  ~BudgetLease() { budget_.give_back(leased_); }
+  ~BudgetLease() {
+    budget_.give_back(leased_);
+    budget_.add_waiting(-told_);
+  }
   BudgetLease(const BudgetLease&) = delete;
   BudgetLease& operator=(const BudgetLease&) = delete;
 
@@ -59,13 +87,44 @@ class BudgetLease {
     return used_ > leased_;
   }
 
+  /// Once a turn: finds out whether memory is scarce, and how large a connection's share is then.
+  void begin_turn(std::uint64_t now_ms) {
+    if (now_ms - told_ms_ >= kTellMs) tell(now_ms);
+    // What this shard has leased and does not use is free, too.
+    const std::int64_t free = budget_.left() + std::max<std::int64_t>(leased_ - used_, 0);
+    scarce_ = free < budget_.total() / kScarcePart;
+    if (scarce_) update_share();
+  }
+  [[nodiscard]] bool scarce() const { return scarce_; }
+  /// Bytes that may wait for one connection. REQUIRES: scarce().
+  [[nodiscard]] std::uint64_t share_bytes() const { return share_bytes_; }
+  /// A connection of this shard begins to have data waiting.
+  void begin_waiting() { ++waiting_; }
+  void end_waiting() { --waiting_; }
+
  private:
   static constexpr std::int64_t kPieceBytes = 1 << 20;
   static constexpr std::int64_t kKeepBytes = 2 * kPieceBytes;
 
+  void tell(std::uint64_t now_ms) {
+    told_ms_ = now_ms;
+    if (waiting_ != told_) budget_.add_waiting(waiting_ - told_);
+    told_ = waiting_;
+  }
+  void update_share() {
+    const std::int64_t waiting = std::max<std::int64_t>(budget_.waiting() - told_ + waiting_, 1);
+    share_bytes_ = std::clamp(static_cast<std::uint64_t>(budget_.total() / kScarcePart / waiting),
+                              kShareBytesMin, kShareBytesMax);
+  }
+
   Budget& budget_;
   std::int64_t leased_ = 0;
   std::int64_t used_ = 0;
+  std::int64_t waiting_ = 0;
+  std::int64_t told_ = 0;  ///< of waiting_, what the budget knows
+  std::uint64_t told_ms_ = 0;
+  std::uint64_t share_bytes_ = kShareBytesMax;
+  bool scarce_ = false;
 };
 
 }  // namespace gimnet::hub

@@ -72,6 +72,10 @@ BufferRef BufferPool::take_chunk(std::uint32_t bytes) {
     }
     return BufferRef(chunk);
   }
+  return take_exact(bytes);
+}
+
+BufferRef BufferPool::take_exact(std::uint32_t bytes) {
   Buffer* chunk = allocate(bytes, BufferKind::chunk);
   chunk->size_class = kUnpooled;
   return BufferRef(chunk);

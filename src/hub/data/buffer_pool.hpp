@@ -30,6 +30,11 @@ class BufferPool {
   /// time.
   [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
 
+  /// A chunk of exactly `bytes`, which is freed after its use: for where memory is scarce. From
+  /// kExactBytesMin on a chunk of the next class could be 3.5 times as large.
+  static constexpr std::uint32_t kExactBytesMin = 4 * 1024;
+  [[nodiscard]] BufferRef take_exact(std::uint32_t bytes);
+
   /// Counts a loan of the memory behind `buffer`, for one mailbox entry, and returns its owner. The
   /// bytes stay until the borrowing shard has called adopt() and let its reference go, or
   /// end_loan().

@@ -125,7 +125,7 @@ bool Attacher::go_on(Connection& connection, const AttachCommand& command, Run& 
   if (partial.frames != 0) replay.push_back(std::move(partial));
   RingQueue<Run>& waiting = connection.outbox.replay();
   for (; !waiting.empty(); waiting.pop_front()) replay.push_back(std::move(waiting.front()));
-  waiting = std::move(replay);
+  connection.outbox.set_replay(std::move(replay));
   connection.resume->taken_told = connection.resume->taken;
   connection.resume->bytes_since_told = 0;
   connection.resume->peer_resume_bytes = command.peer_resume_bytes;
@@ -137,6 +137,7 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
                           const Run& partial) {
   closer_.lose_unconfirmed(connection, partial);
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
+  connection.outbox.set_resume(nullptr);
   connection.resume.reset();
   // The node sends nothing of before again, under whatever id. Else no later REASSIGN would leave
   // room for one more.
@@ -145,6 +146,7 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
   count_anew(connection);
   if (!command.resume_wanted) return;
   connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);
+  connection.outbox.set_resume(&connection.resume->kept);
   connection.resume->hub_epoch = random_epoch();
   connection.resume->peer_epoch = command.peer_epoch;
   connection.resume->peer_resume_bytes = command.peer_resume_bytes;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/clock.hpp"
+#include "hub/shard/flow_words.hpp"
+
 namespace gimnet::hub {
 namespace {
 
@@ -51,6 +54,9 @@ void Flusher::flush(Connection& connection) {
   if (const bool must_confirm = result == Flush::waits; must_confirm != connection.must_confirm) {
     connection.must_confirm = must_confirm;
     state_.signals.arm(connection);
+    if (must_confirm && state_.budget.scarce()) ask_for_confirm(connection);
+  } else if (must_confirm && sent_data && state_.budget.scarce()) {
+    ask_for_confirm(connection);
   }
   connection.sent_bytes += sent;
   SessionCounters& counters = *connection.outbox.counters();
@@ -74,6 +80,12 @@ void Flusher::flush(Connection& connection) {
     case Flush::failed:
       return on_write_failed(connection);
   }
+}
+
+/// A small share is used up long before a quarter of the resume buffer is taken, and the peer would
+/// confirm only with keep-alive.
+void Flusher::ask_for_confirm(Connection& connection) {
+  send_flow(state_, connection, proto::flow::Ping{++connection.ping_sequence, wall_now_ns()});
 }
 
 /// What was not written stays: for a transport that takes no more, for a confirmation, or for the

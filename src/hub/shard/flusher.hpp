@@ -29,6 +29,7 @@ class Flusher {
   void look_after(Connection& connection);
 
  private:
+  void ask_for_confirm(Connection& connection);
   void let_wait(Connection& connection);
   void on_blocked(Connection& connection);
   /// Nothing more can be written. What the peer sent before it went is still read to its end.

@@ -130,6 +130,7 @@ void IoShard::turn(std::span<const Ready> ready, std::uint64_t now_ms) {
   state_.now_ms = state_.egress.now_ms = now_ms;
   state_.egress.now_wall_ns = wall_now_ns();
   state_.shared.quiescence.enter(state_.self.value());
+  state_.budget.begin_turn(now_ms);
   take_commands();
   take_mail();
   keeper_.look_for_others();
@@ -229,6 +230,7 @@ void IoShard::finish_turn() {
   state_.egress.starts.forget();
   state_.counters.turns.add(1);
   state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
+  if (state_.budget.scarce()) state_.counters.scarce_turns.add(1);
   state_.counters.pinned_bytes.store(state_.pool.pinned_bytes());
   state_.counters.pinned_bytes_max.raise_to(state_.pool.pinned_bytes());
   state_.counters.allocated_bytes.store(meter_.bytes());

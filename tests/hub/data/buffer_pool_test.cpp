@@ -156,25 +156,18 @@ TEST_F(BufferPoolTest, LendingABorrowedSlabLendsTheSlabBehindIt) {
   BufferPool::end_loan(slab.get());
 }
 
-TEST(BudgetLease, LeasesInPiecesAndGivesBack) {
-  Budget budget(4 << 20);
+// Where memory is scarce a frame takes what it has, not the room of the next class.
+TEST_F(BufferPoolTest, AnExactChunkIsFreedAfterItsUse) {
+  const std::size_t kept = pool.kept_chunk_bytes();
   {
-    BudgetLease lease(budget);
-    lease.take(100);
-    EXPECT_EQ(budget.left(), 3 << 20);
-    lease.take(4 << 20);
-    EXPECT_EQ(budget.left(), 0);
-    EXPECT_TRUE(lease.exhausted());
-    lease.give_back(100);
-    EXPECT_FALSE(lease.exhausted()) << "exactly the budget";
-    BudgetLease other(budget);
-    other.take(1);
-    EXPECT_TRUE(other.exhausted());
-    lease.give_back(4 << 20);
-    EXPECT_FALSE(other.exhausted()) << "what the other shard gave back";
-    other.give_back(1);
+    const BufferRef chunk = pool.take_exact(20'000);
+    EXPECT_EQ(chunk->capacity, 20'000u);
+    EXPECT_EQ(chunk->kind, BufferKind::chunk);
+    pool.pin(*chunk.get());
+    EXPECT_EQ(pool.pinned_bytes(), 20'000u + kBufferRoom);
   }
-  EXPECT_EQ(budget.left(), 4 << 20);
+  EXPECT_EQ(pool.pinned_bytes(), 0u);
+  EXPECT_EQ(pool.kept_chunk_bytes(), kept);
 }
 
 }  // namespace

@@ -24,6 +24,12 @@ bool still_worth_sending(const Entry& entry, HubId hub, std::int64_t now_ns) {
   return true;
 }
 
+/// While memory is scarce, half of the connection's share: the other half stays for what waits
+/// until room is confirmed.
+std::uint64_t resume_bytes_most(const BudgetLease& budget) {
+  return budget.scarce() ? budget.share_bytes() / 2 : UINT64_MAX;
+}
+
 }  // namespace
 
 void GatherWriter::Batch::add(Source source, const std::byte* begin, std::uint32_t size) {
@@ -185,14 +191,17 @@ void GatherWriter::owe(std::size_t lane, std::uint32_t bytes,
 }
 
 std::uint32_t GatherWriter::allowed(const Run& run, std::size_t planned, Job& job) {
+  if (job.resume == nullptr) return run.size;
   const CountedGroups* counted = job.outbox.counted_groups();
-  if (job.resume == nullptr || job.resume->make_room(planned, run.size, counted)) return run.size;
+  const std::uint64_t most = resume_bytes_most(job.context.budget);
+  if (job.resume->make_room(planned, run.size, counted, most)) return run.size;
   std::uint32_t size = 0;
   for (std::uint32_t frame = 0; frame < run.frames; ++frame) {
     const auto next = static_cast<std::uint32_t>(proto::load_header(run.bytes + size).frame_size());
     // A frame larger than the buffer is kept alone.
+    if (planned + size == 0 && next > most) job.resume->let_go(UINT64_MAX, counted);
     const bool alone = planned + size == 0 && job.resume->bytes() == 0;
-    if (!alone && !job.resume->make_room(planned + size, next, counted)) break;
+    if (!alone && !job.resume->make_room(planned + size, next, counted, most)) break;
     size += next;
   }
   return size;
@@ -265,7 +274,11 @@ std::uint32_t GatherWriter::consume_run(Run& run, std::size_t bytes, bool contro
 void GatherWriter::consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job) {
   Run& run = queue.front();
   const std::uint32_t left = consume_run(run, bytes, control, false, job);
-  if (control) job.outbox.on_control_left(left);
+  if (control) {
+    job.outbox.on_control_left(left);
+  } else {
+    job.outbox.on_replay_left(left);
+  }
   if (run.frames == 0) queue.pop_front();
 }
 
@@ -292,8 +305,19 @@ void GatherWriter::finish(Run run, bool control, bool shared, Job& job) {
     tally.queued -= run.frames;
     return;
   }
+  if (job.context.budget.scarce()) return keep_in_pieces(std::move(run), shared, job);
   job.outbox.settle_run(run, shared, job.context);
   job.resume->wrote(std::move(run));
+}
+
+/// Frame by frame into chunks: frames are let go one by one, and a long copy would stay for the
+/// last of them.
+void GatherWriter::keep_in_pieces(Run run, bool shared, Job& job) {
+  while (run.frames != 0) {
+    Run frame = run.take_frame();
+    job.outbox.settle_run(frame, shared, job.context);
+    job.resume->wrote(std::move(frame));
+  }
 }
 
 }  // namespace gimnet::hub

@@ -100,6 +100,7 @@ class GatherWriter {
   void consume_queue(RingQueue<Run>& queue, std::size_t bytes, bool control, Job& job);
   void consume_lane(std::size_t lane, std::size_t bytes, Job& job);
   static void finish(Run run, bool control, bool shared, Job& job);
+  static void keep_in_pieces(Run run, bool shared, Job& job);
 
   Partial partial_;
 };

@@ -5,8 +5,9 @@
 namespace gimnet::hub {
 
 void KeptMessage::append(const Run& frame, bool shared, EgressContext& context) {
+  const bool small = frame.size < kCopyBytesMax && !shared;
   const bool by_copy =
-      frame.size < kCopyBytesMax && !shared && frame.buffer->kind != BufferKind::chunk;
+      (small || context.budget.scarce()) && frame.buffer->kind != BufferKind::chunk;
   Run piece = by_copy ? copy(frame, context) : frame.share();
   context.pool.pin(*piece.buffer.get());
   frames_ += piece.frames;
@@ -22,7 +23,9 @@ void KeptMessage::append(const Run& frame, bool shared, EgressContext& context) 
 Run KeptMessage::copy(const Run& frame, EgressContext& context) {
   if (!chunk_ || chunk_->capacity - chunk_used_ < frame.size) {
     // The frames of a large message share chunks; a small message takes what it needs.
-    chunk_ = context.pool.take_chunk(frames_ == 0 ? frame.size : kCopyBytesMax);
+    const bool exact = context.budget.scarce() && frame.size >= BufferPool::kExactBytesMin;
+    chunk_ = exact ? context.pool.take_exact(frame.size)
+                   : context.pool.take_chunk(frames_ == 0 ? frame.size : kCopyBytesMax);
     chunk_used_ = 0;
   }
   std::byte* place = chunk_->data + chunk_used_;

@@ -26,6 +26,11 @@ class LaneQueue {
  public:
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  /// The same with the memory of the entries, those included that were dropped and have not left
+  /// their place: many small messages take more for their entries than for their bytes.
+  [[nodiscard]] std::uint64_t held_bytes() const {
+    return bytes_ + entries_.size() * sizeof(Entry);
+  }
   /// Bytes of entries that must not be dropped for room.
   [[nodiscard]] std::uint64_t block_bytes() const { return block_bytes_; }
   /// Does a message wait of which nothing was written yet? The others are finished whatever

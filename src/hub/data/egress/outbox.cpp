@@ -47,14 +47,43 @@ std::uint64_t Outbox::room(std::size_t lane, const Limits& limits) const {
   return limits.lane_bytes(lane) - std::min(limits.lane_bytes(lane), lanes_->queues[lane].bytes());
 }
 
+std::uint64_t Outbox::held_bytes() const {
+  std::uint64_t bytes = control_bytes_ + paced_bytes_;
+  if (resume_ != nullptr) bytes += resume_->bytes();
+  if (!lanes_) return bytes;
+  for (const LaneQueue& queue : lanes_->queues) bytes += queue.held_bytes();
+  return bytes + lanes_->replay_bytes;
+}
+
+void Outbox::note_waiting(EgressContext& context) {
+  const bool waits = held_bytes() != 0;
+  if (waits == waits_) return;
+  waits_ = waits;
+  if (waits) {
+    context.budget.begin_waiting();
+  } else {
+    context.budget.end_waiting();
+  }
+}
+
+Run Outbox::copy_alone(const Run& run, EgressContext& context) {
+  BufferRef chunk = context.pool.take_exact(run.size);
+  std::memcpy(chunk->data, run.bytes, run.size);
+  context.tally.copied_bytes += run.size;
+  const std::byte* const bytes = chunk->data;
+  return Run{std::move(chunk), bytes, run.size, run.frames};
+}
+
 Run Outbox::copy(const Run& run, EgressContext& context) {
+  if (context.budget.scarce() && run.size >= BufferPool::kExactBytesMin)
+    return copy_alone(run, context);
   close_run();
   if (!chunk_ || chunk_->capacity - chunk_used_ < run.size) {
-    // A large one saves entries and calls where there is room; where there is none, each outbox
+    // A large one saves entries and calls where there is room; where there is little, each outbox
     // takes what it must.
-    chunk_bytes_ = context.budget.exhausted() ? 0
-                                              : std::clamp(kChunkGrowth * chunk_bytes_,
-                                                           kFirstChunkBytes, kSharedChunkBytes);
+    const bool little = context.budget.scarce() || context.budget.exhausted();
+    chunk_bytes_ =
+        little ? 0 : std::clamp(kChunkGrowth * chunk_bytes_, kFirstChunkBytes, kSharedChunkBytes);
     chunk_ = context.pool.take_chunk(std::max(run.size, chunk_bytes_));
     chunk_used_ = 0;
     // At once where something waits: by the end of the turn many outboxes may have begun one.
@@ -106,8 +135,14 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   }
   Lanes& lanes = this->lanes();
   lanes.open.close();
+  const bool by_share = backlog_ && context.budget.scarce();
+  if (by_share && run.frames > 1 && run.size > kSharedChunkBytes) {
+    context.tally.queued -= run.frames;
+    return push_in_pieces(run, header, handover, context);
+  }
   const bool has_room = fits(lane, run.size, context.limits);
-  Entry entry = make_entry(run, header, handover, has_room, context);
+  Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
+  if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
     if (!follow_message(entry, header, context)) return;
     if (entry.touched && join_message(entry, header, context)) return;
@@ -164,6 +199,7 @@ void Outbox::put_control(std::span<const std::byte> frame, EgressContext& contex
 
 void Outbox::settle(EgressContext& context) {
   const bool begins = !std::exchange(backlog_, true);
+  note_waiting(context);
   if (!lanes_) return;
   lanes_->open.close();
   if (begins) replace_latest(context);
@@ -211,8 +247,8 @@ void Outbox::settle_lane(LaneQueue& lane, std::uint64_t& settled, EgressContext&
 }
 
 void Outbox::settle_run(Run& run, bool shared, EgressContext& context) {
-  if (run.size < kSettleBytesMax && !shared && run.buffer->kind != BufferKind::chunk)
-    run = copy(run, context);
+  const bool by_copy = (run.size < kSettleBytesMax && !shared) || context.budget.scarce();
+  if (by_copy && run.buffer->kind != BufferKind::chunk) run = copy(run, context);
   context.pool.pin(*run.buffer.get());
 }
 
@@ -223,12 +259,15 @@ void Outbox::on_emptied(EgressContext& context) {
     lanes_->open.close();
   }
   backlog_ = false;
+  const bool waits = paced_bytes_ != 0 || (resume_ != nullptr && resume_->bytes() != 0);
+  if (waits != waits_) note_waiting(context);
   chunk_.reset();
   chunk_bytes_ /= kChunkGrowth;
 }
 
 void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
+  if (context.budget.scarce() && data_bytes() > context.budget.share_bytes() / 2) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
     if (lanes_->queues[lane].bytes() <= context.limits.lane_bytes(lane) / 2) {
       lanes_->pauses.on_room(static_cast<proto::Lane>(lane), context.signals);
@@ -270,8 +309,18 @@ void Outbox::drop_all(proto::DropReason reason, EgressContext& context) {
   on_emptied(context);
 }
 
+void Outbox::set_replay(RingQueue<Run> frames) {
+  Lanes& lanes = this->lanes();
+  lanes.replay = std::move(frames);
+  lanes.replay_bytes = 0;
+  RingQueue<Run>& replay = lanes.replay;
+  for (std::uint64_t number = replay.first_number(); number != replay.end_number(); ++number)
+    lanes.replay_bytes += replay.at(number).size;
+}
+
 void Outbox::drop_replay(proto::DropReason reason, EgressContext& context) {
   if (!lanes_) return;
+  lanes_->replay_bytes = 0;
   for (RingQueue<Run>& replay = lanes_->replay; !replay.empty(); replay.pop_front()) {
     const Run& run = replay.front();
     tell_lost(run);

@@ -11,6 +11,7 @@
 #include "hub/data/egress/lane_queue.hpp"
 #include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
+#include "hub/data/egress/resume_buffer.hpp"
 #include "hub/observe/session_gauges.hpp"
 
 namespace gimnet::hub {
@@ -72,6 +73,29 @@ class Outbox {
     if (counters_ != nullptr) counters_->dropped.add(frames);
   }
 
+  /// What was written and is not confirmed counts as this connection's bytes; nullptr: nothing is
+  /// kept. Valid until: the next call, which comes before the buffer goes.
+  void set_resume(ResumeBuffer* resume) { resume_ = resume; }
+  /// So many bytes more, or fewer, are held by the pacer for this connection.
+  void add_paced(std::uint64_t bytes, EgressContext& context) {
+    paced_bytes_ += bytes;
+    if (paced_bytes_ == bytes) note_waiting(context);
+  }
+  void remove_paced(std::uint64_t bytes, EgressContext& context) {
+    paced_bytes_ -= bytes;
+    if (paced_bytes_ == 0) note_waiting(context);
+  }
+  /// All that waits for this connection: here with the memory of the entries, in the pacer, and
+  /// until it is confirmed.
+  [[nodiscard]] std::uint64_t held_bytes() const;
+  /// Memory is scarce, and with so many bytes more this connection would have more than its share.
+  [[nodiscard]] bool over_share(std::uint64_t bytes, EgressContext& context) const {
+    return context.budget.scarce() && held_bytes() + bytes > context.budget.share_bytes();
+  }
+  /// Lets frames go that were written and not confirmed, oldest first, as far as it takes to have
+  /// room for so many bytes in the share.
+  void release_written(std::uint64_t bytes, EgressContext& context);
+
   /// Messages of that group of which the end still waits in a lane.
   [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
   /// Frames that were for this connection did not get here. REQUIRES: as push().
@@ -79,6 +103,7 @@ class Outbox {
 
   /// Frames of an earlier connection, to be written again before all lanes.
   [[nodiscard]] RingQueue<Run>& replay() { return lanes().replay; }
+  void set_replay(RingQueue<Run> frames);
   /// They will not be written again.
   void drop_replay(proto::DropReason reason, EgressContext& context);
 
@@ -92,7 +117,8 @@ class Outbox {
   /// After a flush that left something: what stays is counted against the budget, small frames are
   /// copied out of their slabs, and policies apply from here on.
   void settle(EgressContext& context);
-  /// The same for one run, also for what is kept after it was written.
+  /// The same for one run, also for what is kept after it was written. While memory is scarce
+  /// every frame is copied: one of 64 KiB would keep a read buffer of 320 KiB.
   void settle_run(Run& run, bool shared, EgressContext& context);
   /// After a flush that left nothing.
   void on_emptied(EgressContext& context);
@@ -122,6 +148,7 @@ class Outbox {
     control_bytes_ -= bytes;
     if (lanes_) lanes_->first_control_bytes -= std::min(bytes, lanes_->first_control_bytes);
   }
+  void on_replay_left(std::uint32_t bytes) { lanes_->replay_bytes -= bytes; }
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
  private:
@@ -140,6 +167,7 @@ class Outbox {
     std::array<std::uint64_t, proto::kLaneCount>
         owed{};  ///< bytes due to a waiting lane, see GatherWriter
     RingQueue<Run> replay;
+    std::uint64_t replay_bytes = 0;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
     std::vector<OpenMessage>
@@ -170,10 +198,23 @@ class Outbox {
   [[nodiscard]] Entry make_entry(const Run& run, const proto::FrameHeader& header,
                                  Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
+  [[nodiscard]] static Run copy_alone(const Run& run, EgressContext& context);
   [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
   /// Bytes that still fit.
   [[nodiscard]] std::uint64_t room(std::size_t lane, const Limits& limits) const;
 
+  void note_waiting(EgressContext& context);
+  /// While memory is scarce frames are taken in pieces that fit in a chunk: a longer one would stay
+  /// for the sake of its last frame.
+  void push_in_pieces(const Run& run, const proto::FrameHeader& header, Handover handover,
+                      EgressContext& context);
+  /// Makes room for the entry in the connection's share, as far as its policy allows.
+  void make_share(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
+  /// What waits is at its limit, whatever the entry's lane has room for.
+  [[nodiscard]] bool memory_refuses(const Entry& entry, EgressContext& context) const {
+    return context.budget.exhausted() ||
+           (backlog_ && !entry.block && over_share(entry.size, context));
+  }
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_first(Entry entry, std::size_t lane_index, EgressContext& context);
   void admit_newest(Entry entry, std::size_t lane_index, EgressContext& context);
@@ -207,11 +248,14 @@ class Outbox {
   std::unique_ptr<Lanes> lanes_;  ///< nullptr: no data since it was made or trimmed
   CountedGroups* counted_ = nullptr;
   SessionCounters* counters_ = nullptr;
+  ResumeBuffer* resume_ = nullptr;
+  std::uint64_t paced_bytes_ = 0;
   BufferRef chunk_;  ///< where copies go
   std::uint32_t chunk_used_ = 0;
   std::uint32_t chunk_bytes_ = 0;  ///< size of the next chunk
   std::uint32_t control_bytes_ = 0;
   bool backlog_ = false;
+  bool waits_ = false;  ///< counted among the connections that have data waiting
 };
 
 }  // namespace gimnet::hub

@@ -16,11 +16,12 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   // order in which they came, or a large one to a slow reader would hold up everybody else in its
   // lane until it ends.
   if (message->touched && message != &lane.entries().back()) return false;
-  if (backlog_ && context.budget.exhausted()) {
+  if (backlog_ && memory_refuses(entry, context)) {
     lose(entry, proto::DropReason::over_budget, context);
     return true;
   }
-  const bool over = !fits(header.lane & proto::kLaneMask, entry.size, context.limits);
+  const bool over = !fits(header.lane & proto::kLaneMask, entry.size, context.limits) ||
+                    (backlog_ && over_share(entry.size, context));
   if (over && entry.block && !ask_to_pause(entry, header, context)) {
     lose(entry, proto::DropReason::queue_full, context);
     return true;
@@ -61,6 +62,40 @@ bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header
   return false;
 }
 
+void Outbox::push_in_pieces(const Run& run, const proto::FrameHeader& header, Handover handover,
+                            EgressContext& context) {
+  for (Run rest = run.share(); rest.frames != 0;) {
+    Leading piece =
+        leading_within(rest, handover.shortest_bytes, kSharedChunkBytes, context.starts);
+    if (piece.frames == 0) piece = leading_from(rest, handover.shortest_bytes, 1, context.starts);
+    push(rest.take_front(piece.frames, piece.size), header, handover, context);
+  }
+}
+
+void Outbox::release_written(std::uint64_t bytes, EgressContext& context) {
+  const std::uint64_t wanted = held_bytes() + bytes;
+  const std::uint64_t share = context.budget.share_bytes();
+  if (resume_ != nullptr && wanted > share) resume_->let_go(wanted - share, counted_);
+}
+
+/// What was written goes first: a connection that holds loses nothing by it. Then what waits, of
+/// the least urgent lane first, and of none that is more urgent than the entry's.
+void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
+                        EgressContext& context) {
+  if (!over_share(entry.size, context)) return;
+  release_written(entry.size, context);
+  if (entry.block || header.policy() == proto::Policy::drop) return;
+  const std::uint64_t share = context.budget.share_bytes();
+  Entry older;
+  for (std::size_t lane = proto::kLaneCount; lane-- > (header.lane & proto::kLaneMask);) {
+    for (std::uint64_t wanted = held_bytes() + entry.size; wanted > share;
+         wanted = held_bytes() + entry.size) {
+      if (!lanes_->queues[lane].drop_oldest(wanted - share, context.starts, older)) break;
+      lose(older, proto::DropReason::over_budget, context);
+    }
+  }
+}
+
 void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[header.lane & proto::kLaneMask];
   if (entry.latest && !entry.touched) {
@@ -72,9 +107,15 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
       return;
     }
   }
-  if (context.budget.exhausted()) {
+  if (memory_refuses(entry, context)) {
     lose(entry, proto::DropReason::over_budget, context);
-  } else if (fits(header.lane & proto::kLaneMask, entry.size, context.limits)) {
+    return;
+  }
+  const bool scarce = backlog_ && context.budget.scarce();
+  // At once, or neighbours in the read buffer would become one run.
+  if (scarce) settle_run(entry.run, entry.shared, context);
+  if (fits(header.lane & proto::kLaneMask, entry.size, context.limits) &&
+      !(scarce && over_share(entry.size, context))) {
     lane.push(std::move(entry));
   } else if (entry.block) {
     if (ask_to_pause(entry, header, context)) {
@@ -95,17 +136,25 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
                           EgressContext& context) {
   const std::size_t lane = header.lane & proto::kLaneMask;
   const Limits& limits = context.limits;
-  const std::uint64_t bytes = lanes_->queues[lane].bytes() + entry.size;
-  const std::uint64_t limit = limits.lane_bytes(lane);
+  const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
+    return bytes - std::min(bytes, limit);
+  };
+  std::uint64_t bytes = beyond(lanes_->queues[lane].bytes() + entry.size, limits.lane_bytes(lane));
+  std::uint64_t reserve = limits.reserve_bytes;
+  if (backlog_ && context.budget.scarce()) {
+    const std::uint64_t share = context.budget.share_bytes();
+    bytes = std::max(bytes, beyond(held_bytes() + entry.size, share));
+    reserve = std::min(reserve, share);
+  }
   const std::uint64_t since_held = lanes_->pauses.on_full(
       NodeId{header.src}, {header.kind, static_cast<proto::Lane>(lane), header.dst}, entry.size,
-      bytes > limit + limits.reserve_bytes, context.signals);
+      bytes > reserve, context.signals);
   // Many senders may come at once: each is held, and loses nothing. What one of them had under way
   // by then was in its shard's mailbox to this one, or came with the reads before its shard heard
   // of the hold.
-  const std::uint64_t reserves = kReservesMax * limits.reserve_bytes;
+  const std::uint64_t reserves = kReservesMax * reserve;
   const bool comes_though_held = since_held > limits.mailbox_bytes + limits.turn_bytes + reserves;
-  return !comes_though_held || bytes <= limit + reserves;
+  return !comes_though_held || bytes <= reserves;
 }
 
 /// Policies count messages: of a run the first that fit are taken.

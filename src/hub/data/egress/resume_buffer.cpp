@@ -1,20 +1,32 @@
 #include "hub/data/egress/resume_buffer.hpp"
 
+#include <algorithm>
+
 namespace gimnet::hub {
 
 bool ResumeBuffer::make_room(std::uint64_t planned, std::uint32_t size,
-                             const CountedGroups* counted) {
-  if (planned + size > bytes_max_) return false;
-  while (bytes_ + planned + size > bytes_max_) {
-    const proto::FrameHeader front = kept_.front().header();
-    if (proto::is_block(front)) return false;
-    // Nobody could say how many messages of a group a gap has.
-    if (counted != nullptr && front.kind == proto::Kind::group &&
-        counted->counts(GroupId{front.dst}))
-      return false;
+                             const CountedGroups* counted, std::uint64_t bytes_most) {
+  const std::uint64_t most = std::min(bytes_max_, bytes_most);
+  if (planned + size > most) return false;
+  while (bytes_ + planned + size > most) {
+    if (!front_may_go(counted)) return false;
     let_front_frame_go();
   }
   return true;
+}
+
+void ResumeBuffer::let_go(std::uint64_t bytes, const CountedGroups* counted) {
+  const std::uint64_t least = bytes_ - std::min(bytes_, bytes);
+  while (bytes_ > least && front_may_go(counted)) let_front_frame_go();
+}
+
+bool ResumeBuffer::front_may_go(const CountedGroups* counted) {
+  if (kept_.empty()) return false;
+  const proto::FrameHeader front = kept_.front().header();
+  if (proto::is_block(front)) return false;
+  // Nobody could say how many messages of a group a gap has.
+  return counted == nullptr || front.kind != proto::Kind::group ||
+         !counted->counts(GroupId{front.dst});
 }
 
 void ResumeBuffer::wrote(Run run) {

@@ -19,9 +19,13 @@ class ResumeBuffer {
   explicit ResumeBuffer(std::uint64_t bytes_max) : bytes_max_(bytes_max) {}
 
   /// Room for `size` more bytes behind `planned` ones that are about to be written? Lets frames go
-  /// where that helps. `counted` may be nullptr.
+  /// where that helps. `counted` may be nullptr. bytes_most: a lower limit than the buffer's own.
   [[nodiscard]] bool make_room(std::uint64_t planned, std::uint32_t size,
-                               const CountedGroups* counted = nullptr);
+                               const CountedGroups* counted = nullptr,
+                               std::uint64_t bytes_most = UINT64_MAX);
+  /// Lets frames at the front go until they come to `bytes`, or one has to be waited for. `counted`
+  /// as above.
+  void let_go(std::uint64_t bytes, const CountedGroups* counted);
   /// `run` was handed to the kernel.
   void wrote(Run run);
   /// The peer has taken `count` frames of this epoch. Returns how many of them are newly confirmed;
@@ -58,6 +62,8 @@ class ResumeBuffer {
 
  private:
   [[nodiscard]] std::uint64_t first_kept() const { return written_ - kept_frames_; }
+  /// Is there a front frame, and may it be let go?
+  [[nodiscard]] bool front_may_go(const CountedGroups* counted);
   void let_front_frame_go();
   void release_below(std::uint64_t count);
 

@@ -148,10 +148,10 @@ void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t l
       continue;
     }
     const Run frame = rest.take_frame();
-    if (context_.budget.exhausted()) {
+    if (context_.budget.exhausted() || !make_share(subscription, frame.size)) {
       drop(subscription, frame, DropReason::over_budget);
     } else {
-      keep(scratch_, frame, handover);
+      keep(subscription, scratch_, frame, handover);
       hold(subscription, scratch_, lane);
     }
   }
@@ -197,7 +197,8 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run,
   }
   open.next_offset = fragment.offset + size;
   open.came_ms = context_.now_ms;
-  if (open.state == State::arriving && context_.budget.exhausted()) {
+  if (open.state == State::arriving &&
+      (context_.budget.exhausted() || !make_share(subscription, run.size))) {
     abandon(subscription, open, DropReason::over_budget);
     open.state = State::cut;
   }
@@ -207,7 +208,7 @@ void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run,
       if (ends) open.state = State::none;
       return pass(subscription, run, ends ? 1 : 0, header, handover);
     case State::arriving:
-      keep(open.message, run, handover);
+      keep(subscription, open.message, run, handover);
       if (ends) end_message(subscription, open);
       return;
     case State::cut:
@@ -243,9 +244,31 @@ void Pacer::pass(PacedSubscription& subscription, const Run& run, std::uint32_t 
   fanout_.deliver(subscription.recipient(), run, header, handover);
 }
 
-void Pacer::keep(KeptMessage& message, const Run& frame, Handover handover) {
+/// Room for a frame that is to be held, in its subscriber's share. What was written goes first,
+/// then the oldest messages of the subscription.
+bool Pacer::make_share(PacedSubscription& subscription, std::uint64_t bytes) {
+  Outbox& outbox = subscription.recipient().outbox;
+  if (!outbox.over_share(bytes, context_)) return true;
+  outbox.release_written(bytes, context_);
+  while (outbox.over_share(bytes, context_)) {
+    if (subscription.held() == 0) return false;
+    drop_oldest(subscription, DropReason::over_budget);
+  }
+  return true;
+}
+
+void Pacer::keep(PacedSubscription& subscription, KeptMessage& message, const Run& frame,
+                 Handover handover) {
   message.append(frame, handover.fan_out, context_);
   context_.tally.queued += 1;
+  subscription.recipient().outbox.add_paced(frame.size, context_);
+}
+
+/// The message is not held any more, or goes on to the outbox, which counts it then.
+void Pacer::uncount(PacedSubscription& subscription, const KeptMessage& message) {
+  if (message.empty()) return;
+  context_.tally.queued -= message.frames();
+  subscription.recipient().outbox.remove_paced(message.bytes(), context_);
 }
 
 void Pacer::hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane) {
@@ -269,7 +292,7 @@ void Pacer::drop_held(PacedSubscription& subscription, DropReason reason) {
 }
 
 void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, DropReason reason) {
-  context_.tally.queued -= message.frames();
+  uncount(subscription, message);
   message.for_each([&](const Run& run) {
     subscription.recipient().outbox.count_dropped(run.frames);
     // Nobody else drops of the same run: it is not worth a place among the starts of those that
@@ -328,7 +351,7 @@ bool Pacer::release_open(PacedSubscription& subscription) {
 }
 
 void Pacer::write_kept(PacedSubscription& subscription, const KeptMessage& message) {
-  context_.tally.queued -= message.frames();
+  uncount(subscription, message);
   message.for_each([&](const Run& run) {
     for (Run rest = run.share(); rest.frames != 0;) {
       const Run frame = rest.take_frame();

@@ -72,7 +72,10 @@ class Pacer {
   void abandon(PacedSubscription& subscription, Open& open, proto::DropReason reason);
   void pass(PacedSubscription& subscription, const Run& run, std::uint32_t ended,
             const proto::FrameHeader& header, Handover handover);
-  void keep(KeptMessage& message, const Run& frame, Handover handover);
+  [[nodiscard]] bool make_share(PacedSubscription& subscription, std::uint64_t bytes);
+  void keep(PacedSubscription& subscription, KeptMessage& message, const Run& frame,
+            Handover handover);
+  void uncount(PacedSubscription& subscription, const KeptMessage& message);
   void hold(PacedSubscription& subscription, KeptMessage& message, std::size_t lane);
   void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
   void drop_held(PacedSubscription& subscription, proto::DropReason reason);

@@ -56,6 +56,27 @@ TEST_F(ResumeBufferTest, LetsNothingGoForWhatNeverFits) {
   EXPECT_EQ(buffer.bytes(), 1'000u);
 }
 
+TEST_F(ResumeBufferTest, HoldsALowerBoundToo) {
+  buffer.wrote(frames(5, kDrop));
+  EXPECT_TRUE(buffer.make_room(0, 100, nullptr, 600)) << "exactly";
+  EXPECT_EQ(buffer.bytes(), 500u);
+  EXPECT_TRUE(buffer.make_room(0, 101, nullptr, 600));
+  EXPECT_EQ(buffer.bytes(), 400u);
+}
+
+TEST_F(ResumeBufferTest, LetsAsManyBytesGoAsItMust) {
+  buffer.wrote(frames(4, kDrop));
+  buffer.wrote(frames(2));
+  buffer.wrote(frames(1, kDrop));
+  buffer.let_go(100, nullptr);
+  EXPECT_EQ(buffer.bytes(), 600u);
+  buffer.let_go(101, nullptr);
+  EXPECT_EQ(buffer.bytes(), 400u);
+  buffer.let_go(UINT64_MAX, nullptr);
+  EXPECT_EQ(buffer.bytes(), 300u) << "BLOCK is waited for";
+  EXPECT_EQ(buffer.rewind(0, replay).gap, 4u) << "SKIP tells it";
+}
+
 TEST_F(ResumeBufferTest, RewindsToEveryCount) {
   for (std::uint64_t count = 0; count <= 5; ++count) {
     ResumeBuffer fresh(1'000);

@@ -310,6 +310,33 @@ TEST_F(PacerTest, HoldsWithinTheLaneAndTheBudget) {
   rig.egress.lease.give_back(rig.egress.limits.budget_bytes);
 }
 
+TEST_F(PacerTest, WhileMemoryIsScarceHoldsWithinTheShare) {
+  PacedSubscription& one = subscribe({.window = 1, .depth = 64});
+  offer(one, {"open"});
+  EXPECT_THAT(sent(), ElementsAre("open"));
+  BudgetLease& lease = rig.egress.lease;
+  lease.take(rig.egress.limits.budget_bytes * 3 / 4);
+  lease.begin_turn(0);
+  const std::uint64_t share = lease.share_bytes();
+  const Outbox& outbox = recipient.outbox;
+  const auto sized = [](std::uint64_t size) { return std::string(size - proto::kHeaderSize, 'x'); };
+  offer(one, {sized(share / 2), sized(share / 2)});
+  EXPECT_EQ(outbox.held_bytes(), share);
+  EXPECT_EQ(one.held(), 2u);
+  offer(one, {sized(proto::kHeaderSize)});
+  EXPECT_EQ(dropped(DropReason::over_budget), 1u) << "the oldest goes";
+  EXPECT_EQ(one.held(), 2u);
+  offer(one, {sized(share + 1)});
+  EXPECT_EQ(dropped(DropReason::over_budget), 4u) << "what is larger is not held";
+  const auto half = static_cast<std::uint32_t>(share / 2);
+  offer_fragment(one, 7, 0, 4 * half, std::string(half, 'x'));
+  EXPECT_LE(rig.egress.pool.pinned_bytes(), share) << "copied out of the read buffer";
+  offer_fragment(one, 7, half, 4 * half, std::string(half, 'x'));
+  EXPECT_EQ(dropped(DropReason::over_budget), 5u) << "the part that came";
+  EXPECT_EQ(outbox.held_bytes(), 0u);
+  lease.give_back(rig.egress.limits.budget_bytes * 3 / 4);
+}
+
 // Only the first frame of what is dropped is looked at, and what is held: the others say nonsense
 // about their length.
 TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {

@@ -1,0 +1,315 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "hub/data/egress/outbox.hpp"
+#include "tests/hub/data/support/egress_rig.hpp"
+
+// While memory is scarce each connection has a share of it.
+
+namespace gimnet::hub {
+namespace {
+
+using proto::DropReason;
+using testing::EgressRig;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using testing::TestConnection;
+using testing::TestFrame;
+using Frames = hub::Run;  // Test has a Run() of its own
+
+constexpr std::uint8_t kBlock = 1;
+constexpr std::uint8_t kDrop = 2;
+constexpr std::uint32_t kKiB = 1024;
+
+/// Group frames are dropped from the oldest on.
+constexpr TestFrame kOldest{.kind = proto::Kind::group};
+
+Limits limits_of_the_test() {
+  Limits limits;
+  limits.budget_bytes = 12 << 20;
+  return limits;
+}
+
+/// A payload that makes a frame of exactly `size` bytes.
+std::string sized(std::uint64_t size, char fill = 'x') {
+  return std::string(size - proto::kHeaderSize, fill);
+}
+
+class OutboxShare : public ::testing::Test {
+ protected:
+  OutboxShare() {
+    // 4 MiB by 128 connections; the one of the test is another one.
+    for (int i = 0; i < 127; ++i) rig.lease.begin_waiting();
+  }
+  ~OutboxShare() override {
+    if (rig.lease.scarce()) rig.lease.give_back(kTaken);
+    for (int i = 0; i < 127; ++i) rig.lease.end_waiting();
+  }
+  void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
+
+  /// The connection takes nothing, and something waits for it. Memory becomes scarce.
+  void block(std::uint8_t lane = 3) {
+    connection.peer.set_room(0);
+    rig.push(connection.outbox, "first", {.kind = proto::Kind::group, .lane = lane});
+    EXPECT_EQ(connection.flush(), Flush::blocked);
+    make_scarce();
+  }
+  void make_scarce() {
+    rig.lease.take(kTaken);
+    rig.lease.begin_turn(0);
+    ASSERT_TRUE(rig.lease.scarce());
+    share = rig.lease.share_bytes();
+  }
+  void end_scarce() {
+    rig.lease.give_back(kTaken);
+    rig.lease.begin_turn(0);
+    ASSERT_FALSE(rig.lease.scarce());
+  }
+  /// What the share has room for yet.
+  std::uint64_t room() { return share - connection.outbox.held_bytes(); }
+  std::vector<std::string> starts() {
+    connection.peer.set_room(MemoryPeer::kAll);
+    std::vector<std::string> texts;
+    while (connection.flush() != Flush::emptied) {
+    }
+    for (const std::string& each : connection.take()) texts.push_back(each.substr(0, 1));
+    return texts;
+  }
+
+  static constexpr std::uint64_t kTaken = 10 << 20;
+  std::uint64_t looks_ = 0;
+  std::uint64_t share = 0;  ///< 32 KiB
+  EgressRig rig{limits_of_the_test()};
+  TestConnection connection{rig};
+};
+
+TEST_F(OutboxShare, DropsTheOldestBeyondTheShare) {
+  block(1);
+  rig.push(connection.outbox, sized(room(), 'a'), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 0u) << "exactly the share";
+  rig.push(connection.outbox, sized(proto::kHeaderSize + 1, 'b'), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 1u);
+  EXPECT_THAT(starts(), ElementsAre("a", "b"));
+}
+
+TEST_F(OutboxShare, DropsTheOldestForOneByteMore) {
+  block(1);
+  rig.push(connection.outbox, sized(room() + 1, 'a'), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 1u);
+  EXPECT_THAT(starts(), ElementsAre("a"));
+}
+
+TEST_F(OutboxShare, IsOnlyAskedWhileMemoryIsScarce) {
+  block();
+  rig.push(connection.outbox, sized(share + 1, 'a'), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 2u) << "no message may be larger";
+  end_scarce();
+  for (int i = 0; i < 4; ++i) rig.push(connection.outbox, sized(share), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 2u);
+}
+
+TEST_F(OutboxShare, IsOnlyAskedWhereSomethingWaits) {
+  make_scarce();
+  for (int i = 0; i < 8; ++i) rig.push(connection.outbox, sized(share), kOldest);
+  EXPECT_FALSE(rig.tally.any_dropped) << "it may all be written at the end of the turn";
+  EXPECT_THAT(starts(), SizeIs(8));
+}
+
+TEST_F(OutboxShare, TakesFromTheLeastUrgentLaneFirst) {
+  block();
+  const std::uint64_t third = room() / 3;
+  for (const std::uint8_t lane : {std::uint8_t{2}, std::uint8_t{0}}) {
+    rig.push(connection.outbox, sized(third - 100, static_cast<char>('0' + lane)),
+             {.kind = proto::Kind::group, .lane = lane});
+  }
+  rig.push(connection.outbox, sized(third + 1'000, '1'), kOldest);
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 2u) << "lanes 3 and 2";
+  rig.push(connection.outbox, sized(third + 1'000, '2'), {.kind = proto::Kind::group, .lane = 2});
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 3u) << "not those that are more urgent";
+  EXPECT_THAT(starts(), ElementsAre("0", "1"));
+}
+
+TEST_F(OutboxShare, ThePolicyDropRefusesTheNewMessage) {
+  block();
+  rig.push(connection.outbox, sized(room(), 'a'), {.flags = kDrop});
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 0u);
+  rig.push(connection.outbox, sized(16, 'b'), {.flags = kDrop});
+  EXPECT_EQ(rig.dropped(DropReason::over_budget), 1u);
+  EXPECT_THAT(starts(), ElementsAre("a", "f"));
+}
+
+TEST_F(OutboxShare, PausesAndHoldsTheSendersOfBlock) {
+  block();
+  rig.push(connection.outbox, sized(room()), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "exactly the share";
+  rig.push(connection.outbox, sized(16), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
+  rig.push(connection.outbox, sized(share + room() - 16), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "as much again";
+  rig.push(connection.outbox, sized(17), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), ElementsAre("hold 1"));
+  EXPECT_FALSE(rig.tally.any_dropped);
+  connection.outbox.signal_room(rig.context);
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "more than half of the share waits";
+  EXPECT_THAT(starts(), SizeIs(5));
+  EXPECT_THAT(rig.signals.take(), ElementsAre("resume 1", "release 1"));
+}
+
+TEST_F(OutboxShare, TheSendersOfBlockGoOnOnceMemoryIsNotScarce) {
+  block();
+  for (int i = 0; i < 3; ++i) rig.push(connection.outbox, sized(share / 2), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
+  connection.outbox.signal_room(rig.context);
+  EXPECT_THAT(rig.signals.take(), IsEmpty());
+  end_scarce();
+  connection.outbox.signal_room(rig.context);
+  EXPECT_THAT(rig.signals.take(), ElementsAre("resume 1")) << "the lane has room";
+}
+
+TEST_F(OutboxShare, OfAMessageInFragmentsWhatIsBeyondTheShareIsCut) {
+  block();
+  constexpr std::uint32_t kPart = 8 * kKiB;
+  for (std::uint32_t part = 0; part < 8; ++part) {
+    rig.push_fragment(connection.outbox, 1, part * kPart, 8 * kPart, std::string(kPart, 'x'),
+                      kOldest);
+  }
+  EXPECT_LE(connection.outbox.held_bytes(), share + kPart);
+  EXPECT_GT(rig.dropped(DropReason::over_budget), 0u);
+  EXPECT_GT(rig.dropped(DropReason::cut_message), 0u);
+}
+
+TEST_F(OutboxShare, WhatIsWrittenAndNotConfirmedGoesFirst) {
+  ResumeBuffer resume{1 << 20};
+  connection.outbox.set_resume(&resume);
+  for (int i = 0; i < 4; ++i) rig.push(connection.outbox, sized(5'000), kOldest);
+  EXPECT_EQ(connection.flush(&resume), Flush::emptied);
+  EXPECT_EQ(resume.bytes(), 20'000u);
+  block(1);
+  rig.push(connection.outbox, sized(room(), 'a'), kOldest);
+  EXPECT_EQ(resume.bytes(), 20'000u) << "exactly the share";
+  rig.push(connection.outbox, sized(room() + 5'001, 'b'), kOldest);
+  EXPECT_EQ(resume.bytes(), 10'000u) << "as many as it takes";
+  EXPECT_FALSE(rig.tally.any_dropped);
+  connection.outbox.set_resume(nullptr);
+  rig.tally.delivered += resume.confirm(4);
+  rig.tally.queued -= 4;
+}
+
+TEST_F(OutboxShare, KeepsNoMoreThanHalfOfItForConfirmation) {
+  ResumeBuffer resume{1 << 20};
+  connection.outbox.set_resume(&resume);
+  make_scarce();
+  for (const std::uint8_t flags : {kDrop, kBlock}) {
+    for (int i = 0; i < 3; ++i) rig.push(connection.outbox, sized(share / 4), {.flags = flags});
+    const bool waits = flags == kBlock;
+    EXPECT_EQ(connection.flush(&resume), waits ? Flush::waits : Flush::emptied);
+    EXPECT_EQ(resume.bytes(), share / 4 * 2) << int{flags};
+    rig.tally.queued -= 3;
+    rig.tally.delivered += 3;
+    static_cast<void>(resume.confirm(resume.written()));
+  }
+  connection.outbox.set_resume(nullptr);
+  rig.tally.queued += 1;
+  rig.tally.delivered -= 1;  // the last one was not written
+}
+
+TEST_F(OutboxShare, AFrameLargerThanThatIsKeptAlone) {
+  ResumeBuffer resume{1 << 20};
+  connection.outbox.set_resume(&resume);
+  make_scarce();
+  for (int i = 0; i < 3; ++i) rig.push(connection.outbox, sized(share), kOldest);
+  EXPECT_EQ(connection.flush(&resume), Flush::emptied);
+  EXPECT_EQ(resume.bytes(), share);
+  connection.outbox.set_resume(nullptr);
+  rig.tally.queued -= 3;
+  rig.tally.delivered += 3;
+}
+
+// A waiting frame of 64 KiB would keep a read buffer of 320 KiB, and so would one of 100 bytes that
+// goes to many.
+TEST_F(OutboxShare, WhatHasToWaitIsCopied) {
+  for (const bool fan_out : {false, true}) {
+    for (const std::uint32_t size : {100u, 20'000u}) {
+      TestConnection slow(rig);
+      slow.peer.set_room(0);
+      rig.push(slow.outbox, sized(size), kOldest, fan_out);
+      EXPECT_EQ(slow.flush(), Flush::blocked);
+      const bool refers = slow.outbox.lane(1).front().run.buffer->kind == BufferKind::slab;
+      EXPECT_EQ(refers, fan_out || size > kSharedChunkBytes) << size;
+    }
+  }
+  block();
+  for (const bool fan_out : {false, true}) {
+    for (const std::uint32_t size : {100u, 20'000u}) {
+      const std::uint64_t pinned = rig.pool.pinned_bytes();
+      TestConnection slow(rig);
+      slow.peer.set_room(0);
+      rig.push(slow.outbox, sized(size), kOldest, fan_out);
+      EXPECT_EQ(slow.flush(), Flush::blocked);
+      EXPECT_EQ(slow.outbox.lane(1).front().run.buffer->kind, BufferKind::chunk) << size;
+      rig.push(slow.outbox, sized(size / 2), kOldest, fan_out);
+      EXPECT_EQ(slow.outbox.lane(1).entries().back().run.buffer->kind, BufferKind::chunk) << size;
+      EXPECT_LE(rig.pool.pinned_bytes() - pinned, 2 * size + 4'096) << size;
+    }
+  }
+}
+
+// A run is one piece of memory as long as one frame of it waits.
+TEST_F(OutboxShare, ALongRunIsTakenInPieces) {
+  block();
+  const Frames run = rig.run(std::vector<std::string>(100, sized(kKiB)), kOldest);
+  connection.outbox.push(run, run.header(), {false, kKiB}, rig.context);
+  EXPECT_LE(connection.outbox.held_bytes(), share + sizeof(Entry));
+  EXPECT_GT(connection.outbox.held_bytes(), share - 2 * kKiB) << "the newest";
+  EXPECT_LE(rig.pool.pinned_bytes(), share + 2 * kSharedChunkBytes);
+  RingQueue<Entry>& entries = connection.outbox.lane(1).entries();
+  EXPECT_GT(entries.size(), 1u);
+}
+
+TEST_F(OutboxShare, WaitingConnectionsAreCounted) {
+  const auto waiting = [&] {
+    rig.lease.begin_turn(1'000'000 + ++looks_ * 10);
+    return rig.budget.waiting() - 127;
+  };
+  EXPECT_EQ(waiting(), 0);
+  connection.peer.set_room(0);
+  rig.push(connection.outbox, "waits");
+  EXPECT_EQ(waiting(), 0) << "before its turn ends nobody knows";
+  EXPECT_EQ(connection.flush(), Flush::blocked);
+  EXPECT_EQ(waiting(), 1);
+  rig.push(connection.outbox, "too");
+  EXPECT_EQ(connection.flush(), Flush::blocked);
+  EXPECT_EQ(waiting(), 1);
+  ResumeBuffer resume{1'000};
+  connection.outbox.set_resume(&resume);
+  connection.peer.set_room(MemoryPeer::kAll);
+  EXPECT_EQ(connection.flush(&resume), Flush::emptied);
+  EXPECT_EQ(waiting(), 1) << "until it is confirmed";
+  rig.tally.delivered += resume.confirm(2);
+  rig.tally.queued -= 2;
+  EXPECT_EQ(connection.flush(&resume), Flush::emptied);
+  EXPECT_EQ(waiting(), 0);
+  connection.outbox.set_resume(nullptr);
+  connection.outbox.add_paced(10, rig.context);
+  EXPECT_EQ(waiting(), 1) << "what the pacer holds";
+  EXPECT_EQ(connection.outbox.held_bytes(), 10u);
+  connection.outbox.remove_paced(10, rig.context);
+  EXPECT_EQ(waiting(), 0);
+}
+
+TEST_F(OutboxShare, WhatIsToBeWrittenAgainCounts) {
+  RingQueue<Frames> again;
+  again.push_back(rig.run({sized(100), sized(100)}));
+  rig.tally.queued += 2;
+  connection.outbox.set_replay(std::move(again));
+  EXPECT_EQ(connection.outbox.held_bytes(), 200u);
+  connection.peer.set_room(150);
+  EXPECT_EQ(connection.flush(), Flush::blocked);
+  EXPECT_EQ(connection.outbox.held_bytes(), 0u) << "one is written, one is begun";
+  connection.peer.set_room(MemoryPeer::kAll);
+  EXPECT_EQ(connection.flush(), Flush::emptied);
+}
+
+}  // namespace
+}  // namespace gimnet::hub
