@@ -1,4 +1,4 @@
-// Answers questions: adds the numbers that somebody sends, and sends the sum back. See ask.cpp.
+// Answers questions: adds the numbers of each question and sends back the sum. See ask.cpp.
 
 #include <iostream>
 #include <sstream>
@@ -6,8 +6,7 @@
 
 #include "gimnet/gimi.hpp"
 
-// What a message is, in numbers of the application's own. Each has a queue of its own at its
-// receiver.
+// The application's own numbers for its messages. Each key has a queue of its own at its receiver.
 constexpr gimnet::MessageKey kQuestion{.type = 1, .instance = 0};
 constexpr gimnet::MessageKey kAnswer{.type = 2, .instance = 0};
 
@@ -15,12 +14,15 @@ int main() try {
   const gimnet::Node node("adder");
   for (;;) {
     const auto question = node.receive(kQuestion).or_throw();
-    std::istringstream numbers{std::string(question.text())};
+    std::istringstream words{std::string(question.text())};
+    std::string number;  // of the question; the answer repeats it
+    words >> number;
     double sum = 0.0;
-    for (double number = 0.0; numbers >> number;) sum += number;
-    const auto sent = node.send(question.from(), std::to_string(sum), {.key = kAnswer});
-    if (!sent)
-      std::cerr << "adder: " << sent.failure().sentence << '\n';  // who asked may be gone: go on
+    for (double summand = 0.0; words >> summand;) sum += summand;
+    const auto sent =
+        node.send(question.from(), number + " " + std::to_string(sum), {.key = kAnswer});
+    // The node that asked may be gone: the next question may be another node's.
+    if (!sent) std::cerr << "adder: " << sent.failure().sentence << '\n';
   }
 } catch (const gimnet::GimnetError& error) {
   std::cerr << "adder: " << error.what() << '\n';

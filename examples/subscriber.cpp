@@ -1,5 +1,5 @@
-// Prints what publisher.cpp says. It may be started first, and goes on when the publisher or the
-// hub was away.
+// Prints the messages of publisher.cpp. It may be started first, and goes on when the publisher or
+// the hub was away.
 
 #include <iostream>
 
@@ -9,7 +9,7 @@ int main() try {
   const gimnet::Node viewer;  // without a name: nobody has to find it
   const auto odometry = viewer.subscribe("robot/odom").or_throw();
   for (;;) {
-    const auto message = odometry.receive().or_throw();
+    const auto message = odometry.receive().or_throw();  // throws when no connection will come
     std::cout << message.from().text() << " #" << message.sequence() << ": " << message.text()
               << std::endl;
   }

@@ -61,15 +61,11 @@ Status status_of(nif_status status) {
 }
 
 Failure failure_of(nif_status status, std::string_view doing) {
+  const std::string_view words = nif_error_text();
+  // NIF's sentences mostly begin so themselves, and name more.
+  if (words.starts_with("cannot ")) return {status_of(status), std::string(words)};
   std::string sentence = "cannot " + std::string(doing) + ": ";
-  if (status == NIF_TIMEOUT) {
-    sentence += "the time given was not enough";
-  } else {
-    const std::string_view words = nif_error_text();
-    // NIF's sentences mostly begin so themselves, and name more.
-    if (words.starts_with("cannot ")) return {status_of(status), std::string(words)};
-    sentence += words.empty() ? std::string_view(nif_status_text(status)) : words;
-  }
+  sentence += words.empty() ? std::string_view(nif_status_text(status)) : words;
   return {status_of(status), std::move(sentence)};
 }
 

@@ -160,7 +160,9 @@ class Outbound {
   void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::string away_words() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status no_turn(bool begun) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
@@ -185,7 +187,8 @@ class Outbound {
   Mutex mutex_;
   Condition changed_;
   State state_ GIMNET_GUARDED_BY(mutex_) = State::away;
-  Failure end_ GIMNET_GUARDED_BY(mutex_);  ///< of State::ended
+  Failure end_ GIMNET_GUARDED_BY(mutex_);                                   ///< of State::ended
+  std::int64_t away_since_ns_ GIMNET_GUARDED_BY(mutex_) = steady_now_ns();  ///< of State::away
   std::uint32_t id_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint32_t frame_bytes_max_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t epochs_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< grows when counts begin anew

@@ -55,7 +55,10 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
 
 void Outbound::detach(bool again) {
   const MutexLock lock(mutex_);
-  if (state_ == State::connected) state_ = State::away;
+  if (state_ == State::connected) {
+    state_ = State::away;
+    away_since_ns_ = steady_now_ns();
+  }
   while (writing_) static_cast<void>(wait(kNever));
   socket_ = nullptr;
   full_ = false;

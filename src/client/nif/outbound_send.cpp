@@ -100,9 +100,24 @@ bool Outbound::write_here() {
   return write_calls_ != before;
 }
 
+/// Since when there is no connection, for the sentences of calls that failed meanwhile.
+std::string Outbound::away_words() const {
+  const std::int64_t tenths = (steady_now_ns() - away_since_ns_) / 100'000'000;
+  return "the hub has been away for " + std::to_string(tenths / 10) + "." +
+         std::to_string(tenths % 10) + " s; the library dials again, so try again later";
+}
+
 nif_status Outbound::not_connected() const {
   if (state_ == State::ended) return fail(end_);
-  return fail(NIF_NOT_CONNECTED, "the connection is broken; the library is dialing again");
+  return fail(NIF_NOT_CONNECTED, away_words());
+}
+
+/// A message waited for its turn as long as it may. `begun`: a part of it was sent.
+nif_status Outbound::no_turn(bool begun) const {
+  std::string why =
+      state_ == State::away ? away_words() : std::string("no room within the time given");
+  if (begun) why += "; the message had begun, so its receiver lost it";
+  return fail(NIF_TIMEOUT, why);
 }
 
 bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own) {
@@ -187,13 +202,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     // for room.
     if (write_here()) continue;
     const std::int64_t now = steady_now_ns();
-    if (now >= deadline) {
-      return fail(
-          NIF_TIMEOUT,
-          own != nullptr && own->number != 0
-              ? "no room within the time given; the message had begun, so its receiver lost it"
-              : "no room within the time given");
-    }
+    if (now >= deadline) return no_turn(own != nullptr && own->number != 0);
     const bool stalled =
         own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;

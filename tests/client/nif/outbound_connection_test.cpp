@@ -1,9 +1,11 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <string>
 #include <vector>
 
+#include "client/nif/error.hpp"
 #include "tests/client/nif/support/frames.hpp"
 #include "tests/client/nif/support/line.hpp"
 
@@ -36,6 +38,17 @@ TEST(OutboundConnection, WithResumeItGoesToTheNextConnection) {
   line.attach(Line::session_of(true));
   EXPECT_EQ(line.outbound.flush(), NIF_OK);
   EXPECT_EQ(payloads(line.read()), std::vector<std::string>{"kept"});
+}
+
+TEST(OutboundConnection, WhileItIsAwayCallsThatFailSayForHowLong) {
+  Line line(Line::session_of(true));
+  line.outbound.detach(true);
+  EXPECT_EQ(hold(line, "in time"), NIF_TIMEOUT);
+  EXPECT_THAT(error_text(), testing::StartsWith("the hub has been away for 0."));
+  EXPECT_EQ(line.outbound.flush(), NIF_NOT_CONNECTED);
+  EXPECT_THAT(error_text(), testing::StartsWith("the hub has been away for 0."));
+  line.attach(Line::session_of(true));
+  EXPECT_EQ(hold(line, "back"), NIF_OK);
 }
 
 TEST(OutboundConnection, GoodbyeIsTheLastWord) {
