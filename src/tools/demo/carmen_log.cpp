@@ -189,8 +189,13 @@ Result<RobotLog> load_robot_log(const std::string& path) {
     if (!*more) break;
     LogRecord record;
     const Result<LineKind> kind = parse_carmen_line(line, record);
-    if (!kind)
-      return Error{fmt::format("{}:{}: {}", path, reader->line_number(), kind.error().sentence)};
+    if (!kind) {
+      if (log.skipped++ == 0) {
+        log.first_skipped =
+            fmt::format("{}:{}: {}", path, reader->line_number(), kind.error().sentence);
+      }
+      continue;
+    }
     if (*kind == LineKind::kIgnored) continue;
     if (*kind == LineKind::kScan) ++log.scans;
     log.records.push_back(std::move(record));
@@ -200,8 +205,11 @@ Result<RobotLog> load_robot_log(const std::string& path) {
     }
   }
   if (log.records.empty()) {
-    return Error{fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?",
-                             path, reader->line_number())};
+    std::string sentence =
+        fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?", path,
+                    reader->line_number());
+    if (log.skipped != 0) sentence += " The first line that is none: " + log.first_skipped;
+    return Error{std::move(sentence)};
   }
   pace_log(log);
   return log;

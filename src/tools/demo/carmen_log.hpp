@@ -34,6 +34,10 @@ struct RobotLog {
   /// A sentence for the user about how the playback is timed; empty where the log's own stamps are
   /// followed.
   std::string pacing_note;
+  /// Lines that could not be read and were left out.
+  std::uint64_t skipped = 0;
+  /// The first of them: file, line number and what is wrong with it. Empty: there is none.
+  std::string first_skipped;
 
   [[nodiscard]] double duration_s() const { return records.empty() ? 0.0 : records.back().due_s; }
 };
@@ -52,8 +56,8 @@ enum class LineKind : std::uint8_t { kIgnored, kOdometry, kScan };
 /// or out of range; the sentence says which, without file and line. Thread safety: any thread.
 [[nodiscard]] Result<LineKind> parse_carmen_line(std::string_view line, LogRecord& record);
 
-/// Reads a whole log, compressed or not, and paces it. Errors: those of the file and of its lines,
-/// with file and line number; a log without ODOM and FLASER lines.
+/// Reads a whole log, compressed or not, and paces it. Lines that cannot be read are skipped and
+/// counted. Errors: those of the file, with the line number; a log without ODOM and FLASER lines.
 [[nodiscard]] Result<RobotLog> load_robot_log(const std::string& path);
 
 }  // namespace gimnet::demo

@@ -24,7 +24,7 @@ Starts a hub of its own, and the robot as a separate process. For your own hub, 
   gimnet-demo robot --hub URL       only the robot
   gimnet-demo view --hub URL        only the viewer and driver
 
-  --log FILE       plays a log, compressed with gzip or not
+  --log FILE       plays a log, compressed with gzip or not; lines that cannot be read are skipped and counted
   --speed X        plays it X times as fast as recorded, 0.1 to 100 (1)
   --map FILE       another hall for the simulated robot: lines of # (wall), blanks, @ (start), 1 to 9 (course)
   --seconds N      ends after N seconds

@@ -34,10 +34,19 @@ void say(const std::string& text) {
 
 void complain(const Error& error) { say(fmt::format("gimnet-demo: {}\n", error.sentence)); }
 
+// Says which lines of a log are left out; a recording that is cut or damaged in one place still
+// plays.
+void say_skipped(const RobotLog& log) {
+  if (log.skipped == 0) return;
+  say(fmt::format("gimnet-demo: skipped {} {} of the log that cannot be read; the first is {}\n",
+                  log.skipped, log.skipped == 1 ? "line" : "lines", log.first_skipped));
+}
+
 Result<Robot::SourceMaker> source_maker(const Options& options) {
   if (!options.log.empty()) {
     Result<RobotLog> log = load_robot_log(options.log);
     if (!log) return log.error();
+    say_skipped(*log);
     const std::string name = std::filesystem::path(options.log).filename().string();
     return Robot::SourceMaker(
         [log = std::move(*log), name, speed = options.speed](std::int64_t now_ns) {

@@ -98,20 +98,29 @@ TEST(RobotLog, KeepsOrderAndCounts) {
   ASSERT_EQ(log->records.size(), 2U);
   EXPECT_EQ(log->scans, 1U);
   EXPECT_TRUE(log->records[1].is_scan());
+  EXPECT_EQ(log->skipped, 0U);
 }
 
-TEST(RobotLog, NamesFileAndLineOfGarbage) {
-  const TemporaryFile file(std::string(kOdom) + "\n# fine\nODOM 1 2\n");
+TEST(RobotLog, SkipsLinesThatCannotBeReadAndNamesTheFirst) {
+  const TemporaryFile file(std::string(kOdom) + "\n# fine\nODOM 1 2\n\x01\x02\n" +
+                           std::string(kScan) + "\n");
   const Result<RobotLog> log = load_robot_log(file.path());
-  ASSERT_FALSE(log);
-  EXPECT_EQ(log.error().sentence,
-            file.path() + ":3: ODOM: the line ends before theta; was it cut?");
+  ASSERT_TRUE(log) << log.error().sentence;
+  EXPECT_EQ(log->records.size(), 2U);
+  EXPECT_EQ(log->skipped, 2U);
+  EXPECT_EQ(log->first_skipped, file.path() + ":3: ODOM: the line ends before theta; was it cut?");
 }
 
 TEST(RobotLog, RefusesALogInWhichNothingHappens) {
   const TemporaryFile file("# nothing\nPARAM a b\n");
   EXPECT_THAT(load_robot_log(file.path()).error().sentence,
               HasSubstr("no ODOM and no FLASER line in 2 lines"));
+}
+
+TEST(RobotLog, RefusesALogOfGarbageAndNamesItsFirstLine) {
+  const TemporaryFile file("# nothing\ngarbage\n");
+  EXPECT_THAT(load_robot_log(file.path()).error().sentence,
+              HasSubstr("The first line that is none: " + file.path() + ":2: "));
 }
 
 }  // namespace

@@ -97,6 +97,22 @@ TEST_F(RunTest, PlaysALog) {
   EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
 }
 
+TEST_F(RunTest, PlaysALogOfWhichSomeLinesCannotBeRead) {
+  std::string log = "garbage\n";
+  for (int step = 0; step < 50; ++step) {
+    const std::string stamp = std::to_string(step * 0.02);
+    log += "ODOM " + std::to_string(step * 0.01) + " 0 0 0 0 0 " + stamp + " host " + stamp + "\n";
+  }
+  log += "ODOM 1 2 3 0";  // the recorder was killed
+  const TemporaryFile file(log, false);
+  const Outcome outcome = run({"--log", file.path(), "--seconds", "60"});
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing was lost."));
+  EXPECT_THAT(outcome.err,
+              HasSubstr("skipped 2 lines of the log that cannot be read; the first is " +
+                        file.path() + ":1: "));
+}
+
 TEST_F(RunTest, PlaysALogThatHoldsOnlyScans) {
   std::string log;
   for (int step = 0; step < 20; ++step) {
