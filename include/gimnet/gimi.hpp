@@ -316,7 +316,8 @@ class Node {
                         Timeout timeout = Timeout{5000}) const;
   /// Subscribes to a service by its full name; it need not exist yet. A second one of the same name
   /// is the same one; where the hub did not take that again after a break, it is asked once more.
-  /// Errors: bad_name, limit, denied, timeout, not_connected, not_found (it is there and accepts
+  /// Errors: bad_name (also of a name without a /, which no service has, and of a pattern, which
+  /// watch() takes), limit, denied, timeout, not_connected, not_found (it is there and accepts
   /// data: send to it).
   Outcome<Subscription> subscribe(std::string_view full_name, const QueueOptions& options = {},
                                   Timeout timeout = Timeout{5000},

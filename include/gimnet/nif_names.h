@@ -149,7 +149,8 @@ typedef struct nif_pace {
 } nif_pace;
 
 /** Subscribes to a service by its full name; it need not exist yet. The library subscribes again
- * after every reconnect. subscription may be NULL. NIF_BAD_NAME, NIF_LIMIT, NIF_DENIED. */
+ * after every reconnect. subscription may be NULL. NIF_BAD_NAME (also of a name without a /, which
+ * no service has, and of a pattern, which nif_watch() takes), NIF_LIMIT, NIF_DENIED. */
 nif_status nif_subscribe(nif_node* node, const char* full_name, nif_subscription* subscription,
                          int32_t timeout_ms);
 

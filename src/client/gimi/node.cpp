@@ -255,6 +255,9 @@ Outcome<std::string> Node::set_hub_log_level(std::string_view level, Timeout tim
 }
 
 Outcome<std::int64_t> Node::ping(Peer to, Timeout timeout, Lane lane, BytesView echo) const {
+  if (gimi::is_every_node(to)) {
+    return Failure{Status::bad_argument, to.text() + " cannot be pinged: this id means all nodes"};
+  }
   return at_home(core().home(), [&] { return core().ping(to, timeout, lane, echo); });
 }
 

@@ -42,6 +42,10 @@ std::optional<Failure> StreamTable::obstacle(const SendOptions& options) const {
 
 Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
   if (!to) return Failure{Status::bad_argument, "cannot send to nobody: the peer's id is 0"};
+  if (is_every_node(to)) {
+    return Failure{Status::bad_argument,
+                   "cannot send to " + to.text() + ": this id means all nodes; send to one node"};
+  }
   const MutexLock lock(mutex_);
   const StreamName name{to, options.key, 0};
   const auto place = streams_.find(name);

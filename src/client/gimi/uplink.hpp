@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/ids.hpp"
 #include "client/gimi/home.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
@@ -17,6 +18,11 @@ namespace gimnet::gimi {
 [[nodiscard]] Status status_of(nif_status status);
 /// What NIF answered in this thread just now, as a Failure; `doing` as in "send to 7.17".
 [[nodiscard]] Failure failure_of(nif_status status, std::string_view doing);
+
+/// Does the id stand for all nodes of a hub, or of the network?
+[[nodiscard]] inline bool is_every_node(Peer peer) {
+  return index_of(NodeId{peer.id}) == kEveryIndex;
+}
 
 /// Where a message goes and how.
 struct Envelope {

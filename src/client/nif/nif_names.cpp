@@ -256,7 +256,9 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     if (pace != nullptr) {
       if (auto failure = read_struct(pace, whole, "subscribe", "nif_pace")) return fail(*failure);
     }
-    if (const nif_status status = check_name(full_name, "subscribe"); status != NIF_OK)
+    if (const nif_status status =
+            check_name(full_name, "subscribe to", proto::service_full_name_fault);
+        status != NIF_OK)
       return status;
     ns::Subscribe request{full_name};
     if (pace != nullptr) {
@@ -268,7 +270,7 @@ nif_status nif_subscribe_paced(nif_node* node, const char* full_name, const nif_
     const Deadline deadline = deadline_after(timeout_ms);
     const auto former = found.declarations().begin_subscription(request);
     const nif_status status = declare(found, [&] {
-      const nif_status asked = ask(found, request, answer, "subscribe", full_name, deadline);
+      const nif_status asked = ask(found, request, answer, "subscribe to", full_name, deadline);
       if (asked == NIF_OK) found.declarations().add_subscription(request, answer.group);
       return asked;
     });

@@ -75,6 +75,17 @@ const char* node_name_fault(std::string_view name) {
   return reads_as_id(name) ? "it reads as the id of a node does, NUMBER.NUMBER" : nullptr;
 }
 
+const char* service_full_name_fault(std::string_view name) {
+  if (name.find('*') != std::string_view::npos && valid_pattern(name)) {
+    return "it is a pattern, and one service is meant: a watch (Node::watch, nif_watch) tells "
+           "which "
+           "services match";
+  }
+  if (const char* found = name_fault(name)) return found;
+  const bool is_one_part = name.find('/') == std::string_view::npos;
+  return is_one_part ? "it is no full name of a service: write NODE/SERVICE" : nullptr;
+}
+
 bool valid_pattern(std::string_view pattern) {
   return fault(pattern, Wildcards::allowed) == nullptr;
 }

@@ -19,6 +19,8 @@ inline constexpr std::size_t kNamePartsMax = 16;
 /// The same of a node's name, which besides must not read as an id does (`7.17`): whoever sends
 /// there means the id.
 [[nodiscard]] const char* node_name_fault(std::string_view name);
+/// The same of the full name of a service, NODE/SERVICE, which one subscribes to.
+[[nodiscard]] const char* service_full_name_fault(std::string_view name);
 
 /// A name, of which parts may be `*` (one part) or `**` (any number, none included).
 [[nodiscard]] bool valid_pattern(std::string_view pattern);

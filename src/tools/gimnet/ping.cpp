@@ -48,6 +48,9 @@ std::optional<Failure> ping_once(Session& session, Peer peer, Tally& tally) {
       session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
   if (answer) {
     tally.round_trips.add(*answer);
+  } else if (answer.is(Status::bad_argument)) {
+    --tally.sent;
+    return answer.failure();
   } else if (session.stopped()) {
     --tally.sent;
   } else {
@@ -79,6 +82,7 @@ ExitCode run_ping(Session& session) {
     failure = ping_once(session, *peer, tally);
     next_ns = std::max(next_ns + interval_ns, steady_now_ns());
   }
+  if (failure && tally.sent == 0) return session.fail(*failure);
   if (options.json) {
     print_json(session, *peer, tally);
   } else {

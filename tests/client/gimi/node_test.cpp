@@ -180,6 +180,15 @@ TEST_F(NodeTest, AQueueThatStopsReadingLosesNothing) {
   EXPECT_EQ(queue.overwritten(), 0u);
 }
 
+TEST_F(NodeTest, AnIdThatMeansAllNodesIsNoAddress) {
+  const Node node = join();
+  const Peer all{node.peer().id | 0xFFFFF};
+  const auto pinged = node.ping(all);
+  EXPECT_TRUE(pinged.is(Status::bad_argument));
+  EXPECT_EQ(pinged.failure().sentence, all.text() + " cannot be pinged: this id means all nodes");
+  EXPECT_TRUE(node.sender(all).is(Status::bad_argument));
+}
+
 TEST_F(NodeTest, PingsAnyNode) {
   const Node first = join();
   Node second = join();

@@ -303,6 +303,17 @@ TEST_F(Services, AreRefusedWithWords) {
   EXPECT_TRUE(robot.subscribe("").is(Status::bad_name));
 }
 
+TEST_F(Services, AreSubscribedByFullNamesOnly) {
+  const Node viewer = join();
+  const auto one_part = viewer.subscribe("odom");
+  EXPECT_TRUE(one_part.is(Status::bad_name));
+  EXPECT_EQ(one_part.failure().sentence,
+            "cannot subscribe to 'odom': it is no full name of a service: write NODE/SERVICE");
+  const auto pattern = viewer.subscribe("robot/*");
+  EXPECT_TRUE(pattern.is(Status::bad_name));
+  EXPECT_NE(pattern.failure().sentence.find("watch"), std::string::npos);
+}
+
 TEST_F(Services, ManyThreadsSubscribeAndPublish) {
   const Node robot = join("robot");
   const Node viewer = join();

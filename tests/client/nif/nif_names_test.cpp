@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/control/ctrl.hpp"
+#include "proto/control/names.hpp"
 #include "proto/control/ns.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
@@ -114,7 +115,11 @@ TEST(NifNames, ChecksNamesBeforeItAsks) {
   EXPECT_EQ(nif_resolve(node, "a b", &id, 0), NIF_BAD_NAME);
   EXPECT_EQ(nif_resolve(node, nullptr, &id, 0), NIF_BAD_ARGUMENT);
   EXPECT_EQ(nif_resolve(node, "a", nullptr, 0), NIF_BAD_ARGUMENT);
-  EXPECT_EQ(nif_subscribe(node, "", nullptr, 0), NIF_BAD_NAME);
+  for (const char* name : {"", "odom", "robot/*"}) {
+    EXPECT_EQ(nif_subscribe(node, name, nullptr, 0), NIF_BAD_NAME) << name;
+    EXPECT_EQ(nif_error_text(), std::string("cannot subscribe to '") + name +
+                                    "': " + proto::service_full_name_fault(name));
+  }
   nif_service service{};
   service.struct_size = sizeof service;
   service.name = "two/parts";

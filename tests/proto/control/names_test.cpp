@@ -1,5 +1,6 @@
 #include "proto/control/names.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -48,6 +49,19 @@ TEST(Names, OfNodesDoNotReadAsIdsDo) {
     EXPECT_STREQ(node_name_fault(name), nullptr) << name;
   }
   EXPECT_STREQ(node_name_fault("a b"), name_fault("a b"));
+}
+
+TEST(Names, OfServicesInFullHaveANodeAndNoWildcard) {
+  EXPECT_STREQ(service_full_name_fault("robot/odom"), nullptr);
+  EXPECT_STREQ(service_full_name_fault("hall/robot/odom"), nullptr);
+  EXPECT_STREQ(service_full_name_fault("odom"),
+               "it is no full name of a service: write NODE/SERVICE");
+  for (const char* pattern : {"*", "**", "robot/*", "*/odom"}) {
+    EXPECT_THAT(service_full_name_fault(pattern), testing::StartsWith("it is a pattern"))
+        << pattern;
+  }
+  for (const char* name : {"", "a b", "robot/", "a*/b"})
+    EXPECT_STREQ(service_full_name_fault(name), name_fault(name)) << name;
 }
 
 TEST(Patterns, AreNamesWithWildcardParts) {
