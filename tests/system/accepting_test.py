@@ -1,14 +1,39 @@
 #!/usr/bin/env python3
-"""Services that accept data: who wants to read one with `gimnet` is told so, and does not wait for ever."""
+"""Services that accept data: `gimnet send` sends to one, and whoever wants to read one is told what it is."""
 
+import json
 import unittest
 
-from support.processes import Hub, run_gimnet, start_gimnet
+from support.processes import BIN, Hub, Process, run_gimnet, start_gimnet
 from support.waiting import wait_until
 from support.wire import NS, Client, number, text
 
 NOT_FOUND = 4
 READERS = ("echo", "hz", "bw")
+
+
+class Sending(unittest.TestCase):
+    def setUp(self):
+        self.hub = Hub(self)
+        robot = Process([str(BIN / "gimnet-demo"), "robot", "--hub", self.hub.url, "--robot", "bot"])
+        self.addCleanup(robot.end)
+        wait_until(lambda: run_gimnet(self.hub, "services", "bot/drive").code == 0, f"bot/drive; it said: {robot.err}")
+
+    def test_a_service_acknowledges_what_is_sent_to_it(self):
+        send = run_gimnet(self.hub, "send", "bot/drive", "--json", data=b"one\ntwo\n")
+        self.assertEqual(send.code, 0, send.err)
+        self.assertEqual(json.loads(send.out), {"sent": 2, "acknowledged": 2, "lost": 0, "waiting": 0})
+
+    def test_a_service_that_gives_data_takes_none(self):
+        send = run_gimnet(self.hub, "send", "bot/odom", data=b"one\n")
+        self.assertEqual(send.code, NOT_FOUND, send.err)
+        self.assertIn("cannot send to 'bot/odom': it gives data and takes none; subscribe to it", send.err)
+
+    def test_a_node_of_that_name_goes_first(self):
+        receiver = start_gimnet(self, self.hub, "recv", "--name", "bot/drive", "--raw", "-n", "1")
+        self.hub.wait_for_node("bot/drive")
+        send = run_gimnet(self.hub, "send", "bot/drive", data=b"one\n")
+        self.assertEqual((send.code, receiver.wait(), receiver.out), (0, 0, b"one\n"), send.err)
 
 
 class Accepting(unittest.TestCase):

@@ -26,10 +26,11 @@ inline constexpr const char* kEverywhere =
     "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
 
 inline constexpr const char* kSendAbout =
-    R"(Send messages to a node, and wait until it has acknowledged them all.
+    R"(Send messages to a node, or to a service that accepts data, and wait until all are acknowledged.
 
 Examples:
   gimnet send B < lines                     a message for each line
+  gimnet send robot/drive < lines           the same to the service drive of the node robot
   gimnet send 7.17 --file map.png           one message
   echo stop | gimnet send B --lane real_time
 

@@ -74,7 +74,7 @@ void add_printing(CLI::App& command, Options& options) {
 
 void add_send(CLI::App& app, Options& options) {
   CLI::App& send = *app.add_subcommand("send", help::kSendAbout);
-  send.add_option("node", options.target, "name or id of the receiver")
+  send.add_option("node", options.target, "name or id of the receiver, or node/service")
       ->required()
       ->check(not_empty());
   send.add_option("--file", options.file, "send this file as one message")->check(not_empty());

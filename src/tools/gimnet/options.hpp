@@ -42,7 +42,7 @@ struct Options {
   Colour colour = Colour::automatic;
   std::optional<std::uint8_t> shard;
 
-  std::string target;  ///< send, ping: name or id; pub: service; others: service or pattern
+  std::string target;  ///< send, ping: name or id; send, pub: service; others: service or pattern
   std::string name;    ///< of this node
   std::string file;
   bool raw = false;

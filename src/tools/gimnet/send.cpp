@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -123,11 +124,18 @@ Failure reason(const Session& session, const SendCounts& counts, Unsent unsent, 
               (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent")};
 }
 
-/// It was the id of nobody: as a name that nobody has.
+/// It was the id of nobody, or a service that was withdrawn: as a name that nobody has.
 bool nobody_there(const SendCounts& counts) {
-  const bool nobody =
-      counts.loss_reason == LossReason::no_such_node || counts.loss_reason == LossReason::no_route;
-  return counts.acknowledged == 0 && nobody;
+  if (counts.acknowledged != 0) return false;
+  switch (counts.loss_reason) {
+    case LossReason::no_such_node:
+    case LossReason::no_route:
+    case LossReason::no_such_group:
+    case LossReason::service_gone:
+      return true;
+    default:
+      return false;
+  }
 }
 
 }  // namespace
@@ -141,14 +149,18 @@ ExitCode run_send(Session& session) {
   how.reconnect = false;  // a message whose fate is not known counts as lost
   how.resume = false;
   if (const auto ending = session.join(how)) return *ending;
-  const auto peer = session.find(options.target);
+  // A node of that name goes first.
+  const bool to_service =
+      session.is_service(options.target) && !session.node().find(options.target);
+  const auto peer = to_service ? std::optional(Peer{}) : session.find(options.target);
   if (!peer) return session.code();
   SendOptions stream;
   stream.key = options.key;
   stream.lane = options.lane;
   stream.window = kWindow;
   stream.end_at_loss = true;
-  const auto sender = session.node().sender(*peer, stream);
+  const auto sender = to_service ? session.node().sender_to_service(options.target, stream)
+                                 : session.node().sender(*peer, stream);
   if (!sender) return session.fail(sender.failure());
   Unsent unsent = Unsent::nothing;
   auto sent = options.file.empty() ? send_lines(session, *sender, unsent)

@@ -46,6 +46,9 @@ class Session {
   /// A node by name or id. Nothing: the words are printed, code() says how to end.
   [[nodiscard]] std::optional<Peer> find(std::string_view name);
 
+  /// Is there a service of that full name?
+  [[nodiscard]] bool is_service(std::string_view name);
+
   /// No node or service (`kind`) matches the target: says so, with the nearest name.
   [[nodiscard]] ExitCode fail_unmatched(const std::string& kind);
 
@@ -74,7 +77,6 @@ class Session {
   [[nodiscard]] std::string nearest_name(const std::string& kind, std::string_view word);
   /// A suggestion where names of nodes or services begin with the word; "" if none do.
   [[nodiscard]] std::string wider_pattern(const std::string& kind, const std::string& word);
-  [[nodiscard]] bool is_service(std::string_view name);
   /// That a service was called where a node was meant.
   [[nodiscard]] static std::string service_words(std::string_view name);
 
