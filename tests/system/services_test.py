@@ -316,6 +316,13 @@ class Watches(unittest.TestCase):
         self.assertEqual(again.code, 0)
         self.assertIn(b"  present     node robot 7.", again.out)
 
+    def test_a_watch_that_the_hub_refuses_names_its_pattern_if_it_has_one(self):
+        hub = Hub(self, "--limit", "watches=0")
+        for words, said in ((["watch"], "gimnet: cannot watch: "), (["watch", "a/*"], "gimnet: cannot watch 'a/*': ")):
+            watch = run_gimnet(hub, *words)
+            self.assertEqual(watch.code, 1, watch.err)
+            self.assertIn(said, watch.err)
+
     def test_its_own_looks_are_left_out_unless_asked_for(self):
         hub = Hub(self)
         quiet = start_gimnet(self, hub, "watch", "--json")

@@ -81,7 +81,8 @@ Outcome<WatchTable::Begun> WatchTable::watch(const std::string& pattern,
   Begun begun;
   const nif_status status = nif_watch(uplink_.node(), pattern.empty() ? nullptr : pattern.c_str(),
                                       subjects, &begun.number, nif_timeout(timeout));
-  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "watch '" + pattern + "'");
+  const std::string doing = pattern.empty() ? "watch" : "watch '" + pattern + "'";
+  auto failure = status == NIF_OK ? Failure{} : failure_of(status, doing);
   {
     const MutexLock lock(mutex_);
     --asking_;

@@ -18,8 +18,9 @@ inline nif_status refused(const char* what, const std::string& about,
                           const proto::Refusal& refusal) {
   const std::string why =
       refusal.sentence.empty() ? proto::status_name(refusal.status) : refusal.sentence;
-  return fail(status_of(refusal.status),
-              std::string("cannot ") + what + " '" + about + "': " + why);
+  std::string doing = std::string("cannot ") + what;
+  if (!about.empty()) doing += " '" + about + "'";  // empty: a pattern that stands for all
+  return fail(status_of(refusal.status), doing + ": " + why);
 }
 
 /// Asks, and reads the answer. `what` and `about` are for the sentence.

@@ -5,11 +5,20 @@
 #include <cstdio>
 
 #include "proto/bitestream/utf8.hpp"
+#include "tools/gimnet/paint.hpp"
 
 namespace gimnet::tool {
 namespace {
 
 constexpr std::string_view kHexDigits = "0123456789abcdef";
+
+/// The code point of a control character in UTF-8 of up to three bytes.
+unsigned code_point(std::string_view letter) {
+  const auto byte = [letter](std::size_t i) { return static_cast<unsigned char>(letter[i]); };
+  if (letter.size() == 1) return byte(0);
+  if (letter.size() == 2) return (byte(0) & 0x1FU) << 6 | (byte(1) & 0x3FU);
+  return (byte(0) & 0x0FU) << 12 | (byte(1) & 0x3FU) << 6 | (byte(2) & 0x3FU);
+}
 
 bool is_utf8(std::string_view text) {
   return proto::bitestream::valid_utf8(reinterpret_cast<const unsigned char*>(text.data()),
@@ -77,25 +86,32 @@ JsonWriter& JsonWriter::bytes_member(const std::string& name, std::span<const st
   return member(name + "_hex", hex);
 }
 
+void JsonWriter::escape(unsigned code) {
+  json_ += "\\u";
+  for (int shift = 12; shift >= 0; shift -= 4) json_ += kHexDigits[code >> shift & 15U];
+}
+
 void JsonWriter::quote(std::string_view text) {
   const bool clean = is_utf8(text);
   json_ += '"';
-  for (const char letter : text) {
+  while (!text.empty()) {
+    const char letter = text.front();
     const auto code = static_cast<unsigned char>(letter);
+    std::size_t size = 1;
     if (letter == '"' || letter == '\\') {
       json_ += '\\';
       json_ += letter;
     } else if (letter == '\n') {
       json_ += "\\n";
-    } else if (code < 0x20 || code == 0x7F) {
-      json_ += "\\u00";
-      json_ += kHexDigits[code >> 4];
-      json_ += kHexDigits[code & 15];
     } else if (code >= 0x80 && !clean) {
       json_ += "\\ufffd";
+    } else if (const std::size_t control = control_size(text); control != 0) {
+      escape(code_point(text.substr(0, control)));
+      size = control;
     } else {
       json_ += letter;
     }
+    text.remove_prefix(size);
   }
   json_ += '"';
 }

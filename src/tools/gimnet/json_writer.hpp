@@ -47,6 +47,7 @@ class JsonWriter {
   JsonWriter& literal(std::string_view text);
   void separate();
   void quote(std::string_view text);
+  void escape(unsigned code);
 
   std::string json_;
   bool first_ = true;

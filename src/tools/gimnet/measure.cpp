@@ -36,11 +36,12 @@ class Meters {
     const auto message = subscriptions_.receive(timeout);
     if (!message) return message.failure();
     const std::int64_t begin_ns = message->arrival_ns();
-    auto& counted =
-        counted_
-            .try_emplace(std::string(message->service()), Counted{Meter(begin_ns, window_ns_), 0})
-            .first->second;
+    auto& counted = counted_
+                        .try_emplace(std::string(message->service()),
+                                     Counted{Meter(begin_ns, window_ns_), 0, false})
+                        .first->second;
     counted.meter.add(message->arrival_ns(), message->size());
+    counted.latest = message->latest();
     ++messages_;
     return {};
   }
@@ -53,7 +54,7 @@ class Meters {
     for (auto& [name, counted] : counted_) {
       readings.push_back(
           {name, span == Span::whole ? counted.meter.whole(now_ns) : counted.meter.recent(now_ns),
-           counted.missed});
+           counted.missed, counted.latest});
     }
     const bool json = session_.options().json;
     session_.output().write(json ? json_of(readings, measure_, span)
@@ -68,13 +69,15 @@ class Meters {
   struct Counted {
     Meter meter;
     std::uint64_t missed = 0;
+    bool latest = false;
   };
 
   /// Services that are there count from now on, also those that send nothing.
   void look() {
     for (const auto& [name, missed] : subscriptions_.missed()) {
       auto& counted =
-          counted_.try_emplace(name, Counted{Meter(wall_now_ns(), window_ns_), 0}).first->second;
+          counted_.try_emplace(name, Counted{Meter(wall_now_ns(), window_ns_), 0, false})
+              .first->second;
       counted.missed = missed;
     }
   }

@@ -18,6 +18,11 @@ bool is_silent(const Reading& reading) {
          reading.silent_s * 1000.0 > kSilentGaps * reading.gaps_ms.max();
 }
 
+std::string missed_cell(const ServiceReading& one) {
+  const bool skipped = one.latest && one.missed != 0;
+  return std::to_string(one.missed) + (skipped ? " skipped" : "");
+}
+
 std::vector<std::string> rate_cells(const ServiceReading& one) {
   const Reading& reading = one.reading;
   const Statistics& gaps = reading.gaps_ms;
@@ -31,7 +36,7 @@ std::vector<std::string> rate_cells(const ServiceReading& one) {
           gap(gaps.max()),
           gap(gaps.deviation()),
           std::to_string(reading.sizes_bytes.count()),
-          std::to_string(one.missed)};
+          missed_cell(one)};
 }
 
 std::vector<std::string> byte_cells(const ServiceReading& one) {
@@ -47,7 +52,7 @@ std::vector<std::string> byte_cells(const ServiceReading& one) {
           size(sizes.max()),
           byte_count(sizes.sum()),
           std::to_string(sizes.count()),
-          std::to_string(one.missed)};
+          missed_cell(one)};
 }
 
 }  // namespace
@@ -59,7 +64,8 @@ std::string json_of(const std::vector<ServiceReading>& readings, Measure measure
     JsonWriter json;
     json.begin_object().member("service", one.service).member("whole", span == Span::whole);
     json.member("seconds", reading.seconds).member("messages", reading.sizes_bytes.count());
-    json.member("missed", one.missed).member("silent_s", reading.silent_s);
+    json.member("missed", one.missed).member("skipped", one.latest ? one.missed : 0);
+    json.member("silent_s", reading.silent_s);
     if (measure == Measure::rate) {
       const Statistics& gaps = reading.gaps_ms;
       json.member("rate_hz", reading.rate_hz())

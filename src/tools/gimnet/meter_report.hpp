@@ -18,6 +18,7 @@ struct ServiceReading {
   std::string service;
   Reading reading;
   std::uint64_t missed = 0;  ///< since the beginning
+  bool latest = false;       ///< of Delivery::latest: what is missed was skipped for newer ones
 };
 
 /// An object a service, each on a line. Gaps in milliseconds.

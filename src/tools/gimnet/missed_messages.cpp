@@ -54,6 +54,11 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
   untold_ = untold_ || missed != told;
 }
 
+std::uint64_t MissedMessages::skipped(std::string_view service) const {
+  const auto found = services_.find(service);
+  return found == services_.end() ? 0 : found->second.skipped.missed;
+}
+
 void MissedMessages::take_lost(const LostCounts& counts) {
   const std::uint64_t lost =
       counts.incomplete + counts.too_large + counts.unknown_service + counts.outdated;

@@ -27,9 +27,20 @@ std::string_view escape_of(Tone tone) {
   return {};
 }
 
-/// Bytes of what stands first, if it is a control character: C0, DEL, and in UTF-8 C1, ends of
-/// lines and paragraphs, and what turns the direction of writing, so that another text is seen than
-/// there is. 0: it is none.
+}  // namespace
+
+Paint Paint::of(Colour colour, int descriptor) {
+  if (colour != Colour::automatic) return Paint(colour == Colour::always);
+  return Paint(::isatty(descriptor) == 1 && variable("NO_COLOR").empty() &&
+               variable("TERM") != "dumb");
+}
+
+std::string Paint::operator()(std::string_view text, Tone tone) const {
+  const std::string_view escape = on_ ? escape_of(tone) : std::string_view{};
+  if (escape.empty()) return std::string(text);
+  return std::string(escape) + std::string(text) + "\x1b[0m";
+}
+
 std::size_t control_size(std::string_view text) {
   const auto byte = [text](std::size_t i) {
     return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
@@ -45,20 +56,6 @@ std::size_t control_size(std::string_view text) {
       second == 0x80 && ((third >= 0x8E && third <= 0x8F) || (third >= 0xA8 && third <= 0xAE));
   const bool isolates = second == 0x81 && third >= 0xA6 && third <= 0xA9;
   return marks || isolates ? 3 : 0;
-}
-
-}  // namespace
-
-Paint Paint::of(Colour colour, int descriptor) {
-  if (colour != Colour::automatic) return Paint(colour == Colour::always);
-  return Paint(::isatty(descriptor) == 1 && variable("NO_COLOR").empty() &&
-               variable("TERM") != "dumb");
-}
-
-std::string Paint::operator()(std::string_view text, Tone tone) const {
-  const std::string_view escape = on_ ? escape_of(tone) : std::string_view{};
-  if (escape.empty()) return std::string(text);
-  return std::string(escape) + std::string(text) + "\x1b[0m";
 }
 
 std::string printable(std::string_view text) {

@@ -29,5 +29,9 @@ class Paint {
 /// Text of others for people, a '.' for each control character: they would let it write over the
 /// terminal, or turn what is written.
 [[nodiscard]] std::string printable(std::string_view text);
+/// Bytes of what stands first, if it is a control character: C0, DEL, and in UTF-8 C1, ends of
+/// lines and paragraphs, and what turns the direction of writing, so that another text is seen than
+/// there is. 0: it is none.
+[[nodiscard]] std::size_t control_size(std::string_view text);
 
 }  // namespace gimnet::tool

@@ -48,7 +48,7 @@ std::string json_line(const Message& message, const Absent& absent) {
     json.member("age_us", static_cast<double>(message.arrival_ns() - *sent) / 1000.0);
   }
   json.member("lost", absent.lost);
-  if (absent.missed) json.member("missed", *absent.missed);
+  if (absent.missed) json.member("missed", *absent.missed).member("skipped", absent.skipped);
   json.member("size", message.size()).bytes_member("text", message.data()).end_object();
   return json.str() + "\n";
 }
@@ -80,7 +80,10 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
       break;
     }
     Absent absent{.lost = lost.all(), .missed = std::nullopt};
-    if (missed != nullptr) absent.missed = missed->take(*message);
+    if (missed != nullptr) {
+      absent.missed = missed->take(*message);
+      absent.skipped = missed->skipped(message->service());
+    }
     print(session, *message, absent);
     ++printed;
     if (!session.output().ok()) break;

@@ -16,6 +16,7 @@ namespace gimnet::tool {
 struct Absent {
   std::uint64_t lost = 0;               ///< to this node, on the way
   std::optional<std::uint64_t> missed;  ///< of the message's service, where somebody counted
+  std::uint64_t skipped = 0;            ///< of `missed`: for newer ones, of Delivery::latest
 };
 
 /// A message as a line for people; `named`: with its service.

@@ -25,6 +25,14 @@ TEST(JsonWriter, EscapesText) {
   EXPECT_EQ(json.str(), R"("\"\\\n\u0009\u007f")");
 }
 
+// As a reader sees them they are other text, or they steer its terminal.
+TEST(JsonWriter, EscapesControlCharactersBeyondAscii) {
+  JsonWriter json;
+  json.text("\u0080\u009f\u00a0|\u2027\u2028\u202e\u202f|\u2065\u2066\u2069\u206a");
+  EXPECT_EQ(json.str(),
+            "\"\\u0080\\u009f\u00a0|\u2027\\u2028\\u202e\u202f|\u2065\\u2066\\u2069\u206a\"");
+}
+
 TEST(JsonWriter, KeepsUtf8AndReplacesWhatIsNone) {
   JsonWriter json;
   json.begin_array().text("ä€").text("a\xff").end_array();

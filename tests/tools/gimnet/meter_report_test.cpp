@@ -17,12 +17,12 @@ std::vector<ServiceReading> readings() {
 TEST(MeterReport, AnObjectALine) {
   EXPECT_EQ(
       json_of(readings(), Measure::rate, Span::recent),
-      R"({"service":"robot/odom","whole":false,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
+      R"({"service":"robot/odom","whole":false,"seconds":2.000,"messages":3,"missed":3,"skipped":0,"silent_s":0.010,)"
       R"("rate_hz":40.000,"gap_min_ms":20.000,"gap_mean_ms":25.000,"gap_max_ms":30.000,"gap_std_ms":5.000})"
       "\n");
   EXPECT_EQ(
       json_of(readings(), Measure::bytes, Span::whole),
-      R"({"service":"robot/odom","whole":true,"seconds":2.000,"messages":3,"missed":3,"silent_s":0.010,)"
+      R"({"service":"robot/odom","whole":true,"seconds":2.000,"messages":3,"missed":3,"skipped":0,"silent_s":0.010,)"
       R"("bytes_per_s":3000.000,"bytes":6000,"size_min":1000,"size_mean":2000.000,"size_max":3000})"
       "\n");
 }
@@ -47,8 +47,18 @@ TEST(MeterReport, AServiceThatFellSilentIsAWarning) {
             std::string::npos);
 }
 
+TEST(MeterReport, WhatALatestServiceReplacedIsSkipped) {
+  auto latest = readings();
+  latest.front().latest = true;
+  EXPECT_NE(text_of(latest, Measure::rate, Span::whole).find("  3 skipped\n"), std::string::npos);
+  EXPECT_NE(json_of(latest, Measure::rate, Span::whole).find(R"("missed":3,"skipped":3)"),
+            std::string::npos);
+  latest.front().missed = 0;
+  EXPECT_EQ(text_of(latest, Measure::rate, Span::whole).find("skipped"), std::string::npos);
+}
+
 TEST(MeterReport, AServiceOfWhichNothingCameHasNoGaps) {
-  EXPECT_NE(text_of({{"a/b", {}, 0}}, Measure::rate, Span::recent).find("a/b      0.0  -"),
+  EXPECT_NE(text_of({{"a/b", {}, 0, false}}, Measure::rate, Span::recent).find("a/b      0.0  -"),
             std::string::npos);
 }
 

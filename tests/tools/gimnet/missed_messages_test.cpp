@@ -99,6 +99,8 @@ TEST_F(MissedMessagesTest, OfTheLatestTheyWereSkipped) {
   EXPECT_EQ(take_latest(4), 2u);
   EXPECT_EQ(missed_.rest(),
             Sentences{"2 messages of r/s skipped for newer ones (delivery latest)"});
+  EXPECT_EQ(missed_.skipped("r/s"), 2u);
+  EXPECT_EQ(missed_.skipped("r/t"), 0u);
   EXPECT_EQ(missed_.rest(), Sentences{}) << "once";
 }
 

@@ -26,8 +26,9 @@ TEST(Printer, AnObjectForPrograms) {
 }
 
 TEST(Printer, AnObjectTellsWhatDidNotCome) {
-  const Absent absent{.lost = 5, .missed = 941};
-  EXPECT_NE(json_line(test::make_message("x", 3), absent).find(R"("lost":5,"missed":941,"size":1)"),
+  const Absent absent{.lost = 5, .missed = 941, .skipped = 40};
+  EXPECT_NE(json_line(test::make_message("x", 3), absent)
+                .find(R"("lost":5,"missed":941,"skipped":40,"size":1)"),
             std::string::npos);
 }
 
