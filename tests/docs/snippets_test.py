@@ -2,7 +2,7 @@
 """The C and C++ that the documents and the public headers show compiles, without a warning, as a newcomer would paste it.
 
 What is code: lines that are indented by four spaces, in a header behind the sign of the comment. They are paragraphs, between empty
-lines; one is C or C++ where a line of it ends in `;` or `{`. A page is read from top to bottom: each paragraph stands in a scope
+lines; one is C or C++ where a line of it ends in `;` or `{`. One with a main() is compiled by itself. A page is read from top to bottom: each paragraph stands in a scope
 within that of the one before it, so that it may use what was declared above, or declare it anew. What a page takes for granted
 beside that stands in PAGES.
 
@@ -37,6 +37,7 @@ GIMI = '#include <iostream>\n#include <vector>\n#include "gimnet/gimi.hpp"\ntemp
 PAGES = {
     "README.md": Page("c++", GIMI),
     "docs/gimi.md": Page("c++", GIMI + "void stop();\nvoid forget_all();\n", "std::vector<std::byte> pixels;\n"),
+    "docs/nif.md": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\n', "uint32_t peer = 1;\nnif_node* node = NULL;\n"),
     "include/gimnet/gimi.hpp": Page("c++", GIMI),
     "include/gimnet/nif.h": Page("c", '#include <stdio.h>\n#include "gimnet/nif.h"\nvoid show(const nif_incoming* in);\n',
                                  "uint32_t peer = 1;\n"),
@@ -72,6 +73,17 @@ def program(name, page, found):
     return "".join(parts) + "}" * len(found) + "\nreturn 0;\n}\n"
 
 
+def is_program(lines):
+    """It stands for itself, with all that it includes."""
+    return any(line.startswith("int main(") for line in lines)
+
+
+def programs(name, page, found):
+    """What to compile: each whole program, and one of all other paragraphs."""
+    whole = [f'#line {number} "{name}"\n' + "\n".join(lines) + "\n" for number, lines in found if is_program(lines)]
+    return [*whole, program(name, page, [each for each in found if not is_program(each[1])])]
+
+
 class Snippets(unittest.TestCase):
     compilers = {}
 
@@ -100,7 +112,8 @@ class Snippets(unittest.TestCase):
             with self.subTest(page=name):
                 self.assertIn(name, PAGES, f"it shows code, in line {found[0][0]}: say in PAGES what it takes for granted")
                 page = PAGES[name]
-                self.assert_compiles(page.language, program(name, page, found))
+                for text_of_program in programs(name, page, found):
+                    self.assert_compiles(page.language, text_of_program)
 
     def test_what_warns_is_seen(self):
         page = PAGES["docs/gimi.md"]
@@ -116,6 +129,13 @@ class Snippets(unittest.TestCase):
         for sign in ("//", " *"):
             text = f"{sign} Words;\n{sign}\n{sign}     int a = 1;\n{sign}     f(a);\n{sign}\nint b;\n"
             self.assertEqual(paragraphs("include/a.h", text), [(3, ["int a = 1;", "f(a);"])])
+
+    def test_a_whole_program_is_compiled_by_itself(self):
+        found = paragraphs("page.md", "    int main() {\n      int x;\n    }\n\nWords.\n\n    int y = 1;\n    show(y);\n")
+        whole, rest = programs("page.md", PAGES["README.md"], found)
+        self.assertEqual(whole, '#line 1 "page.md"\nint main() {\n  int x;\n}\n')
+        self.assertIn("int y = 1;", rest)
+        self.assertNotIn("int x;", rest)
 
     def test_what_is_no_code_is_left_alone(self):
         for text in ("    ./dev build\n    tcphub      # a comment\n", "    00 01 02   key 1 u8: 7\n", "no code;\n", "   int three_spaces;\n"):
