@@ -116,7 +116,9 @@ class Door(unittest.TestCase):
                 continue
             with self.subTest(arguments=arguments):
                 _, calls = self.dev("demo", *arguments)
-                self.assertTrue([call for call in calls if call.startswith("cmake --build")], calls)
+                built = [call for call in calls if call.startswith("cmake --build")]
+                self.assertEqual(len(built), 1, calls)
+                self.assertTrue(built[0].endswith(" --target tcphub gimnet-demo"), "what it starts, and no more")
 
     def test_fuzz_without_a_target_lists_them(self):
         process, calls = self.dev("fuzz")
