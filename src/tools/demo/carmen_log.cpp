@@ -212,6 +212,12 @@ Result<RobotLog> load_robot_log(const std::string& path) {
     return Error{std::move(sentence)};
   }
   pace_log(log);
+  if (log.skipped != 0) {
+    if (!log.pacing_note.empty()) log.pacing_note += "; ";
+    log.pacing_note +=
+        fmt::format("skipped {} that cannot be read",
+                    log.skipped == 1 ? "a line" : fmt::format("{} lines", log.skipped));
+  }
   return log;
 }
 

@@ -31,8 +31,8 @@ struct LogRecord {
 struct RobotLog {
   std::vector<LogRecord> records;
   std::size_t scans = 0;
-  /// A sentence for the user about how the playback is timed; empty where the log's own stamps are
-  /// followed.
+  /// A sentence for the user about how the playback is timed and what is left out; empty where the
+  /// log is played as it is.
   std::string pacing_note;
   /// Lines that could not be read and were left out.
   std::uint64_t skipped = 0;

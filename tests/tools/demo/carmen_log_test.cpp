@@ -108,6 +108,7 @@ TEST(RobotLog, SkipsLinesThatCannotBeReadAndNamesTheFirst) {
   ASSERT_TRUE(log) << log.error().sentence;
   EXPECT_EQ(log->records.size(), 2U);
   EXPECT_EQ(log->skipped, 2U);
+  EXPECT_THAT(log->pacing_note, HasSubstr("skipped 2 lines that cannot be read"));
   EXPECT_EQ(log->first_skipped, file.path() + ":3: ODOM: the line ends before theta; was it cut?");
 }
 
