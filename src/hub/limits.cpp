@@ -44,7 +44,9 @@ constexpr std::array kTable{
         "handshakes_per_address", "connections", &Limits::handshakes_per_address, 1, 1'000'000,
         "the same from one address; connections over loopback or a Unix socket do not count", true},
     LimitInfo{"nodes", "nodes", &Limits::nodes, 1, 1'000'000,
-              "sessions, those within their grace time included", true},
+              "sessions, those within their grace time included; one address other than loopback, "
+              "or one user other than root and the hub's own, has at most half",
+              true},
     LimitInfo{"administrators", "nodes", &Limits::administrators, 0, 1'024,
               "places beyond nodes, and descriptors, that are kept for administrators", true},
     LimitInfo{"grace_ms", "ms", &Limits::grace_ms, 0, 24 * kHour,

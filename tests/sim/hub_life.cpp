@@ -121,10 +121,18 @@ void HubLife::trace_sent() {
   }
 }
 
+hub::PeerInfo HubLife::peer_of(const std::string& identity, std::uint32_t node,
+                               std::uint64_t wire) {
+  constexpr std::uint32_t kOverLoopback = 10;
+  if (identity != "open") return {"unix", "pid " + std::to_string(wire + 1) + " " + identity};
+  const bool loopback = node % kOverLoopback == 0;
+  return {"tcp", (loopback ? "127.0.0.1:" : "10.0.0.1:") + std::to_string(wire)};
+}
+
 std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint64_t number) {
   hub::Stranger stranger;
   stranger.transport = std::make_unique<WireTransport>(newcomer.wire);
-  stranger.peer = {"tcp", "10.0.0.1:" + std::to_string(newcomer.wire->number)};
+  stranger.peer = peer_of(newcomer.identity, newcomer.wire->node, newcomer.wire->number);
   const milliseconds now = setting_.agenda.now_ms();
   shards_.forget_sent();
   stranger.identity = newcomer.identity;

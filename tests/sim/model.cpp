@@ -94,12 +94,7 @@ Model::Verdict Model::judge(const Hello& hello) const {
   judge_token(hello, verdict);
   if (!hello.hello.name.empty()) verdict.refusal = judge_name(hello.hello.name, verdict.session);
   if (verdict.refusal || verdict.session != 0) return verdict;
-  const auto holder = names_.find(hello.hello.name);
-  // With an administrator beyond the limit more would have to go than make way.
-  const std::size_t going =
-      (holder != names_.end() ? 1u : 0u) + (longest_away_nameless() ? 1u : 0u);
-  if (sessions_.size() - going >= places_for(hello.hello.role))
-    verdict.refusal = GoodbyeCode::hub_full;
+  if (is_full_for(hello)) verdict.refusal = GoodbyeCode::hub_full;
   return verdict;
 }
 
@@ -109,7 +104,10 @@ void Model::refused(const Hello& hello, const proto::Goodbye& goodbye, milliseco
     if (goodbye.code == GoodbyeCode::name_taken) census_.add(Happening::name_collision);
     if (goodbye.code == GoodbyeCode::bad_name) census_.add(Happening::bad_name);
     if (goodbye.code == GoodbyeCode::not_allowed) census_.add(Happening::wrong_role);
-    if (goodbye.code == GoodbyeCode::hub_full) census_.add(Happening::hub_full);
+    if (goodbye.code == GoodbyeCode::hub_full) {
+      census_.add(has_half(crowd_of(hello.place, hello.may_administer)) ? Happening::crowd_full
+                                                                        : Happening::hub_full);
+    }
     if (goodbye.code == GoodbyeCode::draining) census_.add(Happening::refused_draining);
     return;
   }
@@ -156,6 +154,8 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   session.role = hello.hello.role;
   session.description = hello.hello.description;
   session.place = hello.place;
+  session.crowd = crowd_of(hello.place, hello.may_administer);
+  session.resumes = hello.hello.resume;
   session.token_name = session.name;
   session.identity = hello.identity;
   session.token_expiry = hello.wall + milliseconds{limits_.token_ms};
@@ -204,28 +204,6 @@ void Model::make_way(const Hello& hello, const Verdict& verdict, milliseconds no
   if (verdict.session == 0) make_room(hello.hello.role, now);
 }
 
-std::uint64_t Model::places_for(Role role) const {
-  return limits_.nodes + (role == Role::admin ? limits_.administrators : 0);
-}
-
-void Model::make_room(Role role, milliseconds now) {
-  if (sessions_.size() < limits_.nodes) return;
-  const std::optional<std::uint32_t> away = longest_away_nameless();
-  if (!away && sessions_.size() < places_for(role)) return;
-  require(away.has_value(), Checker::limits, "somebody is let in beyond the limit on nodes");
-  census_.add(Happening::room_made);
-  end(*away, now);
-}
-
-std::optional<std::uint32_t> Model::longest_away_nameless() const {
-  std::optional<std::uint32_t> found;
-  for (const auto& [index, session] : sessions_) {
-    if (session.connected || !session.name.empty()) continue;
-    if (!found || session.away_order < sessions_.at(*found).away_order) found = index;
-  }
-  return found;
-}
-
 void Model::take_name(std::uint32_t index, const std::string& name, milliseconds now) {
   Session& session = sessions_.at(index);
   if (!session.name.empty()) {
@@ -262,6 +240,10 @@ void Model::detached(const hub::DetachedEvent& event, milliseconds now) {
   if (left || (misconduct && session.name.empty())) {
     least_[index] = session.token_number + 1;
     for (const std::uint32_t each : former(index)) least_[each] = moved_.at(each).token_number + 1;
+    return end(index, now);
+  }
+  if (session.name.empty() && !session.resumes && !session.renumbered) {
+    census_.add(Happening::gone_with_connection);
     return end(index, now);
   }
   if (!event.said_by_peer && event.code != GoodbyeCode::done) {

@@ -113,6 +113,8 @@ class Model final : public Witness {
     std::string name;
     std::string description;
     std::string place;
+    std::string crowd;       ///< as of crowd_of()
+    bool resumes = false;    ///< asked for it, the last time
     std::string token_name;  ///< for which its last token was given
     std::string identity;
     milliseconds token_expiry{};  ///< since 1970
@@ -203,6 +205,10 @@ class Model final : public Witness {
 
   [[nodiscard]] const std::map<std::uint32_t, Session>& sessions() const { return sessions_; }
   [[nodiscard]] const std::map<std::string, std::uint32_t>& names() const { return names_; }
+  /// Whose nodes together may have half of the places: the address or user in a place. "":
+  /// nobody's.
+  [[nodiscard]] static std::string crowd_of(const std::string& place, bool may_administer);
+  [[nodiscard]] bool has_half(const std::string& crowd) const;
   /// nullptr: nobody provides it, and nobody waits for it.
   [[nodiscard]] const Topic* topic(const std::string& full_name) const;
   /// By group index. Never null.
@@ -245,8 +251,13 @@ class Model final : public Witness {
   void make_way(const Hello& hello, const Verdict& verdict, milliseconds now);
   /// How many sessions there may be once somebody of that role was let in.
   [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
+  /// Would there be no place for it even when all have made way who do?
+  [[nodiscard]] bool is_full_for(const Hello& hello) const;
+  [[nodiscard]] std::size_t size_of(const std::string& crowd) const;
+  [[nodiscard]] bool declares_something(std::uint32_t index) const;
   void make_room(proto::Role role, milliseconds now);
-  [[nodiscard]] std::optional<std::uint32_t> longest_away_nameless() const;
+  /// The next one to make way, but not that one; nothing: nobody is away.
+  [[nodiscard]] std::optional<std::uint32_t> longest_away(std::uint32_t but) const;
   void take_new_index(std::uint32_t index, milliseconds now);
   /// `granted`: that was kept before.
   void give_node(std::uint32_t index, bool granted);

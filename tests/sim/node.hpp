@@ -40,6 +40,7 @@ class SimNode {
 
   [[nodiscard]] std::uint32_t number() const { return number_; }
   [[nodiscard]] bool is_slow() const { return slow_; }
+  [[nodiscard]] const std::string& identity() const { return identity_; }
   [[nodiscard]] bool is_up() const { return wire_ != nullptr && link().welcomed; }
   [[nodiscard]] bool waits_for_answers() const { return wire_ != nullptr && !link().open.empty(); }
   /// Why the hub did not let it in last.

@@ -334,7 +334,10 @@ void World::require_served(const SimNode& node) const {
     return require(!node.waits_for_answers(), Checker::answers,
                    "a node waits for an answer that does not come");
   }
-  const bool room = life_->model().sessions().size() < setting_.plan.limits.nodes;
+  const std::string place = HubLife::peer_of(node.identity(), node.number(), 0).address;
+  const std::string crowd = Model::crowd_of(place, node.identity() == kAdministrator);
+  const bool room = life_->model().sessions().size() < setting_.plan.limits.nodes &&
+                    !life_->model().has_half(crowd);
   const bool refused = node.refusal() == GoodbyeCode::name_taken ||
                        (node.refusal() == GoodbyeCode::hub_full && !room);
   if (refused) return;

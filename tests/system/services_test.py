@@ -40,6 +40,21 @@ class Services(unittest.TestCase):
         pub = run_gimnet(hub, "pub", "robot/odom", "--wait", "1", data=b"one\ntwo\n")
         self.assertEqual((pub.code, echo.wait(), echo.out), (0, 0, b"one\ntwo\n"), pub.err)
 
+    def test_a_viewer_that_was_killed_is_no_subscriber(self):
+        hub = Hub(self, "--limit", "grace_ms=3600000")
+        viewer = start_gimnet(self, hub, "echo", "robot/odom", "--raw")
+        pub = start_gimnet(self, hub, "pub", "robot/odom", "--stay", stdin=subprocess.PIPE).feed(b"")
+        wait_until(lambda: subscribers_of(hub, "robot/odom") == 1, "the viewer")
+        viewer.signal(signal.SIGKILL)
+        viewer.wait()
+        wait_until(lambda: subscribers_of(hub, "robot/odom") == 0, "the end of the viewer")
+        pub.signal(signal.SIGINT)
+        pub.wait()
+        waiting = start_gimnet(self, hub, "pub", "robot/odom", "--wait", "1", stdin=subprocess.PIPE).feed(b"one\n")
+        wait_until(lambda: subscribers_of(hub, "robot/odom") == 0, "the service")
+        echo = run_gimnet(hub, "echo", "robot/odom", "-n", "1", "--raw")
+        self.assertEqual((echo.code, echo.out, waiting.wait()), (0, b"one\n", 0), waiting.err)
+
     def test_the_last_line_stays_for_who_comes_late(self):
         hub = Hub(self)
         pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay", "--json",

@@ -24,4 +24,11 @@ namespace gimnet::hub {
   return local ? std::string_view{} : log_peer(transport, address);
 }
 
+/// The crowd that a peer counts in, of which none may have more than half of the places: as
+/// remote_address(), and over a Unix socket the user. Valid until: `address` changes.
+[[nodiscard]] constexpr std::string_view crowd_of(std::string_view transport,
+                                                  std::string_view address) {
+  return transport == "unix" ? log_peer(transport, address) : remote_address(transport, address);
+}
+
 }  // namespace gimnet::hub

@@ -33,5 +33,12 @@ TEST(RemoteAddress, IsNoneForThisMachinesOwn) {
   EXPECT_EQ(remote_address("unix", "pid 77 uid 1000"), "");
 }
 
+TEST(CrowdOf, IsTheAddressOfAnotherMachineOrTheUser) {
+  EXPECT_EQ(crowd_of("tcp", "10.0.0.1:5000"), "10.0.0.1");
+  EXPECT_EQ(crowd_of("tcp", "127.0.0.1:5000"), "");
+  EXPECT_EQ(crowd_of("unix", "pid 77 uid 1000"), "uid 1000");
+  EXPECT_EQ(crowd_of("unix", "unknown"), "unknown");
+}
+
 }  // namespace
 }  // namespace gimnet::hub

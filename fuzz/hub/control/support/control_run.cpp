@@ -104,6 +104,7 @@ void ControlRun::join(Choices& input) {
   stranger.may_administer = (how & 8) == 0;
   stranger.identity = (how & 16) != 0 ? "uid 1000" : "open";
   stranger.hello.description = (how & 32) != 0 ? "a description" : "";
+  stranger.hello.resume = (how & 32) != 0;
   if ((how & 64) != 0 && !tokens_.empty()) {
     stranger.hello.token = tokens_[input.byte() % tokens_.size()];
     const std::uint8_t bit = (how & 128) != 0 ? input.byte() : 0;

@@ -63,12 +63,18 @@ Reference::Verdict Reference::judge(const Stranger& who, milliseconds wall) cons
   judge_token(who, wall, verdict);
   if (!who.hello.name.empty()) verdict.refusal = judge_name(who.hello.name, verdict.session);
   if (verdict.refusal || verdict.session != 0) return verdict;
-  // Whoever is away under that name makes way, then a nameless one.
-  const auto holder = names_.find(who.hello.name);
-  const std::size_t stay = sessions_.size() - (holder != names_.end() ? 1 : 0);
-  const std::uint64_t goes = longest_away_nameless(holder != names_.end() ? holder->second : 0);
-  const std::size_t away = stay >= limits_.nodes && goes != 0 ? 1 : 0;
+  // Whoever is away under that name makes way, then the one that is away longest.
+  const auto named = names_.find(who.hello.name);
+  const std::uint64_t holder = named != names_.end() ? named->second : 0;
+  const std::size_t stay = sessions_.size() - (holder != 0 ? 1 : 0);
+  const std::size_t away = stay >= limits_.nodes && longest_away(holder) != 0 ? 1 : 0;
   if (stay - away >= places_for(role)) verdict.refusal = GoodbyeCode::hub_full;
+  // All strangers come from one address, and those who may administer the hub count for none.
+  const auto in_crowd = std::ranges::count_if(sessions_, [holder](const auto& entry) {
+    return entry.second.in_crowd && entry.first != holder;
+  });
+  if (!who.may_administer && static_cast<std::uint64_t>(in_crowd) >= (limits_.nodes + 1) / 2)
+    verdict.refusal = GoodbyeCode::hub_full;
   return verdict;
 }
 
@@ -76,11 +82,14 @@ std::uint64_t Reference::places_for(Role role) const {
   return limits_.nodes + (role == Role::admin ? limits_.administrators : 0);
 }
 
-std::uint64_t Reference::longest_away_nameless(std::uint64_t but) const {
+std::uint64_t Reference::longest_away(std::uint64_t but) const {
+  const auto rank = [](const Session& session) {
+    return std::pair{!session.provides.empty() || !session.subscribes.empty(), session.away_order};
+  };
   std::uint64_t found = 0;
   for (const auto& [id, session] : sessions_) {
-    if (session.connected || !session.name.empty() || id == but) continue;
-    if (found == 0 || session.away_order < sessions_.at(found).away_order) found = id;
+    if (session.connected || id == but) continue;
+    if (found == 0 || rank(session) < rank(sessions_.at(found))) found = id;
   }
   return found;
 }
@@ -119,6 +128,8 @@ std::uint64_t Reference::came(const Stranger& who, const ControlHub& hub,
   session.role = who.hello.role;
   session.description = who.hello.description;
   session.place = who.place;
+  session.in_crowd = !who.may_administer;
+  session.resumes = who.hello.resume;
   session.identity = who.identity;
   session.token_name = session.name;
   session.token_expiry = hub.wall() + milliseconds{limits_.token_ms};
@@ -147,7 +158,7 @@ std::uint64_t Reference::take_in(const Verdict& verdict, const hub::AttachComman
     return verdict.session;
   }
   if (sessions_.size() >= limits_.nodes) {
-    if (const std::uint64_t away = longest_away_nameless(0); away != 0) end(away, hub.now);
+    if (const std::uint64_t away = longest_away(0); away != 0) end(away, hub.now);
   }
   FUZZ_MUST(index != kHubIndex && index < kEveryIndex && !by_index_.contains(index));
   if (!verdict.former) FUZZ_MUST(is_free(resting_nodes_, index, hub.now));
@@ -194,6 +205,8 @@ void Reference::ended(const Line& line, bool said_by_peer, GoodbyeCode code,
     spend_tokens(session);
     return end(line.session, hub.now);
   }
+  if (session.name.empty() && !session.resumes && !session.renumbered)
+    return end(line.session, hub.now);
   if (!said_by_peer && code != GoodbyeCode::done)
     session.last_goodbye = static_cast<std::uint16_t>(code);
   session.connected = false;

@@ -39,6 +39,8 @@ class Reference {
     std::string name;
     std::string description;
     std::string place;
+    bool in_crowd = false;  ///< counts for its address
+    bool resumes = false;   ///< asked for it, the last time
     std::string identity;
     std::string token_name;
     milliseconds token_expiry{};
@@ -141,7 +143,7 @@ class Reference {
   void judge_token(const Stranger& who, milliseconds wall, Verdict& verdict) const;
   [[nodiscard]] std::optional<proto::GoodbyeCode> judge_name(const std::string& name,
                                                              std::uint64_t claimant) const;
-  [[nodiscard]] std::uint64_t longest_away_nameless(std::uint64_t but) const;
+  [[nodiscard]] std::uint64_t longest_away(std::uint64_t but) const;
   [[nodiscard]] std::uint64_t places_for(proto::Role role) const;
   std::uint64_t take_in(const Verdict& verdict, const hub::AttachCommand& attach,
                         const ControlHub& hub);

@@ -58,6 +58,8 @@ Result<Membership::Joined, proto::Goodbye> Membership::join(const JoinRequest& r
   session.description = request.description;
   session.identity = request.identity;
   session.origin = request.origin;
+  session.resumes = request.resumes;
+  sessions_.move_to_crowd(session, request.crowd);
   sessions_.renew_token(session, request.wall);
   sessions_.attach(session, now);
   effects.emplace_back(
@@ -93,18 +95,25 @@ Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinReq
 void Membership::connection_ended(Session& session, const Ending& ending, milliseconds now,
                                   Effects& effects) {
   const bool left = ending.said_by_peer && ending.code == GoodbyeCode::done;
-  // Nobody knows a nameless node but by its id, and sessions kept for those who send rubbish would
-  // fill the hub.
-  if (left || (session.name.empty() && is_misconduct(ending))) {
-    sessions_.spend_token(session);
+  if (left || ends_with_connection(session, ending)) {
+    // Its token is good for its id otherwise, as after a grace time.
+    if (left || is_misconduct(ending)) sessions_.spend_token(session);
     end(session, now, effects);
     return;
   }
   if (!ending.said_by_peer && ending.code != GoodbyeCode::done) {
     session.closing = std::make_unique<Closing>(Closing{ending.code, ending.sentence});
   }
-  sessions_.begin_grace(session, now);
+  sessions_.begin_grace(
+      session, now, services_.declares(session.index) ? Declared::something : Declared::nothing);
   effects.emplace_back(NodeNoted{ChangeKind::away, session.index, {}, {}});
+}
+
+/// Others know a node without a name by its id alone. Sessions that are kept for those who send
+/// rubbish would fill the hub. A node that was given another id has to come back to learn it.
+bool Membership::ends_with_connection(const Session& session, const Ending& ending) {
+  if (!session.name.empty()) return false;
+  return is_misconduct(ending) || (!session.resumes && !session.renumbered);
 }
 
 std::optional<proto::Refusal> Membership::rename(Session& session, const std::string& name,
@@ -318,17 +327,24 @@ void Membership::end_absent_holder(const std::string& name, const Session* claim
 std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& request,
                                                        const Sessions::Claim& claim,
                                                        milliseconds now) {
-  // The limit may have been lowered, so that more would have to go than make way.
-  const std::size_t ending =
-      (directory_.find(request.name) ? 1u : 0u) + (sessions_.nameless_away() ? 1u : 0u);
-  if (std::optional<proto::Goodbye> refusal = sessions_.full_refusal(places_for(request), ending))
-    return refusal;
+  // The limit may have been lowered, so that more would have to go than make way. The absent holder
+  // of the name goes first, and one more at most.
+  const std::optional<std::uint32_t> index = directory_.find(request.name);
+  const Session* holder = index ? sessions_.find(*index) : nullptr;
+  const std::size_t held = holder != nullptr ? 1 : 0;
+  const std::size_t others = sessions_.away() > held ? 1 : 0;
+  if (auto refusal = sessions_.full_refusal(places_for(request), held + others)) return refusal;
+  if (!request.crowd.empty()) {
+    const bool of_crowd =
+        holder != nullptr && holder->crowd != nullptr && holder->crowd->first == request.crowd;
+    if (auto refusal = sessions_.crowd_refusal(request.crowd, of_crowd ? 1 : 0)) return refusal;
+  }
   return claim.token ? std::nullopt : sessions_.id_refusal(now);
 }
 
 void Membership::make_room(milliseconds now, Effects& effects) {
   if (!sessions_.full()) return;
-  if (Session* away = sessions_.longest_away_nameless()) end(*away, now, effects);
+  if (Session* away = sessions_.longest_away()) end(*away, now, effects);
 }
 
 void Membership::take_name(Session& session, const std::string& name, milliseconds now,

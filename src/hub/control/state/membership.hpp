@@ -25,7 +25,9 @@ struct JoinRequest {
   std::string description;
   std::optional<std::uint16_t> shard_hint;
   Origin origin;
-  bool may_administer = false;       ///< the peer is root or the hub's own user, told by the kernel
+  std::string crowd;            ///< that the peer counts in: its address, or its user; "": none
+  bool resumes = false;         ///< it asks for resume
+  bool may_administer = false;  ///< the peer is root or the hub's own user, told by the kernel
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
 };
 
@@ -53,8 +55,9 @@ class Membership {
     proto::GoodbyeCode code{};
     std::string sentence;
   };
-  /// A connection of the session ended: for good if the node said so or has no name and was closed
-  /// for what it sent, else its grace time begins. REQUIRES: connected.
+  /// A connection of the session ended. The session ends with it if the node said so, or if the
+  /// node has no name and did not ask for resume or was closed for what it sent. Else its grace
+  /// time begins. REQUIRES: connected.
   void connection_ended(Session& session, const Ending& ending, std::chrono::milliseconds now,
                         Effects& effects);
 
@@ -135,6 +138,8 @@ class Membership {
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now,
                                                            Effects& effects);
+  /// Is nobody waiting for the session's node to come back?
+  [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);
   /// Takes an index for a session that there is. Errors: as of renumber().
   [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, std::uint32_t index,
                                                        std::chrono::milliseconds now,
@@ -150,7 +155,8 @@ class Membership {
   [[nodiscard]] std::optional<proto::Goodbye> room_refusal(const JoinRequest& request,
                                                            const Sessions::Claim& claim,
                                                            std::chrono::milliseconds now);
-  /// At the limit on nodes, a nameless session within its grace time makes way for a newcomer.
+  /// At the limit on nodes, the session that is away longest makes way for a newcomer: first of
+  /// those that declared nothing, then of all.
   void make_room(std::chrono::milliseconds now, Effects& effects);
   void take_name(Session& session, const std::string& name, std::chrono::milliseconds now,
                  Effects& effects);

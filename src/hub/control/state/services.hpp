@@ -139,6 +139,8 @@ class Services {
   [[nodiscard]] std::optional<SubscriberTerms> subscribed(std::uint32_t node,
                                                           std::string_view full_name) const;
   [[nodiscard]] std::size_t services_of(std::uint32_t node) const;
+  /// Has the node a service or a subscription?
+  [[nodiscard]] bool declares(std::uint32_t node) const { return nodes_.contains(node); }
   [[nodiscard]] std::size_t topics() const { return topics_.size(); }
   [[nodiscard]] IndexPool& group_indices() { return group_indices_; }
   [[nodiscard]] const IndexPool& group_indices() const { return group_indices_; }

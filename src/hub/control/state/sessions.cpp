@@ -1,6 +1,7 @@
 #include "hub/control/state/sessions.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/check.hpp"
 #include "base/id_text.hpp"
@@ -102,6 +103,18 @@ std::optional<proto::Goodbye> Sessions::full_refusal(Places places, std::size_t 
                             limit};
 }
 
+std::optional<proto::Goodbye> Sessions::crowd_refusal(std::string_view crowd,
+                                                      std::size_t ending) const {
+  // Rounded up, so that a hub of one place is of use to others.
+  const std::uint64_t most = (limits_.nodes + 1) / 2;
+  if (crowds_.size_of(crowd) < most + ending) return std::nullopt;
+  return proto::Goodbye{proto::GoodbyeCode::hub_full,
+                        "nodes of " + std::string{crowd} + " have half of this hub's places (" +
+                            std::to_string(most) + " of " + std::to_string(limits_.nodes) +
+                            "), and no address or user may have more; end some of them, or start "
+                            "the hub with a larger --limit nodes"};
+}
+
 Session& Sessions::put(std::uint32_t index, SessionNumber number,
                        std::optional<std::uint16_t> shard_hint, milliseconds now) {
   const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
@@ -135,11 +148,16 @@ void Sessions::attach(Session& session, milliseconds now) {
   ++session.attachment;
 }
 
-void Sessions::begin_grace(Session& session, milliseconds now) {
+void Sessions::move_to_crowd(Session& session, std::string_view crowd) {
+  crowds_.leave(std::exchange(session.crowd, nullptr));
+  session.crowd = crowds_.join(crowd);
+}
+
+void Sessions::begin_grace(Session& session, milliseconds now, Declared declared) {
   GIMNET_CHECK(session.connected);
   session.connected = false;
   --connected_;
-  DueList<Away>& away = session.name.empty() ? away_nameless_ : away_named_;
+  DueList<Away>& away = declared == Declared::nothing ? away_idle_ : away_declared_;
   away.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation,
             session.attachment},
            sessions_.size(), [this](const Away& each) { return !still_away(each); });
@@ -147,8 +165,8 @@ void Sessions::begin_grace(Session& session, milliseconds now) {
 
 void Sessions::stood_still(milliseconds time, milliseconds now) {
   const milliseconds latest = now + milliseconds{limits_.grace_ms};  // nothing began later than now
-  away_named_.put_off(time, latest);
-  away_nameless_.put_off(time, latest);
+  away_idle_.put_off(time, latest);
+  away_declared_.put_off(time, latest);
   if (returns_until_) returns_until_ = std::min(*returns_until_ + time, latest);
   indices_.put_off_returns(time, latest);
 }
@@ -161,7 +179,7 @@ void Sessions::renumber(Session& session, std::uint32_t index, milliseconds now)
     if (moved.index == former) moved.index = index;
   }
   renumbered_[former] = {index, session.number};
-  for (DueList<Away>* list : {&away_named_, &away_nameless_}) {
+  for (DueList<Away>* list : {&away_idle_, &away_declared_}) {
     for (Away& away : *list) {
       if (away.index == former && away.generation == session.place.generation) away.index = index;
     }
@@ -204,6 +222,7 @@ void Sessions::end(Session& session, milliseconds now) {
     renumbered_.erase(former);
   }
   if (session.connected) --connected_;
+  crowds_.leave(session.crowd);
   const std::uint32_t index = session.index;
   slots_.give_back(session.place);
   indices_.give_back(index, now);
@@ -211,16 +230,11 @@ void Sessions::end(Session& session, milliseconds now) {
 }
 
 Session* Sessions::next_expired(milliseconds now) {
-  Session* named = take_due(away_named_, now);
-  return named != nullptr ? named : take_due(away_nameless_, now);
+  Session* idle = take_due(away_idle_, now);
+  return idle != nullptr ? idle : take_due(away_declared_, now);
 }
 
-bool Sessions::nameless_away() {
-  while (!away_nameless_.empty() && !still_away(away_nameless_.front())) away_nameless_.pop_front();
-  return !away_nameless_.empty();
-}
-
-Session* Sessions::longest_away_nameless() { return take_due(away_nameless_, milliseconds::max()); }
+Session* Sessions::longest_away() { return next_expired(milliseconds::max()); }
 
 Session* Sessions::take_due(DueList<Away>& away, milliseconds now) {
   while (!away.empty() && away.front().until <= now) {
@@ -233,7 +247,7 @@ Session* Sessions::take_due(DueList<Away>& away, milliseconds now) {
 
 std::optional<milliseconds> Sessions::next_expiry() const {
   std::optional<milliseconds> expiry;
-  for (const DueList<Away>* away : {&away_named_, &away_nameless_}) {
+  for (const DueList<Away>* away : {&away_idle_, &away_declared_}) {
     if (!away->empty() && (!expiry || away->front().until < *expiry)) expiry = away->front().until;
   }
   return expiry;

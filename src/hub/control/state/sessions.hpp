@@ -15,6 +15,7 @@
 #include "base/ids.hpp"
 #include "base/result.hpp"
 #include "base/token_bucket.hpp"
+#include "hub/control/state/crowds.hpp"
 #include "hub/control/state/due_list.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/number_floor.hpp"
@@ -50,11 +51,13 @@ struct Session {
   bool connected = false;
   bool renumbered = false;  ///< and not heard of since a WELCOME that told it its id
   bool came_back = false;   ///< with a token, to this hub or to this hub before its restart
+  bool resumes = false;     ///< its latest HELLO asked for resume
   CompactText name;         ///< "" for a node without one
   CompactText description;
   CompactText identity;                      ///< who its peer is; nobody else can claim it
   CompactText token_name;                    ///< for which its latest token was written
   Origin origin;                             ///< of the latest connection
+  Crowds::Entry* crowd = nullptr;            ///< in which it counts; null: in none
   std::chrono::milliseconds token_expiry{};  ///< since 1970
   std::chrono::milliseconds joined{};        ///< when the session began
   std::chrono::milliseconds connected_at{};  ///< when its latest connection was admitted
@@ -73,9 +76,12 @@ enum class Placement : std::uint8_t { spread, hint };
 /// Which places a newcomer may have: also those that are kept for administrators, or not.
 enum class Places : std::uint8_t { ordinary, all };
 
+/// Has a node that went away a service or a subscription?
+enum class Declared : std::uint8_t { nothing, something };
+
 /// All sessions of a hub: ids, places, tokens, grace times. Time and randomness are arguments.
-/// Thread safety: none. Ownership: a Session& is good until end(). Limits: limits.nodes, and
-/// limits.administrators beyond them.
+/// Thread safety: none. Ownership: a Session& is good until end(). Limits: limits.nodes, half of
+/// them for one crowd, and limits.administrators beyond them.
 class Sessions {
  public:
   struct Options {
@@ -133,8 +139,11 @@ class Sessions {
   /// A connection was admitted for the session. What the node says on it tells that it read
   /// WELCOME.
   void attach(Session& session, std::chrono::milliseconds now);
+  /// The session counts in that crowd from now on, and in no other. "": in none.
+  void move_to_crowd(Session& session, std::string_view crowd);
   /// The session's connection is gone: its grace time begins. REQUIRES: it is connected.
-  void begin_grace(Session& session, std::chrono::milliseconds now);
+  void begin_grace(Session& session, std::chrono::milliseconds now,
+                   Declared declared = Declared::nothing);
   /// Tokens of the session count as none from now on.
   void spend_token(const Session& session);
   /// The same, also after a restart, for as long as limits.kicked_tokens allows. False: it does not
@@ -169,13 +178,18 @@ class Sessions {
 
   /// A session whose grace time is over, or nullptr. The caller ends it and asks again.
   [[nodiscard]] Session* next_expired(std::chrono::milliseconds now);
-  /// The session without a name that is away longest, or nullptr. The caller ends it.
-  [[nodiscard]] Session* longest_away_nameless();
-  /// Is there a session for longest_away_nameless()?
-  [[nodiscard]] bool nameless_away();
+  /// The session that is away longest of those that declared nothing, else of all; nullptr: nobody
+  /// is away. The caller ends it.
+  [[nodiscard]] Session* longest_away();
+  /// Sessions within their grace time.
+  [[nodiscard]] std::size_t away() const { return sessions_.size() - connected_; }
   /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
   [[nodiscard]] std::optional<proto::Goodbye> full_refusal(Places places,
                                                            std::size_t ending = 0) const;
+  /// Why nobody of that crowd can be taken in, though so many of its sessions end first; nothing:
+  /// it has less than half of the places.
+  [[nodiscard]] std::optional<proto::Goodbye> crowd_refusal(std::string_view crowd,
+                                                            std::size_t ending = 0) const;
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.
@@ -220,10 +234,11 @@ class Sessions {
   SlotPool slots_;
   std::map<std::uint32_t, Session> sessions_;
   std::map<std::uint32_t, Moved> renumbered_;  ///< by former index
-  // All grace times are equal, so the order is that of `until`. Apart, so that a nameless one is
-  // found at once.
-  DueList<Away> away_named_;
-  DueList<Away> away_nameless_;
+  Crowds crowds_;
+  // All grace times are equal, so each list is in the order of absence. There are two, so that
+  // longest_away() finds one that declared nothing at once.
+  DueList<Away> away_idle_;
+  DueList<Away> away_declared_;
   std::size_t connected_ = 0;
 };
 

@@ -282,42 +282,85 @@ TEST_F(MembershipTest, ANamelessNodeClosedForWhatItSentIsForgottenAtOnce) {
 }
 
 TEST_F(MembershipTest, OthersWhoWereClosedKeepTheirGraceTime) {
+  JoinRequest resuming = request("");
+  resuming.resumes = true;
   membership_.connection_ended(*join("robot"), {false, GoodbyeCode::malformed, "why"}, 1s,
                                effects_);
-  membership_.connection_ended(*join(""), {false, GoodbyeCode::silent, "why"}, 1s, effects_);
-  membership_.connection_ended(*join(""), {true, GoodbyeCode::malformed, "your frame"}, 1s,
-                               effects_);
+  for (const Membership::Ending& ending :
+       {Membership::Ending{false, GoodbyeCode::silent, "why"},
+        Membership::Ending{true, GoodbyeCode::malformed, "your frame"}}) {
+    const auto joined = membership_.join(resuming, 0ms, effects_);
+    ASSERT_TRUE(joined);
+    membership_.connection_ended(*joined->session, ending, 1s, effects_);
+  }
   EXPECT_EQ(membership_.sessions().all().size(), 3u);
 }
 
-TEST_F(MembershipTest, AtTheLimitTheNamelessNodeThatIsAwayLongestMakesWay) {
-  Session* named = join("robot");
-  Session* second = join("");
-  Session* first = join("");
-  const std::uint32_t named_index = named->index;
-  const std::uint32_t first_index = first->index;
-  const std::uint32_t second_index = second->index;
-  lose(*named, 1s);
-  lose(*first, 2s);
-  lose(*second, 3s);
-  ASSERT_NE(join("", 4s), nullptr);  // the last free place: nobody has to go
-  EXPECT_EQ(count<SessionEnded>(), 0u);
-  ASSERT_NE(join("", 4s), nullptr);
+TEST_F(MembershipTest, ANodeWithNeitherNameNorResumeIsGoneWithItsConnection) {
+  Session* viewer = join("");
+  Session* robot = join("robot");
+  ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
+  ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
+  const std::uint32_t index = viewer->index;
+  const std::vector<std::byte> token = token_of(*viewer);
+  effects_.clear();
+  lose(*viewer, 1s);
   EXPECT_EQ(count<SessionEnded>(), 1u);
-  EXPECT_EQ(membership_.sessions().find(first_index), nullptr);
-  ASSERT_NE(join("", 4s), nullptr);
-  EXPECT_EQ(membership_.sessions().find(second_index), nullptr);
-  EXPECT_EQ(refused(request(""), 4s), GoodbyeCode::hub_full);
-  EXPECT_NE(membership_.sessions().find(named_index), nullptr);
-  EXPECT_EQ(membership_.next_deadline(), 1s + kGrace);
+  EXPECT_EQ(count<SubscriberDue>(), 1u);
+  EXPECT_EQ(membership_.sessions().find(index), nullptr);
+  JoinRequest again = request("");
+  again.token = token;
+  const auto joined = membership_.join(again, 2s, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_TRUE(joined->new_session);
+  EXPECT_EQ(joined->session->index, index) << "its token is good for its id";
 }
 
-TEST_F(MembershipTest, ANamelessNodeThatCameBackDoesNotMakeWay) {
+TEST_F(MembershipTest, ANamelessNodeComesBackToLearnItsNewId) {
   Session* viewer = join("");
+  const std::vector<std::byte> token = token_of(*viewer);
+  ASSERT_FALSE(membership_.renumber(*viewer, 50, 1s, effects_));
+  membership_.connection_ended(*viewer, {false, GoodbyeCode::renumbered, "50"}, 1s, effects_);
+  JoinRequest again = request("");
+  again.token = token;
+  const auto joined = membership_.join(again, 2s, effects_);
+  ASSERT_TRUE(joined);
+  EXPECT_EQ(joined->session, viewer);
+  EXPECT_EQ(joined->session->index, 50u);
+}
+
+TEST_F(MembershipTest, AtTheLimitTheOneThatIsAwayLongestMakesWay) {
+  Session* provider = join("provider");
+  Session* reader = join("reader");
+  Session* second = join("second");
+  Session* first = join("first");
+  ASSERT_TRUE(
+      membership_.services().advertise(provider->index, "provider/odom", {}, 0ms, effects_));
+  ASSERT_TRUE(membership_.services().subscribe(reader->index, "provider/odom", {}, effects_));
+  lose(*provider, 1s);
+  lose(*reader, 2s);
+  lose(*first, 3s);
+  lose(*second, 4s);
+  // First those that declared nothing, then the others.
+  const char* const newcomers[] = {"a", "b", "c", "d"};
+  const char* const gone[] = {"first", "second", "provider", "reader"};
+  for (std::size_t i = 0; i < std::size(gone); ++i) {
+    effects_.clear();
+    ASSERT_TRUE(membership_.directory().find(gone[i]));
+    ASSERT_NE(join(newcomers[i], 5s), nullptr);
+    EXPECT_EQ(count<SessionEnded>(), 1u);
+    EXPECT_FALSE(membership_.directory().find(gone[i])) << gone[i];
+  }
+  EXPECT_EQ(refused(request("e"), 5s), GoodbyeCode::hub_full);
+  EXPECT_EQ(membership_.next_deadline(), std::nullopt);
+}
+
+TEST_F(MembershipTest, ANodeThatCameBackDoesNotMakeWay) {
+  Session* viewer = join("viewer");
   for (int i = 0; i < 3; ++i) ASSERT_NE(join(""), nullptr);
   lose(*viewer, 1s);
   const std::vector<std::byte> token = token_of(*viewer);
-  JoinRequest again = request("");
+  JoinRequest again = request("viewer");
   again.token = token;
   ASSERT_TRUE(membership_.join(again, 2s, effects_));
   EXPECT_EQ(refused(request(""), 3s), GoodbyeCode::hub_full);

@@ -42,8 +42,11 @@ class StoodStill : public ::testing::Test {
 };
 
 TEST_F(StoodStill, GraceTimesStandStillToo) {
-  for (const std::string name : {"robot", ""}) {
+  for (const std::string name : {"robot", "reader"}) {
     const std::uint32_t robot = join(name);
+    if (name == "reader") {
+      ASSERT_TRUE(membership_.services().subscribe(robot, "robot/odom", {}, effects_));
+    }
     lose(robot, 1s);
     membership_.stood_still(60s, 62s);
     EXPECT_EQ(membership_.next_deadline(), 91s);
