@@ -322,8 +322,11 @@ bool Reader::handle_link(Connection& connection, const proto::RunView& view) {
                                            view.size - proto::kHeaderSize);
   const auto goodbye = proto::decode<proto::Goodbye>(payload);
   if (!goodbye) {
-    return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
-                  "after WELCOME the only LINK message is GOODBYE");
+    const auto control = proto::split_control(payload);
+    const bool is_goodbye = control && control->header.operation == proto::Goodbye::kOperation;
+    return refuse(
+        connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,
+        is_goodbye ? goodbye.error().sentence : "after WELCOME the only LINK message is GOODBYE");
   }
   closer_.on_goodbye(connection, goodbye->code, goodbye->sentence);
   return false;

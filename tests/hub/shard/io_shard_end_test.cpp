@@ -68,5 +68,21 @@ TEST(IoShard, KeepsNoBufferForTheNextTurnThatNobodyWaitsFor) {
   EXPECT_EQ(rig.state(1).pool.pinned_bytes(), 0u);
 }
 
+TEST(IoShard, SaysWhatIsWrongWithALinkMessage) {
+  const std::string goodbye_without_code("\x03\x00\x00\x00", 4);
+  const std::string hello("\x01\x00\x00\x00", 4);
+  for (const auto& [payload, sentence] :
+       {std::pair{goodbye_without_code, "GOODBYE has no code (key 1)"},
+        std::pair{hello, "after WELCOME the only LINK message is GOODBYE"}}) {
+    HubRig rig;
+    FakeNode& node = rig.join(0);
+    rig.send(node, 0, payload, {.kind = proto::Kind::link, .src = 0});
+    rig.settle();
+    ASSERT_TRUE(node.goodbye);
+    EXPECT_EQ(node.goodbye->code, proto::GoodbyeCode::malformed);
+    EXPECT_EQ(node.goodbye->sentence, sentence);
+  }
+}
+
 }  // namespace
 }  // namespace gimnet::hub
