@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/endian.hpp"
+#include "hub/shard/control_frame.hpp"
 #include "proto/frame/flow.hpp"
 
 namespace gimnet::sim {
@@ -37,6 +38,13 @@ SimShards::SimShards(Setting& setting, Parts parts)
     : setting_(setting), parts_(std::move(parts)), shards_(parts_.shards) {}
 
 void SimShards::send(ShardIndex index, ShardCommand command) {
+  if (auto* tell = std::get_if<hub::TellCommand>(&command)) {
+    for (const hub::TellCommand::To& to : tell->to) {
+      hub::set_destination(tell->frame, to.node);
+      send(index, hub::SendControlCommand{to.session, 0, tell->frame, 0, tell->move});
+    }
+    return;
+  }
   parts_.before_it_leaves(index, command);
   Shard& shard = shards_[index.value()];
   shard.commands.push_back(std::move(command));

@@ -1,6 +1,7 @@
 #include "hub/control/effect_runner.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "hub/control/change_log.hpp"
 #include "hub/shard/control_frame.hpp"
@@ -90,8 +91,24 @@ void EffectRunner::run(const RenumberDue& effect) {
 }
 
 void EffectRunner::run(const ServiceMovedDue& effect) {
-  if (const Session* session = find(effect.subscriber))
-    send_event(*session, payload_of(effect), effect.move);
+  const auto frame = control_frame(proto::Kind::ns, NodeId{}, parts_.facts.id, payload_of(effect));
+  std::vector<std::vector<TellCommand::To>> by_shard(parts_.shards.shards());
+  const auto tell = [&](std::size_t shard) {
+    TellCommand command{std::exchange(by_shard[shard], {}), frame, effect.move};
+    parts_.shards.send(ShardIndex{static_cast<std::uint8_t>(shard)}, std::move(command));
+  };
+  for (const std::uint32_t subscriber : effect.subscribers) {
+    const Session* session = find(subscriber);
+    // When it is back it is told by tell_again().
+    if (session == nullptr || !session->connected) continue;
+    const std::size_t shard = session->place.shard.value();
+    by_shard[shard].push_back(
+        {ref_of(session->place), parts_.membership.sessions().node_id(*session)});
+    if (by_shard[shard].size() == TellCommand::kToMost) tell(shard);
+  }
+  for (std::size_t shard = 0; shard < by_shard.size(); ++shard) {
+    if (!by_shard[shard].empty()) tell(shard);
+  }
 }
 
 void EffectRunner::tell_again(const Session& session, AttachCommand& command) const {
@@ -164,8 +181,7 @@ void EffectRunner::run(const NameDecided& effect) {
                                                                      effect.sentence}));
 }
 
-void EffectRunner::send_event(const Session& session, const proto::Payload& payload,
-                              std::uint64_t move) {
+void EffectRunner::send_event(const Session& session, const proto::Payload& payload) {
   // When it is back it is told how services moved, and learns the rest from the answers to what it
   // declares again.
   if (!session.connected) return;
@@ -173,7 +189,6 @@ void EffectRunner::send_event(const Session& session, const proto::Payload& payl
   command.session = ref_of(session.place);
   command.frame = control_frame(proto::Kind::ns, parts_.membership.sessions().node_id(session),
                                 parts_.facts.id, payload);
-  command.move = move;
   parts_.shards.send(session.place.shard, std::move(command));
 }
 

@@ -33,10 +33,8 @@ class EffectRunner {
   void carry_out(const Effects& effects, std::chrono::milliseconds now);
   /// A shard has taken what another one had handed over to it.
   void fence_passed(const FencePassedEvent& event);
-  /// Sends an event of kind NS; nothing to a node that is away. `move`, if not 0: the conductor
-  /// wants to hear when the node has read what it was told of the services' moves up to that one
-  /// (Services::moves_read()).
-  void send_event(const Session& session, const proto::Payload& payload, std::uint64_t move = 0);
+  /// Sends an event of kind NS; nothing to a node that is away.
+  void send_event(const Session& session, const proto::Payload& payload);
   /// Adds what the node has to be told ahead of all else, since it came back: how services moved
   /// meanwhile.
   void tell_again(const Session& session, AttachCommand& command) const;

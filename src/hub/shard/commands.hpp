@@ -85,6 +85,19 @@ struct SendControlCommand {
   std::uint64_t move = 0;
 };
 
+/// One event for many sessions of a shard, encoded once: each gets it as by a SendControlCommand.
+struct TellCommand {
+  /// As many sessions as the commands that a shard carries out in one turn.
+  static constexpr std::size_t kToMost = 256;
+  struct To {
+    SessionRef session;
+    NodeId node;
+  };
+  std::vector<To> to;            ///< at most kToMost
+  std::vector<std::byte> frame;  ///< to node 0: set_destination() for each of them
+  std::uint64_t move = 0;        ///< as SendControlCommand::move
+};
+
 /// Say GOODBYE and close the session's connection. The session itself stays until ReleaseCommand.
 struct CloseCommand {
   SessionRef session;
@@ -149,9 +162,10 @@ struct DrainCommand {
 /// End the shard's thread.
 struct StopCommand {};
 
-using ShardCommand = std::variant<AttachCommand, SendControlCommand, CloseCommand, ReleaseCommand,
-                                  RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand,
-                                  ForgetRetainedCommand, FenceCommand, DrainCommand, StopCommand>;
+using ShardCommand =
+    std::variant<AttachCommand, SendControlCommand, TellCommand, CloseCommand, ReleaseCommand,
+                 RenumberCommand, LimitsCommand, PaceCommand, EndPaceCommand, ForgetRetainedCommand,
+                 FenceCommand, DrainCommand, StopCommand>;
 
 // ---- shard -> conductor
 // --------------------------------------------------------------------------------------------

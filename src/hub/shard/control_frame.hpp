@@ -24,4 +24,11 @@ namespace gimnet::hub {
   return frame;
 }
 
+/// Addresses such a frame to another node. REQUIRES: a whole header.
+inline void set_destination(std::span<std::byte> frame, NodeId to) {
+  proto::FrameHeader header = proto::load_header(frame.data());
+  header.dst = to.value();
+  proto::store_header(frame.data(), header);
+}
+
 }  // namespace gimnet::hub

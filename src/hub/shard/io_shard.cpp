@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/clock.hpp"
+#include "hub/shard/control_frame.hpp"
 #include "hub/shard/flow_words.hpp"
 
 namespace gimnet::hub {
@@ -247,14 +248,9 @@ void IoShard::execute(ShardCommand& command) {
                    if (control.attachment != 0 && control.attachment != connection->attachment)
                      return;
                    connection->requests -= std::min(control.answers, connection->requests);
-                   if (connection->outbox.push_control(control.frame, state_.egress)) {
-                     state_.recipients.mark_dirty(*connection);
-                     if (control.move != 0) ask_whether_read(state_, *connection, control.move);
-                     return;
-                   }
-                   closer_.close(*connection, proto::GoodbyeCode::too_many_requests,
-                                 "answers wait and are not taken; read what you asked for");
+                   say(*connection, control.frame, control.move);
                  },
+                 [&](TellCommand& told) { tell(told); },
                  [&](CloseCommand& close) {
                    if (Connection* connection = state_.find(close.session)) {
                      closer_.close(*connection, close.code, std::move(close.sentence));
@@ -281,6 +277,25 @@ void IoShard::execute(ShardCommand& command) {
                  [&](StopCommand&) { stopped_ = true; },
              },
              command);
+}
+
+void IoShard::say(Connection& connection, std::span<const std::byte> frame, std::uint64_t move) {
+  if (connection.outbox.push_control(frame, state_.egress)) {
+    state_.recipients.mark_dirty(connection);
+    if (move != 0) ask_whether_read(state_, connection, move);
+    return;
+  }
+  closer_.close(connection, proto::GoodbyeCode::too_many_requests,
+                "answers wait and are not taken; read what you asked for");
+}
+
+void IoShard::tell(TellCommand& command) {
+  for (const TellCommand::To& to : command.to) {
+    Connection* connection = state_.find(to.session);
+    if (connection == nullptr || !connection->connected) continue;
+    set_destination(command.frame, to.node);
+    say(*connection, command.frame, command.move);
+  }
 }
 
 void IoShard::begin_pace(const PaceCommand& command) {

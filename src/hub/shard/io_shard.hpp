@@ -69,6 +69,9 @@ class IoShard {
   void flush();
   void finish_turn();
   void execute(ShardCommand& command);
+  /// Hands a control frame to the connection, or closes it if too many wait.
+  void say(Connection& connection, std::span<const std::byte> frame, std::uint64_t move);
+  void tell(TellCommand& command);
   void begin_pace(const PaceCommand& command);
 
   ShardState state_;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "base/log.hpp"
 #include "proto/control/ctrl.hpp"
 #include "proto/control/ns.hpp"
@@ -84,6 +86,36 @@ TEST_F(EffectRunnerTest, WhoMaySendToAServiceHearsOfItsGroupOnceThatIsThere) {
   offer.direction = ns::Direction::provides;
   ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
   EXPECT_THAT(there, ElementsAre(true, true, false)) << "what it provides comes to who was told";
+}
+
+TEST_F(EffectRunnerTest, AnEventIsEncodedOnceForAllWhoHearOfIt) {
+  constexpr std::size_t kReaders = 2 * TellCommand::kToMost + 2;
+  const Node robot = join("robot");
+  std::set<NodeId> readers;
+  for (std::size_t i = 0; i < kReaders; ++i) {
+    const Node reader = join("reader-" + std::to_string(i));
+    // Both shards have readers with a window of their own, and one more than fits in a command.
+    ns::Subscribe wanted{"robot/odom"};
+    if (i < 2) wanted.window = 3;
+    ASSERT_TRUE(ask<ns::SubscribeAnswer>(reader, wanted));
+    readers.insert(reader.id);
+  }
+  shards.sent.clear();
+  shards.told.clear();
+  ns::Advertise offer{.service = "odom"};
+  offer.delivery = ns::Delivery::sync;
+  offer.window = 8;
+  ASSERT_TRUE(ask<ns::AdvertiseAnswer>(robot, offer));
+  EXPECT_THAT(shards.told, ElementsAre(1, 1, TellCommand::kToMost, TellCommand::kToMost));
+  std::set<NodeId> told;
+  for (const FakeShards::Sent& each : shards.sent) {
+    const auto moved = event_in<ns::ServiceMoved>(each.command);
+    if (!moved) continue;
+    EXPECT_EQ(moved->name, "robot/odom");
+    const auto& frame = std::get<SendControlCommand>(each.command).frame;
+    told.insert(NodeId{proto::load_header(frame.data()).dst});
+  }
+  EXPECT_EQ(told, readers);
 }
 
 }  // namespace

@@ -94,6 +94,24 @@ TEST(ToldAgain, ANodeThatIsToldMuchMayAskAllTheSame) {
   EXPECT_FALSE(node.goodbye);
 }
 
+TEST(ToldAgain, OneEventGoesToEachOfManySessions) {
+  HubRig rig;
+  FakeNode& one = rig.join(0);
+  FakeNode& other = rig.join(0);
+  TellCommand command;
+  command.frame = event_for(one);
+  command.move = 4;
+  for (const FakeNode* node : {&one, &other}) command.to.push_back({node->session, node->id});
+  command.to.push_back({{ConnectionSlot{77}, 1}, NodeId{77}});  // it left meanwhile
+  rig.command(0, std::move(command));
+  rig.settle();
+  for (FakeNode* node : {&one, &other}) {
+    EXPECT_EQ(std::ranges::count(node->kinds, Kind::ns), 1);
+    pong(rig, *node, last_ping(*node));
+    EXPECT_THAT(read_moves(rig), ElementsAre(std::pair{4u, 1u}));
+  }
+}
+
 TEST(ToldAgain, NothingIsAskedWhereNothingWasTold) {
   HubRig rig;
   FakeNode& node = rig.join(0);

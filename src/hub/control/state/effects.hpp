@@ -46,10 +46,10 @@ struct RenumberDue {
   std::uint32_t index = 0;
   std::string sentence;
 };
-/// Tell a subscriber that a service has another group id. Groups and nodes are named by index here;
-/// 0: none.
+/// Tell subscribers that a service has another group id: all those that have the same window.
+/// Groups and nodes are named by index here; 0: none.
 struct ServiceMovedDue {
-  std::uint32_t subscriber = 0;
+  std::vector<std::uint32_t> subscribers;
   std::string full_name;
   std::uint32_t old_group = 0;
   std::uint32_t new_group = 0;

@@ -85,9 +85,12 @@ void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
 
 void Services::tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects) {
   event.move = ++moves_;
-  for (const std::uint32_t subscriber : topic.subscribers) {
-    event.subscriber = subscriber;
-    event.window = window_of(topic, subscriber);
+  std::map<std::uint32_t, std::vector<std::uint32_t>> by_window;
+  for (const std::uint32_t subscriber : topic.subscribers)
+    by_window[window_of(topic, subscriber)].push_back(subscriber);
+  for (auto& [window, subscribers] : by_window) {
+    event.subscribers = std::move(subscribers);
+    event.window = window;
     effects.emplace_back(event);
   }
   topic.untold.on_moved(topic.subscribers, event.old_group, event.move);
@@ -112,7 +115,7 @@ std::vector<ServiceMovedDue> Services::untold_moves(std::uint32_t node) const {
     if (topic.service) event = moved(topic, *topic.service, 0, topic.service->group);
     event.full_name = std::string{topic.full_name};
     event.old_group = is_another(untold->known) ? 0 : untold->known;
-    event.subscriber = node;
+    event.subscribers = {node};
     event.window = window_of(topic, node);
     event.move = untold->move;
     event.again = true;

@@ -407,7 +407,7 @@ TEST_F(MembershipTest, ANewNameWithdrawsWhatTheNodeProvides) {
   ASSERT_EQ(count<ServiceMovedDue>(), 1u);
   for (const Effect& effect : effects_) {
     if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
-      EXPECT_EQ(moved->subscriber, viewer->index);
+      EXPECT_EQ(moved->subscribers.at(0), viewer->index);
       EXPECT_EQ(moved->new_group, 0u);
     }
   }

@@ -74,7 +74,7 @@ TEST_F(ServicesMovedTest, SeveralMovesAreToldAsOneWithWhatIsTrueNow) {
   EXPECT_EQ(services_.withdraw(kRobot, between, now_, effects_), std::nullopt);
   const std::uint32_t present = advertise(7);
   const ServiceMovedDue event = told();
-  EXPECT_EQ(event.subscriber, kViewer);
+  EXPECT_THAT(event.subscribers, ElementsAre(kViewer));
   EXPECT_EQ(event.full_name, "robot/odom");
   EXPECT_EQ(event.old_group, known);
   EXPECT_EQ(event.new_group, present);
@@ -122,7 +122,7 @@ TEST_F(ServicesMovedTest, GoesWithTheSubscriptionAndWithTheNode) {
   advertise(6);
   services_.node_renumbered(kViewer, kOther, effects_);
   EXPECT_THAT(services_.untold_moves(kViewer), IsEmpty());
-  EXPECT_EQ(told(kOther).subscriber, kOther);
+  EXPECT_THAT(told(kOther).subscribers, ElementsAre(kOther));
   EXPECT_EQ(services_.unsubscribe(kOther, "robot/odom", effects_), std::nullopt);
   EXPECT_TRUE(services_.subscribe(kOther, "robot/odom", {}, effects_));
   EXPECT_THAT(services_.untold_moves(kOther), IsEmpty()) << "the answer told";

@@ -35,8 +35,11 @@ std::vector<std::string> words(const Effects& effects) {
       result.push_back("member " + std::to_string(member->subscriber) + " of " +
                        std::to_string(member->group));
     } else if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
-      result.push_back("moved " + std::to_string(moved->subscriber) + ": " +
-                       std::to_string(moved->old_group) + "->" + std::to_string(moved->new_group));
+      for (const std::uint32_t subscriber : moved->subscribers) {
+        result.push_back("moved " + std::to_string(subscriber) + ": " +
+                         std::to_string(moved->old_group) + "->" +
+                         std::to_string(moved->new_group));
+      }
     } else if (const auto* change = std::get_if<SubscriberDue>(&effect)) {
       result.push_back((change->joined ? "joined " : "left ") + std::to_string(change->subscriber) +
                        " of " + std::to_string(change->group) + ": " +

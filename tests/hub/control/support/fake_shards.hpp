@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hub/control/shard_proxy.hpp"
+#include "hub/shard/control_frame.hpp"
 
 namespace gimnet::hub {
 
@@ -17,7 +18,16 @@ class FakeShards final : public ShardProxy {
     ShardIndex shard;
     ShardCommand command;
   };
+  /// A TellCommand is written down as what it means: one SendControlCommand for each session.
   void send(ShardIndex shard, ShardCommand command) override {
+    if (auto* tell = std::get_if<TellCommand>(&command)) {
+      told.push_back(tell->to.size());
+      for (const TellCommand::To& to : tell->to) {
+        set_destination(tell->frame, to.node);
+        send(shard, SendControlCommand{to.session, 0, tell->frame, 0, tell->move});
+      }
+      return;
+    }
     if (on_send) on_send(command);
     sent.push_back({shard, std::move(command)});
   }
@@ -34,6 +44,7 @@ class FakeShards final : public ShardProxy {
   }
 
   std::vector<Sent> sent;
+  std::vector<std::size_t> told;  ///< sessions of each TellCommand
   std::function<void(const ShardCommand&)> on_send;
 
  private:
