@@ -10,6 +10,7 @@
 #include "base/clock.hpp"
 #include "base/log.hpp"
 #include "hub/control/acceptor.hpp"
+#include "hub/control/event_turns.hpp"
 #include "hub/control/waiting_room.hpp"
 
 namespace gimnet::hub {
@@ -21,6 +22,8 @@ using std::chrono::milliseconds;
 using Descriptor = asio::posix::stream_descriptor;
 
 constexpr milliseconds kCollectEvery{20};
+/// Of events, before strangers and timers have a turn: many listings take longer than many others.
+constexpr milliseconds kBatchMost{5};
 /// The shards end by themselves at the deadline of DrainCommand; this is for one that does not.
 constexpr milliseconds kDrainMargin{1'000};
 
@@ -102,23 +105,30 @@ struct ConductorLoop::Impl {
     });
   }
 
-  /// What the shards told before this HELLO was sent holds already, however much that is: a name
-  /// that was given back is free.
+  /// The ends of connections that the shards told before this HELLO was sent hold already, however
+  /// much else they told: a name that was given back is free.
   std::optional<proto::Goodbye> admit(Stranger& stranger, const proto::Hello& hello) {
     // Draining ends in take_events().
-    if (!stopping)
-      wiring.inbox.drain_present(
-          [this](ShardEvent&& event) { take_event_in_admit(std::move(event)); });
+    if (!stopping) {
+      take_present();
+      for (ShardEvent& event : turns.take_ended())
+        wiring.conductor.on_event(std::move(event), now());
+    }
     return wiring.conductor.admit(stranger, hello, {now(), wall_now_ns()});
   }
 
-  void take_event_in_admit(ShardEvent event) {
-    if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
-      leaving.push_back(
-          std::move(farewell->transport));  // the waiting room is busy with this stranger
-    } else {
-      wiring.conductor.on_event(std::move(event), now());
-    }
+  /// Gives the events that shards have handed over their turns. Peers to be seen off wait in
+  /// `leaving`: the waiting room may be busy with a stranger.
+  void take_present() {
+    wiring.inbox.drain_present([this](ShardEvent&& event) {
+      if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
+        leaving.push_back(std::move(farewell->transport));
+      } else if (std::holds_alternative<FencePassedEvent>(event.what)) {
+        wiring.conductor.on_event(std::move(event), now());
+      } else {
+        turns.put(std::move(event));
+      }
+    });
   }
 
   /// Who has said HELLO is not one of those who make way.
@@ -152,13 +162,20 @@ struct ConductorLoop::Impl {
   void take_events() {
     look_whether_it_stood();
     wiring.inbox.waker().awake();
-    wiring.inbox.drain(ControlInbox::kEventsABatch,
-                       [this](ShardEvent event) { take_event(std::move(event)); });
+    const milliseconds until = now() + kBatchMost;
+    take_present();
+    for (std::size_t i = 0; i < ControlInbox::kEventsABatch && !turns.empty(); ++i) {
+      wiring.conductor.on_event(turns.take(), now());
+      if (now() >= until) break;
+      // A node that asks now waits for one answer to each other node, not for this batch.
+      if (!wiring.inbox.empty()) take_present();
+    }
+    see_off_leaving();
     serve_watches();
     arm_timer();
     if (wiring.conductor.drain_wanted() && !stopping) begin_drain();
     end_if_all_left();
-    if (wiring.inbox.empty()) {
+    if (wiring.inbox.empty() && turns.empty()) {
       wiring.inbox.waker().prepare_to_sleep();
       if (wiring.inbox.empty()) {
         inbox_watch.wait([this] {
@@ -180,14 +197,6 @@ struct ConductorLoop::Impl {
       serving_watches = false;
       serve_watches();
     });
-  }
-
-  void take_event(ShardEvent event) {
-    if (auto* farewell = std::get_if<FarewellEvent>(&event.what)) {
-      strangers.see_off(std::move(farewell->transport), now());
-    } else {
-      wiring.conductor.on_event(std::move(event), now());
-    }
   }
 
   void arm_timer() {
@@ -272,6 +281,7 @@ struct ConductorLoop::Impl {
   }
 
   const Wiring wiring;
+  EventTurns turns;
   asio::io_context context{1};
   DescriptorReserve reserve;
   WaitingRoom strangers;

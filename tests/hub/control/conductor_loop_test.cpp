@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "base/log.hpp"
+#include "hub/shard/control_frame.hpp"
+#include "proto/control/ns.hpp"
 #include "tests/hub/control/support/peer.hpp"
 #include "tests/hub/control/support/test_conductor.hpp"
 
@@ -67,6 +69,43 @@ TEST(ConductorLoop, ANameThatWasGivenBackIsFreeHoweverMuchWasToldBefore) {
   ::close(client);
   set_log_level(LogLevel::info);
   EXPECT_TRUE(admitted);
+}
+
+TEST(ConductorLoop, ARequestWaitsForOneAnswerToEachOtherNode) {
+  constexpr std::size_t kBusy = 8;
+  constexpr std::uint16_t kRequests = 60;
+  set_log_level(LogLevel::off);
+  TestConductor hub;
+  std::vector<TestConductor::Node> busy;
+  for (std::size_t i = 0; i < kBusy; ++i) busy.push_back(hub.join("busy-" + std::to_string(i)));
+  const TestConductor::Node other = hub.join("other");
+  ControlInbox inbox(2);
+  const auto ask = [&inbox](const TestConductor::Node& node, const proto::Payload& request) {
+    inbox.push({ShardIndex{0},
+                ControlFrameEvent{node.session, node.attachment, node.id,
+                                  control_frame(proto::Kind::ns, NodeId{}, HubId{7}, request)}});
+  };
+  for (const TestConductor::Node& node : busy) {
+    for (std::uint16_t i = 1; i <= kRequests; ++i) ask(node, proto::encode(proto::ns::List{}, i));
+  }
+  ask(other, proto::encode(proto::ns::Resolve{"busy-0"}, 1));
+  std::size_t answers = 0;
+  std::size_t before = 0;
+  hub.shards.on_send = [&](const ShardCommand& command) {
+    if (const auto* answer = std::get_if<SendControlCommand>(&command)) {
+      if (NodeId{proto::load_header(answer->frame.data()).dst} == other.id) before = answers;
+      if (++answers == kBusy * kRequests + 1) ::raise(SIGTERM);
+    }
+    if (std::holds_alternative<DrainCommand>(command)) {
+      for (const ShardIndex shard : {ShardIndex{0}, ShardIndex{1}})
+        inbox.push({shard, DrainedEvent{}});
+    }
+  };
+  ConductorLoop loop({hub.conductor, inbox, hub.limits, hub.refusals}, {});
+  loop.run();
+  set_log_level(LogLevel::info);
+  EXPECT_EQ(answers, kBusy * kRequests + 1);
+  EXPECT_EQ(before, kBusy) << "answers to others that came first";
 }
 
 }  // namespace
