@@ -5,12 +5,13 @@ option(GIMNET_CCACHE "Compile through ccache" "$ENV{GIMNET_CCACHE}")
 option(GIMNET_MOLD "Link with mold" "$ENV{GIMNET_MOLD}")
 
 add_library(gimnet_options INTERFACE)
+target_compile_features(gimnet_options INTERFACE cxx_std_20)  # of the headers, for other projects
 target_compile_options(gimnet_options INTERFACE
   -Wall -Wextra -Wshadow -Wconversion $<$<BOOL:${GIMNET_WARNINGS_AS_ERRORS}>:-Werror>
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>
   $<$<AND:$<CXX_COMPILER_ID:Clang>,$<COMPILE_LANGUAGE:CXX>>:-Wthread-safety -Wglobal-constructors
     -Wno-unused-command-line-argument>)
-target_include_directories(gimnet_options INTERFACE ${CMAKE_SOURCE_DIR}/src ${CMAKE_SOURCE_DIR}/include)
+target_include_directories(gimnet_options INTERFACE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
 
 if(GIMNET_SANITIZE STREQUAL "address")
   target_compile_options(gimnet_options INTERFACE
@@ -34,17 +35,29 @@ if(GIMNET_FUZZ)
   target_compile_options(gimnet_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# gimnet_need_program(OPTION PROGRAM PACKAGE): ends here where the program of an option is missing,
+# and not in the middle of the build.
+function(gimnet_need_program option program package)
+  find_program(_found ${program} NO_CACHE)
+  if(NOT _found)
+    message(FATAL_ERROR "${option} is on, and ${program} is not installed: install it with "
+      "`apt-get install ${package}`, or configure with -D ${option}=OFF")
+  endif()
+endfunction()
+
 if(GIMNET_CCACHE)
+  gimnet_need_program(GIMNET_CCACHE ccache ccache)
   set(CMAKE_C_COMPILER_LAUNCHER ccache)
   set(CMAKE_CXX_COMPILER_LAUNCHER ccache)
 endif()
 if(GIMNET_MOLD)
+  gimnet_need_program(GIMNET_MOLD ld.mold mold)
   add_link_options(-fuse-ld=mold)
 endif()
 
 if(CMAKE_CXX_CLANG_TIDY)
   # What clang-tidy has passed is not looked at again before it, or a header of it, changes; nor before the rules do.
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/.clang-tidy)
-  file(SHA256 ${CMAKE_SOURCE_DIR}/.clang-tidy _rules)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/.clang-tidy)
+  file(SHA256 ${PROJECT_SOURCE_DIR}/.clang-tidy _rules)
   add_compile_definitions(GIMNET_LINT_RULES=${_rules})
 endif()

@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+"""How the project configures: missing programs are told at once, and it can be a part of another project.
+
+Usage: cmake_test.py CMAKE"""
+
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TIMEOUT_S = 300
+# What CMake finds beside the folders of PATH.
+NO_SYSTEM_PROGRAMS = ("-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF", "-DCMAKE_FIND_USE_INSTALL_PREFIX=OFF")
+TOOLCHAIN = f"""cmake_minimum_required(VERSION 3.22)
+project(outside LANGUAGES NONE)
+include({ROOT}/cmake/GimnetToolchain.cmake)
+"""
+OUTSIDE = f"""cmake_minimum_required(VERSION 3.22)
+project(outside LANGUAGES C CXX)
+add_subdirectory({ROOT} gimnet)
+add_executable(pose {ROOT}/examples/pose.c)
+target_link_libraries(pose PRIVATE gimnet_bitestream)
+add_library(publisher OBJECT {ROOT}/examples/publisher.cpp)
+target_link_libraries(publisher PRIVATE gimnet_gimi)
+"""
+
+
+class Configuring(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.programs = self.folder / "programs"
+        self.programs.mkdir()
+
+    def cmake(self, *arguments, **environment):
+        return subprocess.run([CMAKE, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=TIMEOUT_S, env=environment or None, check=False)
+
+    def configure(self, project, *arguments, **environment):
+        (self.folder / "CMakeLists.txt").write_text(project)
+        return self.cmake("-S", self.folder, "-B", self.folder / "build", "-G", "Ninja", *arguments, **environment)
+
+    def test_tells_which_program_of_an_option_is_missing(self):
+        for option, program, package in (("GIMNET_CCACHE", "ccache", "ccache"), ("GIMNET_MOLD", "ld.mold", "mold")):
+            how = (f"-DCMAKE_MAKE_PROGRAM={shutil.which('ninja')}", *NO_SYSTEM_PROGRAMS)
+            environment = {"PATH": str(self.programs), option: "1"}
+            with self.subTest(option):
+                shutil.rmtree(self.folder / "build", ignore_errors=True)  # it remembers the options
+                missing = self.configure(TOOLCHAIN, *how, **environment)
+                self.assertNotEqual(missing.returncode, 0)
+                words = " ".join(missing.stderr.split())
+                self.assertIn(f"{option} is on, and {program} is not installed: install it with `apt-get install {package}`",
+                              words)
+                (self.programs / program).write_text("#!/bin/sh\n")
+                (self.programs / program).chmod(0o755)
+                there = self.configure(TOOLCHAIN, *how, **environment)
+                self.assertEqual(there.returncode, 0, there.stderr)
+
+    def test_is_a_part_of_another_project(self):
+        made = self.configure(OUTSIDE, "-DCMAKE_BUILD_TYPE=Release")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        built = self.cmake("--build", self.folder / "build", "--target", "pose", "publisher")
+        self.assertEqual(built.returncode, 0, built.stdout + built.stderr)
+        pose = subprocess.run([self.folder / "build" / "pose"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=TIMEOUT_S, check=False)
+        self.assertEqual(pose.returncode, 0, pose.stderr)
+
+
+if __name__ == "__main__":
+    CMAKE = sys.argv.pop(1)
+    unittest.main()
