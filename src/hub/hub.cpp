@@ -200,6 +200,12 @@ Result<std::unique_ptr<Hub>> Hub::start(const HubOptions& options, const ConfigS
     if (!listener) return listener.error();
     listeners.push_back(std::move(*listener));
   }
+  for (const auto& listener : listeners) {
+    if (listener->url().is_local()) continue;
+    log_warning("listening on " + listener->url().text() +
+                ": other machines can reach it, nothing is encrypted, and whoever connects is let "
+                "in (insecure = true; docs/operations.md, 'Crossing a network')");
+  }
   // After the addresses: a second hub by mistake is told that they are in use, which says more.
   const std::chrono::milliseconds wall{wall_now_ns() / 1'000'000};
   Result<StartState> state = start_state({options.state_dir, options.id, urls.front(), wall});

@@ -55,6 +55,16 @@ class CommandLine(unittest.TestCase):
                 self.assertEqual(hub.process.stdout.read(), "")
                 self.assertFalse(os.path.exists(f"{folder}/s"))
 
+    def test_says_which_address_other_machines_can_reach(self):
+        with Hub("--listen", "tcp://127.0.0.1:0", "--listen", "tcp://0.0.0.0:0", "--insecure") as hub:
+            self.assertEqual(hub.end(signal.SIGTERM), 0)
+            said = hub.process.stderr.read()
+        self.assertEqual(said.count("nothing is encrypted"), 1, said)
+        self.assertRegex(said, r"listening on tcp://0\.0\.0\.0:\d+: other machines can reach it, nothing is encrypted")
+        with Hub("--listen", "tcp://127.0.0.1:0", "--insecure") as hub:
+            self.assertEqual(hub.end(signal.SIGTERM), 0)
+            self.assertNotIn("encrypted", hub.process.stderr.read())
+
     def test_both_signals_end_it_well(self):
         with Hub("--listen", "tcp://127.0.0.1:0") as hub:
             self.assertEqual(hub.end(signal.SIGINT), 0)
