@@ -35,14 +35,26 @@ std::string remedy_of(int error, const std::string& path, const std::string& els
   return "; " + elsewhere;
 }
 
+/// Root makes a folder in another user's folder: it becomes that user's.
+void give_to_user_above(const std::string& path) {
+  struct stat above{};
+  const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  if (::geteuid() != 0 || ::fstatat(folder.get(), "..", &above, 0) != 0 || above.st_uid == 0)
+    return;
+  // Where the system refuses, the folder stays root's, which can use it.
+  static_cast<void>(!::fchown(folder.get(), above.st_uid, above.st_gid));
+}
+
 /// "" when there is something at `path` then; `info` describes it.
 std::string make_folder(const std::string& path, struct stat& info,
                         const char* elsewhere = kElsewhere) {
-  if (::mkdir(path.c_str(), kPrivate) != 0 && errno != EEXIST) {
+  const bool made = ::mkdir(path.c_str(), kPrivate) == 0;
+  if (!made && errno != EEXIST) {
     const int error = errno;
     return "cannot create the folder " + path + ": " + system_text(error) +
            remedy_of(error, path, elsewhere);
   }
+  if (made) give_to_user_above(path);
   if (::lstat(path.c_str(), &info) != 0) {
     const int error = errno;
     return "cannot use the folder " + path + ": " + system_text(error) +
@@ -100,7 +112,8 @@ std::string prepare_state_folder(const std::string& path) {
     return "cannot use " + path + " for state: it is not a folder; remove it, or " +
            kStateElsewhere;
   }
-  if (info.st_uid != ::geteuid() && info.st_uid != 0) {
+  // Root acts for whoever has the folder, and gives that user the files.
+  if (info.st_uid != ::geteuid() && info.st_uid != 0 && ::geteuid() != 0) {
     return "cannot use the folder " + path +
            " for state: it belongs to another user, who could put other files into it; run tcphub "
            "as that user, or " +

@@ -20,7 +20,7 @@ namespace gimnet::hub {
 [[nodiscard]] std::vector<std::string> default_addresses();
 
 /// The folder for what a hub keeps, created with mode 0700. "" or why it cannot be used: it is no
-/// folder, others may write to it, or this user may not.
+/// folder, others may write to it, or this user may not. Root may use any user's.
 [[nodiscard]] std::string prepare_state_folder(const std::string& path);
 
 /// Where the state of the hub of that name belongs, if nobody says: `name` in STATE_DIRECTORY

@@ -38,12 +38,12 @@ std::string open_fault(int error, const std::string& otherwise) {
   return system_text(error) + (error == EACCES ? kOtherFolder : otherwise);
 }
 
-/// "" for a regular file of this user that nobody else may look into, or why it is none.
-std::string private_file_fault(int descriptor, const std::string& path) {
+/// "" for a regular file of that user into which nobody else may look, or why it is none.
+std::string private_file_fault(int descriptor, const std::string& path, uid_t user) {
   struct stat info{};
   if (::fstat(descriptor, &info) != 0) return system_text(errno);
   if (!S_ISREG(info.st_mode)) return "it is not a file; remove it";
-  if (info.st_uid != ::geteuid())
+  if (info.st_uid != user)
     return "it belongs to another user; run tcphub as that user, or give it --state-dir";
   if ((info.st_mode & 0077) != 0) return "other users have rights in it; chmod 600 " + path;
   return {};
@@ -118,10 +118,10 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
     return Error{"cannot use the folder " + path +
                  " for state: " + open_fault(errno, kOtherFolder)};
   const std::string name = path + "/" + kLock;
-  Descriptor lock(
-      ::openat(folder.get(), kLock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, kPrivate));
+  const Owner owner = owner_in(folder.get());
+  Descriptor lock(open_lock(folder.get(), owner));
   if (!lock.is_open()) return Error{"cannot use " + name + ": " + open_fault(errno, kOtherFolder)};
-  if (const std::string fault = private_file_fault(lock.get(), name); !fault.empty()) {
+  if (const std::string fault = private_file_fault(lock.get(), name, owner.user); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
@@ -139,7 +139,29 @@ Result<std::unique_ptr<StateFolder>> StateFolder::open(const std::string& path) 
       info.st_size > 0 || ::faccessat(folder.get(), kState, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   write_holder(lock.get());
   return std::unique_ptr<StateFolder>(
-      new StateFolder(path, folder.release(), lock.release(), was_used));
+      new StateFolder(path, owner, folder.release(), lock.release(), was_used));
+}
+
+StateFolder::Owner StateFolder::owner_in(int folder) {
+  struct stat info{};
+  if (::geteuid() != 0 || ::fstat(folder, &info) != 0) return {::geteuid(), ::getegid()};
+  return {info.st_uid, info.st_gid};
+}
+
+bool StateFolder::give(int file, const Owner& owner) {
+  return owner.user == ::geteuid() || ::fchown(file, owner.user, owner.group) == 0;
+}
+
+int StateFolder::open_lock(int folder, const Owner& owner) {
+  constexpr int kHow = O_RDWR | O_NOFOLLOW | O_CLOEXEC;
+  for (;;) {
+    // Only a file that was created here is given away.
+    Descriptor created(::openat(folder, kLock, kHow | O_CREAT | O_EXCL, kPrivate));
+    if (created.is_open()) return give(created.get(), owner) ? created.release() : -1;
+    if (errno != EEXIST) return -1;
+    const int found = ::openat(folder, kLock, kHow);
+    if (found >= 0 || errno != ENOENT) return found;  // else a hub that kept nothing took it away
+  }
 }
 
 StateFolder::~StateFolder() {
@@ -156,7 +178,7 @@ Result<std::optional<HubState>> StateFolder::read() const {
     if (errno == ENOENT) return std::optional<HubState>{};
     return Error{"cannot read " + name + ": " + open_fault(errno, kBeginAnew)};
   }
-  if (const std::string fault = private_file_fault(file.get(), name); !fault.empty()) {
+  if (const std::string fault = private_file_fault(file.get(), name, owner_.user); !fault.empty()) {
     return Error{"cannot use " + name + ": " + fault};
   }
   int error = 0;
@@ -186,6 +208,7 @@ std::string StateFolder::write(const HubState& state) {
       ::openat(folder_, kFresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kPrivate));
   if (!file.is_open()) return failed("create");
   created = true;
+  if (!give(file.get(), owner_)) return failed("chown");
   if (!write_all(file.get(), write_hub_state(state))) return failed("write");
   if (::fsync(file.get()) != 0) return failed("fsync");
   if (::renameat(folder_, kFresh, folder_, kState) != 0) return failed("rename");

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,8 +16,9 @@ namespace gimnet::hub {
 /// second hub out while this one lives. What stands there is not trusted: it is read within bounds,
 /// links are not followed. A folder that no hub used before, that was opened and into which nothing
 /// was kept is left empty. Where the lock cannot be had its file stays: to remove it without
-/// holding it could take it from another hub. Thread safety: none. Ownership: of two descriptors.
-/// Errors: sentences that name the file and say what to do.
+/// holding it could take it from another hub. In a folder of another user, which root alone may
+/// use, the files are that user's, so that both can go on from them. Thread safety: none.
+/// Ownership: of two descriptors. Errors: sentences that name the file and say what to do.
 class StateFolder {
  public:
   /// Creates the folder (mode 0700) where there is none, but not the one above it, and locks it.
@@ -35,10 +38,21 @@ class StateFolder {
   [[nodiscard]] bool was_used() const { return was_used_; }
 
  private:
-  StateFolder(std::string path, int folder, int lock, bool was_used)
-      : path_(std::move(path)), folder_(folder), lock_(lock), was_used_(was_used) {}
+  struct Owner {
+    uid_t user{};
+    gid_t group{};
+  };
+  StateFolder(std::string path, const Owner& owner, int folder, int lock, bool was_used)
+      : path_(std::move(path)), owner_(owner), folder_(folder), lock_(lock), was_used_(was_used) {}
+  /// Whose the files of that folder are.
+  [[nodiscard]] static Owner owner_in(int folder);
+  /// Makes a file that this process created the owner's. False: errno says why not.
+  [[nodiscard]] static bool give(int file, const Owner& owner);
+  /// Opens the lock file, creates it if there is none. Below 0: errno says why not.
+  [[nodiscard]] static int open_lock(int folder, const Owner& owner);
 
   const std::string path_;
+  const Owner owner_;
   const int folder_;
   const int lock_;
   const bool was_used_;

@@ -103,9 +103,25 @@ TEST(Folders, AnotherUsersStateFolderIsRefused) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder away";
   const TestFolder folder;
   ASSERT_EQ(prepare_state_folder(folder.path("state")), "");
+  ASSERT_EQ(::chmod(folder.path("").c_str(), 0755), 0);
   ASSERT_EQ(::chown(folder.path("state").c_str(), 12'345, 12'345), 0);
-  EXPECT_THAT(prepare_state_folder(folder.path("state")),
-              AllOf(HasSubstr("another user"), HasSubstr("--state-dir")));
+  EXPECT_EQ(prepare_state_folder(folder.path("state")), "") << "root may use it";
+  ASSERT_EQ(::seteuid(12'346), 0);
+  const std::string said = prepare_state_folder(folder.path("state"));
+  ASSERT_EQ(::seteuid(0), 0);
+  EXPECT_THAT(said, AllOf(HasSubstr("another user"), HasSubstr("--state-dir")));
+}
+
+TEST(Folders, WhatRootMakesInAnotherUsersFolderIsThatUsers) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder away";
+  const TestFolder folder;
+  ASSERT_EQ(prepare_state_folder(folder.path("home")), "");
+  ASSERT_EQ(::chown(folder.path("home").c_str(), 12'345, 12'346), 0);
+  EXPECT_EQ(prepare_state_folder(folder.path("home/state")), "");
+  struct stat info{};
+  ASSERT_EQ(::stat(folder.path("home/state").c_str(), &info), 0);
+  EXPECT_EQ(info.st_uid, 12'345u);
+  EXPECT_EQ(info.st_gid, 12'346u);
 }
 
 TEST(Folders, AStateFolderThatCannotBeMadeIsToldWithTheRemedy) {

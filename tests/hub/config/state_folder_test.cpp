@@ -68,6 +68,28 @@ TEST_F(StateFolderTest, KeepsStateInFilesOfOneUser) {
   EXPECT_EQ(**(*again)->read(), some_state(4));
 }
 
+TEST_F(StateFolderTest, RootKeepsStateInAnotherUsersFolderInFilesOfThatUser) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can use another user's folder";
+  constexpr uid_t kOther = 12'345;
+  ASSERT_EQ(::chmod(folder_.path("").c_str(), 0755), 0);
+  ASSERT_EQ(::mkdir(path().c_str(), 0700), 0);
+  ASSERT_EQ(::chown(path().c_str(), kOther, kOther), 0);
+  keep();
+  keep();  // over the files that are there
+  for (const char* name : {"state", "lock"}) {
+    struct stat info{};
+    ASSERT_EQ(::stat(file(name).c_str(), &info), 0);
+    EXPECT_EQ(info.st_uid, kOther) << name;
+    EXPECT_EQ(mode_of(file(name)), 0600u);
+  }
+  ASSERT_EQ(::seteuid(kOther), 0);
+  const std::string fault = read_fault();
+  ASSERT_EQ(::seteuid(0), 0);
+  EXPECT_EQ(fault, "") << "that user goes on from them";
+  ASSERT_EQ(::chown(file("state").c_str(), 0, 0), 0);
+  EXPECT_THAT(read_fault(), HasSubstr("another user")) << "a link to a file of root's, perhaps";
+}
+
 TEST_F(StateFolderTest, AHubThatKeptNothingLeavesNoTrace) {
   {
     const auto folder = StateFolder::open(path());
