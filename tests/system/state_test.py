@@ -8,7 +8,7 @@ import socket
 import tempfile
 import unittest
 
-from support.processes import TCPHUB, Hub, Process
+from support.processes import TCPHUB, Hub, Process, run_gimnet
 from support.waiting import wait_until
 from support.wire import Client
 
@@ -131,6 +131,14 @@ class Folder(unittest.TestCase):
             wait_until(lambda h=hub: os.path.exists(os.path.join(state, "lock")) or h.process.out, "it has begun")
             hub.kill()
         PlainHub(self, "--listen", "tcp://127.0.0.1:0", "--state-dir", state).wait_ready()
+
+
+class Programs(unittest.TestCase):
+    def test_a_folder_is_no_address_of_a_hub(self):
+        with tempfile.TemporaryDirectory() as folder:
+            said = run_gimnet(f"unix:{folder}", "nodes")
+            self.assertNotEqual(said.code, 0)
+            self.assertIn(f"it is a folder; name the hub's socket in it, as in unix:{folder}/tcphub.sock", said.err)
 
 
 if __name__ == "__main__":

@@ -57,6 +57,14 @@ Failure cannot_connect(const Endpoint& endpoint, int error) {
   if (error == EACCES && endpoint.transport == Endpoint::Transport::unix_socket) {
     remedy = "; it is another user's: connect as the user that runs the hub, or over TCP";
   }
+  struct stat info{};
+  if (endpoint.transport == Endpoint::Transport::unix_socket &&
+      ::stat(endpoint.path.c_str(), &info) == 0 && S_ISDIR(info.st_mode)) {
+    const std::string folder = endpoint.path.substr(0, endpoint.path.find_last_not_of('/') + 1);
+    return {NIF_BAD_ARGUMENT, "cannot connect to " + endpoint.url() +
+                                  ": it is a folder; name the hub's socket in it, as in unix:" +
+                                  folder + "/tcphub.sock"};
+  }
   return {status, "cannot connect to " + endpoint.url() + ": " + system_error_text(error) + remedy};
 }
 

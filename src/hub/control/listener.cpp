@@ -126,6 +126,10 @@ std::string unix_obstacle(const sockaddr_un& address) {
 std::string clear_path(const std::string& path, const sockaddr_un& address) {
   struct stat info{};
   if (::lstat(path.c_str(), &info) != 0) return {};
+  if (S_ISDIR(info.st_mode)) {
+    const std::string folder = path.substr(0, path.find_last_not_of('/') + 1);
+    return "it is a folder; name a file in it, as in unix:" + folder + "/tcphub.sock";
+  }
   if (!S_ISSOCK(info.st_mode))
     return "there is a file of that name that is no socket; choose another path";
   if (std::string obstacle = unix_obstacle(address); !obstacle.empty()) return obstacle;

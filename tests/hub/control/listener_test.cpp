@@ -229,6 +229,18 @@ TEST(Listener, DoesNotTouchAFileThatIsNoSocket) {
   EXPECT_EQ(fs::file_size(folder.path("s")), 8u);
 }
 
+TEST(Listener, AFolderIsNoSocket) {
+  const TestFolder folder;
+  for (const std::string& path : {folder.path("s"), folder.path("s/")}) {
+    ::mkdir(folder.path("s").c_str(), 0700);
+    const auto listener = Listener::open(url("unix:" + path));
+    ASSERT_FALSE(listener);
+    EXPECT_EQ(listener.error().sentence, "cannot listen on unix:" + path +
+                                             ": it is a folder; name a file in it, as in unix:" +
+                                             folder.path("s") + "/tcphub.sock");
+  }
+}
+
 TEST(Listener, AMissingFolderIsNamed) {
   const TestFolder folder;
   const auto listener = Listener::open(url("unix:" + folder.path("none/s")));
