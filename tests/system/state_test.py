@@ -8,7 +8,7 @@ import socket
 import tempfile
 import unittest
 
-from support.processes import TCPHUB, Hub, Process, run_gimnet
+from support.processes import TCPHUB, Hub, Process, run_gimnet, start_recv
 from support.waiting import wait_until
 from support.wire import Client
 
@@ -134,6 +134,22 @@ class Folder(unittest.TestCase):
 
 
 class Programs(unittest.TestCase):
+    def test_a_token_file_that_cannot_be_used_is_named(self):
+        hub = Hub(self)
+        with tempfile.TemporaryDirectory() as runtime:
+            env = {"XDG_RUNTIME_DIR": runtime}
+            start_recv(self, hub, "cam", env=env).signal(signal.SIGKILL)
+            tokens = os.path.join(runtime, "gimnet", "tokens")
+            path = os.path.join(tokens, os.listdir(tokens)[0])
+            with open(path, "w", encoding="utf-8") as file:
+                file.write("no token")
+            receiver = start_recv(self, hub, "cam", env=env)
+            self.assertIn(f"the token file {path} is not used, and the node may get a new id", receiver.err)
+            receiver.signal(signal.SIGKILL)
+            receiver.wait()
+            os.chmod(path, 0o644)
+            self.assertIn(f"{path} is another user's, open to others, or no file", start_recv(self, hub, "cam", env=env).err)
+
     def test_a_folder_is_no_address_of_a_hub(self):
         with tempfile.TemporaryDirectory() as folder:
             said = run_gimnet(f"unix:{folder}", "nodes")

@@ -25,12 +25,15 @@ class PrivateFolder {
 
   /// "" or why it cannot be used, and what to do.
   [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// With its name in it, as long as fault() is "".
+  [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] Descriptor descriptor() const { return descriptor_; }
 
  private:
   void enter(Descriptor above, const std::string& name, const std::string& path);
 
   std::string fault_;
+  std::string path_;
   Descriptor descriptor_ = -1;
 };
 

@@ -98,6 +98,7 @@ void PrivateFolder::enter(Descriptor above, const std::string& name, const std::
     return;
   }
   ::close(std::exchange(descriptor_, inner));
+  path_ = path;
 }
 
 LockedFile::LockedFile(LockedFile&& other) noexcept

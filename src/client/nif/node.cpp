@@ -122,7 +122,8 @@ bool Node::take_over(Admitted admitted, bool first) {
     info_.frame_bytes_max = session_.frame_bytes_max;
     copy_text(info_.name, sizeof info_.name, session_.name);
     copy_text(info_.hub_name, sizeof info_.hub_name, session_.hub_name);
-    if (!session_.earlier_goodbye.empty()) last_error_ = session_.earlier_goodbye;
+    if (!session_.earlier_goodbye.empty())
+      last_error_ = "the hub ended this node's last connection: " + session_.earlier_goodbye;
   }
   if (!first) {
     Record* event = make_event(NIF_CONNECTED, session_.earlier_goodbye);

@@ -15,9 +15,17 @@ std::vector<std::byte> TokenStore::find(const std::string& address) {
   if (!open(address, false)) return {};
   // One byte more than is legal, so that a longer file shows.
   std::array<std::byte, kTokenRecordBytesMax + 1> memory;
-  const auto record = read_token_record(std::span(memory).first(file_.read(memory)));
-  if (!record || record->address != address || record->name != name_) return {};
-  return record->token;
+  const std::size_t size = file_.read(memory);
+  if (size == 0) return {};  // a program ended before it wrote its token
+  const auto record = read_token_record(std::span(memory).first(size));
+  if (record && record->address == address && record->name == name_) return record->token;
+  unused_ = "the token file " + path() + " is not used, and the node may get a new id: " +
+            (record ? "it is that of another node" : "what it holds is no session token");
+  return {};
+}
+
+std::string TokenStore::path() const {
+  return folder_->path() + "/" + token_file_name(address_, name_);
 }
 
 void TokenStore::keep(const std::string& address, const std::vector<std::byte>& token) {
@@ -28,10 +36,10 @@ void TokenStore::keep(const std::string& address, const std::vector<std::byte>& 
   const auto record = write_token_record({address, name_, token});
   kept_ = record && file_.write(*record);
   if (kept_) {
-    fault_.clear();
+    fault_ = std::exchange(unused_, {});
     return;
   }
-  fault_ = "the session token is not kept over a crash: its file cannot be written";
+  fault_ = "the session token is not kept over a crash: " + path() + " cannot be written";
   forget();
 }
 
@@ -63,9 +71,12 @@ bool TokenStore::open(const std::string& address, bool made) {
   const LockedFile::State state = file_.open(*folder_, token_file_name(address, name_), made);
   address_ = address;
   if (state == LockedFile::State::in_use) {
-    fault_ = "the session token is not kept over a crash: another node of that name keeps its own";
+    fault_ =
+        "the session token is not kept over a crash: another node of that name keeps its own in " +
+        path();
   } else if (state == LockedFile::State::refused) {
-    fault_ = "the session token is not kept over a crash: its file is another user's, or no file";
+    fault_ = "the session token is not kept over a crash: " + path() +
+             " is another user's, open to others, or no file; remove it";
   }
   return state == LockedFile::State::open;
 }

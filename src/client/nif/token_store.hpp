@@ -36,12 +36,14 @@ class TokenStore {
 
   /// The latest token is in its file.
   [[nodiscard]] bool kept() const { return kept_; }
-  /// "" or why it is not.
+  /// "" or why it is not, or why the token that find() met is not used; names the file.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
  private:
   /// Opens the file for that address, unless it is open. `made`: makes it if there is none.
   [[nodiscard]] bool open(const std::string& address, bool made);
+  /// Of the file for the address.
+  [[nodiscard]] std::string path() const;
   [[nodiscard]] bool enabled() const { return wanted_ && !name_.empty(); }
 
   std::string name_;
@@ -51,6 +53,7 @@ class TokenStore {
   std::string address_;  ///< for which it is open
   bool kept_ = false;
   std::string fault_;
+  std::string unused_;  ///< why the file that find() met is not used; told once
 };
 
 }  // namespace gimnet::nif

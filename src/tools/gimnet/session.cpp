@@ -60,6 +60,8 @@ std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
     return no_hub && code == exit_code_of(failure.status) ? ExitCode::no_connection : code;
   }
   node_ = std::move(*joined);
+  // A token file that cannot be used, or how the hub ended the node's last connection.
+  if (const std::string trouble = node_->state().trouble; !trouble.empty()) say(trouble);
   stop_.on_stop([this] { node_->close(); });
   return std::nullopt;
 }

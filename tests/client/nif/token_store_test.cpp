@@ -127,6 +127,11 @@ TEST(TokenStore, AFileWithSomethingElseInItIsNoToken) {
   EXPECT_TRUE(again.find(kHub).empty());
   again.keep(kHub, token(3));
   EXPECT_TRUE(again.kept());
+  EXPECT_EQ(again.fault(), "the token file " + path +
+                               " is not used, and the node may get a new id: what it holds is no "
+                               "session token");
+  again.keep(kHub, token(3));
+  EXPECT_EQ(again.fault(), "") << "told once";
   EXPECT_LT(std::filesystem::file_size(path), 200u);
   // Another node's record, by whatever chance.
   again.release();
@@ -135,6 +140,22 @@ TEST(TokenStore, AFileWithSomethingElseInItIsNoToken) {
       .write(reinterpret_cast<const char*>(record->data()),
              static_cast<std::streamsize>(record->size()));
   EXPECT_TRUE(TokenStore("robot", true).find(kHub).empty());
+}
+
+TEST(TokenStore, AFileThatCannotBeOpenedIsNamed) {
+  const RuntimeFolder runtime;
+  {
+    TokenStore store("robot", true);
+    store.keep(kHub, token(1));
+  }
+  const std::string path = runtime.tokens() + "/" + token_file_name(kHub, "robot");
+  ASSERT_EQ(::chmod(path.c_str(), 0644), 0);
+  TokenStore store("robot", true);
+  EXPECT_TRUE(store.find(kHub).empty());
+  store.keep(kHub, token(2));
+  EXPECT_FALSE(store.kept());
+  EXPECT_EQ(store.fault(), "the session token is not kept over a crash: " + path +
+                               " is another user's, open to others, or no file; remove it");
 }
 
 TEST(TokenStore, AFolderThatOthersCanEnterIsNotUsedAndTold) {
