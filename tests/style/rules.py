@@ -11,7 +11,7 @@ import planted  # noqa: E402
 
 FILE_LINES_MAX = 400
 # Grew beyond it when the columns went from 120 to 100; each leaves the list with its next change.
-FILE_LINES_EXCUSED = ("include/gimnet/nif.h", "src/client/gimi/core.cpp", "src/hub/data/fanout/pacer.cpp",
+FILE_LINES_EXCUSED = ("include/gimnet/nif.h", "src/hub/data/fanout/pacer.cpp",
                       "tests/client/gimi/service_table_moves_test.cpp", "tests/client/nif/declarations_test.cpp",
                       "tests/client/nif/outbound_send_test.cpp", "tests/hub/control/handle/administer_test.cpp",
                       "tests/hub/control/state/membership_test.cpp", "tests/hub/shard/reader_test.cpp",

@@ -11,7 +11,7 @@
 #include "client/gimi/inbox.hpp"
 #include "client/gimi/loss_tally.hpp"
 #include "client/gimi/ping_table.hpp"
-#include "client/gimi/received_streams.hpp"
+#include "client/gimi/reception.hpp"
 #include "client/gimi/service_table.hpp"
 #include "client/gimi/stream_table.hpp"
 #include "client/gimi/uplink.hpp"
@@ -50,39 +50,21 @@ class Core {
 
   static nif_verdict on_incoming(void* user, const nif_incoming* in);
   [[nodiscard]] nif_verdict dispatch(const nif_incoming& in);
-  [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
-  [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
-  /// A message without a GIMI header.
-  [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
-  [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
-                                          const proto::gimi::MessageView& view);
-  /// Of a stream that its sender has begun anew since.
-  [[nodiscard]] nif_verdict drop_outdated();
-  void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
-  void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
-  /// A message that is larger than this node takes: its sender is told.
-  [[nodiscard]] nif_verdict refuse(const nif_incoming& in, const proto::gimi::MessageView& view);
-  void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);
-  void on_report(const nif_incoming& in);
   void on_gap(const nif_incoming& in);
   void on_connected(const nif_incoming& in);
   void on_disconnected(const nif_incoming& in);
   void end(const Ending& ending);
 
-  const std::size_t message_bytes_max_;
   Uplink uplink_;
   Inbox inbox_;
   StreamTable streams_;
   ServiceTable services_;
   WatchTable watches_;
   PingTable pings_;
-  const std::uint32_t ping_epoch_ = Uplink::draw_epoch();
-  ReceivedStreams received_;  ///< the library's thread
   LossTally losses_;
   mutable std::atomic<std::uint64_t> unreadable_{0};  ///< as NIF counted when it was asked last
   Clerk clerk_;
-  std::uint32_t reconnects_ =
-      0;  ///< the library's thread: as the messages that come now count them
+  Reception reception_;  ///< the library's thread
   std::atomic<bool> ready_{false};
   std::atomic<bool> closed_{false};
   mutable Mutex mutex_;

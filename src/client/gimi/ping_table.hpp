@@ -7,6 +7,7 @@
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
+#include "client/gimi/uplink.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "gimnet/gimi/outcome.hpp"
 
@@ -15,6 +16,8 @@ namespace gimnet::gimi {
 /// PINGs of the program that wait for their PONG. Thread safety: any thread.
 class PingTable {
  public:
+  /// In each PING, and in the PONG that answers it.
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   void expect(std::uint32_t number, Peer peer) GIMNET_EXCLUDES(mutex_);
   /// The round trip in ns, or why there is none by `deadline`, which `timeout` led to. The number
   /// is forgotten.
@@ -35,6 +38,8 @@ class PingTable {
     std::int64_t sent_ns = 0;
     std::optional<Outcome<std::int64_t>> answer;
   };
+  const std::uint32_t epoch_ = Uplink::draw_epoch();
+
   Mutex mutex_;
   Condition answered_;
   std::map<std::uint32_t, Waiting> waiting_ GIMNET_GUARDED_BY(mutex_);

@@ -1,0 +1,242 @@
+#include "client/gimi/reception.hpp"
+
+#include <algorithm>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "client/gimi/message_access.hpp"
+#include "client/gimi/report_words.hpp"
+#include "proto/control/control_message.hpp"
+#include "proto/frame/frame_header.hpp"
+
+namespace gimnet::gimi {
+namespace {
+
+/// Status of an ERROR about a DATA that is larger than its receiver takes.
+constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
+/// Of what another node says, so many bytes are kept.
+constexpr std::size_t kPeerWordsMax = 256;
+
+/// What another node says, fit for a terminal.
+std::string plain_words(std::string_view sentence) {
+  std::string words(sentence.substr(0, kPeerWordsMax));
+  std::ranges::replace_if(words, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return words;
+}
+
+StreamName stream_of(const nif_incoming& in, std::uint32_t peer, std::uint32_t group) {
+  const auto key = proto::gimi::StreamKey::of(in.key);
+  return {Peer{peer}, {key.type, key.instance}, group};
+}
+
+/// As its receiver names it.
+StreamName received_stream_of(const nif_incoming& in) {
+  return stream_of(in, in.from, in.kind == NIF_SERVICE ? in.to : 0);
+}
+
+/// Somebody sent it to this node, or to a service of it.
+bool is_for_one(const nif_incoming& in) { return in.kind == NIF_UNICAST || in.kind == NIF_SERVICE; }
+
+std::span<const std::byte> payload_of(const nif_incoming& in) {
+  return {static_cast<const std::byte*>(in.payload), in.size};
+}
+
+/// The ACK of a message becomes due before the program can take the message and leave.
+class AckReceipt final : public Receipt {
+ public:
+  AckReceipt(Clerk& clerk, const StreamName& sender, Lane lane,
+             const proto::gimi::MessageHeader& data)
+      : clerk_(clerk), sender_(sender), lane_(lane), data_(data) {}
+  void on_kept() override { clerk_.take(sender_, lane_, data_); }
+
+ private:
+  Clerk& clerk_;
+  const StreamName& sender_;
+  const Lane lane_;
+  const proto::gimi::MessageHeader data_;
+};
+
+/// The GIMI header in the 20 bytes that a report repeats: behind the key, where nothing stands
+/// before it. NIF takes the fragment header away of what it remembers.
+std::optional<proto::gimi::MessageHeader> reported_header(const nif_incoming& in) {
+  const auto bytes = payload_of(in);
+  if (bytes.size() < proto::kHeaderSize + proto::kKeySize + proto::gimi::kMessageHeaderSize)
+    return std::nullopt;
+  const proto::FrameHeader header = proto::load_header(bytes.data());
+  if (!header.has(proto::kFlagKeyed) || header.has(proto::kFlagFragment) ||
+      header.has(proto::kFlagExt)) {
+    return std::nullopt;
+  }
+  return proto::gimi::load_message_header(bytes.data() + proto::kHeaderSize + proto::kKeySize);
+}
+
+}  // namespace
+
+nif_verdict Reception::on_message(const nif_incoming& in) {
+  using proto::gimi::Operation;
+  if ((in.flags & NIF_FLAG_KEYED) == 0) return on_plain(in);
+  const auto view = proto::gimi::parse_message(payload_of(in));
+  if (!view) {
+    losses_.add_unreadable();
+    return NIF_DONE;
+  }
+  switch (view->header.operation) {
+    case Operation::data:
+      return on_data(in, *view);
+    case Operation::ack:
+      on_ack(in, *view);
+      return NIF_DONE;
+    case Operation::error:
+      on_error(in, *view);
+      return NIF_DONE;
+    case Operation::ping:
+      on_ping(in, *view);
+      return NIF_DONE;
+    case Operation::pong:
+      if (view->header.epoch == pings_.epoch())
+        pings_.on_pong(view->header.sequence, Peer{in.from});
+      return NIF_DONE;
+    default:
+      inbox_.count_dropped();
+      return NIF_DONE;
+  }
+}
+
+nif_verdict Reception::on_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (view.data.size() > message_bytes_max_) return refuse(in, view);
+  if (in.kind == NIF_GROUP) return on_group_data(in, view);
+  const StreamName name = received_stream_of(in);
+  StreamEpochs& epochs = received_.find({name.peer, in.kind, name.group, name.key});
+  const StreamEpochs::Step step = epochs.look(view.header.epoch);
+  if (step == StreamEpochs::Step::former) return drop_outdated();
+  Message message = MessageAccess::make(in, view, nullptr, reconnects_);
+  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
+  AckReceipt receipt(clerk_, name, static_cast<Lane>(in.lane), view.header);
+  const bool wanted = is_for_one(in) && view.header.has(proto::gimi::kFlagAckWanted);
+  if (!inbox_.put(name.key, message, wanted ? &receipt : nullptr)) {
+    MessageAccess::disown(message);
+    return NIF_NOT_NOW;
+  }
+  epochs.take(view.header.epoch);
+  return NIF_KEEP;
+}
+
+nif_verdict Reception::on_plain(const nif_incoming& in) {
+  const auto data = payload_of(in);
+  if (data.size() > message_bytes_max_) {
+    losses_.add(proto::DropReason::too_large, 1);
+    return NIF_DONE;
+  }
+  MessageQueue* queue = nullptr;
+  std::shared_ptr<const std::string> service_name;
+  if (in.kind == NIF_GROUP) {
+    const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+    if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
+    if (service == nullptr) return verdict_of(place);
+    queue = &service->queue();
+    service_name = service->shared_name();
+  }
+  Message message = MessageAccess::make_plain(in, data, std::move(service_name), reconnects_);
+  const bool taken = queue != nullptr ? inbox_.put(*queue, message, nullptr)
+                                      : inbox_.put(MessageKey{}, message, nullptr);
+  if (taken) return NIF_KEEP;
+  MessageAccess::disown(message);
+  return NIF_NOT_NOW;
+}
+
+nif_verdict Reception::drop_outdated() {
+  losses_.add_outdated();
+  return NIF_DONE;
+}
+
+nif_verdict Reception::on_group_data(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto [place, service] = services_.subscribed(in.group != 0 ? in.group : in.to);
+  if (place == ServiceTable::Place::unknown) losses_.add_unknown_service();
+  if (service == nullptr) return verdict_of(place);
+  // After a break the hub gives the last message of a retained service again: it does not know who
+  // had it.
+  const StreamName name = stream_of(in, in.from, 0);
+  const SubscribedService::Position position{name.peer, name.key, view.header.epoch,
+                                             view.header.sequence};
+  if (service->is_repeated(position)) return NIF_DONE;
+  const StreamEpochs::Step step = service->look(position);
+  if (step == StreamEpochs::Step::former) return drop_outdated();
+  Message message = MessageAccess::make(in, view, service->shared_name(), reconnects_);
+  if (step == StreamEpochs::Step::begins) MessageAccess::begin_stream(message);
+  if (!inbox_.put(service->queue(), message, nullptr)) {
+    MessageAccess::disown(message);
+    return NIF_NOT_NOW;
+  }
+  service->on_message(position);
+  return NIF_KEEP;
+}
+
+nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  inbox_.count_dropped();
+  losses_.add(proto::DropReason::too_large, 1);
+  if (!is_for_one(in) || !view.header.has(proto::gimi::kFlagAckWanted)) return NIF_DONE;
+  const std::string sentence = "it takes messages of at most " +
+                               std::to_string(message_bytes_max_) + " bytes, and this one has " +
+                               std::to_string(view.data.size());
+  const StreamName name = received_stream_of(in);
+  const Envelope envelope{
+      in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
+  // Where there is no room for it, the sender learns from the next PONG that the message is not
+  // here.
+  static_cast<void>(uplink_.transmit(
+      envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
+      false, proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));
+  return NIF_DONE;
+}
+
+void Reception::on_error(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto failure = proto::gimi::decode_failure(view.data);
+  if (!failure || failure->status != kTooLarge) return inbox_.count_dropped();
+  streams_.on_refused(
+      stream_of(in, in.from, failure->group), view.header,
+      {LossReason::refused, "the receiver refused it: " + plain_words(failure->sentence)});
+}
+
+void Reception::on_ack(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  const auto ack = proto::gimi::decode_ack(view.data);
+  if (ack) streams_.on_ack(stream_of(in, in.from, ack->group), view.header, *ack);
+}
+
+void Reception::on_ping(const nif_incoming& in, const proto::gimi::MessageView& view) {
+  if (!is_for_one(in) || in.from == 0) return;
+  const StreamName name = received_stream_of(in);
+  const auto lane = static_cast<Lane>(in.lane);
+  // Both fit or neither arrives: whoever misses them asks again.
+  if (view.header.has(proto::gimi::kFlagAckWanted) &&
+      clerk_.acknowledge(name, lane, view.header) != NIF_OK) {
+    return;
+  }
+  const Envelope envelope{in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, lane, name.key, 0, 0};
+  static_cast<void>(uplink_.transmit(
+      envelope, {view.header.sequence, proto::gimi::Operation::pong, 0, 0, view.header.epoch},
+      false, view.data, 0));
+}
+
+void Reception::on_report(const nif_incoming& in) {
+  if (in.kind == static_cast<std::uint8_t>(proto::Kind::taken))
+    return streams_.on_doubt(reported_loss(in.reason, in.text));
+  if (!is_for_one(in)) return;
+  const auto header = reported_header(in);
+  const bool to_service = in.kind == NIF_SERVICE;
+  const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
+  const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;
+  StreamTable::Report report{name, keyed, in.reason, in.count, 0, 0, in.text};
+  if (header && header->operation == proto::gimi::Operation::data) {
+    report.sequence = header->sequence;
+    report.epoch = header->epoch;
+  }
+  if (header && header->operation == proto::gimi::Operation::ping &&
+      header->epoch == pings_.epoch()) {
+    pings_.on_lost(header->sequence, report_words(report.text));
+  }
+  streams_.on_report(report);
+}
+
+}  // namespace gimnet::gimi

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "client/gimi/clerk.hpp"
+#include "client/gimi/inbox.hpp"
+#include "client/gimi/loss_tally.hpp"
+#include "client/gimi/ping_table.hpp"
+#include "client/gimi/received_streams.hpp"
+#include "client/gimi/service_table.hpp"
+#include "client/gimi/stream_table.hpp"
+#include "client/gimi/uplink.hpp"
+#include "gimnet/nif.h"
+#include "proto/gimi/message_header.hpp"
+
+namespace gimnet::gimi {
+
+/// For NIF: a message or event of a service that is still on its way into the table comes again.
+[[nodiscard]] inline nif_verdict verdict_of(ServiceTable::Place place) {
+  return place == ServiceTable::Place::not_yet ? NIF_NOT_NOW : NIF_DONE;
+}
+
+/// Takes what other nodes sent, and the hub's reports of what this node sent: puts messages into
+/// their queues, and tells streams and pings of their answers. Other nodes write what it reads, so
+/// it drops and counts what it cannot read. Thread safety: the library's thread. Ownership: its
+/// parts outlive it. Limits: those of its parts, and `message_bytes_max`.
+class Reception {
+ public:
+  struct Parts {
+    const Uplink& uplink;
+    Inbox& inbox;
+    StreamTable& streams;
+    ServiceTable& services;
+    PingTable& pings;
+    Clerk& clerk;
+    LossTally& losses;
+  };
+  /// `message_bytes_max`: of the application's bytes of one message.
+  Reception(const Parts& parts, std::size_t message_bytes_max)
+      : uplink_(parts.uplink),
+        inbox_(parts.inbox),
+        streams_(parts.streams),
+        services_(parts.services),
+        pings_(parts.pings),
+        clerk_(parts.clerk),
+        losses_(parts.losses),
+        message_bytes_max_(message_bytes_max) {}
+
+  /// NIF_KEEP: a queue has it, with its storage.
+  [[nodiscard]] nif_verdict on_message(const nif_incoming& in);
+  void on_report(const nif_incoming& in);
+  /// Messages that come from now on came behind another break.
+  void on_reconnected() { ++reconnects_; }
+
+ private:
+  [[nodiscard]] nif_verdict on_data(const nif_incoming& in, const proto::gimi::MessageView& view);
+  /// A message without a GIMI header.
+  [[nodiscard]] nif_verdict on_plain(const nif_incoming& in);
+  [[nodiscard]] nif_verdict on_group_data(const nif_incoming& in,
+                                          const proto::gimi::MessageView& view);
+  /// Of a stream that its sender has begun anew since.
+  [[nodiscard]] nif_verdict drop_outdated();
+  /// A message that is larger than this node takes: its sender is told.
+  [[nodiscard]] nif_verdict refuse(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_ack(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_error(const nif_incoming& in, const proto::gimi::MessageView& view);
+  void on_ping(const nif_incoming& in, const proto::gimi::MessageView& view);
+
+  const Uplink& uplink_;
+  Inbox& inbox_;
+  StreamTable& streams_;
+  ServiceTable& services_;
+  PingTable& pings_;
+  Clerk& clerk_;
+  LossTally& losses_;
+  const std::size_t message_bytes_max_;
+  ReceivedStreams received_;
+  std::uint32_t reconnects_ = 0;
+};
+
+}  // namespace gimnet::gimi
