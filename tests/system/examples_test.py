@@ -2,6 +2,7 @@
 """The programs of examples/, as a newcomer starts them, with a real hub."""
 
 import os
+import pathlib
 import signal
 import struct
 import subprocess
@@ -12,6 +13,18 @@ from support.waiting import wait_until
 from support.wire import FLAG_KEYED, Client
 
 EXAMPLES = os.path.join(os.path.dirname(GIMNET), "examples")
+# All but SIGKILL and SIGSTOP, which nobody can block, and the two that belong to the C library.
+ALL_SIGNALS = (1 << 64) - 1 & ~(1 << signal.SIGKILL - 1 | 1 << signal.SIGSTOP - 1 | 3 << 31)
+
+
+def blocked_signals(process):
+    """What the threads of a program block, without the first one, which is the program's own."""
+    blocked = {}
+    for task in pathlib.Path(f"/proc/{process.popen.pid}/task").iterdir():
+        if task.name != str(process.popen.pid):
+            line = next(line for line in (task / "status").read_text().splitlines() if line.startswith("SigBlk:"))
+            blocked[task.name] = int(line.split()[1], 16)
+    return blocked
 
 
 def start(test, hub, name, *arguments, **pipes):
@@ -103,6 +116,16 @@ class Examples(unittest.TestCase):
         hello = start(self, hub, "hello", "again")
         self.assertEqual((hello.wait(), hello.out, hello.err), (0, b"again\n", ""))
         self.assertEqual(mirror.err, "")
+
+    def test_the_threads_of_the_libraries_take_no_signals(self):
+        hub = Hub(self)
+        for name, threads in (("mirror", 1), ("adder", 2)):  # of NIF; of GIMI, which adds the clerk
+            with self.subTest(name=name):
+                program = start(self, hub, name)
+                hub.wait_for_node(name)
+                blocked = wait_until(lambda: len(blocked_signals(program)) == threads and blocked_signals(program),
+                                     "its threads")
+                self.assertEqual([signals & ALL_SIGNALS for signals in blocked.values()], [ALL_SIGNALS] * threads)
 
     def test_values_go_into_a_message_and_out_again(self):
         pose = start(self, Hub(self), "pose")
