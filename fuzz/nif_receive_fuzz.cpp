@@ -1,9 +1,11 @@
 // The receiving side of NIF against a hub that sends anything: the same bytes give the same
 // messages however they are split, nothing that is another node's or larger than allowed comes out,
-// and nothing breaks. Frames of other nodes do not even end the connection. Input: a byte that
-// chooses handshake or connection and the size of the pieces, then the hub's bytes.
+// and nothing breaks. Frames of another node do not even end the connection, and messages of a
+// third one come whole between them. Input: a byte that chooses handshake or connection and the
+// size of the pieces, then the hub's bytes.
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -16,6 +18,8 @@
 #include "client/nif/outbound.hpp"
 #include "client/nif/request_table.hpp"
 #include "fuzz/support/fuzz_input.hpp"
+#include "fuzz/support/stranger_frames.hpp"
+#include "proto/frame/frame_builder.hpp"
 
 namespace {
 
@@ -23,6 +27,8 @@ using namespace gimnet;
 using namespace gimnet::nif;
 
 constexpr std::uint32_t kOwnId = (7u << 20) | 17;
+constexpr std::uint32_t kStrangerId = kOwnId + 1;
+constexpr std::uint32_t kPeerId = kOwnId + 2;
 constexpr proto::ReassemblyLimits kLimits{
     .message_bytes_max = 4096, .waiting_bytes_max = 8192, .streams_max = 4};
 
@@ -86,6 +92,7 @@ class Witness final : public InboundHost {
 
   [[nodiscard]] const std::vector<std::string>& delivered() const { return delivered_; }
   [[nodiscard]] const std::vector<std::string>& asked() const { return asked_; }
+  [[nodiscard]] std::uint32_t messages_of_peer() const { return messages_of_peer_; }
 
  private:
   void note(std::string what) { asked_.push_back(std::move(what)); }
@@ -94,6 +101,7 @@ class Witness final : public InboundHost {
     FUZZ_MUST(in.text != nullptr && in.storage != nullptr);
     FUZZ_MUST(in.type != NIF_MESSAGE || in.kind != NIF_UNICAST || in.to == kOwnId);
     FUZZ_MUST(in.type != NIF_MESSAGE || in.size <= proto::kFrameLengthDefault);
+    messages_of_peer_ += in.type == NIF_MESSAGE && in.from == kPeerId && in.size == 6 ? 1 : 0;
     std::string written = std::to_string(in.type) + "/" + std::to_string(in.from) + "/" +
                           std::to_string(in.to) + "/" + std::to_string(in.kind) + "/" +
                           std::to_string(in.flags) + "/" + std::to_string(in.key) + "/" +
@@ -111,6 +119,7 @@ class Witness final : public InboundHost {
   HubClock clock_;
   std::vector<std::string> delivered_;
   std::vector<std::string> asked_;
+  std::uint32_t messages_of_peer_ = 0;
 };
 
 Inbound::Verdict feed(Inbound& inbound, std::span<const std::byte> bytes, std::size_t step) {
@@ -150,34 +159,41 @@ void check_connection(std::span<const std::byte> bytes, std::size_t step) {
   static_cast<void>(feed(whole, bytes, step));
 }
 
-/// Gives every frame a kind that another node may send, and cuts what follows a frame of a size
-/// that no hub passes on.
-std::vector<std::byte> as_of_strangers(std::span<const std::byte> bytes) {
-  std::vector<std::byte> frames(bytes.begin(), bytes.end());
-  std::size_t at = 0;
-  while (frames.size() - at >= proto::kHeaderSize) {
-    std::byte& kind = frames[at + proto::kKindOffset];
-    kind &= std::byte{15};
-    if (kind == static_cast<std::byte>(proto::Kind::report) ||
-        kind == static_cast<std::byte>(proto::Kind::flow))
-      kind = static_cast<std::byte>(proto::Kind::taken);
-    const proto::FrameHeader header = proto::load_header(frames.data() + at);
-    if (header.length > proto::kFrameLengthDefault || header.frame_size() > frames.size() - at)
-      break;
-    at += header.frame_size();
+/// A message in two fragments, of a node that keeps to the protocol.
+std::array<std::vector<std::byte>, 2> good_fragments(std::uint32_t number) {
+  const std::array<std::byte, 3> piece{std::byte{'o'}, std::byte{'k'}, std::byte{'!'}};
+  std::array<std::vector<std::byte>, 2> frames;
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    proto::FrameParts parts;
+    parts.header.src = kPeerId;
+    parts.header.dst = kOwnId;
+    parts.fragment = proto::FragmentHeader{number, 3 * i, 6};
+    parts.payload_size = piece.size();
+    frames[i].resize(proto::prefix_size(parts) + piece.size());
+    static_cast<void>(proto::write_frame(parts, piece, frames[i]));
   }
-  frames.resize(at);
   return frames;
 }
 
-/// Frames of other nodes never end a connection, whatever is in them.
+/// Frames of another node never end a connection, whatever is in them, and cost no third node a
+/// message.
 void check_strangers(std::span<const std::byte> bytes, std::size_t step) {
   Session session;
   session.id = kOwnId;
   Witness witness;
   Inbound inbound(kLimits, witness);
   inbound.begin(session);
-  FUZZ_MUST(feed(inbound, as_of_strangers(bytes), step) == Inbound::Verdict::going);
+  const auto must_go_on = [&](std::span<const std::byte> frame) {
+    FUZZ_MUST(feed(inbound, frame, step) == Inbound::Verdict::going);
+  };
+  std::uint32_t sent = 0;
+  fuzz::for_each_stranger_frame(bytes, kStrangerId, kOwnId, [&](std::span<const std::byte> frame) {
+    const auto good = good_fragments(++sent);
+    must_go_on(good[0]);
+    must_go_on(frame);
+    must_go_on(good[1]);
+    FUZZ_MUST(witness.messages_of_peer() == sent);
+  });
 }
 
 Handshake::State shake(Handshake& handshake, std::span<const std::byte> bytes, std::size_t step) {
