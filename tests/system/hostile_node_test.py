@@ -14,9 +14,9 @@ import time
 import unittest
 
 from support.hostile_frames import GIMI_PING, GIMI_PONG, HostileFrames, Surroundings
-from support.processes import Hub, run_gimnet, start_gimnet
+from support.processes import Hub, run_gimnet, start_gimnet, start_recv
 from support.waiting import wait_until
-from support.wire import FLAG_KEYED, FLAG_REPORT, GROUP, NS, OPENING, REPORT, UNICAST, WELCOME, Client, Closed, hello, number, text
+from support.wire import FLAG_FRAGMENT, FLAG_KEYED, FLAG_REPORT, GROUP, NS, OPENING, REPORT, UNICAST, WELCOME, Client, Closed, hello, number, text
 
 FULL = os.environ.get("GIMNET_STRESS") == "full"
 SECONDS = 60 if FULL else 5
@@ -134,6 +134,25 @@ class Witness:
                 raise AssertionError(f"a program lost its connection: it was reported with reason {got.payload[0]}")
             if got.flags == FLAG_KEYED and got.payload[12:17] == struct.pack("<IB", self._asked, GIMI_PONG):
                 waiting.discard(got.src)
+
+
+class NodesThatDoNotRead(unittest.TestCase):
+    def test_what_a_node_is_answered_and_does_not_read_holds_nobody_up(self):
+        hub = Hub(self, *(word for name in ("block_ms", "silent_ms", "slow_consumer_ms") for word in
+                          ("--limit", f"{name}=600000")))
+        recv = start_recv(self, hub, "R")
+        to = int(hub.wait_for_node("R")["id"].partition(".")[2]) | 7 << 20
+        hostile = Client(self, hub, receive_bytes=4096).join()
+        asking = bytes(8) + struct.pack("<IIBBHq", 1, 1, GIMI_PING, 0, 0, 0)
+        for number in range(0, 60_000, 1000):
+            # Each beginning of a message that is too large is refused, each ping answered.
+            hostile.send(b"".join(
+                hostile.frame(to, struct.pack("<III", number + i, 0, 1 << 30) + b"x", flags=FLAG_FRAGMENT) +
+                hostile.frame(to, asking, flags=FLAG_KEYED) for i in range(1000)))
+        lines = b"".join(b"line %d\n" % i for i in range(1000))
+        send = run_gimnet(hub, "send", "R", data=lines)
+        self.assertEqual(send.code, 0, send.err)
+        wait_until(lambda: recv.out == lines, "all lines")
 
 
 class HostileNodes(unittest.TestCase):

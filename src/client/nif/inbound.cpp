@@ -42,13 +42,17 @@ void Inbound::begin(const Session& session) {
   confirm_bytes_ =
       session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
   unconfirmed_bytes_ = 0;
-  if (session.resumed) return;
+  if (session.resumed) return tell_taken(assembler_.notices_again(std::nullopt));
   taken_ = 0;
   const MessageAssembler::Lost lost = assembler_.clear();
   counts_.messages_lost += lost.messages;
   if (lost.messages > 0) add_gap(0, lost.messages, proto::DropReason::cut_message);
-  for (const auto& notice : lost.notices) host_.send_taken(notice.to, notice.taken);
+  tell_taken(lost.notices);
   deliver();
+}
+
+void Inbound::tell_taken(const std::vector<MessageAssembler::Notice>& notices) {
+  for (const auto& notice : notices) host_.send_taken(notice.to, notice.taken);
 }
 
 std::span<std::byte> Inbound::space() {

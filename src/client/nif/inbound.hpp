@@ -45,6 +45,7 @@ class InboundHost {
   /// How the message with a fragment header began that the report is about, if that is known.
   [[nodiscard]] virtual std::optional<ReportedMessages::Start> message_of(
       const proto::Report& report) = 0;
+  /// It may not go now; tell_taken_again() brings it.
   virtual void send_taken(std::uint32_t to, const proto::Taken& taken) = 0;
   /// What a message of that group is tagged with; 0: it does not count in a window.
   [[nodiscard]] virtual std::uint32_t epoch_for(std::uint32_t group) = 0;
@@ -88,6 +89,9 @@ class Inbound {
   };
   /// `bytes` were written to space().
   [[nodiscard]] Verdict take(std::size_t bytes, const Arrival& arrival);
+
+  /// TAKENs to that node may go again, which the hub had paused.
+  void tell_taken_again(NodeId sender) { tell_taken(assembler_.notices_again(sender)); }
 
   /// Data frames of this epoch taken so far.
   [[nodiscard]] std::uint64_t taken() const { return taken_; }
@@ -136,6 +140,7 @@ class Inbound {
   void add_moved(const proto::ns::ServiceMoved& event, GroupId from, GroupId to);
   void add_subscriber(nif_incoming_type type, const proto::ns::SubscriberChange& change);
   void deliver();
+  void tell_taken(const std::vector<MessageAssembler::Notice>& notices);
 
   [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const {
     return dst == id_ ||

@@ -3,8 +3,8 @@
 namespace gimnet::nif {
 namespace {
 
-std::uint64_t window_key(const proto::FrameHeader& header, std::uint32_t message) {
-  return (static_cast<std::uint64_t>(header.src) << 32) | message;
+std::uint64_t window_key(std::uint32_t sender, std::uint32_t message) {
+  return (static_cast<std::uint64_t>(sender) << 32) | message;
 }
 
 /// Smaller ones are allowed as a whole before the first TAKEN, so nobody waits for one.
@@ -17,7 +17,7 @@ bool has_window(const proto::FrameView& view) {
 std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view,
                                                        std::uint32_t taken, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
-  const std::uint64_t key = window_key(view.header, fragment.message);
+  const std::uint64_t key = window_key(view.header.src, fragment.message);
   auto found = windows_.find(key);
   if (found == windows_.end()) {
     // Messages that ended without a word to this end leave their windows behind; those that go on
@@ -51,9 +51,24 @@ MessageAssembler::Step MessageAssembler::take(const proto::FrameView& view, std:
       step.notice = Notice{view.header.src, *taken};
     return step;
   }
-  windows_.erase(window_key(view.header, fragment.message));
+  windows_.erase(window_key(view.header.src, fragment.message));
   step.notice = Notice{view.header.src, proto::ReceiveWindow::refusal(fragment.message)};
   return step;
+}
+
+std::vector<MessageAssembler::Notice> MessageAssembler::notices_again(
+    std::optional<NodeId> sender) {
+  std::vector<Notice> notices;
+  for (const auto& standing : reassembler_.standings(sender)) {
+    const std::uint32_t to = standing.stream.src;
+    if (standing.stream.kind != proto::Kind::unicast) continue;
+    if (standing.lost) notices.push_back({to, proto::ReceiveWindow::refusal(*standing.lost)});
+    if (!standing.open) continue;
+    const auto found = windows_.find(window_key(to, standing.open->message));
+    if (found == windows_.end()) continue;
+    notices.push_back({to, found->second.progress.tell(standing.open->offset)});
+  }
+  return notices;
 }
 
 MessageAssembler::Lost MessageAssembler::clear() {

@@ -176,6 +176,8 @@ bool Node::on_flow(const proto::flow::Message& message) {
     outbound_.on_pause(pause->target);
   } else if (const auto* resume = std::get_if<proto::flow::Resume>(&message)) {
     outbound_.on_resume(resume->target);
+    if (resume->target.kind == proto::Kind::taken)
+      inbound_.tell_taken_again(NodeId{resume->target.dst});
   } else if (const auto* confirmed = std::get_if<proto::flow::Confirm>(&message)) {
     return outbound_.on_confirm(confirmed->count);
   }
@@ -277,7 +279,7 @@ void Node::send_taken(std::uint32_t to, const proto::Taken& taken) {
   parts.header.lane = static_cast<std::uint8_t>(proto::Lane::real_time);
   std::array<std::byte, proto::kHeaderSize + proto::kTakenSize> frame;
   static_cast<void>(proto::write_frame(parts, payload, frame));
-  outbound_.post_data(frame, parts.header.lane);
+  outbound_.post_data(frame);
 }
 
 void Node::set_last_error(std::string sentence) {

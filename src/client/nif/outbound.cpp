@@ -145,9 +145,11 @@ bool Outbound::post(const proto::flow::Message& message) {
   return post(std::span<const std::byte>(frame).first(size));
 }
 
-bool Outbound::post_data(std::span<const std::byte> frame, std::uint8_t lane) {
+bool Outbound::post_data(std::span<const std::byte> frame) {
   const MutexLock lock(mutex_);
-  if (state_ != State::connected || !put_frame(queue_.append(lane, frame.size()), frame))
+  const proto::FrameHeader header = proto::load_header(frame.data());
+  if (pauses_.is_paused(stream_code(header.kind, header.lane, header.dst))) return false;
+  if (state_ != State::connected || !put_frame(queue_.append(header.lane, frame.size()), frame))
     return false;
   count_appended(kBurstBytes);
   write_or_leave(false);

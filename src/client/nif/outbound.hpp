@@ -51,8 +51,9 @@ class Outbound {
   /// filled in here, where it cannot change on the way. False: not connected, or no memory.
   bool post(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
   bool post(const proto::flow::Message& message) GIMNET_EXCLUDES(mutex_);
-  /// A frame of a data kind that the library sends by itself; it does not wait for room.
-  bool post_data(std::span<const std::byte> frame, std::uint8_t lane) GIMNET_EXCLUDES(mutex_);
+  /// A frame of a data kind that the library sends by itself; it does not wait for room. False: the
+  /// hub paused its way, not connected, or no memory.
+  bool post_data(std::span<const std::byte> frame) GIMNET_EXCLUDES(mutex_);
   /// The own service of that name is retained and has this group now (0: none): its last message is
   /// kept, see LastMessages.
   void follow_retained(const std::string& service, std::uint32_t group) GIMNET_EXCLUDES(mutex_);

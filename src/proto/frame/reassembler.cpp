@@ -69,6 +69,18 @@ std::uint32_t Reassembler::clear() {
   return lost;
 }
 
+std::vector<Reassembler::Standing> Reassembler::standings(std::optional<NodeId> src) const {
+  std::vector<Standing> found;
+  for (const Entry& entry : entries_) {
+    if (src && entry.stream.src != src->value()) continue;
+    Standing& standing = found.emplace_back(Standing{entry.stream, std::nullopt, std::nullopt});
+    const auto taken = static_cast<std::uint32_t>(entry.bytes.size());
+    if (entry.open) standing.open = FragmentHeader{entry.message, taken, entry.total};
+    if (entry.has_lost) standing.lost = entry.lost_message;
+  }
+  return found;
+}
+
 /// The stream's entry, moved to the end of those that wait; where there are too many, the first one
 /// goes.
 Reassembler::Entry& Reassembler::touch(const FragmentStream& stream) {

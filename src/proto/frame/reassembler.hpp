@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
+#include <optional>
 #include <span>
 #include <unordered_map>
+#include <vector>
 
 #include "base/byte_buffer.hpp"
 #include "base/ids.hpp"
@@ -79,6 +81,15 @@ class Reassembler {
   std::uint32_t forget(NodeId src);
   /// The connection is new: everything unfinished is lost. Returns how many messages.
   std::uint32_t clear();
+
+  /// How far one stream is.
+  struct Standing {
+    FragmentStream stream;
+    std::optional<FragmentHeader> open;  ///< the unfinished message; `offset`: bytes taken so far
+    std::optional<std::uint32_t> lost;   ///< the number of the message that was lost last
+  };
+  /// Of all streams of that node; of nobody: of all nodes.
+  [[nodiscard]] std::vector<Standing> standings(std::optional<NodeId> src) const;
 
   [[nodiscard]] std::uint64_t waiting_bytes() const { return waiting_bytes_; }
   [[nodiscard]] std::size_t open_messages() const { return open_messages_; }

@@ -52,6 +52,32 @@ TEST(HostileNode, SendsFramesThatAreDroppedAndCounted) {
   }
 }
 
+// A node that does not read must not make its hub stop reading the one that answers it.
+TEST(HostileNode, IsToldNothingWhileTheHubHasPausedTheWay) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options(), make_welcome());
+  const proto::flow::Target way{proto::Kind::taken, proto::Lane::real_time, kPeerId};
+  const auto refused = [&](std::uint32_t number) {
+    proto::FrameParts parts = from_peer();
+    parts.fragment = proto::FragmentHeader{number, 0, NIF_MESSAGE_BYTES_MAX};
+    connected.hub.send(parts, "x");
+  };
+  const auto next_taken = [&] {
+    return proto::decode_taken(connected.hub.next_message()->view().payload);
+  };
+  refused(1);
+  EXPECT_EQ(next_taken(), proto::ReceiveWindow::refusal(1));
+  connected.hub.send(proto::flow::Pause{way});
+  refused(2);
+  refused(3);
+  connected.hub.send(proto::flow::Ping{1, 2});
+  const auto answer = connected.hub.next();
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->header.kind, proto::Kind::flow) << "the PONG, and no TAKEN before it";
+  connected.hub.send(proto::flow::Resume{way});
+  EXPECT_EQ(next_taken(), proto::ReceiveWindow::refusal(3));
+}
+
 TEST(HostileNode, PaysForTheBytesThatItsMessagesKeep) {
   constexpr std::size_t kRounds = 40;
   Receiving receiving;

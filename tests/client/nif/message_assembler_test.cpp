@@ -88,6 +88,21 @@ TEST(MessageAssembler, TellsTheSenderThatAMessageIsLost) {
   EXPECT_TRUE(step.notice->taken.refuses());
 }
 
+TEST(MessageAssembler, SaysAgainWhatSendersAreToKnow) {
+  MessageAssembler assembler({});
+  static_cast<void>(assembler.take(piece(1, 0, kLarge, "abc"), 1));
+  static_cast<void>(assembler.take(piece(1, 5, kLarge, "gap"), 1));
+  static_cast<void>(assembler.take(piece(2, 0, kLarge, "abcd"), 1));
+  const auto notices = assembler.notices_again(NodeId{kSender});
+  ASSERT_EQ(notices.size(), 2u);
+  EXPECT_EQ(notices[0].taken, proto::ReceiveWindow::refusal(1));
+  EXPECT_EQ(notices[1].taken.message, 2u);
+  EXPECT_EQ(notices[1].taken.taken, 4u);
+  EXPECT_GT(notices[1].taken.allowed, 4u);
+  EXPECT_TRUE(assembler.notices_again(NodeId{kSender + 1}).empty());
+  EXPECT_EQ(assembler.notices_again(std::nullopt).size(), 2u);
+}
+
 TEST(MessageAssembler, ClearingTellsTheSendersOfLargeMessages) {
   MessageAssembler assembler({});
   static_cast<void>(assembler.take(piece(4, 0, kLarge, "abc"), 1));

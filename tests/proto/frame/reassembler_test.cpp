@@ -172,6 +172,21 @@ TEST(Reassembler, ForgetsASource) {
   EXPECT_EQ(reassembler.waiting_bytes(), 0u);
 }
 
+TEST(Reassembler, SaysHowFarTheStreamsOfANodeAre) {
+  Reassembler reassembler;
+  const Bytes piece(10);
+  static_cast<void>(reassembler.take(stream_of(1), {4, 5, 100}, piece));  // no beginning came
+  static_cast<void>(reassembler.take(stream_of(1), {5, 0, 100}, piece));
+  static_cast<void>(reassembler.take(stream_of(2), {6, 0, 100}, piece));
+  const auto standings = reassembler.standings(NodeId{1});
+  ASSERT_EQ(standings.size(), 1u);
+  EXPECT_EQ(standings[0].stream, stream_of(1));
+  EXPECT_EQ(standings[0].open, (FragmentHeader{5, 10, 100}));
+  EXPECT_EQ(standings[0].lost, 4u);
+  EXPECT_EQ(reassembler.standings(std::nullopt).size(), 2u);
+  EXPECT_TRUE(reassembler.standings(NodeId{3}).empty());
+}
+
 TEST(Reassembler, GivesWhatWasCutHoweverStreamsInterleave) {
   std::mt19937 generator(7);  // NOLINT: the same every time
   const auto below = [&generator](std::uint32_t end) {
