@@ -14,15 +14,23 @@ bool has_window(const proto::FrameView& view) {
 
 }  // namespace
 
+void MessageAssembler::forget_ended() {
+  std::unordered_map<std::uint64_t, OpenMessage> open;
+  for (const auto& standing : reassembler_.standings(std::nullopt)) {
+    if (!standing.open) continue;
+    auto window = windows_.extract(window_key(standing.stream.src, standing.open->message));
+    if (!window.empty()) open.insert(std::move(window));
+  }
+  windows_.swap(open);
+}
+
 std::optional<proto::Taken> MessageAssembler::progress(const proto::FrameView& view,
                                                        std::uint32_t taken, std::int64_t now_ns) {
   const proto::FragmentHeader& fragment = *view.fragment;
   const std::uint64_t key = window_key(view.header.src, fragment.message);
   auto found = windows_.find(key);
   if (found == windows_.end()) {
-    // Messages that ended without a word to this end leave their windows behind; those that go on
-    // get theirs again.
-    if (windows_.size() >= limits_.streams_max) windows_.clear();
+    if (windows_.size() >= limits_.streams_max) forget_ended();
     found =
         windows_
             .emplace(key, OpenMessage{.progress = {fragment.message, fragment.total}, .tuning = {}})

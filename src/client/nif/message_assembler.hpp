@@ -60,6 +60,9 @@ class MessageAssembler {
   [[nodiscard]] std::optional<proto::Taken> progress(const proto::FrameView& view,
                                                      std::uint32_t taken, std::int64_t now_ns);
 
+  /// Messages that ended without a word to this end leave their windows behind.
+  void forget_ended();
+
   const proto::ReassemblyLimits limits_;
   proto::Reassembler reassembler_;
   std::unordered_map<std::uint64_t, OpenMessage> windows_;  ///< by sender and message number

@@ -123,5 +123,19 @@ TEST(MessageAssembler, WindowsOfHostileSendersAreBounded) {
   EXPECT_LE(assembler.clear().notices.size(), 8u);
 }
 
+TEST(MessageAssembler, MessagesThatEndCostOthersNoWindow) {
+  MessageAssembler assembler(
+      {.message_bytes_max = 64u << 20, .waiting_bytes_max = 64u << 20, .streams_max = 8});
+  const std::string quarter(proto::kWindowDefault / 4, 'x');
+  EXPECT_TRUE(assembler.take(piece(1, 0, kLarge, quarter), 1).notice);
+  for (std::uint32_t message = 1; message < 1000; ++message) {
+    auto beginning = piece(message, 0, kLarge, "x");
+    beginning.header.src = kSender + 1;
+    static_cast<void>(assembler.take(beginning, 1));
+  }
+  const auto offset = static_cast<std::uint32_t>(quarter.size());
+  EXPECT_FALSE(assembler.take(piece(1, offset, kLarge, "x"), 1).notice) << "it was told just now";
+}
+
 }  // namespace
 }  // namespace gimnet::nif::test
