@@ -46,4 +46,9 @@ AckBook::Entry AckBook::acknowledge(const StreamName& sender) {
   return found->second;
 }
 
+bool AckBook::hold(const StreamName& sender) {
+  const auto found = entries_.find(sender);
+  return found == entries_.end() || std::exchange(found->second.due, true);
+}
+
 }  // namespace gimnet::gimi

@@ -16,6 +16,8 @@ namespace {
 constexpr std::int64_t kTickNs = 50'000'000;
 /// When to try again where the hub had paused the way of an ACK.
 constexpr std::int64_t kRetryNs = 5'000'000;
+/// ACKs that wait for their way; whoever misses another one asks for it by a PING.
+constexpr std::size_t kPausedAcksMax = 1024;
 /// How long a node that leaves tries to get its last ACKs away.
 constexpr std::int64_t kLastAcksNs = 500'000'000;
 
@@ -121,13 +123,18 @@ void Clerk::run() {
 }
 
 void Clerk::send_due(std::vector<Due>& due) {
-  std::erase_if(due, [this](const Due& ack) {
+  std::size_t kept = 0;
+  std::erase_if(due, [this, &kept](const Due& ack) {
     AckBook::Entry taken;
     {
       const MutexLock lock(mutex_);
       taken = book_.acknowledge(ack.sender);
     }
-    return send_ack(ack.sender, ack.lane, taken, 0) != NIF_TIMEOUT;
+    if (send_ack(ack.sender, ack.lane, taken, 0) != NIF_TIMEOUT) return true;
+    const MutexLock lock(mutex_);
+    if (kept == kPausedAcksMax || book_.hold(ack.sender)) return true;
+    ++kept;
+    return false;
   });
 }
 

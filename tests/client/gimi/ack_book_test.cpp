@@ -81,6 +81,17 @@ TEST(AckBook, KeepsStreamsApart) {
   EXPECT_EQ(book.acknowledge(kSender).sequence, 7u);
 }
 
+TEST(AckBook, HoldsWhatCouldNotBeSent) {
+  AckBook book;
+  EXPECT_TRUE(book.take(kSender, data(7)));
+  EXPECT_EQ(book.acknowledge(kSender).sequence, 7u);
+  EXPECT_FALSE(book.hold(kSender));
+  EXPECT_FALSE(book.take(kSender, data(8))) << "it is due already";
+  EXPECT_EQ(book.acknowledge(kSender).sequence, 8u);
+  EXPECT_TRUE(book.take(kSender, data(9)));
+  EXPECT_TRUE(book.hold(kSender)) << "it became due anew meanwhile";
+}
+
 TEST(AckBook, IsBounded) {
   AckBook book;
   for (std::uint32_t peer = 1; peer <= AckBook::kStreamsMax; ++peer)

@@ -26,6 +26,12 @@ class ClerkTest : public Conversation {
     }
   }
 
+  void resume(std::uint32_t node) {
+    for (std::uint8_t lane = 0; lane < proto::kLaneCount; ++lane) {
+      hub_.send(proto::flow::Resume{{proto::Kind::unicast, static_cast<proto::Lane>(lane), node}});
+    }
+  }
+
   /// A DATA that asks for an ACK.
   void send_data(std::uint32_t from) {
     std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
@@ -51,6 +57,19 @@ TEST_F(ClerkTest, LooksAfterStreamsWhileAnAckWaitsForItsWay) {
   stream.send("is not acknowledged").or_throw();
   EXPECT_EQ(next().header.operation, Operation::data);
   EXPECT_EQ(next().header.operation, Operation::ping) << "asks for the ACK";
+}
+
+TEST_F(ClerkTest, AnAckThatWaitsForItsWayIsOne) {
+  pause(kSlow);
+  for (int i = 0; i < 5; ++i) {
+    send_data(kSlow);
+    send_data(kPeerId);
+    ASSERT_EQ(next().frame.dst, kPeerId) << "the ACK for the other one was tried before";
+  }
+  resume(kSlow);
+  EXPECT_EQ(next().frame.dst, kSlow);
+  send_data(kPeerId);
+  EXPECT_EQ(next().frame.dst, kPeerId);
 }
 
 }  // namespace
