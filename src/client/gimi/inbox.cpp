@@ -22,6 +22,7 @@ MessageQueue& Inbox::queue(MessageKey key, const QueueOptions* options) {
     const auto place = by_key_.find(key);
     if (place != by_key_.end()) {
       found = place->second;
+      std::erase(unasked_, found);
       if (options != nullptr) found->set(*options);
       news = news_of(*found);
     } else {
@@ -86,7 +87,11 @@ bool Inbox::put(MessageQueue& queue, Message& message, Receipt* receipt) {
 bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
   const MutexLock lock(mutex_);
   const auto place = by_key_.find(key);
-  if (place != by_key_.end()) return push(*place->second, message, receipt);
+  if (place != by_key_.end()) {
+    if (!push(*place->second, message, receipt)) return false;
+    bound_unasked();
+    return true;
+  }
   if (unasked_keys_ == kUnaskedKeysMax) {
     ++dropped_;
     return true;
@@ -95,7 +100,24 @@ bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
   MessageQueue& queue = queues_.emplace_back(
       *this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
   by_key_.emplace(key, &queue);
-  return push(queue, message, receipt);
+  unasked_.push_back(&queue);
+  static_cast<void>(push(queue, message, receipt));  // it refuses nothing
+  bound_unasked();
+  return true;
+}
+
+void Inbox::bound_unasked() {
+  std::size_t bytes = 0;
+  for (const MessageQueue* queue : unasked_) bytes += queue->bytes();
+  while (bytes > kUnaskedBytesMax) {
+    MessageQueue* oldest = nullptr;
+    for (MessageQueue* queue : unasked_) {
+      if (queue->empty() || queue->first_arrival() == arrivals_) continue;
+      if (oldest == nullptr || queue->first_arrival() < oldest->first_arrival()) oldest = queue;
+    }
+    if (oldest == nullptr) return;
+    bytes -= oldest->overwrite_oldest();
+  }
 }
 
 void Inbox::count_dropped() {

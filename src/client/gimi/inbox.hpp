@@ -6,6 +6,7 @@
 #include <list>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "client/gimi/ending.hpp"
@@ -31,6 +32,9 @@ class Inbox {
  public:
   /// Keys for which nobody asked that get a queue.
   static constexpr std::size_t kUnaskedKeysMax = 1024;
+  /// Bytes that wait in their queues together, as many as the largest message has by default: a
+  /// program that never looks there does not grow, whatever strangers send it.
+  static constexpr std::size_t kUnaskedBytesMax = std::size_t{64} << 20;
 
   /// Called without a lock. `more`: others wait in the same queue.
   using OnTaken = std::function<void(const TakenMessages& taken, bool more)>;
@@ -60,7 +64,8 @@ class Inbox {
   /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
   [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
-  /// As put() to the queue of the key; of too many keys it is dropped, and true.
+  /// As put() to the queue of the key; of too many keys it is dropped, and true. Where nobody asked
+  /// for the key, older messages of such keys may go for it.
   [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
@@ -88,6 +93,8 @@ class Inbox {
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
+  /// Overwrites the oldest messages beyond kUnaskedBytesMax; the newest one stays.
+  void bound_unasked() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
   /// What a change of a queue has to be told, without the lock.
   struct News {
@@ -111,6 +118,8 @@ class Inbox {
   std::list<MessageQueue> queues_ GIMNET_GUARDED_BY(mutex_);
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
   std::size_t unasked_keys_ GIMNET_GUARDED_BY(mutex_) = 0;
+  /// Of those keys, the ones for which still nobody asked. Limit: kUnaskedKeysMax
+  std::vector<MessageQueue*> unasked_ GIMNET_GUARDED_BY(mutex_);
   std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
   MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) =
       nullptr;  ///< at most one: nothing comes while one refuses

@@ -65,12 +65,16 @@ void MessageQueue::count_taken(const Message& message) {
 }
 
 void MessageQueue::make_room(std::size_t messages) {
-  while (entries_.size() > messages) {
-    bytes_ -= entries_.front().message.size();
-    count_taken(entries_.front().message);
-    entries_.pop_front();
-    ++overwritten_;
-  }
+  while (entries_.size() > messages) overwrite_oldest();
+}
+
+std::size_t MessageQueue::overwrite_oldest() {
+  const std::size_t bytes = entries_.front().message.size();
+  bytes_ -= bytes;
+  count_taken(entries_.front().message);
+  entries_.pop_front();
+  ++overwritten_;
+  return bytes;
 }
 
 }  // namespace gimnet::gimi

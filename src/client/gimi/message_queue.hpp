@@ -43,12 +43,15 @@ class MessageQueue {
   void push(Message message, std::uint64_t arrival);
   [[nodiscard]] std::optional<Message> pop();
   [[nodiscard]] std::optional<Message> pop_newest();
+  /// The oldest one counts as overwritten. Returns its bytes. REQUIRES: !empty().
+  std::size_t overwrite_oldest();
 
   /// What went out of it since the last call, popped or overwritten.
   [[nodiscard]] std::vector<TakenMessages> take_taken() { return std::exchange(taken_, {}); }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
   /// REQUIRES: !empty().
   [[nodiscard]] std::uint64_t first_arrival() const { return entries_.front().arrival; }
   [[nodiscard]] std::uint64_t received() const { return received_; }

@@ -168,5 +168,26 @@ TEST_F(InboxTest, DropsMessagesOfTooManyKeys) {
   EXPECT_EQ(inbox_.dropped(), 1u) << "one that is asked for has room";
 }
 
+TEST_F(InboxTest, BoundsTheBytesForWhichNobodyAsked) {
+  const std::string text(Inbox::kUnaskedBytesMax / 4, 'x');
+  const auto put_large = [&](std::uint32_t type) {
+    Message message = make_message(text, type, {type, 0});
+    EXPECT_TRUE(inbox_.put(MessageKey{type, 0}, message, nullptr));
+  };
+  const QueueOptions options;
+  inbox_.queue({100, 0}, &options);
+  put_large(100);
+  for (std::uint32_t type = 1; type <= 4; ++type) put_large(type);
+  EXPECT_TRUE(put({5, 0}));
+  for (const std::uint32_t type : {100, 2, 3, 4, 1}) {
+    EXPECT_EQ(inbox_.receive_any(kNoWait)->key().type, type == 1 ? 5 : type)
+        << "the oldest one went, not that of the key which was asked for";
+  }
+  const std::string huge(Inbox::kUnaskedBytesMax + 1, 'x');
+  Message message = make_message(huge, 1, {6, 0});
+  EXPECT_TRUE(inbox_.put(MessageKey{6, 0}, message, nullptr));
+  EXPECT_EQ(inbox_.receive_any(kNoWait)->size(), huge.size()) << "the newest one stays";
+}
+
 }  // namespace
 }  // namespace gimnet::gimi
