@@ -152,10 +152,10 @@ void BufferPool::recycle(Buffer& buffer) {
 
 void BufferPool::keep_or_free(Buffer& buffer) {
   if (buffer.kind == BufferKind::slab) {
-    if (free_slabs_.count < kFreeSlabsMax) return free_slabs_.push(buffer);
+    if (free_slabs_.count < free_slabs_max()) return free_slabs_.push(buffer);
   } else if (buffer.size_class != kUnpooled) {
     FreeList& list = free_chunks_[buffer.size_class];
-    if (list.count * buffer.capacity < kFreeChunkBytesMax) return list.push(buffer);
+    if (list.count * buffer.capacity < free_chunk_bytes_max()) return list.push(buffer);
   }
   free_buffer(&buffer);
 }
@@ -165,6 +165,14 @@ std::size_t BufferPool::kept_chunk_bytes() const {
   for (std::size_t i = 0; i < free_chunks_.size(); ++i)
     bytes += free_chunks_[i].count * chunk_bytes_[i];
   return bytes;
+}
+
+void BufferPool::free_kept() {
+  while (free_slabs_.count > free_slabs_max()) free_buffer(free_slabs_.pop());
+  for (std::size_t i = 0; i < free_chunks_.size(); ++i) {
+    FreeList& list = free_chunks_[i];
+    while (list.count * chunk_bytes_[i] > free_chunk_bytes_max()) free_buffer(list.pop());
+  }
 }
 
 void BufferPool::take_back_lent() {

@@ -55,6 +55,9 @@ class BufferPool {
   void recycle(Buffer& buffer);
   /// Now and then: keeps or frees what other shards have let go meanwhile.
   void take_back_lent();
+  /// While memory is scarce: frees kept buffers. Other sizes are used then, and these would stay
+  /// beside the budget.
+  void free_kept();
   /// Free here, and still read by other shards when last looked at.
   [[nodiscard]] std::size_t lent_buffers() const { return lent_.size(); }
   /// Bytes of free chunks that wait for their next use.
@@ -67,6 +70,9 @@ class BufferPool {
   /// again.
   static constexpr std::size_t kFreeSlabsMax = 64;
   static constexpr std::size_t kFreeChunkBytesMax = std::size_t{8} << 20;
+  /// While memory is scarce: enough for the reads of some turns.
+  static constexpr std::size_t kScarceSlabsMax = 4;
+  static constexpr std::size_t kScarceChunkBytesMax = std::size_t{256} << 10;
 
   struct FreeList {
     Buffer* head = nullptr;
@@ -78,6 +84,12 @@ class BufferPool {
   [[nodiscard]] Buffer* allocate(std::uint32_t capacity, BufferKind kind);
   static void free_buffer(Buffer* buffer);
   void keep_or_free(Buffer& buffer);
+  [[nodiscard]] std::size_t free_slabs_max() const {
+    return budget_.scarce() ? kScarceSlabsMax : kFreeSlabsMax;
+  }
+  [[nodiscard]] std::size_t free_chunk_bytes_max() const {
+    return budget_.scarce() ? kScarceChunkBytesMax : kFreeChunkBytesMax;
+  }
 
   const std::uint32_t slab_bytes_;
   const std::array<std::uint32_t, 5> chunk_bytes_;

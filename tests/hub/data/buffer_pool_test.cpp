@@ -112,6 +112,24 @@ TEST_F(BufferPoolTest, TakesBackWhatWasLent) {
   EXPECT_EQ(pool.lent_buffers(), 0u);
 }
 
+TEST_F(BufferPoolTest, KeepsLittleWhileMemoryIsScarce) {
+  const auto use_many = [&] {
+    std::vector<BufferRef> used;
+    for (int i = 0; i < 200; ++i) used.push_back(pool.take_chunk(4'000));
+  };
+  use_many();
+  EXPECT_GT(pool.kept_chunk_bytes(), 800'000u);
+  lease.take(60 << 20);
+  lease.begin_turn(0);
+  ASSERT_TRUE(lease.scarce());
+  pool.free_kept();
+  EXPECT_LE(pool.kept_chunk_bytes(), 256u * 1'024);
+  use_many();
+  EXPECT_LE(pool.kept_chunk_bytes(), 260u * 1'024);
+  EXPECT_GT(pool.kept_chunk_bytes(), 200u * 1'024) << "enough for some turns";
+  lease.give_back(60 << 20);
+}
+
 TEST_F(BufferPoolTest, KeepsChunksUpToTheLargestFrame) {
   for (const std::uint32_t bytes : {1'024u, 4'096u, 16'384u, 65'536u + 16}) {
     BufferRef chunk = pool.take_chunk(bytes);
