@@ -14,8 +14,13 @@ void Keeper::tick() {
   const std::uint64_t late_ms = state_.now_ms - next_tick_at_ms_;
   next_tick_at_ms_ = state_.now_ms + kTickMs;
   state_.pool.take_back_lent();
+  if (state_.budget.scarce()) state_.pool.free_kept();
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
-    if (connection == nullptr || !connection->connected) continue;
+    if (connection == nullptr) continue;
+    // Those who were paused for a share may go on once memory is not scarce; of an absent
+    // connection nothing else tells them.
+    connection->outbox.signal_room(state_.egress);
+    if (!connection->connected) continue;
     if (late_ms > kTickMs) forgive(*connection, late_ms);
     look_at(*connection);
   }
