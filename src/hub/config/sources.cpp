@@ -110,7 +110,7 @@ void read_one(const std::string& path, const ReadOptions& how, ReadConfiguration
   }
   // One more than is told, to know whether there are more.
   const std::size_t most = how.faults_max - std::min(how.faults_max, read.faults.size());
-  TomlFile toml = read_toml(file.text, path, most + 1);
+  TomlFile toml = read_toml(file.text, path);
   Faults faults = std::move(toml.faults);
   for (const Given& given : toml.keys) {
     if (faults.size() > most) break;

@@ -73,11 +73,11 @@ TEST_F(ReloaderTest, ABadFileChangesNothing) {
 TEST_F(ReloaderTest, OfManyFaultsSomeAreToldAndThatThereAreMore) {
   Reloader reloader = started();
   std::string text;
-  for (std::size_t i = 0; i < kReloadFaultsMax; ++i) text += "no TOML\n";
+  for (std::size_t i = 0; i < kReloadFaultsMax; ++i) text += "x" + std::to_string(i) + " = 1\n";
   write(text);
   EXPECT_THAT(reloader.read_again().faults, SizeIs(kReloadFaultsMax));
   EXPECT_FALSE(reloader.read_again().more_faults);
-  write(text + "no TOML\n");
+  write(text + "y = 1\n");
   const Reloading bad = reloader.read_again();
   EXPECT_THAT(bad.faults, SizeIs(kReloadFaultsMax));
   EXPECT_TRUE(bad.more_faults);
