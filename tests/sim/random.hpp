@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 
 #include "base/check.hpp"
 
@@ -11,9 +12,13 @@ namespace gimnet::sim {
 /// xoshiro256**, seeded by splitmix64 (Blackman and Vigna, https://prng.di.unimi.it). The
 /// distributions of the standard library are not used: they differ between libraries. Two draws
 /// never stand in one expression of which the order of evaluation is open. Thread safety: none.
+///
+/// A fuzzer may give `choices`: they are taken first, as few bytes for each draw as its bound
+/// needs, so that changing one byte changes one draw. Valid until: the generator ends.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) {
+  explicit Random(std::uint64_t seed, std::span<const std::uint8_t> choices = {})
+      : choices_(choices) {
     for (std::uint64_t& word : state_) {
       seed += 0x9E3779B97F4A7C15u;
       std::uint64_t z = seed;
@@ -37,7 +42,7 @@ class Random {
   /// 0..bound-1. The bias of the remainder does not matter here.
   std::uint64_t below(std::uint64_t bound) {
     GIMNET_CHECK(bound > 0);
-    return next() % bound;
+    return (choices_.empty() ? next() : chosen(bound)) % bound;
   }
   /// least..most, both included.
   std::uint64_t between(std::uint64_t least, std::uint64_t most) {
@@ -51,7 +56,17 @@ class Random {
   }
 
  private:
+  std::uint64_t chosen(std::uint64_t bound) {
+    std::uint64_t value = 0;
+    for (int shift = 0; shift < 64 && (bound - 1) >> shift != 0 && !choices_.empty(); shift += 8) {
+      value |= std::uint64_t{choices_.front()} << shift;
+      choices_ = choices_.subspan(1);
+    }
+    return value;
+  }
+
   std::array<std::uint64_t, 4> state_{};
+  std::span<const std::uint8_t> choices_;
 };
 
 }  // namespace gimnet::sim

@@ -14,8 +14,8 @@ namespace gimnet::sim {
 /// What all parts of a world share. Thread safety: none. Lifetime: the world's.
 struct Setting {
   /// `without`: what is taken out of what the seed drew.
-  Setting(std::uint64_t seed, std::size_t nodes, const Faults& without, bool print)
-      : random(seed), plan(draw(random, nodes, without)), trace(agenda, print) {}
+  Setting(const Random& source, std::size_t nodes, const Faults& without, bool print)
+      : random(source), plan(draw(random, nodes, without)), trace(agenda, print) {}
 
   Random random;
   const Plan plan;

@@ -10,7 +10,8 @@ using namespace std::chrono_literals;
 
 World::World(const Options& options)
     : options_(options),
-      setting_(options.seed, options.nodes, options.without, options.print),
+      setting_(Random(options.seed, options.choices), options.nodes, options.without,
+               options.print),
       network_(setting_) {
   network_.connect({[this](Wire& wire) { life_->shards().has_something(wire); },
                     [this](const WirePointer& wire, const Bytes& frame) {

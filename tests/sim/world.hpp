@@ -31,6 +31,8 @@ class World {
     std::size_t nodes = 200;
     Faults without;      ///< faults that are left out, though the seed drew them
     bool print = false;  ///< every event, as it happens
+    std::span<const std::uint8_t> choices{};  ///< of a fuzzer, taken before the seed's. Valid
+                                              ///< until: the world ends
   };
   explicit World(const Options& options);
   World(const World&) = delete;
