@@ -199,7 +199,8 @@ void Outbox::put_control(std::span<const std::byte> frame, EgressContext& contex
 
 void Outbox::settle(EgressContext& context) {
   const bool begins = !std::exchange(backlog_, true);
-  note_waiting(context);
+  // Once it waits it does so until it is emptied.
+  if (!waits_) note_waiting(context);
   if (!lanes_) return;
   lanes_->open.close();
   if (begins) replace_latest(context);
