@@ -123,6 +123,7 @@ class LongRun : public ::testing::Test {
       auto sent = std::exchange(hub_.shards.sent, {});
       for (const FakeShards::Sent& each : sent) again = react(each) || again;
       hub_.kept.clear();
+      hub_.shards.told.clear();
     }
     if (const auto due = hub_.conductor.next_deadline(); due && *due <= hub_.now)
       hub_.conductor.tick(hub_.now);
