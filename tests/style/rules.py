@@ -23,7 +23,7 @@ UNTESTED_MAX = 12
 PLANTED_TABLE = "tests/planted/bugs.toml"
 REQUIREMENTS = "docs/requirements.md"
 
-# Who may include whom: the table of docs/architecture.md, "May include". Longest prefix wins.
+# Who may include whom: the table of docs/architecture.md, "Include rules". Longest prefix wins.
 _BASE = ("base",)
 _PROTO = _BASE + ("proto",)
 _HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/session_gauges.hpp")

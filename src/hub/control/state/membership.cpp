@@ -232,7 +232,7 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
     if (due.index == former && due.generation == session.place.generation) due.index = index;
   }
   // The new id leads to the node before the old one says that it moved. Its groups may be published
-  // at any time: what is sent to them goes by places (docs/architecture.md, "Another id").
+  // at any time: what is sent to them goes by places.
   effects.emplace_back(NodeChanged{index});
   effects.emplace_back(NodeChanged{former});
   // Who hears of the new id may send to it at once: by then no frame goes to the connection on
