@@ -188,7 +188,7 @@ Work topics(std::size_t count) {
 /// Tokens of which so many bytes of the MAC are right, and the next one is wrong.
 Work wrong_tokens(std::size_t count) {
   const Secret secret{};
-  const TokenHolder holder{HubId{7}, "robot", "open"};
+  const TokenHolder holder{HubId{7}, "robot", Identity::open()};
   auto token = std::make_shared<std::vector<std::byte>>(
       write_token({1, 2, milliseconds{3}}, holder, secret));
   constexpr std::size_t kMacBytes = 32;

@@ -121,10 +121,11 @@ void HubLife::trace_sent() {
   }
 }
 
-hub::PeerInfo HubLife::peer_of(const std::string& identity, std::uint32_t node,
+hub::PeerInfo HubLife::peer_of(const hub::Identity& identity, std::uint32_t node,
                                std::uint64_t wire) {
   constexpr std::uint32_t kOverLoopback = 10;
-  if (identity != "open") return {"unix", "pid " + std::to_string(wire + 1) + " " + identity};
+  if (identity.is_user())
+    return {"unix", "pid " + std::to_string(wire + 1) + " " + identity.text()};
   const bool loopback = node % kOverLoopback == 0;
   return {"tcp", (loopback ? "127.0.0.1:" : "10.0.0.1:") + std::to_string(wire)};
 }
@@ -136,10 +137,10 @@ std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint
   const milliseconds now = setting_.agenda.now_ms();
   shards_.forget_sent();
   stranger.identity = newcomer.identity;
-  stranger.may_administer = newcomer.identity == kAdministrator;
+  stranger.rights.administer = newcomer.identity == kAdministrator;
   const std::int64_t wall = wall_ns(setting_);
   const auto refusal = conductor_.admit(stranger, newcomer.hello, {now, wall});
-  const Model::Hello hello{newcomer.hello,    stranger.may_administer,        stranger.peer.address,
+  const Model::Hello hello{newcomer.hello,    stranger.rights.administer,     stranger.peer.address,
                            newcomer.identity, milliseconds{wall / 1'000'000}, number};
   trace_sent();
   if (refusal) {

@@ -28,10 +28,10 @@ class HubLife {
   struct Newcomer {
     WirePointer wire;
     proto::Hello hello;
-    std::string identity;
+    hub::Identity identity;
   };
   /// Where a program comes from: users over a Unix socket, and most others from one machine.
-  [[nodiscard]] static hub::PeerInfo peer_of(const std::string& identity, std::uint32_t node,
+  [[nodiscard]] static hub::PeerInfo peer_of(const hub::Identity& identity, std::uint32_t node,
                                              std::uint64_t wire);
   /// Returns why it is refused. `number` is for the session, if it is a new one.
   [[nodiscard]] std::optional<proto::Goodbye> admit(const Newcomer& newcomer, std::uint64_t number);

@@ -46,7 +46,7 @@ struct GivenToken {
   std::uint32_t index = 0;
   std::uint64_t number = 0;  ///< Model::Session::token_number
   std::string name;
-  std::string identity;
+  hub::Identity identity;
   milliseconds expiry{};  ///< since 1970
 };
 
@@ -116,7 +116,7 @@ class Model final : public Witness {
     std::string crowd;       ///< as of crowd_of()
     bool resumes = false;    ///< asked for it, the last time
     std::string token_name;  ///< for which its last token was given
-    std::string identity;
+    hub::Identity identity;
     milliseconds token_expiry{};  ///< since 1970
     std::set<std::uint32_t> watches;
     milliseconds joined{};
@@ -167,7 +167,7 @@ class Model final : public Witness {
     const proto::Hello& hello;
     bool may_administer = false;
     std::string place;
-    std::string identity;
+    hub::Identity identity;
     milliseconds wall{};
     std::uint64_t new_session = 0;  ///< the number of the session, if it is a new one
   };

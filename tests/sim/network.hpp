@@ -7,13 +7,14 @@
 #include <memory>
 #include <vector>
 
+#include "hub/control/state/identity.hpp"
 #include "hub/transport/transport.hpp"
 #include "tests/sim/setting.hpp"
 
 namespace gimnet::sim {
 
 /// Who may administer the hub, as the system tells it.
-inline constexpr const char* kAdministrator = "uid 0";
+inline constexpr hub::Identity kAdministrator = hub::Identity::of_user(0);
 
 using Bytes = std::vector<std::byte>;
 

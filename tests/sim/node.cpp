@@ -30,7 +30,7 @@ SimNode::SimNode(const Around& around, std::uint32_t number) : around_(around), 
   wish_ = nameless ? std::string{} : name;
   slow_ = random.chance(plan.slow_reader);
   resumes_ = random.chance(plan.waits_away);
-  identity_ = random.chance(500) ? "open" : "uid " + std::to_string(number + 1);
+  identity_ = random.chance(500) ? hub::Identity::open() : hub::Identity::of_user(number + 1);
   administers_ = number % kAdministrators == 1;
   if (administers_) identity_ = kAdministrator;
 }
@@ -224,14 +224,14 @@ void SimNode::dial() {
   links_[wire_->number].wire = wire_;
   links_[wire_->number].dialled = around_.setting.agenda.now();
   ++dials_;
-  std::string identity = identity_;
+  hub::Identity identity = identity_;
   const proto::Hello said = hello(identity);
   around_.setting.trace.note("node {a} dials, wire {b}, {c} bytes of token, as: {t}", number_,
                              wire_->number, said.token.size(), said.name);
   around_.say_hello(wire_, said, identity);
 }
 
-proto::Hello SimNode::hello(std::string& identity) {
+proto::Hello SimNode::hello(hub::Identity& identity) {
   Random& random = around_.setting.random;
   proto::Hello hello;
   hello.name = wish_;
@@ -250,13 +250,13 @@ proto::Hello SimNode::hello(std::string& identity) {
   return hello;
 }
 
-void SimNode::spoil_token(proto::Hello& hello, std::string& identity) {
+void SimNode::spoil_token(proto::Hello& hello, hub::Identity& identity) {
   Setting& setting = around_.setting;
   const std::uint64_t how = setting.random.below(3);
   if (how == 0 && !old_token_.empty()) {
     hello.token = old_token_;
   } else if (how == 1) {
-    identity = "uid 999999";
+    identity = hub::Identity::of_user(999'999);
   } else {
     setting.census.add(Happening::token_altered);
     const std::uint64_t bit = setting.random.below(8 * hello.token.size());

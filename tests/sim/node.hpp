@@ -25,7 +25,7 @@ class SimNode {
   struct Around {
     Setting& setting;
     Network& network;
-    std::function<void(const WirePointer&, const proto::Hello&, const std::string& identity)>
+    std::function<void(const WirePointer&, const proto::Hello&, const hub::Identity& identity)>
         say_hello;
     std::function<void(const WirePointer&, bool mute)> set_mute;
   };
@@ -40,7 +40,7 @@ class SimNode {
 
   [[nodiscard]] std::uint32_t number() const { return number_; }
   [[nodiscard]] bool is_slow() const { return slow_; }
-  [[nodiscard]] const std::string& identity() const { return identity_; }
+  [[nodiscard]] const hub::Identity& identity() const { return identity_; }
   [[nodiscard]] bool is_up() const { return wire_ != nullptr && link().welcomed; }
   [[nodiscard]] bool waits_for_answers() const { return wire_ != nullptr && !link().open.empty(); }
   /// Why the hub did not let it in last.
@@ -111,8 +111,8 @@ class SimNode {
   void act_later();
   void act();
   void dial();
-  [[nodiscard]] proto::Hello hello(std::string& identity);
-  void spoil_token(proto::Hello& hello, std::string& identity);
+  [[nodiscard]] proto::Hello hello(hub::Identity& identity);
+  void spoil_token(proto::Hello& hello, hub::Identity& identity);
   void spoil_proof(proto::ns::Advertise& offer);
   bool break_something();
   void fall(bool unseen);
@@ -183,7 +183,7 @@ class SimNode {
   bool slow_ = false;
   bool resumes_ = false;
   bool administers_ = false;
-  std::string identity_;  ///< as the system tells the hub
+  hub::Identity identity_;  ///< as the system tells the hub
   // Of its session
   std::vector<std::byte> token_;
   std::vector<std::byte> old_token_;  ///< of a session before

@@ -21,7 +21,7 @@ World::World(const Options& options)
   begin_life(make_disk());
   const SimNode::Around around{
       setting_, network_,
-      [this](const WirePointer& wire, const proto::Hello& hello, const std::string& identity) {
+      [this](const WirePointer& wire, const proto::Hello& hello, const hub::Identity& identity) {
         say_hello(wire, hello, identity);
       },
       [this](const WirePointer& wire, bool mute) { life_->shards().set_mute(wire, mute); }};
@@ -181,7 +181,7 @@ void World::look_at_drain() {
 }
 
 void World::say_hello(const WirePointer& wire, const proto::Hello& hello,
-                      const std::string& identity) {
+                      const hub::Identity& identity) {
   setting_.agenda.at(network_.arrival(wire->next_at_hub),
                      [this, wire, hello, identity, life = lives_] {
                        if (life != lives_ || down_) return network_.close_by_hub(wire);

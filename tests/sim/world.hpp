@@ -57,7 +57,7 @@ class World {
   /// What the conductor's loop does after events: begins to drain, or ends
   /// (hub/control/conductor_loop.cpp).
   void look_at_drain();
-  void say_hello(const WirePointer& wire, const proto::Hello& hello, const std::string& identity);
+  void say_hello(const WirePointer& wire, const proto::Hello& hello, const hub::Identity& identity);
   void want_conductor(Time delay);
   /// One thing that the conductor does, out of those that wait for it.
   void conductor_turn();

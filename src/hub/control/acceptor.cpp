@@ -81,7 +81,7 @@ Stranger Acceptor::stranger(int descriptor) const {
   Stranger result;
   if (listener_->url().scheme == ListenUrl::Scheme::tcp) {
     result.peer = PeerInfo{"tcp", tcp_peer(descriptor)};
-    result.identity = "open";
+    result.identity = Identity::open();
     result.transport =
         std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::tcp, limits_);
     return result;
@@ -89,12 +89,11 @@ Stranger Acceptor::stranger(int descriptor) const {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   result.peer = PeerInfo{"unix", "unknown"};
-  result.identity = "unknown";
   if (::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
     result.peer.address =
         "pid " + std::to_string(credentials.pid) + " uid " + std::to_string(credentials.uid);
-    result.identity = "uid " + std::to_string(credentials.uid);
-    result.may_administer = credentials.uid == 0 || credentials.uid == ::geteuid();
+    result.identity = Identity::of_user(credentials.uid);
+    result.rights.administer = credentials.uid == 0 || credentials.uid == ::geteuid();
   }
   result.transport =
       std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::unix_socket, limits_);
@@ -126,7 +125,7 @@ Acceptor::Shortage Acceptor::accept_with_spare(const std::function<void(Stranger
 
 bool Acceptor::find_room(Stranger& peer) {
   Room room = make_room_(peer);
-  if (room == Room::none && peer.may_administer && reserve_.give_up_one()) room = Room::reserved;
+  if (room == Room::none && peer.rights.administer && reserve_.give_up_one()) room = Room::reserved;
   peer.on_reserve = room == Room::reserved;
   return room != Room::none;
 }

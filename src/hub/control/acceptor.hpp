@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string>
 
 #include "hub/control/descriptor_reserve.hpp"
 #include "hub/control/listener.hpp"
+#include "hub/control/state/identity.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
 #include "hub/transport/transport.hpp"
@@ -17,9 +17,8 @@ namespace gimnet::hub {
 struct Stranger {
   std::unique_ptr<Transport> transport;
   PeerInfo peer;
-  std::string identity;  ///< who it is, as far as the system tells: "uid 1000" over a Unix socket,
-                         ///< "open" over TCP
-  bool may_administer = false;  ///< root or the hub's own user, over a Unix socket
+  Identity identity;
+  Rights rights;
   bool on_reserve =
       false;  ///< has a descriptor that is kept for administrators: nobody else may stay
 };

@@ -89,10 +89,10 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   request.shard_hint = hello.shard;
   request.origin = Origin{stranger.peer.transport, stranger.peer.address};
   // Root and the hub's own user need no bound: they can end the hub.
-  if (!stranger.may_administer)
+  if (!stranger.rights.administer)
     request.crowd = crowd_of(stranger.peer.transport, stranger.peer.address);
   request.resumes = hello.resume;
-  request.may_administer = stranger.may_administer;
+  request.rights = stranger.rights;
   request.identity = stranger.identity;
   request.wall = milliseconds{moment.wall_ns / 1'000'000};
   Effects effects;

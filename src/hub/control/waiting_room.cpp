@@ -201,13 +201,13 @@ std::optional<Goodbye> WaitingRoom::refusal(Peer& peer) const {
 }
 
 Acceptor::Room WaitingRoom::give_way_to(const Stranger& newcomer) {
-  const bool for_administrator = newcomer.may_administer;
+  const bool for_administrator = newcomer.rights.administer;
   auto gone = std::ranges::find_if(
       leaving_, [&](const Peer& peer) { return for_administrator || !peer.stranger.on_reserve; });
   const bool told = gone != leaving_.end();
   if (!told) {
     gone = std::ranges::find_if(waiting_,
-                                [](const Peer& peer) { return !peer.stranger.may_administer; });
+                                [](const Peer& peer) { return !peer.stranger.rights.administer; });
     if (gone == waiting_.end() && for_administrator) gone = waiting_.begin();
     if (gone == waiting_.end()) return Acceptor::Room::none;
     const Goodbye goodbye{

@@ -79,7 +79,8 @@ TEST_F(AcceptorTest, KnowsTcpPeersByAddress) {
   ASSERT_EQ(strangers_.size(), 1u);
   EXPECT_EQ(strangers_[0].peer.transport, "tcp");
   EXPECT_THAT(strangers_[0].peer.address, StartsWith("127.0.0.1:"));
-  EXPECT_FALSE(strangers_[0].may_administer);
+  EXPECT_EQ(strangers_[0].identity, Identity::open());
+  EXPECT_FALSE(strangers_[0].rights.administer);
 }
 
 TEST_F(AcceptorTest, KnowsUnixPeersByTheKernelsWord) {
@@ -90,7 +91,8 @@ TEST_F(AcceptorTest, KnowsUnixPeersByTheKernelsWord) {
   EXPECT_EQ(strangers_[0].peer.transport, "unix");
   EXPECT_EQ(strangers_[0].peer.address,
             "pid " + std::to_string(::getpid()) + " uid " + std::to_string(::getuid()));
-  EXPECT_TRUE(strangers_[0].may_administer);
+  EXPECT_EQ(strangers_[0].identity, Identity::of_user(::getuid()));
+  EXPECT_TRUE(strangers_[0].rights.administer);
 }
 
 TEST_F(AcceptorTest, TakesABatchAndComesBackForTheRest) {
@@ -209,7 +211,7 @@ TEST_F(AcceptorTest, WhoGetsAnAdministratorsDescriptorIsOnTheReserve) {
   {
     NoDescriptors none;
     make_room_ = [&](const Stranger& newcomer) {
-      EXPECT_TRUE(newcomer.may_administer);
+      EXPECT_TRUE(newcomer.rights.administer);
       none.free_one();
       return Acceptor::Room::reserved;
     };

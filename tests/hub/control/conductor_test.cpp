@@ -345,7 +345,7 @@ TEST_F(ConductorTest, ATokenIsForItsIdentityOnly) {
   proto::Hello hello;
   hello.name = "robot";
   hello.token = robot.welcome.token;
-  identity = "uid 7";
+  identity = Identity::of_user(7);
   EXPECT_NE(join(hello).id, robot.id);
 }
 

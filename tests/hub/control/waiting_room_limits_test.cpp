@@ -175,7 +175,7 @@ TEST_F(WaitingRoomTest, WithoutDescriptorsAdministratorsMakeWayForTheirLikeOnly)
   const Stranger newcomer;
   EXPECT_EQ(room_.give_way_to(newcomer), Acceptor::Room::none);
   Stranger administrator;
-  administrator.may_administer = true;
+  administrator.rights.administer = true;
   EXPECT_EQ(room_.give_way_to(administrator), Acceptor::Room::reserved);
   EXPECT_EQ(room_.leaving(), 0u);
   enter();

@@ -20,7 +20,7 @@ void require(bool condition) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto input = std::as_bytes(std::span{data, size});
-  const TokenHolder holder{gimnet::HubId{7}, "robot1/base", "uid 1000"};
+  const TokenHolder holder{gimnet::HubId{7}, "robot1/base", Identity::of_user(1000)};
   Secret secret;
   secret.fill(std::byte{0x42});
   const SessionToken said{17, first_number(3) + 5, std::chrono::milliseconds{1'700'000'000'000}};

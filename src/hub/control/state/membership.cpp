@@ -297,13 +297,13 @@ std::optional<proto::Goodbye> Membership::check(const JoinRequest& request) cons
     return proto::Goodbye{GoodbyeCode::not_allowed,
                           "this hub takes no links from other hubs; connect as a node"};
   }
-  if (request.role == proto::Role::admin && !request.may_administer) {
+  if (request.role == proto::Role::admin && !request.rights.administer) {
     // By another way it would not be told apart from nobody, by this one it is told as whom it
     // came.
-    if (request.identity.starts_with("uid ")) {
+    if (request.identity.is_user()) {
       return proto::Goodbye{GoodbyeCode::not_allowed,
                             "only root and the user that runs the hub administer it, and this is " +
-                                request.identity + "; run the command as one of them"};
+                                request.identity.text() + "; run the command as one of them"};
     }
     return proto::Goodbye{GoodbyeCode::not_allowed,
                           "administrators connect over the hub's Unix socket, as root or as the "

@@ -11,6 +11,7 @@
 #include "hub/control/state/due_list.hpp"
 #include "hub/control/state/durable.hpp"
 #include "hub/control/state/effects.hpp"
+#include "hub/control/state/identity.hpp"
 #include "hub/control/state/services.hpp"
 #include "hub/control/state/sessions.hpp"
 
@@ -21,13 +22,13 @@ struct JoinRequest {
   proto::Role role{};
   std::string name;                  ///< "": none, or the one that the session has
   std::span<const std::byte> token;  ///< empty: none
-  std::string identity;  ///< who the peer is, as its connection tells: "uid 1000", "open"
+  Identity identity;                 ///< who the peer is, as its connection proves it
+  Rights rights;                     ///< of the peer
   std::string description;
   std::optional<std::uint16_t> shard_hint;
   Origin origin;
-  std::string crowd;            ///< that the peer counts in: its address, or its user; "": none
-  bool resumes = false;         ///< it asks for resume
-  bool may_administer = false;  ///< the peer is root or the hub's own user, told by the kernel
+  std::string crowd;     ///< that the peer counts in: its address, or its user; "": none
+  bool resumes = false;  ///< it asks for resume
   std::chrono::milliseconds wall{};  ///< since 1970: tokens expire by it
 };
 

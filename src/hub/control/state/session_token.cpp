@@ -23,7 +23,7 @@ constexpr std::string_view kPurpose = "GIMnet session token";
 
 Digest mac_of(std::span<const std::byte> clear, const TokenHolder& holder, const Secret& secret) {
   MacText text(kPurpose);
-  text.add_number(holder.hub.value()).add(holder.name).add(holder.identity).add_bytes(clear);
+  text.add_number(holder.hub.value()).add(holder.name).add(holder.identity.text()).add_bytes(clear);
   return hmac_sha256(secret, text.bytes());
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/ids.hpp"
+#include "hub/control/state/identity.hpp"
 #include "hub/crypto/hmac.hpp"
 
 // What a node shows to get its session back: docs/protocol.md, section 3. The layout is the hub's
@@ -34,8 +35,8 @@ struct SessionToken {
 /// For whom a token is good. Its MAC covers this beside what it says; it is not in the token.
 struct TokenHolder {
   HubId hub;
-  std::string_view name;      ///< "": a node without one
-  std::string_view identity;  ///< who the peer is, told by its connection: "uid 1000", "open"
+  std::string_view name;  ///< "": a node without one
+  Identity identity;      ///< who the peer is, as its connection proves it
 };
 
 inline constexpr std::size_t kSessionTokenBytes = 56;

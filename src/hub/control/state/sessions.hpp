@@ -17,6 +17,7 @@
 #include "base/token_bucket.hpp"
 #include "hub/control/state/crowds.hpp"
 #include "hub/control/state/due_list.hpp"
+#include "hub/control/state/identity.hpp"
 #include "hub/control/state/index_pool.hpp"
 #include "hub/control/state/number_floor.hpp"
 #include "hub/control/state/place.hpp"
@@ -54,7 +55,7 @@ struct Session {
   bool resumes = false;     ///< its latest HELLO asked for resume
   CompactText name;         ///< "" for a node without one
   CompactText description;
-  CompactText identity;                      ///< who its peer is; nobody else can claim it
+  Identity identity;                         ///< who its peer is; nobody else can claim it
   CompactText token_name;                    ///< for which its latest token was written
   Origin origin;                             ///< of the latest connection
   Crowds::Entry* crowd = nullptr;            ///< in which it counts; null: in none
@@ -113,7 +114,7 @@ class Sessions {
   struct Presented {
     std::span<const std::byte> token;
     std::string_view name;             ///< that HELLO asks for
-    std::string_view identity;         ///< as the connection tells it
+    Identity identity;                 ///< as the connection proves it
     std::chrono::milliseconds wall{};  ///< since 1970
   };
   /// What a token is good for. Neither member set: it counts as none.

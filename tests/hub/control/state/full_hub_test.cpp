@@ -21,7 +21,7 @@ class FullHub : public ::testing::Test {
   Session* join_as_administrator(std::chrono::milliseconds now = 1s) {
     JoinRequest wanted = request("");
     wanted.role = proto::Role::admin;
-    wanted.may_administer = true;
+    wanted.rights.administer = true;
     const auto joined = membership_.join(wanted, now, effects_);
     return joined ? joined->session : nullptr;
   }
@@ -47,7 +47,7 @@ class FullHub : public ::testing::Test {
     JoinRequest result;
     result.name = name;
     result.origin = Origin{"tcp", "127.0.0.1:1"};
-    result.identity = "open";
+    result.identity = Identity::open();
     return result;
   }
 };

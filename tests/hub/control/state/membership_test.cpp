@@ -19,7 +19,7 @@ class MembershipTest : public ::testing::Test {
     JoinRequest result;
     result.name = name;
     result.origin = Origin{"tcp", "127.0.0.1:1"};
-    result.identity = "open";
+    result.identity = Identity::open();
     return result;
   }
   Session* join(const std::string& name, std::chrono::milliseconds now = 0ms) {
@@ -253,12 +253,12 @@ TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
   JoinRequest admin = request("");
   admin.role = proto::Role::admin;
   EXPECT_EQ(refused(admin), GoodbyeCode::not_allowed);
-  admin.identity = "uid 1000";
+  admin.identity = Identity::of_user(1000);
   const auto by_socket = membership_.join(admin, 0ms, effects_);
   ASSERT_FALSE(by_socket);
   EXPECT_THAT(by_socket.error().sentence,
               ::testing::HasSubstr("this is uid 1000; run the command as one of them"));
-  admin.may_administer = true;
+  admin.rights.administer = true;
   EXPECT_EQ(refused(admin), GoodbyeCode::done);
   JoinRequest unknown = request("");
   unknown.role = static_cast<proto::Role>(9);

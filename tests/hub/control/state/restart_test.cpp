@@ -39,7 +39,7 @@ class RestartTest : public ::testing::Test {
                    std::span<const std::byte> token = {}) {
     JoinRequest request;
     request.name = name;
-    request.identity = "open";
+    request.identity = Identity::open();
     request.token = token;
     Effects effects;
     const auto joined = hub.join(request, 0ms, effects);
@@ -163,7 +163,7 @@ TEST_F(RestartTest, AnotherNameAnotherIdentityOrAnotherHubIsNotHonoured) {
   EXPECT_NE(join(*after, "L", k.second).first, k.first);
   JoinRequest request;
   request.name = "K";
-  request.identity = "uid 1000";
+  request.identity = Identity::of_user(1000);
   request.token = k.second;
   Effects effects;
   EXPECT_NE((*after->join(request, 0ms, effects)).session->index, k.first);

@@ -18,13 +18,13 @@ class SessionsTest : public ::testing::Test {
   Session& create(std::chrono::milliseconds now = 0ms) {
     const auto created = sessions_.create(std::nullopt, now);
     EXPECT_TRUE(created);
-    (*created)->identity = "open";
+    (*created)->identity = Identity::open();
     sessions_.renew_token(**created, 0ms);
     sessions_.attach(**created, now);
     return **created;
   }
 
-  Session* claim(std::span<const std::byte> token, std::string_view identity = "open",
+  Session* claim(std::span<const std::byte> token, Identity identity = Identity::open(),
                  std::chrono::milliseconds wall = 0ms) {
     return sessions_.claim({token, "", identity, wall}).session;
   }
@@ -110,32 +110,32 @@ TEST_F(SessionsTest, WhateverIsWrongWithATokenTheAnswerIsTheSame) {
   }
   const std::vector<std::byte> right = sessions_.token_of(gone);
   sessions_.end(gone, 0ms);
-  ASSERT_TRUE(sessions_.claim({right, "", "open", 0ms}).token);
+  ASSERT_TRUE(sessions_.claim({right, "", Identity::open(), 0ms}).token);
   const auto is_nothing = [](const Sessions::Claim& claim) {
     return claim.session == nullptr && !claim.token;
   };
   for (const std::vector<std::byte>& token : wrong) {
     for (const std::chrono::milliseconds wall : {0ms, expired}) {
-      EXPECT_TRUE(is_nothing(sessions_.claim({token, "", "open", wall}))) << token.size();
+      EXPECT_TRUE(is_nothing(sessions_.claim({token, "", Identity::open(), wall}))) << token.size();
     }
   }
-  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", "open", expired})));
-  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", "uid 1000", 0ms})));
-  EXPECT_TRUE(is_nothing(sessions_.claim({right, "another name", "open", 0ms})));
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", Identity::open(), expired})));
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "", Identity::of_user(1000), 0ms})));
+  EXPECT_TRUE(is_nothing(sessions_.claim({right, "another name", Identity::open(), 0ms})));
 }
 
 TEST_F(SessionsTest, AnotherIdentityClaimsNothing) {
   Session& session = create();
-  EXPECT_EQ(claim(sessions_.token_of(session), "uid 1000"), nullptr);
-  EXPECT_EQ(claim(sessions_.token_of(session), ""), nullptr);
+  EXPECT_EQ(claim(sessions_.token_of(session), Identity::of_user(1000)), nullptr);
+  EXPECT_EQ(claim(sessions_.token_of(session), Identity{}), nullptr);
 }
 
 TEST_F(SessionsTest, ATokenIsGoodUntilItsTimeExactly) {
   Session& session = create();
   const std::vector<std::byte> token = sessions_.token_of(session);
   const std::chrono::milliseconds lifetime{limits_.token_ms};
-  EXPECT_EQ(claim(token, "open", lifetime - 1ms), &session);
-  EXPECT_EQ(claim(token, "open", lifetime), nullptr);
+  EXPECT_EQ(claim(token, Identity::open(), lifetime - 1ms), &session);
+  EXPECT_EQ(claim(token, Identity::open(), lifetime), nullptr);
 }
 
 TEST_F(SessionsTest, ATokenOutlivesARenamingAndIsForTheNewNameOnceRenewed) {
@@ -153,7 +153,7 @@ TEST_F(SessionsTest, AnEndedSessionsTokenBringsItBackUntilItIsSpent) {
   const std::vector<std::byte> token = sessions_.token_of(session);
   const std::uint32_t index = session.index;
   sessions_.end(session, 0ms);
-  const auto claim_again = sessions_.claim({token, "", "open", 0ms});
+  const auto claim_again = sessions_.claim({token, "", Identity::open(), 0ms});
   EXPECT_EQ(claim_again.session, nullptr);
   ASSERT_TRUE(claim_again.token);
   const auto restored = sessions_.restore(*claim_again.token, std::nullopt, 0ms);
@@ -162,7 +162,7 @@ TEST_F(SessionsTest, AnEndedSessionsTokenBringsItBackUntilItIsSpent) {
   EXPECT_EQ((*restored)->number, claim_again.token->number);
   sessions_.spend_token(**restored);
   sessions_.end(**restored, 0ms);
-  EXPECT_FALSE(sessions_.claim({token, "", "open", 0ms}).token);
+  EXPECT_FALSE(sessions_.claim({token, "", Identity::open(), 0ms}).token);
 }
 
 TEST_F(SessionsTest, RemembersAsManyKickedOnesAsTheLimitAllows) {
@@ -206,10 +206,10 @@ TEST_F(SessionsTest, AFormerIdsTokenIsGoodAsLongAsTheSession) {
   EXPECT_EQ(claim(latest), &session);
   sessions_.end(session, 0ms);
   for (const std::chrono::milliseconds later : {0ms, 1'000'000ms}) {
-    const auto forgotten = sessions_.claim({former, "", "open", later});
+    const auto forgotten = sessions_.claim({former, "", Identity::open(), later});
     EXPECT_EQ(forgotten.session, nullptr);
     EXPECT_FALSE(forgotten.token) << "the node would have two ids: " << former_index << " and 70";
-    EXPECT_TRUE(sessions_.claim({latest, "", "open", later}).token);
+    EXPECT_TRUE(sessions_.claim({latest, "", Identity::open(), later}).token);
   }
 }
 

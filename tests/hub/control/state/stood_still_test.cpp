@@ -19,7 +19,7 @@ class StoodStill : public ::testing::Test {
   static JoinRequest request(const std::string& name) {
     JoinRequest result;
     result.name = name;
-    result.identity = "open";
+    result.identity = Identity::open();
     return result;
   }
   std::uint32_t join(const std::string& name) {

@@ -60,7 +60,7 @@ class TestConductor {
 
   std::optional<proto::Goodbye> try_join(const proto::Hello& hello) {
     Stranger stranger;
-    stranger.may_administer = may_administer;
+    stranger.rights.administer = may_administer;
     stranger.transport = std::make_unique<NoTransport>();
     stranger.peer = PeerInfo{"tcp", "127.0.0.1:5000"};
     stranger.identity = identity;
@@ -147,9 +147,9 @@ class TestConductor {
   const SessionGauges* gauges[2] = {&sessions[0], &sessions[1]};
   RefusalCounters refusals;
   FakeShards shards{2};
-  std::string identity = "open";  ///< of those who join
-  std::vector<HubState> kept;     ///< what the hub had to keep, in order
-  std::string keep_error;         ///< why it cannot
+  Identity identity = Identity::open();  ///< of those who join
+  std::vector<HubState> kept;            ///< what the hub had to keep, in order
+  std::string keep_error;                ///< why it cannot
   std::uint16_t requests = 0;
   std::chrono::milliseconds now{1'000};
   Conductor conductor;

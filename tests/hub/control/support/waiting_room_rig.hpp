@@ -47,15 +47,15 @@ class WaitingRoomTest : public ::testing::Test {
     const auto goodbye = peer.receive_goodbye();
     return goodbye && goodbye->code == proto::GoodbyeCode::hello_timeout;
   }
-  struct Rights {
+  struct Standing {
     bool may_administer = false;
     bool on_reserve = false;
   };
-  Peer& enter_as(const Rights& rights) {
+  Peer& enter_as(const Standing& standing) {
     peers_.push_back(std::make_unique<Peer>(limits_));
     Stranger stranger = peers_.back()->take_stranger();
-    stranger.may_administer = rights.may_administer;
-    stranger.on_reserve = rights.on_reserve;
+    stranger.rights.administer = standing.may_administer;
+    stranger.on_reserve = standing.on_reserve;
     room_.enter(std::move(stranger), std::chrono::milliseconds{0});
     return *peers_.back();
   }
