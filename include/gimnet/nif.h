@@ -278,7 +278,8 @@ typedef struct nif_outgoing {
   uint64_t key;               /**< With NIF_FLAG_KEYED: 8 bytes, little-endian on the wire. */
   const nif_bytes* parts;     /**< The payload, gathered from part_count pieces. */
   size_t part_count;          /**< 0..NIF_PARTS_MAX. */
-  uint32_t age_ms_max;        /**< Not 0: dropped `too_old` on the way when older (EXT AGE). */
+  uint32_t age_ms_max;        /**< Not 0: dropped `too_old` on the way when older, by the clocks of
+                                 the hubs (EXT AGE). */
   uint8_t trace_slots; /**< Up to 8 hubs on the way write arrival and departure into the message
                           (EXT TRACE). */
 } nif_outgoing;

@@ -112,7 +112,7 @@ struct SendOptions {
   AtFullWindow at_full = AtFullWindow::wait;
   bool timestamp = false;  ///< tell the receiver when it was sent: 8 bytes more
   std::uint32_t age_max_ms =
-      0;  ///< not 0: dropped on the way when older, by the clocks of this node and the hubs
+      0;  ///< not 0: dropped on the way when older, by the clocks of the hubs
   /// Of a synchronized stream: once a message was lost, send() sends nothing more and answers
   /// not_delivered, for streams in which what comes later is worth nothing without what came
   /// before.

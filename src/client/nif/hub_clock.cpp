@@ -3,6 +3,20 @@
 #include <algorithm>
 
 namespace gimnet::nif {
+namespace {
+
+/// The hub's time may be anything: unsigned arithmetic wraps where signed would be undefined.
+std::int64_t difference(std::int64_t hub_ns, std::int64_t own_ns) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(hub_ns) -
+                                   static_cast<std::uint64_t>(own_ns));
+}
+
+std::int64_t sum(std::int64_t time_ns, std::int64_t offset_ns) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(time_ns) +
+                                   static_cast<std::uint64_t>(offset_ns));
+}
+
+}  // namespace
 
 proto::flow::Ping HubClock::ping(std::int64_t steady_ns, std::int64_t wall_ns) {
   const MutexLock lock(mutex_);
@@ -19,13 +33,25 @@ void HubClock::on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) {
   UnderWay& ping = found->second;
   Measurement measured;
   measured.round_trip_ns = steady_ns - ping.steady_ns;
-  // The hub's time may be anything: unsigned arithmetic wraps where signed would be undefined.
-  const auto middle = static_cast<std::uint64_t>(ping.wall_ns + measured.round_trip_ns / 2);
-  measured.offset_ns = static_cast<std::int64_t>(static_cast<std::uint64_t>(pong.now_ns) - middle);
+  const std::int64_t half_ns = measured.round_trip_ns / 2;
+  measured.offset_ns = difference(pong.now_ns, ping.wall_ns + half_ns);
+  measured.steady_offset_ns = difference(pong.now_ns, ping.steady_ns + half_ns);
   ping.answer = measured;
   kept_[measured_ % kKept] = measured;
   ++measured_;
+  steady_offset_ns_ = shortest().steady_offset_ns;
   changed_.notify_all();
+}
+
+void HubClock::begin(std::int64_t hub_ns, std::int64_t steady_ns) {
+  const MutexLock lock(mutex_);
+  steady_offset_ns_ = difference(hub_ns, steady_ns);
+}
+
+std::optional<std::int64_t> HubClock::hub_time(std::int64_t steady_ns) {
+  const MutexLock lock(mutex_);
+  if (!steady_offset_ns_) return std::nullopt;
+  return sum(steady_ns, *steady_offset_ns_);
 }
 
 void HubClock::clear() {
@@ -49,12 +75,18 @@ std::optional<HubClock::Measurement> HubClock::wait_for(std::uint32_t sequence, 
 std::optional<HubClock::Measurement> HubClock::best() {
   const MutexLock lock(mutex_);
   if (measured_ == 0) return std::nullopt;
+  Measurement best = shortest();
+  best.round_trip_ns = kept_[(measured_ - 1) % kKept].round_trip_ns;
+  return best;
+}
+
+/// REQUIRES: something was measured.
+const HubClock::Measurement& HubClock::shortest() const {
   const auto end =
       kept_.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(measured_, kKept));
-  const auto shortest = std::min_element(kept_.begin(), end, [](const auto& a, const auto& b) {
+  return *std::min_element(kept_.begin(), end, [](const auto& a, const auto& b) {
     return a.round_trip_ns < b.round_trip_ns;
   });
-  return Measurement{kept_[(measured_ - 1) % kKept].round_trip_ns, shortest->offset_ns};
 }
 
 }  // namespace gimnet::nif

@@ -18,7 +18,8 @@ class HubClock {
  public:
   struct Measurement {
     std::int64_t round_trip_ns = 0;
-    std::int64_t offset_ns = 0;  ///< hub's clock minus ours
+    std::int64_t offset_ns = 0;         ///< hub's clock minus ours
+    std::int64_t steady_offset_ns = 0;  ///< hub's clock minus our steady one
   };
 
   /// A PING that is about to be sent.
@@ -26,6 +27,12 @@ class HubClock {
       GIMNET_EXCLUDES(mutex_);
   /// A PONG. What was not asked, or was answered already, is ignored.
   void on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) GIMNET_EXCLUDES(mutex_);
+  /// A WELCOME said that it is `hub_ns` at the hub: what counts until a PONG says better.
+  void begin(std::int64_t hub_ns, std::int64_t steady_ns) GIMNET_EXCLUDES(mutex_);
+  /// The hub's time at that moment, in ns since 1970. While the connection is broken it goes on as
+  /// the last hub had it. Nothing: no hub has told its time yet.
+  [[nodiscard]] std::optional<std::int64_t> hub_time(std::int64_t steady_ns)
+      GIMNET_EXCLUDES(mutex_);
   /// The connection broke: what is under way will not be answered, and the next hub may have
   /// another clock.
   void clear() GIMNET_EXCLUDES(mutex_);
@@ -37,6 +44,8 @@ class HubClock {
   [[nodiscard]] std::optional<Measurement> best() GIMNET_EXCLUDES(mutex_);
 
  private:
+  [[nodiscard]] const Measurement& shortest() const GIMNET_REQUIRES(mutex_);
+
   static constexpr std::size_t kKept = 8;
   static constexpr std::size_t kUnderWayMax = 64;
   struct UnderWay {
@@ -51,6 +60,7 @@ class HubClock {
   std::map<std::uint32_t, UnderWay> under_way_ GIMNET_GUARDED_BY(mutex_);
   std::array<Measurement, kKept> kept_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t measured_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::optional<std::int64_t> steady_offset_ns_ GIMNET_GUARDED_BY(mutex_);  ///< in use
 };
 
 }  // namespace gimnet::nif

@@ -78,7 +78,7 @@ nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout
   return with_node(node, [&](Node& found) -> nif_status {
     if (message == nullptr) return fail(NIF_BAD_ARGUMENT, "cannot send: message is NULL");
     gimnet::nif::Outgoing outgoing;
-    if (const auto failure = outgoing.read(*message)) return fail(*failure);
+    if (const auto failure = outgoing.read(*message, &found.clock())) return fail(*failure);
     const bool may_wait = timeout_ms != 0 && !found.in_callback();
     return found.outbound().send(outgoing, may_wait ? deadline_after(timeout_ms) : 0);
   });

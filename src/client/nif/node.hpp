@@ -43,6 +43,7 @@ class Node final : private InboundHost {
   [[nodiscard]] WatchTable& watches() { return watches_; }
   [[nodiscard]] NameCache& names() { return names_; }
   [[nodiscard]] CreditBook& credits() { return credits_; }
+  [[nodiscard]] HubClock& clock() { return clock_; }
   /// The hub registered this node under another name, "" for none. The library's thread declares
   /// the services anew. Not if the hub has taken that name back since begin_naming(), of which the
   /// library's thread may hear first.

@@ -78,16 +78,18 @@ std::optional<Failure> Outgoing::read_payload(const nif_outgoing& message) {
   return std::nullopt;
 }
 
-void Outgoing::read_extensions(const nif_outgoing& message) {
+void Outgoing::read_extensions(const nif_outgoing& message, HubClock* clock) {
   proto::ExtensionWriter writer(extensions_);
   // 8 TRACE slots and an AGE take 212 bytes: there is room.
-  if (message.age_ms_max != 0)
-    static_cast<void>(writer.add_age({wall_now_ns(), message.age_ms_max}));
+  if (message.age_ms_max != 0) {
+    const auto hub_ns = clock == nullptr ? std::nullopt : clock->hub_time(steady_now_ns());
+    static_cast<void>(writer.add_age({hub_ns.value_or(wall_now_ns()), message.age_ms_max}));
+  }
   if (message.trace_slots != 0) static_cast<void>(writer.add_trace(message.trace_slots));
   parts_.extensions = writer.written();
 }
 
-std::optional<Failure> Outgoing::read(const nif_outgoing& given) {
+std::optional<Failure> Outgoing::read(const nif_outgoing& given, HubClock* clock) {
   nif_outgoing whole;
   const nif_outgoing* known = &given;
   if (auto failure = read_struct(known, whole, "send", "nif_outgoing")) return failure;
@@ -101,7 +103,7 @@ std::optional<Failure> Outgoing::read(const nif_outgoing& given) {
   more_ = (message.flags & NIF_FLAG_MORE) != 0;
   if (auto failure = read_address(message)) return failure;
   if (auto failure = read_payload(message)) return failure;
-  if (message.age_ms_max != 0 || message.trace_slots != 0) read_extensions(message);
+  if (message.age_ms_max != 0 || message.trace_slots != 0) read_extensions(message, clock);
   return std::nullopt;
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/ids.hpp"
 #include "client/nif/error.hpp"
+#include "client/nif/hub_clock.hpp"
 #include "gimnet/nif.h"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_builder.hpp"
@@ -19,8 +20,9 @@ namespace gimnet::nif {
 /// caller's payload. Thread safety: one thread.
 class Outgoing {
  public:
+  /// An AGE begins now, in the hub's time as `clock` knows it; nullptr: in the own time.
   /// Errors: NIF_BAD_ARGUMENT, NIF_TOO_LARGE. REQUIRES: `given` and what it points to outlive this.
-  [[nodiscard]] std::optional<Failure> read(const nif_outgoing& given);
+  [[nodiscard]] std::optional<Failure> read(const nif_outgoing& given, HubClock* clock = nullptr);
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
   /// Frame parts without fragment and payload size. Valid until: this goes.
@@ -50,7 +52,7 @@ class Outgoing {
  private:
   [[nodiscard]] std::optional<Failure> read_address(const nif_outgoing& message);
   [[nodiscard]] std::optional<Failure> read_payload(const nif_outgoing& message);
-  void read_extensions(const nif_outgoing& message);
+  void read_extensions(const nif_outgoing& message, HubClock* clock);
   void copy_payload(std::byte* to, std::uint32_t offset, std::uint32_t bytes);
 
   proto::FrameParts parts_;

@@ -17,9 +17,10 @@ struct Session {
   std::uint32_t frame_bytes_max = 0;
   std::int64_t keep_alive_ns = 0;
   std::int64_t silent_after_ns = 0;
-  bool resume = false;          ///< both ends keep what is unconfirmed
-  bool resumed = false;         ///< the counts of the earlier connection go on
-  std::uint64_t hub_taken = 0;  ///< data frames of this epoch that the hub took
+  std::int64_t hub_time_ns = 0;  ///< when it said WELCOME; 0: it does not tell
+  bool resume = false;           ///< both ends keep what is unconfirmed
+  bool resumed = false;          ///< the counts of the earlier connection go on
+  std::uint64_t hub_taken = 0;   ///< data frames of this epoch that the hub took
   std::uint32_t hub_resume_bytes = 0;
   std::string earlier_goodbye;  ///< why the hub closed the session's last connection
 };

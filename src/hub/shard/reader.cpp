@@ -215,7 +215,7 @@ void Reader::route(Connection& connection, const proto::NextRun& found) {
   count(connection, view);
   if (state_.router.append(view.bytes, view.size, view.frames)) return;
   const proto::FrameHeader header = proto::load_header(view.bytes);
-  if (header.has(proto::kFlagExt)) fill_trace(view);
+  if (header.has(proto::kFlagExt)) stamp_arrival(view);
   const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
   state_.router.route(run, header, found.shortest_bytes);
 }
@@ -232,7 +232,8 @@ void Reader::count_taken(Connection& connection, const proto::RunView& view) {
   if (resume.bytes_since_told >= resume.peer_resume_bytes / 4) send_confirm(state_, connection);
 }
 
-void Reader::fill_trace(const proto::RunView& view) {
+/// TRACE gets the time of arrival, and an AGE from the future begins now.
+void Reader::stamp_arrival(const proto::RunView& view) {
   const auto frame = proto::parse_frame({view.bytes, view.size}, proto::Origin::node);
   if (!frame) return;
   const std::span<std::byte> extensions(const_cast<std::byte*>(frame->extensions.data()),
@@ -241,6 +242,7 @@ void Reader::fill_trace(const proto::RunView& view) {
   // in which it came. Both are the time of their turn: read anew, an arrival could be later than a
   // departure.
   const std::int64_t now_ns = state_.egress.now_wall_ns;
+  proto::bound_origin(extensions, now_ns);
   static_cast<void>(proto::fill_trace(extensions, {state_.shared.hub, now_ns, now_ns}));
 }
 

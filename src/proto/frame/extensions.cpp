@@ -68,6 +68,16 @@ bool too_old(const Age& age, std::int64_t now_ns) {
   return passed_ns > static_cast<std::uint64_t>(age.longest_ms) * kNsPerMs;
 }
 
+void bound_origin(std::span<std::byte> extensions, std::int64_t now_ns) {
+  ExtensionReader reader(extensions);
+  while (const auto extension = reader.next()) {
+    if (extension->type != ExtensionType::age || extension->value.size() != kAgeSize) continue;
+    std::byte* value = extensions.data() + (extension->value.data() - extensions.data());
+    if (load_le<std::int64_t>(value) > now_ns) store_le(value, now_ns);
+    return;
+  }
+}
+
 std::size_t TraceView::used() const {
   return std::min(static_cast<std::size_t>(value_[0]), slots());
 }

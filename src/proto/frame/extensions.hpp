@@ -58,6 +58,10 @@ struct Age {
 /// True when more than `longest_ms` went by; an origin in the future (clocks differ) is not old.
 [[nodiscard]] bool too_old(const Age& age, std::int64_t now_ns);
 
+/// An origin of the first AGE that is later than `now_ns` becomes `now_ns`, in place: the frame
+/// ages from now on, whatever clock its sender has.
+void bound_origin(std::span<std::byte> extensions, std::int64_t now_ns);
+
 // TRACE
 
 inline constexpr std::size_t kTraceHeadSize = 4;

@@ -21,6 +21,23 @@ TEST(HubClock, TakesTheOffsetOfTheShortestRoundTrip) {
   EXPECT_EQ(clock.best()->round_trip_ns, 1000) << "the last one";
 }
 
+TEST(HubClock, TellsTheHubsTimeByTheWelcomeAndThenByTheShortestRoundTrip) {
+  HubClock clock;
+  EXPECT_FALSE(clock.hub_time(1'000));
+  clock.begin(50'000, 1'000);
+  EXPECT_EQ(clock.hub_time(1'500), 50'500);
+  const auto first = clock.ping(2'000, 9);
+  clock.on_pong({first.sequence, 9, 70'050}, 2'100);
+  EXPECT_EQ(clock.hub_time(3'050), 71'050);
+  const auto slow = clock.ping(4'000, 9);
+  clock.on_pong({slow.sequence, 9, 99'999}, 5'000);
+  EXPECT_EQ(clock.hub_time(3'050), 71'050) << "a longer round trip says less";
+  clock.clear();
+  EXPECT_EQ(clock.hub_time(3'050), 71'050) << "it goes on while the connection is broken";
+  clock.begin(10, 3'050);
+  EXPECT_EQ(clock.hub_time(3'050), 10) << "another hub";
+}
+
 TEST(HubClock, IgnoresWhatWasNotAskedAndRepeats) {
   HubClock clock;
   clock.on_pong({99, 0, 0}, 0);

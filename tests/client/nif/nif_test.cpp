@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "base/clock.hpp"
+#include "proto/frame/extensions.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
 namespace gimnet::nif::test {
@@ -76,6 +78,26 @@ TEST(Nif, GathersWhatIsSentWithMore) {
   for (int i = 0; i < kMessages; ++i) ASSERT_TRUE(connected.hub.next_message());
   const nif_counters after = counters_of(connected.node.get());
   EXPECT_LT(after.write_calls - before.write_calls, 20u);
+}
+
+TEST(Nif, StampsAnAgeInTheHubsTime) {
+  for (const std::int64_t ahead_ns :
+       {std::int64_t{5'000'000'000}, std::int64_t{-3'600'000'000'000}}) {
+    FakeHub hub;
+    proto::Welcome welcome = make_welcome();
+    const std::int64_t before_ns = welcome.hub_time_ns = wall_now_ns() + ahead_ns;
+    Connected connected = connect_to(hub, default_options(), welcome);
+    nif_outgoing message = NIF_OUTGOING_INIT;
+    message.to = kPeerId;
+    message.age_ms_max = 100;
+    ASSERT_EQ(nif_send(connected.node.get(), &message, NIF_FOREVER), NIF_OK);
+    const auto frame = connected.hub.next_message();
+    ASSERT_TRUE(frame);
+    const auto age = proto::find_age(frame->view().extensions);
+    ASSERT_TRUE(age);
+    EXPECT_GE(age->origin_ns, before_ns) << ahead_ns;
+    EXPECT_LE(age->origin_ns, wall_now_ns() + ahead_ns) << ahead_ns;
+  }
 }
 
 TEST(Nif, RefusesUnsoundMessages) {

@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "base/clock.hpp"
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_builder.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
@@ -287,6 +288,35 @@ TEST(Reader, CountsRequestsUpToTheLargestLimit) {
   rig.settle();
   ASSERT_TRUE(a.goodbye);
   EXPECT_EQ(a.goodbye->code, GoodbyeCode::too_many_requests);
+}
+
+// Its sender's clock is an hour ahead: it may be as old as it says, and not an hour older.
+TEST(Reader, TakesAnAgeFromTheFutureForNow) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  constexpr std::int64_t kHourNs = 3'600'000'000'000;
+  std::byte memory[64];
+  proto::ExtensionWriter writer(memory);
+  ASSERT_TRUE(writer.add_age({wall_now_ns() + kHourNs, 250}));
+  proto::FrameParts parts;
+  parts.header.dst = b.id.value();
+  parts.header.src = a.id.value();
+  parts.extensions = writer.written();
+  std::byte bytes[256];
+  const std::size_t size = proto::write_frame(parts, std::as_bytes(std::span("hello", 5)), bytes);
+  rig.write(a, {bytes, size});
+  rig.settle();
+  ASSERT_THAT(b.frames, SizeIs(1));
+  std::vector<std::byte> whole(proto::kHeaderSize);
+  proto::store_header(whole.data(), b.frames[0].header);
+  whole.insert(whole.end(), b.frames[0].body.begin(), b.frames[0].body.end());
+  const auto frame = proto::parse_frame(whole, proto::Origin::hub);
+  ASSERT_TRUE(frame);
+  const auto age = proto::find_age(frame->extensions);
+  ASSERT_TRUE(age);
+  EXPECT_LE(age->origin_ns, wall_now_ns());
+  EXPECT_EQ(age->longest_ms, 250u);
 }
 
 TEST(Reader, FillsInTraceAndCarriesWhatItDoesNotKnow) {

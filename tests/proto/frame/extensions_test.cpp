@@ -68,6 +68,21 @@ TEST(Age, EndsAfterItsTime) {
   EXPECT_FALSE(too_old(age, kNewYear - 1)) << "clocks differ";
 }
 
+TEST(Age, FromTheFutureBeginsNow) {
+  for (const std::int64_t ahead_ns : {std::int64_t{3'600'000'000'000}, std::int64_t{1}}) {
+    auto extensions = extensions_of("frame/unicast_age");
+    bound_origin(extensions, kNewYear - ahead_ns);
+    EXPECT_EQ(find_age(extensions), (Age{kNewYear - ahead_ns, 250}));
+  }
+  auto extensions = extensions_of("frame/unicast_age");
+  bound_origin(extensions, kNewYear);
+  bound_origin(extensions, kNewYear + 1);
+  EXPECT_EQ(find_age(extensions), (Age{kNewYear, 250})) << "of now, and of the past";
+  auto odd = from_hex("02 01 00");
+  bound_origin(odd, 0);
+  EXPECT_EQ(odd, from_hex("02 01 00")) << "of a wrong size";
+}
+
 TEST(Age, SurvivesAnyTime) {
   constexpr auto kFirst = std::numeric_limits<std::int64_t>::min();
   constexpr auto kLast = std::numeric_limits<std::int64_t>::max();
