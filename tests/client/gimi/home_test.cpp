@@ -52,8 +52,22 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(node.take_name("x"))) return "take_name";
   if (!is_forked(node.flush())) return "flush";
   if (!is_forked(node.drain())) return "drain";
+  if (!is_forked(node.sender("robot", {}, kForever))) return "sender by name";
+  if (!is_forked(node.send("robot", "x"))) return "send by name";
+  if (!is_forked(node.services())) return "services";
+  if (!is_forked(node.name_of(Peer{1}))) return "name_of";
+  if (!is_forked(node.give_name_back())) return "give_name_back";
   if (!is_forked(node.hub())) return "hub";
-  if (subscription.try_receive() || queue.take_newest() || watch.try_receive())
+  if (!is_forked(node.hub_counters())) return "hub_counters";
+  if (!is_forked(node.hub_connections())) return "hub_connections";
+  if (!is_forked(node.hub_routes())) return "hub_routes";
+  if (!is_forked(node.kick(Peer{1}))) return "kick";
+  if (!is_forked(node.reassign(Peer{1}, Peer{2}))) return "reassign";
+  if (!is_forked(node.drain_hub())) return "drain_hub";
+  if (!is_forked(node.reload_hub())) return "reload_hub";
+  if (!is_forked(node.set_hub_log_level("debug"))) return "set_hub_log_level";
+  if (subscription.try_receive() || queue.try_receive() || queue.take_newest() ||
+      watch.try_receive())
     return "something that was received";
   if (queue.size() + publisher.subscribers() + node.dropped() + node.lost().all() != 0)
     return "a count";

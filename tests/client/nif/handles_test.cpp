@@ -52,6 +52,34 @@ TEST(Handles, AChildIsToldThatTheHandleIsItsParents) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   EXPECT_EQ(status, 0);
   EXPECT_EQ(nif_send_to(node, kPeerId, "", 0), NIF_OK) << "the parent goes on";
+  const auto frame = connected.hub.next_message();
+  ASSERT_TRUE(frame) << "the connection stands";
+  EXPECT_EQ(frame->header.kind, proto::Kind::unicast) << "the child said nothing to the hub";
+}
+
+// Also one that would wait for ever.
+TEST(Handles, ACallOfAChildThatWaitsIsRefused) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome(1u << 20));
+  nif_node* const node = connected.node.get();
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::alarm(20);  // where it hangs
+    nif_incoming in{};
+    std::uint32_t id = 0;
+    nif_outgoing message = NIF_OUTGOING_INIT;
+    message.to = kPeerId;
+    const bool right = nif_receive(node, &in, NIF_FOREVER) == NIF_FORKED &&
+                       nif_send(node, &message, NIF_FOREVER) == NIF_FORKED &&
+                       nif_drain(node, NIF_FOREVER) == NIF_FORKED &&
+                       nif_resolve(node, "other", &id, NIF_FOREVER) == NIF_FORKED &&
+                       nif_ping_hub(node, nullptr, nullptr, NIF_FOREVER) == NIF_FORKED;
+    ::_exit(right ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
 }
 
 TEST(Handles, EveryCallRefusesWhatIsNoHandle) {
