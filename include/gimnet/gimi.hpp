@@ -269,9 +269,10 @@ class Node {
                          Timeout timeout = Timeout{5000}) const;
   /// To who accepts the service of that full name, with its key (SendOptions::key counts for
   /// nothing). Every node of the network may send there; the hub of the service routes it (kind
-  /// SERVICE, docs/protocol.md, section 2). The node follows the service until it is closed, as one
-  /// of its subscribers. Errors: not_found (no such service at the moment, or one that gives data),
-  /// bad_name, bad_argument, limit, timeout, not_connected.
+  /// SERVICE, docs/protocol.md, section 2). The node follows the service, as one of its
+  /// subscribers. Of services without a Sender it keeps the latest 1,024. Errors: not_found (no
+  /// such service at the moment, or one that gives data), bad_name, bad_argument, limit, timeout,
+  /// not_connected.
   Outcome<Sender> sender_to_service(std::string_view full_name, const SendOptions& options = {},
                                     Timeout timeout = Timeout{5000}) const;
   /// Sends one message; sender() and Sender::send() in one.

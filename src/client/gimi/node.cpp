@@ -21,6 +21,17 @@ NodeOptions options_of(std::string_view name, std::string_view hub) {
   return options;
 }
 
+/// What a Sender has: as long as it is there the table does not end the stream, nor the node its
+/// parts.
+std::shared_ptr<gimi::SendStream> owned(std::shared_ptr<gimi::Core> core,
+                                        gimi::StreamTable::Stream stream) {
+  gimi::SendStream* const raw = stream.get();
+  return {raw, [core = std::move(core), stream = std::move(stream)](gimi::SendStream*) mutable {
+            stream.reset();
+            core.reset();
+          }};
+}
+
 }  // namespace
 
 Node::Node(std::string_view name, std::string_view hub)
@@ -57,7 +68,7 @@ NodeState Node::state() const {
 Outcome<Sender> Node::sender(Peer to, const SendOptions& options) const {
   auto stream = at_home(core().home(), [&] { return core().streams().stream(to, options); });
   if (!stream) return stream.failure();
-  return Sender({core_, *stream});
+  return Sender(owned(core_, *stream));
 }
 
 Outcome<Sender> Node::sender(std::string_view to, const SendOptions& options,
@@ -83,11 +94,14 @@ Outcome<Sender> Node::sender_to_service(std::string_view full_name, const SendOp
     return Failure{Status::not_found,
                    "cannot send to '" + name + "': it gives data and takes none; subscribe to it"};
   }
+  gimi::StreamTable& streams = core().streams();
+  if (const auto ended = streams.make_place(name))
+    core().services().unfollow(*ended, [&] { return streams.has_service(*ended); });
   auto stream = core().services().follow(name, timeout, [&](const gimi::ServicePlace& place) {
-    return core().streams().service_stream(name, place, options);
+    return streams.service_stream(name, place, options);
   });
   if (!stream) return stream.failure();
-  return Sender({core_, *stream});
+  return Sender(owned(core_, *stream));
 }
 
 Outcome<void> Node::send(Peer to, BytesView data, const SendOptions& options,

@@ -240,6 +240,16 @@ void SendStream::end(const Ending& ending) {
   changed_.notify_all();
 }
 
+bool SendStream::idle() {
+  const MutexLock lock(mutex_);
+  return !sending_ && !watched_ && !held_ && window_.empty();
+}
+
+std::uint32_t SendStream::group() {
+  const MutexLock lock(mutex_);
+  return destination_.id;
+}
+
 bool SendStream::tick(std::int64_t now_ns) {
   std::uint32_t ping = 0;
   std::uint32_t sequence = 0;

@@ -81,6 +81,10 @@ class SendStream {
   /// more.
   void on_moved(const ServicePlace& place) GIMNET_EXCLUDES(mutex_);
   void end(const Ending& ending) GIMNET_EXCLUDES(mutex_);
+  /// Nothing waits for an ACK or is held, and nobody ticks.
+  [[nodiscard]] bool idle() GIMNET_EXCLUDES(mutex_);
+  /// Of a stream to a service: its group; 0: nobody has it.
+  [[nodiscard]] std::uint32_t group() GIMNET_EXCLUDES(mutex_);
 
   /// Puts a PING behind what waits for too long, sends what is held. False: nothing waits. Does not
   /// block.

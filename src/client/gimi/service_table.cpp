@@ -255,8 +255,8 @@ void ServiceTable::end_groups(SubscribedService& service) {
   while (ended_groups_.size() > kEndedGroupsMax) ended_groups_.pop_front();
 }
 
-Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout timeout,
-                                          const MakeStream& make) {
+Outcome<ServiceTable::Stream> ServiceTable::follow(const std::string& full_name, Timeout timeout,
+                                                   const MakeStream& make) {
   const MutexLock turn(asking_);
   const Asking asking(*this);
   Subscribed service;
@@ -282,6 +282,23 @@ Outcome<SendStream*> ServiceTable::follow(const std::string& full_name, Timeout 
     place = service->place;
   }
   return make(place);
+}
+
+void ServiceTable::unfollow(const std::string& full_name, const std::function<bool()>& again) {
+  const MutexLock turn(asking_);
+  if (again()) return;
+  Subscribed service;
+  {
+    const MutexLock lock(mutex_);
+    const auto known = subscribed_.find(full_name);
+    if (known == subscribed_.end()) return;
+    service = known->second;
+  }
+  service->followed = false;
+  if (service->handles != 0) return;
+  // Where the hub is not told in time, NIF tells it with the next connection.
+  static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
+  forget_unused(service);
 }
 
 ServiceTable::Found ServiceTable::subscribed(std::uint32_t group) {

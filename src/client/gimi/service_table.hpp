@@ -52,10 +52,13 @@ class ServiceTable {
   [[nodiscard]] std::size_t subscriptions() GIMNET_EXCLUDES(mutex_);
 
   /// Begins a stream to a service: `make` is called once with where it is; what changes then comes
-  /// to on_moved(), for as long as the node lives.
-  using MakeStream = std::function<Outcome<SendStream*>(const ServicePlace& place)>;
-  [[nodiscard]] Outcome<SendStream*> follow(const std::string& full_name, Timeout timeout,
-                                            const MakeStream& make)
+  /// to on_moved(), until unfollow().
+  using Stream = std::shared_ptr<SendStream>;
+  using MakeStream = std::function<Outcome<Stream>(const ServicePlace& place)>;
+  [[nodiscard]] Outcome<Stream> follow(const std::string& full_name, Timeout timeout,
+                                       const MakeStream& make) GIMNET_EXCLUDES(asking_, mutex_);
+  /// The stream to that service ended; unless `again` says that there is one anew.
+  void unfollow(const std::string& full_name, const std::function<bool()>& again)
       GIMNET_EXCLUDES(asking_, mutex_);
   /// The node has another name now: so have its services, in full.
   void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);

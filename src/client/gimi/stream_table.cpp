@@ -40,7 +40,7 @@ std::optional<Failure> StreamTable::obstacle(const SendOptions& options) const {
                                     " (peer, key) and services already"};
 }
 
-Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
+Outcome<StreamTable::Stream> StreamTable::stream(Peer to, const SendOptions& options) {
   if (!to) return Failure{Status::bad_argument, "cannot send to nobody: the peer's id is 0"};
   if (is_every_node(to)) {
     return Failure{Status::bad_argument,
@@ -49,88 +49,118 @@ Outcome<SendStream*> StreamTable::stream(Peer to, const SendOptions& options) {
   const MutexLock lock(mutex_);
   const StreamName name{to, options.key, 0};
   const auto place = streams_.find(name);
-  if (place != streams_.end()) return place->second.get();
+  if (place != streams_.end()) return place->second;
   if (auto failure = obstacle(options)) return *failure;
-  return streams_.emplace(name, std::make_unique<SendStream>(uplink_, *this, to, options))
-      .first->second.get();
+  return streams_.emplace(name, std::make_shared<SendStream>(uplink_, *this, to, options))
+      .first->second;
 }
 
-Outcome<SendStream*> StreamTable::service_stream(const std::string& full_name,
-                                                 const ServicePlace& place,
-                                                 const SendOptions& options) {
+Outcome<StreamTable::Stream> StreamTable::service_stream(const std::string& full_name,
+                                                         const ServicePlace& place,
+                                                         const SendOptions& options) {
   const MutexLock lock(mutex_);
   const auto known = services_.find(full_name);
-  if (known != services_.end()) return known->second.get();
+  if (known != services_.end()) {
+    known->second.asked = ++asked_;
+    return known->second.stream;
+  }
   if (auto failure = obstacle(options)) return *failure;
-  auto made = std::make_unique<SendStream>(uplink_, *this, full_name, place, options);
-  if (place.group != 0) by_group_[place.group] = made.get();
-  return services_.emplace(full_name, std::move(made)).first->second.get();
+  auto made = std::make_shared<SendStream>(uplink_, *this, full_name, place, options);
+  if (place.group != 0) by_group_[place.group] = made;
+  services_.emplace(full_name, Service{made, ++asked_});
+  return made;
+}
+
+std::optional<std::string> StreamTable::make_place(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  if (services_.size() < kServicesKept || services_.contains(full_name)) return std::nullopt;
+  auto oldest = services_.end();
+  for (auto each = services_.begin(); each != services_.end(); ++each) {
+    if (oldest != services_.end() && oldest->second.asked < each->second.asked) continue;
+    // The table itself has one reference, and another where the group is known.
+    const SendStream* const stream = each->second.stream.get();
+    const auto group = by_group_.find(each->second.stream->group());
+    const bool grouped = group != by_group_.end() && group->second.get() == stream;
+    if (each->second.stream.use_count() > (grouped ? 2 : 1)) continue;
+    if (each->second.stream->idle()) oldest = each;
+  }
+  if (oldest == services_.end()) return std::nullopt;
+  std::string name = oldest->first;
+  const Stream stream = oldest->second.stream;
+  std::erase_if(by_group_, [&stream](const auto& entry) { return entry.second == stream; });
+  services_.erase(oldest);
+  return name;
+}
+
+bool StreamTable::has_service(const std::string& full_name) {
+  const MutexLock lock(mutex_);
+  return services_.contains(full_name);
 }
 
 void StreamTable::on_service_moved(const std::string& full_name, const ServicePlace& place) {
-  SendStream* stream = nullptr;
+  Stream stream;
   {
     const MutexLock lock(mutex_);
     const auto known = services_.find(full_name);
     if (known == services_.end()) return;
-    stream = known->second.get();
-    std::erase_if(by_group_, [stream](const auto& entry) { return entry.second == stream; });
+    stream = known->second.stream;
+    std::erase_if(by_group_, [&stream](const auto& entry) { return entry.second == stream; });
     if (place.group != 0) by_group_[place.group] = stream;
   }
   stream->on_moved(place);
 }
 
-SendStream* StreamTable::find(const StreamName& name) {
+StreamTable::Stream StreamTable::find(const StreamName& name) {
   const MutexLock lock(mutex_);
   if (name.group != 0) {
     const auto service = by_group_.find(name.group);
     return service == by_group_.end() ? nullptr : service->second;
   }
   const auto place = streams_.find(name);
-  return place == streams_.end() ? nullptr : place->second.get();
+  return place == streams_.end() ? nullptr : place->second;
 }
 
-std::vector<SendStream*> StreamTable::all() {
+std::vector<StreamTable::Stream> StreamTable::all() {
   const MutexLock lock(mutex_);
-  std::vector<SendStream*> streams;
+  std::vector<Stream> streams;
   streams.reserve(streams_.size() + services_.size());
-  for (const auto& [name, stream] : streams_) streams.push_back(stream.get());
-  for (const auto& [name, stream] : services_) streams.push_back(stream.get());
+  for (const auto& [name, stream] : streams_) streams.push_back(stream);
+  for (const auto& [name, service] : services_) streams.push_back(service.stream);
   return streams;
 }
 
 void StreamTable::on_ack(const StreamName& name, const proto::gimi::MessageHeader& header,
                          const proto::gimi::Ack& ack) {
-  SendStream* stream = find(name);
+  const Stream stream = find(name);
   if (stream == nullptr || stream->epoch() != header.epoch) return;
   if (stream->on_ack(header.sequence, ack)) attend_(true);
 }
 
 void StreamTable::on_refused(const StreamName& name, const proto::gimi::MessageHeader& header,
                              const Loss& why) {
-  SendStream* stream = find(name);
+  const Stream stream = find(name);
   if (stream != nullptr && stream->epoch() == header.epoch) stream->on_lost(header.sequence, why);
 }
 
 void StreamTable::on_report(const Report& report) {
   const Loss why = reported_loss(report.reason, report.text);
   if (is_route_gone(report.reason) && report.name.group != 0) {
-    if (SendStream* stream = find(report.name); stream != nullptr) stream->on_broken(why);
+    if (const Stream stream = find(report.name); stream != nullptr) stream->on_broken(why);
     return;
   }
   if (is_route_gone(report.reason)) {
-    for (SendStream* stream : all()) {
+    for (const Stream& stream : all()) {
       if (stream->to() == report.name.peer) stream->on_broken(why);
     }
     return;
   }
   if (!report.has_key && report.name.group == 0) {
-    for (SendStream* stream : all()) {
+    for (const Stream& stream : all()) {
       if (stream->to() == report.name.peer) stream->on_doubt(why);
     }
     return attend_(true);
   }
-  SendStream* stream = find(report.name);
+  const Stream stream = find(report.name);
   if (stream == nullptr || (report.sequence != 0 && report.epoch != stream->epoch())) return;
   if (report.sequence != 0) stream->on_lost(report.sequence, why);
   if (report.sequence != 0 && report.count == 1) return;
@@ -139,16 +169,16 @@ void StreamTable::on_report(const Report& report) {
 }
 
 void StreamTable::on_doubt(const Loss& why) {
-  for (SendStream* stream : all()) stream->on_doubt(why);
+  for (const Stream& stream : all()) stream->on_doubt(why);
   attend_(true);
 }
 
 void StreamTable::on_broken(const Loss& why) {
-  for (SendStream* stream : all()) stream->on_broken(why);
+  for (const Stream& stream : all()) stream->on_broken(why);
 }
 
 void StreamTable::end(const Ending& ending) {
-  for (SendStream* stream : all()) stream->end(ending);
+  for (const Stream& stream : all()) stream->end(ending);
 }
 
 void StreamTable::watch(SendStream& stream) {

@@ -15,24 +15,33 @@
 
 namespace gimnet::gimi {
 
-/// All streams that a node sends. Thread safety: any thread. Streams live as long as the table.
+/// All streams that a node sends. Thread safety: any thread. Streams to nodes live as long as the
+/// table, those to services until another one needs their place.
 class StreamTable final : public StreamKeeper {
  public:
-  /// Most (peer, key) and services that a node can send to in its life.
+  /// Most (peer, key) that a node can send to in its life, and services that it sends to.
   static constexpr std::size_t kStreamsMax = 65536;
+  /// So many services are kept, the latest ones. More only where each has a Sender, or waits for an
+  /// ACK. As many as a hub allows one node to subscribe.
+  static constexpr std::size_t kServicesKept = 1024;
+  using Stream = std::shared_ptr<SendStream>;
 
   /// `attend` is called without a lock when tick() has something to do soon (false) or at once
   /// (true).
   StreamTable(Uplink& uplink, std::function<void(bool at_once)> attend)
       : uplink_(uplink), attend_(std::move(attend)) {}
 
-  [[nodiscard]] Outcome<SendStream*> stream(Peer to, const SendOptions& options)
-      GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<Stream> stream(Peer to, const SendOptions& options) GIMNET_EXCLUDES(mutex_);
   /// To whoever accepts the service of that full name, which is at `place` now.
-  [[nodiscard]] Outcome<SendStream*> service_stream(const std::string& full_name,
-                                                    const ServicePlace& place,
-                                                    const SendOptions& options)
+  [[nodiscard]] Outcome<Stream> service_stream(const std::string& full_name,
+                                               const ServicePlace& place,
+                                               const SendOptions& options) GIMNET_EXCLUDES(mutex_);
+  /// Before the stream to a service is asked for: where it is a new one and kServicesKept are
+  /// there, the one that was asked for longest ago ends, of those that nobody uses. Returns its
+  /// name.
+  [[nodiscard]] std::optional<std::string> make_place(const std::string& full_name)
       GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] bool has_service(const std::string& full_name) GIMNET_EXCLUDES(mutex_);
   /// From the library's thread: a service that this node follows is there now.
   void on_service_moved(const std::string& full_name, const ServicePlace& place)
       GIMNET_EXCLUDES(mutex_);
@@ -69,22 +78,26 @@ class StreamTable final : public StreamKeeper {
   void watch(SendStream& stream) override GIMNET_EXCLUDES(mutex_);
 
  private:
-  [[nodiscard]] SendStream* find(const StreamName& name) GIMNET_EXCLUDES(mutex_);
+  struct Service {
+    Stream stream;
+    std::uint64_t asked = 0;  ///< grows with each time that the program asked for one
+  };
+  [[nodiscard]] Stream find(const StreamName& name) GIMNET_EXCLUDES(mutex_);
   /// Why there cannot be another stream; nothing if there can.
   [[nodiscard]] std::optional<Failure> obstacle(const SendOptions& options) const
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] std::vector<SendStream*> all() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] std::vector<Stream> all() GIMNET_EXCLUDES(mutex_);
 
   Uplink& uplink_;
   const std::function<void(bool)> attend_;
   std::atomic<std::int64_t> interrupted_ns_{0};
 
   Mutex mutex_;
-  std::unordered_map<StreamName, std::unique_ptr<SendStream>, StreamNameHash> streams_
-      GIMNET_GUARDED_BY(mutex_);
+  std::unordered_map<StreamName, Stream, StreamNameHash> streams_ GIMNET_GUARDED_BY(mutex_);
   /// By full name, and of those which are there by group id.
-  std::unordered_map<std::string, std::unique_ptr<SendStream>> services_ GIMNET_GUARDED_BY(mutex_);
-  std::unordered_map<std::uint32_t, SendStream*> by_group_ GIMNET_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, Service> services_ GIMNET_GUARDED_BY(mutex_);
+  std::unordered_map<std::uint32_t, Stream> by_group_ GIMNET_GUARDED_BY(mutex_);
+  std::uint64_t asked_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::vector<SendStream*> watched_ GIMNET_GUARDED_BY(mutex_);
 };
 

@@ -60,8 +60,8 @@ class LeftSubscriptions : public testing::Test {
   /// It is read with a window of 2.
   void follow() {
     std::thread asking([this] {
-      static_cast<void>(
-          table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
+      static_cast<void>(table_.follow(
+          kName, kForever, [](const ServicePlace& place) -> Outcome<ServiceTable::Stream> {
             EXPECT_EQ(place.group, kGroup);
             return Failure{Status::closed, "no stream is needed here"};
           }));

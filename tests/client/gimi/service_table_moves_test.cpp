@@ -351,7 +351,7 @@ TEST(ServiceTable, AMoveWaitsForTheServiceThatIsJustNotReadAnyMore) {
   std::thread asking([&] {
     auto service = table.subscribe("robot/odom", {}, {}, kForever).or_throw();
     static_cast<void>(table.follow("robot/odom", kForever, [](const ServicePlace&) {
-      return Outcome<SendStream*>(Failure{Status::denied, "there is nothing to send"});
+      return Outcome<ServiceTable::Stream>(Failure{Status::denied, "there is nothing to send"});
     }));
     table.unsubscribe(std::move(service));
   });

@@ -104,11 +104,11 @@ TEST_F(RefusedSubscriptions, AreNoOthersWhereTheHubRefusesThemAgain) {
 
 TEST_F(RefusedSubscriptions, AreAskedForWhereTheyAreToBeSentTo) {
   std::thread asking([&] {
-    static_cast<void>(
-        table_.follow(kName, kForever, [](const ServicePlace& place) -> Outcome<SendStream*> {
-          EXPECT_EQ(place.group, kGroup);
-          return Failure{Status::closed, "no stream is needed here"};
-        }));
+    static_cast<void>(table_.follow(kName, kForever,
+                                    [](const ServicePlace& place) -> Outcome<ServiceTable::Stream> {
+                                      EXPECT_EQ(place.group, kGroup);
+                                      return Failure{Status::closed, "no stream is needed here"};
+                                    }));
   });
   answer_subscribe(kWindow, proto::Status::done);
   asking.join();
