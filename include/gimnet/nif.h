@@ -122,7 +122,9 @@ typedef struct nif_options {
   int32_t connect_timeout_ms;
   /** Not 0: nif_connect() dials again until connect_timeout_ms is over if there is no hub yet. */
   uint8_t wait_for_hub;
-  /** Not 0: do not dial again after a break; calls then answer NIF_NOT_CONNECTED. */
+  /** Not 0: do not dial again after a break; calls then answer NIF_NOT_CONNECTED. With
+   * NIF_RESUME_ON the library dials as long as the session can be resumed: until its grace time is
+   * over, nothing listens at the address any more, or a hub says that it does not know it. */
   uint8_t no_reconnect;
   uint8_t resume; /**< nif_resume. */
   /** Shard of the hub wished for, plus 1; 0: none. Honoured by a hub started with `--placement

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """The hub's process stands still for longer than its timers (SIGSTOP) and goes on: what peers did meanwhile counts."""
 
+import json
 import pathlib
 import signal
+import subprocess
 import time
 import unittest
 
-from support.processes import Hub
+from support.processes import Hub, start_gimnet, start_recv
 from support.waiting import wait_until
 from support.wire import NS, OPENING, WELCOME, Client, hello, text
 
 ADVERTISE = 7
 TIME_S = 8
+SEND_S = 6
 
 
 def stop(hub):
@@ -51,6 +54,42 @@ class Stopped(unittest.TestCase):
         # Its session was not over, nor its service: that is where its subscribers know it.
         again.id = answer.dst
         self.assertEqual(again.ask(NS, ADVERTISE, text(3, "odom"))[3], group)
+
+    def test_send_waits_for_it_and_loses_nothing(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B")
+        sender = start_gimnet(self, hub, "send", "B", "--json", stdin=subprocess.PIPE)
+        self.addCleanup(hub.process.signal, signal.SIGCONT)
+
+        def say(line):
+            sender.popen.stdin.write(line)
+            sender.popen.stdin.flush()
+        say(b"one\n")
+        wait_until(lambda: receiver.out == b"one\n", "the first line")
+        began = time.monotonic()
+        stop(hub)
+        say(b"two\n")
+        wait_until(lambda: "the connection broke" in sender.err, "a sender that hears nothing")
+        wait_until(lambda: time.monotonic() - began > SEND_S, "a hub that stood still for longer than a sender waits for a word")
+        hub.process.signal(signal.SIGCONT)
+        sender.feed(b"three\n")
+        self.assertEqual(sender.wait(), 0, sender.err)
+        self.assertEqual(json.loads(sender.out), {"sent": 3, "acknowledged": 3, "lost": 0, "waiting": 0})
+        wait_until(lambda: receiver.out == b"one\ntwo\nthree\n", "all lines")
+
+    def test_send_ends_where_the_hub_does_not_know_it_any_more(self):
+        hub = Hub(self)
+        receiver = start_recv(self, hub, "B")
+        sender = start_gimnet(self, hub, "send", "B", stdin=subprocess.PIPE)
+        sender.popen.stdin.write(b"one\n")
+        sender.popen.stdin.flush()
+        wait_until(lambda: receiver.out == b"one\n", "the first line")
+        stop(hub)
+        wait_until(lambda: "the connection broke" in sender.err, "a sender that hears nothing")
+        hub.process.signal(signal.SIGKILL)
+        hub.process.wait()
+        self.assertEqual(sender.wait(), 1, sender.err)
+        self.assertIn("lost the connection to the hub", sender.err)
 
 
 if __name__ == "__main__":

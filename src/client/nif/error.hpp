@@ -15,6 +15,7 @@ namespace gimnet::nif {
 struct Failure {
   nif_status status = NIF_OK;
   std::string sentence;
+  bool nobody_listens = false;  ///< at the hub's address: its process is gone
 };
 
 /// Stores the sentence for nif_error_text() of this thread and returns the status.

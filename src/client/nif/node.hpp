@@ -112,6 +112,13 @@ class Node final : private InboundHost {
   void on_goodbye(const proto::Goodbye& goodbye);
   [[nodiscard]] std::optional<Failure> ending_of(const std::string& why,
                                                  proto::GoodbyeCode code) const;
+  /// The hub keeps the session, and this node may dial to take it up again.
+  [[nodiscard]] bool may_resume(proto::GoodbyeCode code) const;
+  /// A dial failed. True: another may help.
+  [[nodiscard]] bool dials_again(const Failure& failure) const;
+  void end_of_dialing(Failure failure);
+  /// Connected, but not as this node may: leaves again.
+  void turn_down(Admitted admitted);
   void set_disconnected(const std::string& why, bool for_good) GIMNET_EXCLUDES(mutex_);
   void end(const Failure& failure, std::string why, proto::GoodbyeCode code)
       GIMNET_EXCLUDES(mutex_);
@@ -171,6 +178,8 @@ class Node final : private InboundHost {
   std::int64_t last_heard_ns_ = 0;
   std::int64_t last_tick_ns_ = 0;
   bool was_reading_ = true;
+  bool resumes_only_ = false;  ///< the next connection has to resume the session ...
+  std::int64_t broke_ns_ = 0;  ///< ... whose last one broke then
   bool ended_ = false;
   std::array<Item, 64>
       in_hand_;                ///< taken out of the receive queue under one lock, for the callback

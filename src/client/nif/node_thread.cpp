@@ -215,16 +215,16 @@ void Node::redial() {
   }
   if (closing_.load()) return;
   take_new_name();
-  auto admitted =
-      admit(options_.endpoints, options_.socket, hello(), steady_now_ns() + kRedialNs, stop_);
+  Deadline deadline = steady_now_ns() + kRedialNs;
+  if (resumes_only_) deadline = std::min(deadline, broke_ns_ + session_.grace_ns);
+  auto admitted = admit(options_.endpoints, options_.socket, hello(), deadline, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);
-    // Who dials only because it was given another id (`renumbered`) has one try.
-    const bool again = options_.reconnect && admitted.error().status != NIF_REPLACED;
-    if (!again) end(admitted.error(), admitted.error().sentence, proto::GoodbyeCode::done);
+    if (!dials_again(admitted.error())) end_of_dialing(std::move(admitted.error()));
     return;
   }
+  if (resumes_only_ && !admitted->session.resumed) return turn_down(std::move(*admitted));
   if (!take_over(std::move(*admitted), false)) {
     epoch_ = random_bits() | 1;
     session_.hub_epoch = 0;
@@ -232,6 +232,40 @@ void Node::redial() {
     return;
   }
   outbound_.write_pending(true);
+}
+
+bool Node::dials_again(const Failure& failure) const {
+  if (failure.status == NIF_REPLACED) return false;
+  // Who dials only because it was given another id (`renumbered`) has one try.
+  if (!resumes_only_) return options_.reconnect;
+  // What a hub keeps of a session is gone with its process.
+  return !failure.nobody_listens && steady_now_ns() - broke_ns_ < session_.grace_ns;
+}
+
+void Node::end_of_dialing(Failure failure) {
+  if (resumes_only_ && failure.status != NIF_REPLACED) {
+    failure = {NIF_NOT_CONNECTED,
+               "the connection to the hub broke, and could not be resumed: " + failure.sentence};
+    set_last_error(failure.sentence);
+  }
+  end(failure, failure.sentence, proto::GoodbyeCode::done);
+}
+
+void Node::turn_down(Admitted admitted) {
+  const auto goodbye = encode_goodbye(proto::GoodbyeCode::done, "");
+  const std::span<const std::byte> bytes(goodbye);
+  static_cast<void>(admitted.socket.write(std::span(&bytes, 1)));
+  const std::string why =
+      "the connection to the hub broke, and it does not know this session any more";
+  set_last_error(why);
+  end({NIF_NOT_CONNECTED, why}, why, proto::GoodbyeCode::done);
+}
+
+bool Node::may_resume(proto::GoodbyeCode code) const {
+  const bool kept = code == proto::GoodbyeCode::done || code == proto::GoodbyeCode::silent ||
+                    code == proto::GoodbyeCode::slow_consumer ||
+                    code == proto::GoodbyeCode::stalled_frame;
+  return options_.dials_to_resume && session_.resume && session_.grace_ns > 0 && kept;
 }
 
 void Node::on_goodbye(const proto::Goodbye& goodbye) {
@@ -251,13 +285,15 @@ std::optional<Failure> Node::ending_of(const std::string& why, proto::GoodbyeCod
     case proto::GoodbyeCode::renumbered:
       return std::nullopt;  // not told to go: it comes back whatever else it does at a break
     default:
-      if (options_.reconnect) return std::nullopt;
+      if (options_.reconnect || may_resume(code)) return std::nullopt;
       return Failure{NIF_NOT_CONNECTED, why};
   }
 }
 
 void Node::disconnect(std::string why, proto::GoodbyeCode code) {
   const std::optional<Failure> ending = ending_of(why, code);
+  resumes_only_ = may_resume(code);
+  broke_ns_ = steady_now_ns();
   outbound_.detach(!ending);
   socket_.close();
   requests_.fail_all();

@@ -74,6 +74,7 @@ Result<Options, Failure> read_options(const nif_options* options) {
   checked.administrator = given.administrator != 0;
   checked.wait_for_hub = given.wait_for_hub != 0;
   checked.reconnect = given.no_reconnect == 0;
+  checked.dials_to_resume = !checked.reconnect && given.resume == NIF_RESUME_ON;
   checked.keep_token = given.no_token_file == 0;
   checked.callback = given.callback;
   checked.user = given.user;

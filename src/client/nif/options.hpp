@@ -25,6 +25,7 @@ struct Options {
   std::int32_t connect_timeout_ms = 5'000;
   bool wait_for_hub = false;
   bool reconnect = true;
+  bool dials_to_resume = false;  ///< without reconnect: dials where the session can be resumed
   bool resume = false;
   bool keep_token = true;  ///< over a crash; of nodes with a name only
   bool administrator = false;

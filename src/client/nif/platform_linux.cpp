@@ -65,7 +65,8 @@ Failure cannot_connect(const Endpoint& endpoint, int error) {
                                   ": it is a folder; name the hub's socket in it, as in unix:" +
                                   folder + "/tcphub.sock"};
   }
-  return {status, "cannot connect to " + endpoint.url() + ": " + system_error_text(error) + remedy};
+  return {status, "cannot connect to " + endpoint.url() + ": " + system_error_text(error) + remedy,
+          error == ECONNREFUSED || error == ENOENT};
 }
 
 /// Waits for a connect() under way. Nothing: connected.

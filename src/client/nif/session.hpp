@@ -17,6 +17,7 @@ struct Session {
   std::uint32_t frame_bytes_max = 0;
   std::int64_t keep_alive_ns = 0;
   std::int64_t silent_after_ns = 0;
+  std::int64_t grace_ns = 0;     ///< so long after a break the session can be resumed
   std::int64_t hub_time_ns = 0;  ///< when it said WELCOME; 0: it does not tell
   bool resume = false;           ///< both ends keep what is unconfirmed
   bool resumed = false;          ///< the counts of the earlier connection go on

@@ -146,8 +146,9 @@ ExitCode run_send(Session& session) {
     return session.fail(readable.failure());
   NodeOptions how;
   how.name = options.name;
-  how.reconnect = false;  // a message whose fate is not known counts as lost
-  how.resume = false;
+  // A message whose fate is not known counts as lost: only the same session can tell it.
+  how.reconnect = false;
+  how.resume = true;
   if (const auto ending = session.join(how)) return *ending;
   // A node of that name goes first.
   const bool to_service =
