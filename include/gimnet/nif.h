@@ -311,8 +311,13 @@ typedef struct nif_outgoing {
  * KiB, UNICAST) opens no window, and, where a session can be taken up again, while the connection
  * is broken. Waiting holds up no other destination.
  *
- *  NIF_TIMEOUT: nothing was sent; if the message is over 8 KiB and had begun, its receiver counts
- * it as lost (the sentence says so). NIF_NOT_CONNECTED: broken, and not dialing again or no resume.
+ *  The message is taken whole or not at all. Where the time is over when it has begun, the library
+ * keeps a copy of the rest and goes on to send it: of one such message of any size, or of several
+ * that have at most send_queue_bytes together. A further one of over 8 KiB waits for them, unless
+ * its time is NIF_FOREVER. What becomes of the rest only reports tell (NIF_FLAG_REPORT), and
+ * nif_drain().
+ *
+ *  NIF_TIMEOUT: nothing was sent. NIF_NOT_CONNECTED: broken, and not dialing again or no resume.
  * NIF_REPLACED. NIF_TOO_LARGE: over 1 GiB, or refused by the receiver. NIF_NOT_DELIVERED: a
  * fragmented message that the hub reported undeliverable. NIF_REFUSED: to the group of a service
  * that the hub did not take again. NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */

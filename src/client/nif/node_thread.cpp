@@ -164,6 +164,7 @@ void Node::on_timers(std::int64_t now, bool reading) {
   // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not
   // pile up.
   if (due && !wants.writable) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
+  outbound_.look_after_held();
   static_cast<void>(outbound_.flush());
 }
 

@@ -44,6 +44,7 @@ bool Outbound::write_once() {
 }
 
 bool Outbound::write_gathered() {
+  if (!held_.empty()) put_held();
   const auto pieces = queue_.gather();
   if (pieces.empty()) return false;
   std::size_t offered = 0;
@@ -82,7 +83,7 @@ void Outbound::write_rounds(bool by_library) {
     ++rounds;
   end_writing();
   last_write_ns_ = steady_now_ns();
-  const bool more = rounds >= rounds_max && !queue_.all_written();
+  const bool more = rounds >= rounds_max && (!queue_.all_written() || !held_.empty());
   // The library's thread sees for itself that the kernel is full: waking it would only make it try
   // again at once.
   if (more || (!by_library && (full_ || broken_))) wake_library();
@@ -225,6 +226,7 @@ std::uint64_t Outbound::set_declaring(bool declaring) {
   const std::uint64_t lost = queue_.drop_parked();
   lost_ |= lost > 0;
   notify_waiting();
+  if (!held_.empty()) write_or_leave(false);
   return lost;
 }
 
@@ -265,6 +267,7 @@ void Outbound::on_resume(const proto::flow::Target& target) {
   const MutexLock lock(mutex_);
   pauses_.resume(target);
   notify_waiting();
+  if (!held_.empty()) write_or_leave(false);
 }
 
 bool Outbound::on_confirm(std::uint64_t count) {
@@ -272,17 +275,21 @@ bool Outbound::on_confirm(std::uint64_t count) {
   const bool possible = queue_.confirm(count);
   asked_ = false;
   notify_waiting();
+  if (!held_.empty()) write_or_leave(false);
   return possible;
 }
 
 void Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
   const MutexLock lock(mutex_);
+  const auto report = held_.empty() ? std::nullopt : held_.report_of(from, taken);
   for (auto& [stream, progress] : in_progress_) {
     if (progress->number != taken.message || progress->dst != from || !progress->windowed) continue;
     static_cast<void>(progress->window.on_taken(taken));
     progress->refused |= taken.refuses();
     notify_waiting();
   }
+  if (!held_.empty()) write_or_leave(false);
+  return report;
 }
 
 bool Outbound::on_report(const proto::Report& report) {
@@ -301,7 +308,7 @@ bool Outbound::on_report(const proto::Report& report) {
   const auto number = ReportedMessages::number_of(report);
   if (found != in_progress_.end() && found->second->windowed && header.has(proto::kFlagFragment) &&
       (!number || *number == found->second->number)) {
-    InProgress& progress = *found->second;
+    SendProgress& progress = *found->second;
     // Why the rest of a message goes is what became of its beginning.
     const bool rest = report.reason == proto::DropReason::cut_message;
     if (!rest || progress.undelivered == proto::DropReason::none)
@@ -326,7 +333,7 @@ void Outbound::add_counters(nif_counters& counters) {
   counters.bytes_sent = bytes_sent_;
   counters.write_calls = write_calls_;
   counters.pauses = pause_count_;
-  counters.send_queue_bytes = queue_.unsent_bytes() + queue_.parked_bytes();
+  counters.send_queue_bytes = queue_.unsent_bytes() + queue_.parked_bytes() + held_.bytes();
   counters.retained_bytes = queue_.retained_bytes();
   counters.last_messages_not_kept = last_.not_kept();
 }

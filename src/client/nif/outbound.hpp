@@ -12,6 +12,7 @@
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
 #include "client/nif/group_moves.hpp"
+#include "client/nif/held_messages.hpp"
 #include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
@@ -41,7 +42,7 @@ class Outbound {
   /// `wake` rouses the library's thread, which then calls write_pending().
   Outbound(const SendQueue::Limits& limits, WakeSignal& wake,
            std::size_t last_message_bytes = LastMessages::kMessageBytesDefault)
-      : wake_(wake), queue_(limits), last_(last_message_bytes) {}
+      : wake_(wake), queue_(limits), held_(limits.queue_bytes), last_(last_message_bytes) {}
 
   // Any thread.
   [[nodiscard]] nif_status send(Outgoing& message, Deadline deadline) GIMNET_EXCLUDES(mutex_);
@@ -112,7 +113,11 @@ class Outbound {
   void on_pause(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   void on_resume(const proto::flow::Target& target) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool on_confirm(std::uint64_t count) GIMNET_EXCLUDES(mutex_);
-  void on_taken(std::uint32_t from, const proto::Taken& taken) GIMNET_EXCLUDES(mutex_);
+  /// A report of a message that its receiver gave up after send() had answered.
+  [[nodiscard]] std::optional<proto::Report> on_taken(std::uint32_t from, const proto::Taken& taken)
+      GIMNET_EXCLUDES(mutex_);
+  /// Now and then: asks whether receivers are still there that allow no more of what is held.
+  void look_after_held() GIMNET_EXCLUDES(mutex_);
   /// True: the program never asked for reports, or this is about a question of the library alone.
   /// The library asks for reports of every message of more than a window, and some come when it is
   /// sent. Once the program does, it gets all: a hub merges them, whatever they are about.
@@ -128,29 +133,27 @@ class Outbound {
   static constexpr std::size_t kBurstBytes = 64 * 1024;
 
   enum class State : std::uint8_t { away, connected, ended };
-  /// A fragmented message whose sender is in send().
-  struct InProgress {
-    std::uint32_t number = 0;  ///< 0: not begun
-    std::uint64_t epoch = 0;
-    std::uint32_t dst = 0;
-    bool windowed = false;
-    bool refused = false;
-    proto::DropReason undelivered = proto::DropReason::none;
-    proto::SendWindow window;
-  };
-
   [[nodiscard]] nif_status send_whole(Outgoing& message, Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status send_fragments(Outgoing& message, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status send_pieces(Outgoing& message, InProgress& progress, Deadline deadline)
+  [[nodiscard]] nif_status send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status hold_rest(Outgoing& message, const SendProgress& progress,
+                                     const proto::Fragmenter& fragmenter) GIMNET_REQUIRES(mutex_);
+  /// Puts into the queue what may go of the messages that are held.
+  void put_held() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool put_held(HeldMessage& held) GIMNET_REQUIRES(mutex_);
+  void drop_held() GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status put_piece(Outgoing& message, SendProgress& progress,
+                                     proto::Fragmenter& fragmenter) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] std::uint32_t piece_max(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_for_turn(Outgoing& message, std::size_t frame_size,
-                                         const InProgress* own, Deadline deadline)
+                                         const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
-                                                const InProgress* own, Deadline deadline)
+                                                const SendProgress* own, Deadline deadline)
       GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status check_progress(const InProgress& own) const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status check_progress(const SendProgress& own) const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool put_frame(std::span<std::byte> memory, std::span<const std::byte> frame)
       GIMNET_REQUIRES(mutex_);
   /// Queues a FLOW frame; false: no memory.
@@ -158,14 +161,18 @@ class Outbound {
   [[nodiscard]] bool put_piece(const LastMessage& last, const proto::FrameParts& parts,
                                std::uint32_t offset) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::uint32_t number_of(Outgoing& message, bool windowed) GIMNET_REQUIRES(mutex_);
-  void probe(const InProgress& own) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool is_retained(const Outgoing& message) const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status check_retained(Outgoing& message) const GIMNET_REQUIRES(mutex_);
+  void probe(const SendProgress& own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool write_here() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool ask_for_confirm() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::string away_words() const GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status not_connected() const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] nif_status no_turn(bool begun) const GIMNET_REQUIRES(mutex_);
-  [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own)
-      GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] nif_status no_turn() const GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool may_go(const Outgoing& message, std::size_t frame_size,
+                            const SendProgress* own) GIMNET_REQUIRES(mutex_);
+  [[nodiscard]] bool has_room(const Outgoing& message, std::size_t frame_size,
+                              const SendProgress* own) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool wait(Deadline deadline) GIMNET_REQUIRES(mutex_);
   [[nodiscard]] nif_status put(Outgoing& message, std::optional<proto::FragmentHeader> fragment,
                                std::uint32_t offset, std::uint32_t size, bool report)
@@ -202,8 +209,10 @@ class Outbound {
   std::vector<std::byte> goodbye_
       GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written
   PauseTable pauses_ GIMNET_GUARDED_BY(mutex_);
-  std::unordered_map<std::uint64_t, InProgress*> in_progress_
+  std::unordered_map<std::uint64_t, SendProgress*> in_progress_
       GIMNET_GUARDED_BY(mutex_);  ///< by stream
+  HeldMessages held_ GIMNET_GUARDED_BY(mutex_);
+  bool leaving_ GIMNET_GUARDED_BY(mutex_) = false;  ///< what waits is the last that goes
   std::uint32_t next_message_ GIMNET_GUARDED_BY(mutex_) = 1;
   ReportedMessages reported_ GIMNET_GUARDED_BY(mutex_);
   bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =

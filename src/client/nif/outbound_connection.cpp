@@ -6,6 +6,52 @@
 
 namespace gimnet::nif {
 
+void Outbound::put_held() {
+  if (state_ != State::connected && !leaving_) return;
+  for (auto each = held_.begin(); each != held_.end();) {
+    if (!put_held(*each)) {
+      ++each;
+      continue;
+    }
+    in_progress_.erase(each->message->stream());
+    each = held_.erase(each);
+    notify_waiting();
+  }
+}
+
+/// True: nothing of it is left, or it is lost.
+bool Outbound::put_held(HeldMessage& held) {
+  Outgoing& message = *held.message;
+  const std::size_t frame =
+      proto::prefix_size(message.parts()) + proto::kFragmentHeaderSize + piece_max(message);
+  while (!held.fragmenter.done()) {
+    if (held.progress.lost(epochs_)) return true;
+    if (!has_room(message, frame, &held.progress)) return false;
+    const bool refused = message.is_group() && moves_.refuses(message.parts().header.dst);
+    if (refused || put_piece(message, held.progress, held.fragmenter) != NIF_OK) {
+      lost_ = true;
+      return true;
+    }
+  }
+  return true;
+}
+
+/// Their counts have begun anew, or no connection will come.
+void Outbound::drop_held() {
+  lost_ |= !held_.empty();
+  for (const HeldMessage& held : held_) in_progress_.erase(held.message->stream());
+  held_.clear();
+}
+
+void Outbound::look_after_held() {
+  const MutexLock lock(mutex_);
+  if (state_ != State::connected || held_.empty()) return;
+  for (const HeldMessage& held : held_) {
+    if (held.progress.windowed && held.progress.window.room() == 0) probe(held.progress);
+  }
+  write_or_leave(false);
+}
+
 /// The queue goes on, or begins anew. As attach().
 std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
   std::uint64_t missing = 0;
@@ -21,6 +67,7 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
     lost_ |= queue_.retained_bytes() > 0;
     queue_.restart(session.id);
     ++epochs_;
+    drop_held();
   }
   queue_.set_resume(session.resume);
   return missing;
@@ -72,6 +119,7 @@ void Outbound::detach(bool again) {
     lost_ |= no_memory_ || !queue_.all_written() || queue_.parked_bytes() > 0 ||
              queue_.retained_bytes() > 0;
     static_cast<void>(queue_.drop_all());
+    drop_held();
     no_memory_ = false;
   }
   changed_.notify_all();
@@ -89,6 +137,7 @@ void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goo
   const MutexLock lock(mutex_);
   if (taken != 0) static_cast<void>(put_flow(proto::flow::Confirm{taken}));
   goodbye_.assign(goodbye.begin(), goodbye.end());
+  leaving_ = true;
 }
 
 bool Outbound::write_last() {
@@ -97,6 +146,7 @@ bool Outbound::write_last() {
   if (socket_ == nullptr || broken_) return false;
   writing_ = true;
   do {
+    if (!held_.empty()) put_held();
     if (queue_.all_written() && !goodbye_.empty()) {
       static_cast<void>(put_frame(queue_.append_control(goodbye_.size()), goodbye_));
       goodbye_.clear();
@@ -104,6 +154,16 @@ bool Outbound::write_last() {
   } while (write_once());
   end_writing();
   return !broken_ && !queue_.all_written();
+}
+
+nif_status Outbound::wait_connected(Deadline deadline) {
+  const MutexLock lock(mutex_);
+  for (;;) {
+    if (state_ == State::connected) return NIF_OK;
+    if (state_ == State::ended) return not_connected();
+    if (deadline != kNever && steady_now_ns() >= deadline) return not_connected();
+    static_cast<void>(wait(deadline));
+  }
 }
 
 }  // namespace gimnet::nif

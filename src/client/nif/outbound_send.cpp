@@ -112,20 +112,24 @@ nif_status Outbound::not_connected() const {
   return fail(NIF_NOT_CONNECTED, away_words());
 }
 
-/// A message waited for its turn as long as it may. `begun`: a part of it was sent.
-nif_status Outbound::no_turn(bool begun) const {
-  std::string why =
-      state_ == State::away ? away_words() : std::string("no room within the time given");
-  if (begun) why += "; the message had begun, so its receiver lost it";
-  return fail(NIF_TIMEOUT, why);
+/// A message waited for its turn as long as it may.
+nif_status Outbound::no_turn() const {
+  return fail(NIF_TIMEOUT,
+              state_ == State::away ? away_words() : std::string("no room within the time given"));
 }
 
-bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InProgress* own) {
-  if (state_ != State::connected || pauses_.is_paused(message.stream())) return false;
+bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
+  return state_ == State::connected && has_room(message, frame_size, own);
+}
+
+bool Outbound::has_room(const Outgoing& message, std::size_t frame_size, const SendProgress* own) {
+  if (pauses_.is_paused(message.stream())) return false;
   if (own != nullptr) {
     if (own->windowed && own->window.room() == 0) return false;
-  } else if (!in_progress_.empty() && in_progress_.contains(message.stream())) {
-    return false;
+  } else {
+    if (!in_progress_.empty() && in_progress_.contains(message.stream())) return false;
+    const bool may_be_held = !message.patient() && message.size() > proto::kUncutMessageMax;
+    if (may_be_held && !held_.has_place(message.size())) return false;
   }
   if (declaring_ && message.parts().header.kind == proto::Kind::group) return false;
   if (message.replaceable() &&
@@ -136,7 +140,7 @@ bool Outbound::may_go(const Outgoing& message, std::size_t frame_size, const InP
 }
 
 /// Why a message that has begun cannot be finished; NIF_OK: it can.
-nif_status Outbound::check_progress(const InProgress& own) const {
+nif_status Outbound::check_progress(const SendProgress& own) const {
   if (own.undelivered != proto::DropReason::none) {
     return fail(NIF_NOT_DELIVERED, std::string("the hub reported ") +
                                        proto::drop_reason_name(own.undelivered) +
@@ -156,7 +160,7 @@ nif_status Outbound::check_progress(const InProgress& own) const {
 
 /// A receiver that crashed says nothing more; a TAKEN of no message, which its hub reports if there
 /// is nobody to take it, tells that from one that is slow.
-void Outbound::probe(const InProgress& own) {
+void Outbound::probe(const SendProgress& own) {
   proto::FrameHeader header;
   header.length = proto::kTakenSize;
   header.dst = own.dst;
@@ -172,8 +176,8 @@ void Outbound::probe(const InProgress& own) {
 }
 
 /// Waits until a frame of the message may enter the queue. `own`: the message is under way already.
-nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size, const InProgress* own,
-                                   Deadline deadline) {
+nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size,
+                                   const SendProgress* own, Deadline deadline) {
   if (own != nullptr) return wait_until_it_may_go(message, frame_size, own, deadline);
   if (!message.is_group()) return wait_until_it_may_go(message, frame_size, own, deadline);
   moves_.redirect(message);
@@ -184,7 +188,7 @@ nif_status Outbound::wait_for_turn(Outgoing& message, std::size_t frame_size, co
 }
 
 nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t frame_size,
-                                          const InProgress* own, Deadline deadline) {
+                                          const SendProgress* own, Deadline deadline) {
   std::int64_t probe_at = 0;
   for (;;) {
     if (state_ == State::ended || (state_ == State::away && !queue_.resume()))
@@ -202,7 +206,7 @@ nif_status Outbound::wait_until_it_may_go(const Outgoing& message, std::size_t f
     // for room.
     if (write_here()) continue;
     const std::int64_t now = steady_now_ns();
-    if (now >= deadline) return no_turn(own != nullptr && own->number != 0);
+    if (now >= deadline) return no_turn();
     const bool stalled =
         own != nullptr && own->windowed && own->window.room() == 0 && state_ == State::connected;
     if (stalled && probe_at == 0) probe_at = now + kProbeNs;
@@ -247,29 +251,49 @@ nif_status Outbound::send_whole(Outgoing& message, Deadline deadline) {
   return put(message, fragment, 0, message.size(), false);
 }
 
-nif_status Outbound::send_pieces(Outgoing& message, InProgress& progress, Deadline deadline) {
+std::uint32_t Outbound::piece_max(const Outgoing& message) const {
   const std::size_t prefix = frame_size(message, true, 0) - proto::kHeaderSize;
-  const auto piece_max = static_cast<std::uint32_t>(
+  return static_cast<std::uint32_t>(
       std::min<std::size_t>(proto::kFragmentPayload, frame_bytes_max_ - prefix));
-  proto::Fragmenter fragmenter(message.size(), piece_max);
+}
+
+/// The next fragment. REQUIRES: it may go.
+nif_status Outbound::put_piece(Outgoing& message, SendProgress& progress,
+                               proto::Fragmenter& fragmenter) {
+  const proto::Piece piece = fragmenter.next(
+      progress.windowed ? std::min(progress.window.room(), piece_max(message)) : UINT32_MAX);
+  const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
+  const nif_status status = put(message, fragment, piece.offset, piece.size, progress.windowed);
+  if (status == NIF_OK && progress.windowed) progress.window.on_sent(piece.size);
+  return status;
+}
+
+nif_status Outbound::send_pieces(Outgoing& message, SendProgress& progress, Deadline deadline) {
+  const std::uint32_t largest = piece_max(message);
+  proto::Fragmenter fragmenter(message.size(), largest);
   while (!fragmenter.done()) {
     const nif_status turn =
-        wait_for_turn(message, frame_size(message, true, piece_max), &progress, deadline);
+        wait_for_turn(message, frame_size(message, true, largest), &progress, deadline);
+    if (turn == NIF_TIMEOUT && progress.number != 0)
+      return hold_rest(message, progress, fragmenter);
     if (turn != NIF_OK) return turn;
     if (progress.number == 0) {
       progress.number = number_of(message, progress.windowed);
       progress.epoch = epochs_;
       progress.window = proto::SendWindow(progress.number, message.size());
     }
-    const proto::Piece piece =
-        fragmenter.next(progress.windowed ? progress.window.room() : UINT32_MAX);
-    const proto::FragmentHeader fragment{progress.number, piece.offset, message.size()};
-    const nif_status put_status =
-        put(message, fragment, piece.offset, piece.size, progress.windowed);
-    if (put_status != NIF_OK) return put_status;
-    if (progress.windowed) progress.window.on_sent(piece.size);
+    const nif_status status = put_piece(message, progress, fragmenter);
+    if (status != NIF_OK) return status;
     write_or_leave(!fragmenter.done() || message.more());
   }
+  return NIF_OK;
+}
+
+/// The sender's time is over, and the message goes on without it.
+nif_status Outbound::hold_rest(Outgoing& message, const SendProgress& progress,
+                               const proto::Fragmenter& fragmenter) {
+  HeldMessage& held = held_.hold(message, progress, fragmenter);
+  in_progress_[message.stream()] = &held.progress;
   return NIF_OK;
 }
 
@@ -277,11 +301,11 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
   const nif_status turn =
       wait_for_turn(message, frame_size(message, true, proto::kFragmentPayload), nullptr, deadline);
   if (turn != NIF_OK) return turn;
-  InProgress progress{.number = 0,
-                      .dst = message.parts().header.dst,
-                      .windowed = message.parts().header.kind == proto::Kind::unicast &&
-                                  message.size() > proto::kWindowDefault,
-                      .window = proto::SendWindow(0, message.size())};
+  SendProgress progress{.number = 0,
+                        .dst = message.parts().header.dst,
+                        .windowed = message.parts().header.kind == proto::Kind::unicast &&
+                                    message.size() > proto::kWindowDefault,
+                        .window = proto::SendWindow(0, message.size())};
   in_progress_.emplace(message.stream(), &progress);
   nif_status status = NIF_NO_MEMORY;
   try {
@@ -299,6 +323,7 @@ nif_status Outbound::send(Outgoing& message, Deadline deadline) {
   const MutexLock lock(mutex_);
   const bool whole = message.size() <= proto::kUncutMessageMax;
   reports_wanted_ |= message.reported();
+  message.set_patient(deadline == kNever);
   const nif_status status =
       whole ? send_whole(message, deadline) : send_fragments(message, deadline);
   if (status != NIF_OK) return status;
@@ -337,22 +362,13 @@ nif_status Outbound::drain(Deadline deadline) {
                   "the connection was lost before everything was confirmed; some of it may not "
                   "have arrived");
     }
-    const bool nothing_waits = queue_.all_written() && queue_.parked_bytes() == 0 && !writing_;
+    const bool nothing_waits =
+        queue_.all_written() && queue_.parked_bytes() == 0 && held_.empty() && !writing_;
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
     if (write_here() || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {
       return fail(NIF_TIMEOUT, "not everything was written and confirmed within the time given");
     }
-    static_cast<void>(wait(deadline));
-  }
-}
-
-nif_status Outbound::wait_connected(Deadline deadline) {
-  const MutexLock lock(mutex_);
-  for (;;) {
-    if (state_ == State::connected) return NIF_OK;
-    if (state_ == State::ended) return not_connected();
-    if (deadline != kNever && steady_now_ns() >= deadline) return not_connected();
     static_cast<void>(wait(deadline));
   }
 }

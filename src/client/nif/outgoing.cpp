@@ -117,6 +117,23 @@ bool Outgoing::replaceable() const {
          parts_.header.kind != proto::Kind::list && size_ <= proto::kUncutMessageMax;
 }
 
+std::unique_ptr<Outgoing> Outgoing::copy_rest(std::uint32_t offset) {
+  auto copy = std::make_unique<Outgoing>();
+  copy->parts_ = parts_;
+  copy->recipients_ = recipients_;
+  copy->parts_.recipients = copy->recipients_;
+  copy->extensions_ = extensions_;
+  copy->parts_.extensions = std::span(copy->extensions_).first(parts_.extensions.size());
+  copy->rest_.resize(size_ - offset);
+  copy_payload(copy->rest_.data(), offset, size_ - offset);
+  copy->rest_part_ = {copy->rest_.data(), copy->rest_.size()};
+  copy->payload_ = {&copy->rest_part_, 1};
+  copy->part_offset_ = offset;
+  copy->size_ = size_;
+  copy->stream_ = stream_;
+  return copy;
+}
+
 /// Pieces are asked for in order, so the search goes on where the last one ended.
 void Outgoing::copy_payload(std::byte* to, std::uint32_t offset, std::uint32_t bytes) {
   if (offset < part_offset_) {

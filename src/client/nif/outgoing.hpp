@@ -37,6 +37,15 @@ class Outgoing {
   void redirect(std::uint32_t dst);
   [[nodiscard]] bool reported() const { return parts_.header.has(proto::kFlagReport); }
 
+  /// The same message with a copy of the payload from `offset` on; nothing before that can be
+  /// written. May throw std::bad_alloc.
+  [[nodiscard]] std::unique_ptr<Outgoing> copy_rest(std::uint32_t offset);
+  /// Bytes of such a copy.
+  [[nodiscard]] std::size_t rest_bytes() const { return rest_.size(); }
+  /// Its sender waits without a limit: nothing of it is held.
+  [[nodiscard]] bool patient() const { return patient_; }
+  void set_patient(bool patient) { patient_ = patient; }
+
   /// Writes one frame with the payload bytes from `offset` on; `frame` has exactly its size.
   void write_frame(std::span<std::byte> frame, std::uint32_t src,
                    std::optional<proto::FragmentHeader> fragment, std::uint32_t offset,
@@ -62,6 +71,9 @@ class Outgoing {
   std::uint32_t size_ = 0;
   std::uint64_t stream_ = 0;
   bool more_ = false;
+  bool patient_ = true;
+  std::vector<std::byte> rest_;  ///< of a copy
+  nif_bytes rest_part_{};
   std::size_t part_ = 0;         ///< where the last copy ended
   std::size_t part_offset_ = 0;  ///< payload bytes before that part
 };
