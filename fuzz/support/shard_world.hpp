@@ -26,7 +26,8 @@ inline Limits small_limits() {
   limits.control_bytes = 2 * 1024;
   limits.requests = 3;
   limits.block_ms = 1'000;
-  limits.retained_bytes = 1'000;
+  limits.retained_message_bytes = 1'000;
+  limits.retained_budget_bytes = 4'000;
   return limits;
 }
 
@@ -49,8 +50,9 @@ struct Node {
 class ShardWorld {
  public:
   ShardWorld()
-      : shared_{kHub,   limits_,     nodes_,    groups_,      quiescence_, budget_,
-                inbox_, {&mailbox_}, {&waker_}, {&counters_}, {&sessions_}},
+      : shared_{kHub,        limits_,   nodes_,           groups_,
+                quiescence_, budget_,   retained_budget_, inbox_,
+                {&mailbox_}, {&waker_}, {&counters_},     {&sessions_}},
         shard_(std::make_unique<IoShard>(ShardIndex{0}, shared_, IoShard::Options{})) {
     for (std::uint32_t i = 0; i < 2; ++i) {
       node_[i].id = make_id<NodeId>(kHub, i + 1);
@@ -228,6 +230,7 @@ class ShardWorld {
   GroupTable groups_;
   Quiescence quiescence_{1};
   Budget budget_{limits_.budget_bytes};
+  Budget retained_budget_{limits_.retained_budget_bytes};
   ControlInbox inbox_{1};
   Waker waker_;
   Mailbox mailbox_{1, {limits_.mailbox_entries, limits_.mailbox_bytes}, waker_};

@@ -128,8 +128,9 @@ class Publisher {
   /// Sends 0 bytes to 1 GiB to all subscribers; slow ones are not waited for. Without subscribers
   /// nothing leaves the process, but of a retained service. Waits while the connection is broken,
   /// where that is resumed, while the own send queue is full, and while another thread publishes.
-  /// Errors: timeout (nothing was sent; subscribers may count it as missed), refused (the hub did
-  /// not take the service again), not_connected, too_large, closed.
+  /// Errors: timeout (not sent; subscribers may count it as missed), not_retained (sent, but too
+  /// large to be kept), refused (the hub did not take the service again), not_connected, too_large,
+  /// closed.
   Outcome<void> publish(BytesView data, Timeout timeout = kPublishTimeout,
                         More more = More::no) const;
   Outcome<void> publish(BytesView data, More more) const {
@@ -141,7 +142,10 @@ class Publisher {
   Outcome<void> wait_for_subscribers(std::size_t count, Timeout timeout = kForever) const;
   [[nodiscard]] std::string name()
       const;  ///< in full, as it is now: another one after Node::take_name()
-  [[nodiscard]] std::uint64_t published() const;  ///< messages given to publish() that answered ok
+  [[nodiscard]] std::uint64_t published() const;  ///< messages that publish() sent
+  /// Does the hub keep the last message for later subscribers? Ok until it says no, a moment after
+  /// publish(). Errors: not_retained (why), closed.
+  [[nodiscard]] Outcome<void> retained() const;
   /// Does the hub have the service, or will it be offered with the next connection? Errors: why it
   /// did not take it again after a break or another name, with its words (limit and others; it is
   /// asked again after the next break); closed.
@@ -269,10 +273,9 @@ class Node {
                          Timeout timeout = Timeout{5000}) const;
   /// To who accepts the service of that full name, with its key (SendOptions::key counts for
   /// nothing). Every node of the network may send there; the hub of the service routes it (kind
-  /// SERVICE, docs/protocol.md, section 2). The node follows the service, as one of its
-  /// subscribers. Of services without a Sender it keeps the latest 1,024. Errors: not_found (no
-  /// such service at the moment, or one that gives data), bad_name, bad_argument, limit, timeout,
-  /// not_connected.
+  /// SERVICE, docs/protocol.md, section 2). The node follows it as a subscriber; of services
+  /// without a Sender it keeps the latest 1,024. Errors: not_found (no such service now, or one
+  /// that gives data), bad_name, bad_argument, limit, timeout, not_connected.
   Outcome<Sender> sender_to_service(std::string_view full_name, const SendOptions& options = {},
                                     Timeout timeout = Timeout{5000}) const;
   /// Sends one message; sender() and Sender::send() in one.

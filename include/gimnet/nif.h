@@ -166,10 +166,10 @@ typedef struct nif_options {
    * the user that runs it. Anybody else is refused, NIF_DENIED. */
   uint8_t administrator;
   /** Bytes of the largest last message of an own service with `retain` that the library keeps to
-   * give it to a hub that lost it, default 1 MiB: as much as a hub keeps itself. A hub that was
-   * told to keep more (`retained_bytes`) loses larger ones when it is started again, unless this is
-   * as large. At most 64 MiB, which all services of the handle have together. What is not kept is
-   * counted (nif_counters.last_messages_not_kept). */
+   * give it to a hub that lost it, without a GIMI header. Default 16 MiB: as much as a hub keeps
+   * itself. A hub that was told to keep more (`retained_message_bytes`) loses larger ones when it
+   * is started again, unless this is as large. At most 64 MiB, which all services of the handle
+   * have together. What is not kept is counted (nif_counters.last_messages_not_kept). */
   uint32_t last_message_bytes;
 } nif_options;
 
@@ -319,8 +319,9 @@ typedef struct nif_outgoing {
  *
  *  NIF_TIMEOUT: nothing was sent. NIF_NOT_CONNECTED: broken, and not dialing again or no resume.
  * NIF_REPLACED. NIF_TOO_LARGE: over 1 GiB, or refused by the receiver. NIF_NOT_DELIVERED: a
- * fragmented message that the hub reported undeliverable. NIF_REFUSED: to the group of a service
- * that the hub did not take again. NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */
+ * fragmented message that the hub reported undeliverable. NIF_NOT_RETAINED: sent, but larger than
+ * what the hub keeps of a service with retain. NIF_REFUSED: to the group of a service that the hub
+ * did not take again. NIF_BAD_ARGUMENT, NIF_NO_MEMORY. */
 nif_status nif_send(nif_node* node, const nif_outgoing* message, int32_t timeout_ms);
 
 /** nif_send() of one piece to one node in the normal lane, with the default policy, without a time
@@ -352,7 +353,8 @@ typedef enum nif_incoming_type {
    * KiB those bytes are as if it had come in one frame without a fragment header, as long as it is
    * among the last 1,024 such messages that asked for reports or have over 1 MiB. Hubs merge
    * reports: a program that ever asked for one gets those of messages over 1 MiB that did not, too.
-   * Where the last frame was the library's own, which asked whether a receiver is still there,
+   * One with NIF_DROP_NOT_RETAINED comes without being asked for, and nothing was lost. Where the
+   * last frame was the library's own, which asked whether a receiver is still there,
    * `kind` is 7 (TAKEN), and of the `count` messages before it only the reason is known. */
   NIF_REPORT = 1,
   /** Messages were lost [from: the sender; 0: any to this node; reason, text: its name; count: so

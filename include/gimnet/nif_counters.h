@@ -15,7 +15,7 @@ extern "C" {
 /** What this library counted for one handle since nif_connect(). */
 typedef struct nif_counters {
   size_t struct_size;         /**< sizeof(nif_counters), set by the caller. */
-  uint64_t messages_sent;     /**< nif_send() calls that answered NIF_OK. */
+  uint64_t messages_sent;     /**< nif_send() calls that sent a message. */
   uint64_t messages_received; /**< NIF_MESSAGEs put into the receive queue. */
   uint64_t frames_sent;       /**< Data frames written for the first time. */
   uint64_t frames_resent;     /**< ... written again after a resume. */

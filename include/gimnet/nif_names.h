@@ -76,7 +76,7 @@ typedef struct nif_service {
   const char* metadata; /**< For people and tools, at most 4,096 bytes of UTF-8; may be NULL. */
   uint32_t window; /**< n of NIF_SYNC_DELIVERY, 0: 1. At most the hub's limit, 1,024 unless it was
                       set. */
-  /** Not 0: the hub keeps the last message (1 MiB) and gives it to each new subscriber first. The
+  /** Not 0: the hub keeps the last message (16 MiB) and gives it to each new subscriber first. The
    * library keeps a copy (nif_options.last_message_bytes) and gives it to a hub that may have lost
    * its own, before newer messages of its lane: after a break without resume, under another group,
    * or after a NIF_GAP of the own id. Subscribers may get it twice then. */

@@ -45,7 +45,9 @@ typedef enum nif_status {
   NIF_FORKED = 23,           /**< The handle belongs to the parent process. */
   NIF_BUFFER_TOO_SMALL = 24, /**< Reserved: no call answers it. */
   NIF_SYSTEM = 25,           /**< The operating system refused; the sentence says what. */
-  NIF_NO_HOST = 26 /**< No address is known for the host in the hub's URL. Is its name right? */
+  NIF_NO_HOST = 26, /**< No address is known for the host in the hub's URL. Is its name right? */
+  NIF_NOT_RETAINED = 27 /**< The message is on its way to the subscribers of an own service with
+                           retain, but the hub does not keep it for later ones: it is too large. */
 } nif_status;
 
 /** A short English text for a status, for example "name taken". Never NULL; static. */
@@ -82,7 +84,10 @@ typedef enum nif_drop_reason {
   NIF_DROP_CUT_MESSAGE = 17,
   NIF_DROP_NO_SUBSCRIBER = 18,
   NIF_DROP_MALFORMED = 19,
-  NIF_DROP_WRONG_SOURCE = 20
+  NIF_DROP_WRONG_SOURCE = 20,
+  NIF_DROP_NOT_RETAINED =
+      21 /**< Of a NIF_REPORT only: the message reached the subscribers of an own
+            service with retain, but its hub does not keep it for later ones. */
 } nif_drop_reason;
 
 #ifdef __cplusplus

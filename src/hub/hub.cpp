@@ -82,7 +82,10 @@ class Shards final : public ShardProxy {
 /// What the shards share, and what keeps it.
 struct Ground {
   explicit Ground(const HubOptions& options)
-      : quiescence(options.shards), budget(options.limits.budget_bytes), inbox(options.shards) {
+      : quiescence(options.shards),
+        budget(options.limits.budget_bytes),
+        retained_budget(options.limits.retained_budget_bytes),
+        inbox(options.shards) {
     // As many as a reload may allow: what is not used costs nothing.
     const std::uint64_t nodes_most = find_limit("nodes")->most + find_limit("administrators")->most;
     for (std::size_t i = 0; i < options.shards; ++i) {
@@ -103,6 +106,7 @@ struct Ground {
                      .groups = groups,
                      .quiescence = quiescence,
                      .budget = budget,
+                     .retained_budget = retained_budget,
                      .inbox = inbox,
                      .mailboxes = {},
                      .wakers = {},
@@ -119,6 +123,7 @@ struct Ground {
   GroupTable groups;
   Quiescence quiescence;
   Budget budget;
+  Budget retained_budget;
   ControlInbox inbox;
   std::vector<std::unique_ptr<Waker>> wakers;
   std::vector<std::unique_ptr<Mailbox>> mailboxes;

@@ -138,8 +138,12 @@ constexpr std::array kTable{
               "largest number of newest messages held for one subscription", true},
     LimitInfo{"subscription_rate_hz", "Hz", &Limits::subscription_rate_hz, 1, 1'000,
               "largest maximal rate that a subscription may ask for; time is kept in ms", true},
-    LimitInfo{"retained_bytes", "bytes", &Limits::retained_bytes, 0, 64 * kMiB,
-              "the message that is kept for one service with retain; a larger one is not kept"},
+    LimitInfo{"retained_message_bytes", "bytes", &Limits::retained_message_bytes, 0, kGiB,
+              "application data of the message that is kept for one service with retain; a larger "
+              "one is not kept. A map of 4,096 by 4,096 cells has as many"},
+    LimitInfo{"retained_budget_bytes", "bytes", &Limits::retained_budget_bytes, 0, 1024 * kGiB,
+              "application data of the messages that are kept for services with retain, the whole "
+              "hub; one node may have half of it"},
     LimitInfo{"page_records", "records", &Limits::page_records, 1, 1'000,
               "in one answer to LIST and the like", true},
     LimitInfo{"scan_records", "records", &Limits::scan_records, 64, 1'000'000,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -69,7 +70,8 @@ struct Limits {
   std::uint64_t sync_window = 1'024;
   std::uint64_t subscription_depth = 64;
   std::uint64_t subscription_rate_hz = 1'000;
-  std::uint64_t retained_bytes = 1ull << 20;
+  std::uint64_t retained_message_bytes = 16ull << 20;
+  std::uint64_t retained_budget_bytes = 64ull << 20;
   std::uint64_t page_records = 256;
   std::uint64_t scan_records = 4'096;
   std::uint64_t watches_per_node = 16;
@@ -85,6 +87,10 @@ struct Limits {
   std::uint64_t log_lines_per_s = 100;
   std::uint64_t peer_log_lines_per_s = 10;
 
+  /// The largest message of a retained service that can be kept: one node has half of the budget.
+  [[nodiscard]] std::uint64_t retained_most() const {
+    return std::min(retained_message_bytes, retained_budget_bytes / 2);
+  }
   /// Those of the four fields laneN_bytes. REQUIRES: lane < 4.
   [[nodiscard]] std::uint64_t lane_bytes(std::size_t lane) const {
     const std::uint64_t by_lane[] = {lane0_bytes, lane1_bytes, lane2_bytes, lane3_bytes};

@@ -57,6 +57,15 @@ TEST(Limits, RequestsAreNeverFewerThanEveryNodeMayAsk) {
   EXPECT_THAT(set(limits, "requests", "63"), HasSubstr("64 to 65536"));
 }
 
+TEST(Limits, OneNodeRetainsHalfOfTheBudgetAtMost) {
+  Limits limits;
+  EXPECT_EQ(limits.retained_most(), 16ull << 20);
+  EXPECT_EQ(set(limits, "retained_budget_bytes", "32M"), "");
+  EXPECT_EQ(limits.retained_most(), 16ull << 20);
+  EXPECT_EQ(set(limits, "retained_budget_bytes", "1001"), "");
+  EXPECT_EQ(limits.retained_most(), 500u);
+}
+
 TEST(Limits, SuffixesArePowersOf1024) {
   Limits limits;
   EXPECT_EQ(set(limits, "resume_bytes", "64k"), "");

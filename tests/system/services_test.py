@@ -98,14 +98,31 @@ class Services(unittest.TestCase):
         self.assertNotIn("did not come", subscriber.err)
 
     def test_who_publishes_a_line_that_is_too_large_to_be_kept_is_told(self):
-        hub = Hub(self)
-        largest = (1 << 20) - 20  # GIMI's header
-        for size, kept in ((largest, True), (largest + 1, False)):
-            pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay",
+        most = 1 << 20
+        hub = Hub(self, "--limit", f"retained_message_bytes={most}")
+        subscriber = start_gimnet(self, hub, "echo", "robot/map", "--raw")
+        for size, kept in ((most, True), (most + 1, False)):
+            pub = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay", "--wait", "1",
                                stdin=subprocess.PIPE).feed(b"x" * size + b"\n")
             wait_until(lambda: "stays until Ctrl-C" in pub.err, "the end of its input")
-            self.assertEqual("bytes is too large to be kept" in pub.err, not kept, pub.err)
+            said = f"robot/map was published, but: the hub does not keep the message of {size} bytes" in pub.err
+            self.assertEqual(said, not kept, pub.err)
             self.assertEqual(hub.counter("not_retained") != 0, not kept, "what it says is what the hub does")
+            pub.signal(signal.SIGINT)
+            self.assertEqual(pub.wait(), 130, pub.err)
+        wait_until(lambda: subscriber.out_size == 2 * most + 3, "both lines")
+
+    def test_who_publishes_more_than_the_hub_has_room_for_is_told(self):
+        hub = Hub(self, "--limit", "retained_budget_bytes=2000")
+        large = start_gimnet(self, hub, "pub", "robot/map", "--retain", "--stay", stdin=subprocess.PIPE).feed(b"x" * 1000 + b"\n")
+        wait_until(lambda: "stays until Ctrl-C" in large.err, "the end of its input")
+        self.assertNotIn("does not keep", large.err)
+        other = start_gimnet(self, hub, "pub", "other/map", "--retain", "--stay", stdin=subprocess.PIPE).feed(b"x" * 1000 + b"\n")
+        wait_until(lambda: "stays until Ctrl-C" in other.err, "the end of its input")
+        self.assertNotIn("does not keep", other.err)
+        third = start_gimnet(self, hub, "pub", "third/map", "--retain", "--stay", stdin=subprocess.PIPE).feed(b"x\n")
+        wait_until(lambda: "the hub does not keep the last message of third/map" in third.err, "the word of the hub")
+        for pub in (large, other, third):
             pub.signal(signal.SIGINT)
             self.assertEqual(pub.wait(), 130, pub.err)
 

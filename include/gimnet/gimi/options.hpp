@@ -39,7 +39,7 @@ struct NodeOptions {
   Timeout timeout{5000};      ///< for joining, in ms
   bool wait_for_hub = false;  ///< dial again until `timeout` if there is no hub yet
   /// Dial again after a break, after a random time below 50 ms, 100 ms ... 1 s. false: a break is
-  /// the end.
+  /// the end, but with `resume` = true only if the hub cannot resume the session.
   bool reconnect = true;
   /// After a break nothing is lost and nothing comes twice, for a copy of what is unconfirmed.
   /// Default: nodes with a name.
@@ -62,9 +62,9 @@ struct NodeOptions {
   std::uint32_t socket_receive_bytes = 0;  ///< SO_RCVBUF, in bytes; 0: the system's
   /// Bytes of the largest last message of an own service with `retain` that is kept for a hub that
   /// was started again: as much as hubs keep themselves unless they are told otherwise
-  /// (`retained_bytes`). 1..64 MiB, which all services have together.
+  /// (`retained_message_bytes`). 1..64 MiB, which all services have together.
   /// NodeState::last_messages_not_kept counts what was not.
-  std::uint32_t last_message_bytes = std::uint32_t{1} << 20;
+  std::uint32_t last_message_bytes = std::uint32_t{16} << 20;
 };
 
 /// What a queue does when a message comes and it is full.
@@ -127,7 +127,8 @@ struct PublishOptions {
   std::string metadata{};  ///< for people and tools, at most 4,096 bytes of UTF-8
   std::uint32_t window =
       1;  ///< of Delivery::sync: messages not taken by a subscriber, 1..1,024 (a hub's limit)
-  /// The hub keeps the last message, up to 1 MiB, and gives it to each new subscriber first.
+  /// The hub keeps the last message, up to 16 MiB, and gives it to each new subscriber first. See
+  /// Publisher::retained().
   bool retain = false;
 };
 

@@ -38,6 +38,7 @@ enum class Status : std::uint8_t {
   protocol,       ///< The peer sent bytes that docs/protocol.md forbids.
   system,         ///< The operating system refused, or memory is out.
   forked,         ///< The node belongs to the parent process: after fork(), join anew in the child.
+  not_retained,   ///< The message was published, but is not kept for those who subscribe later.
 };
 
 /// Why a message did not arrive.

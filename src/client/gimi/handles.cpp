@@ -61,6 +61,9 @@ std::string Publisher::name() const {
 std::uint64_t Publisher::published() const {
   return at_home(service_->home(), [&] { return service_->published(); });
 }
+Outcome<void> Publisher::retained() const {
+  return at_home(service_->home(), [&] { return service_->retained(); });
+}
 Outcome<void> Publisher::standing() const {
   return at_home(service_->home(), [&] { return service_->standing(); });
 }

@@ -44,6 +44,8 @@ std::string_view status_text(Status status) {
       return "system error";
     case Status::forked:
       return "forked";
+    case Status::not_retained:
+      return "not retained";
   }
   return "unknown status";
 }

@@ -32,18 +32,43 @@ Outcome<void> PublishedService::publish(BytesView data, Timeout timeout, More mo
       return {};
     }
     envelope.to = group_;
+    not_retained_.reset();  // what is said from now on is about this message
     sending_ = true;
   }
   const nif_status status =
       uplink_.transmit(envelope, {sequence, proto::gimi::Operation::data, 0, 0, epoch_},
                        options_.timestamp, data, nif_timeout_until(deadline));
-  auto failure = status == NIF_OK ? Failure{} : failure_of(status, "publish " + full_name());
+  const bool sent = status == NIF_OK || status == NIF_NOT_RETAINED;
+  Failure failure;
+  if (status == NIF_NOT_RETAINED) {
+    failure = {Status::not_retained, full_name() + " was published, but: " + nif_error_text()};
+  } else if (!sent) {
+    failure = failure_of(status, "publish " + full_name());
+  }
   const MutexLock lock(mutex_);
   sending_ = false;
   changed_.notify_all();
-  if (status != NIF_OK) return failure;
-  ++published_;
+  if (sent) ++published_;
+  if (status == NIF_OK) return {};
+  if (sent) not_retained_ = failure;
+  return failure;
+}
+
+Outcome<void> PublishedService::retained() {
+  const MutexLock lock(mutex_);
+  if (end_) return end_.failure("keep " + full_name_);
+  if (not_retained_) return *not_retained_;
   return {};
+}
+
+void PublishedService::on_not_retained(const std::optional<proto::gimi::MessageHeader>& sent) {
+  const MutexLock lock(mutex_);
+  const bool of_the_last = !sent || (sent->epoch == epoch_ && sent->sequence == sequence_);
+  if (!of_the_last || not_retained_) return;
+  not_retained_ = {Status::not_retained,
+                   "the hub does not keep the last message of " + full_name_ +
+                       " for those who subscribe later: its memory for such messages is used up; "
+                       "raise its limit retained_budget_bytes, of which one node has half"};
 }
 
 std::string PublishedService::full_name() {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -34,6 +35,7 @@ class PublishedService {
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t published() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Outcome<void> standing() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] Outcome<void> retained() GIMNET_EXCLUDES(mutex_);
 
   /// 0: the hub refuses it at the moment.
   [[nodiscard]] std::uint32_t group() GIMNET_EXCLUDES(mutex_);
@@ -41,6 +43,9 @@ class PublishedService {
   /// Why that is so: the hub's words.
   void on_refused(Failure refusal) GIMNET_EXCLUDES(mutex_);
   void on_subscribers(std::size_t count) GIMNET_EXCLUDES(mutex_);
+  /// The hub does not keep a message; `sent`: its header, if that is known.
+  void on_not_retained(const std::optional<proto::gimi::MessageHeader>& sent)
+      GIMNET_EXCLUDES(mutex_);
   /// The node has another name now.
   void on_renamed(const std::string& own_name) GIMNET_EXCLUDES(mutex_);
   /// After a break nobody knows how many there are until the hub says so.
@@ -65,6 +70,7 @@ class PublishedService {
   bool subscribers_known_ GIMNET_GUARDED_BY(mutex_) = true;
   std::uint32_t sequence_ GIMNET_GUARDED_BY(mutex_) = 0;
   std::uint64_t published_ GIMNET_GUARDED_BY(mutex_) = 0;
+  std::optional<Failure> not_retained_ GIMNET_GUARDED_BY(mutex_);  ///< of the last message
   bool sending_ GIMNET_GUARDED_BY(mutex_) = false;
   Ending end_ GIMNET_GUARDED_BY(mutex_);
 };

@@ -222,8 +222,9 @@ void Reception::on_ping(const nif_incoming& in, const proto::gimi::MessageView& 
 void Reception::on_report(const nif_incoming& in) {
   if (in.kind == static_cast<std::uint8_t>(proto::Kind::taken))
     return streams_.on_doubt(reported_loss(in.reason, in.text));
-  if (!is_for_one(in)) return;
   const auto header = reported_header(in);
+  if (in.reason == NIF_DROP_NOT_RETAINED) return services_.on_not_retained(in.to, header);
+  if (!is_for_one(in)) return;
   const bool to_service = in.kind == NIF_SERVICE;
   const StreamName name = stream_of(in, to_service ? 0 : in.to, to_service ? in.to : 0);
   const bool keyed = (in.flags & NIF_FLAG_KEYED) != 0;

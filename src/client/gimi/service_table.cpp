@@ -322,6 +322,13 @@ ServiceTable::Place ServiceTable::on_subscribers(std::uint32_t group, std::size_
   return Place::found;
 }
 
+void ServiceTable::on_not_retained(std::uint32_t group,
+                                   const std::optional<proto::gimi::MessageHeader>& sent) {
+  const MutexLock lock(mutex_);
+  const auto place = published_by_group_.find(group);
+  if (place != published_by_group_.end()) place->second->on_not_retained(sent);
+}
+
 std::optional<Failure> ServiceTable::refusal_of(const nif_incoming& moved) {
   if (moved.group != 0 || moved.reason == NIF_OK) return std::nullopt;
   const auto status = static_cast<nif_status>(moved.reason);

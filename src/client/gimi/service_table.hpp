@@ -74,6 +74,9 @@ class ServiceTable {
   [[nodiscard]] Found subscribed(std::uint32_t group) GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] Place on_subscribers(std::uint32_t group, std::size_t count)
       GIMNET_EXCLUDES(mutex_);
+  /// The hub does not keep a message of that own service; `sent`: its header, if that is known.
+  void on_not_retained(std::uint32_t group, const std::optional<proto::gimi::MessageHeader>& sent)
+      GIMNET_EXCLUDES(mutex_);
   /// What a NIF_SERVICE_MOVED or NIF_OWN_SERVICE_MOVED says of a refusal.
   [[nodiscard]] static std::optional<Failure> refusal_of(const nif_incoming& moved);
   [[nodiscard]] Place on_service_moved(const nif_incoming& moved) GIMNET_EXCLUDES(mutex_);

@@ -53,6 +53,8 @@ Status status_of(nif_status status) {
       return Status::system;
     case NIF_FORKED:
       return Status::forked;
+    case NIF_NOT_RETAINED:
+      return Status::not_retained;
     case NIF_OK:
     case NIF_CLOSED:
       break;

@@ -10,13 +10,13 @@ namespace {
 
 thread_local constinit std::array<char, NIF_SENTENCE_BYTES_MAX + 1> t_sentence{};
 
-constexpr std::array<const char*, 27> kTexts{
+constexpr std::array<const char*, 28> kTexts{
     "done",           "timeout",       "closed",      "bad argument", "no hub",
     "not connected",  "bad version",   "name taken",  "bad name",     "hub full",
     "refused",        "replaced",      "not found",   "taken",        "denied",
     "limit reached",  "not supported", "bad request", "too large",    "not delivered",
     "protocol error", "out of memory", "in callback", "forked",       "buffer too small",
-    "system error",   "unknown host"};
+    "system error",   "unknown host",  "not retained"};
 
 }  // namespace
 

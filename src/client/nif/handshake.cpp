@@ -152,6 +152,7 @@ Handshake::State Handshake::take_welcome(const proto::Welcome& welcome) {
       std::max(milliseconds(welcome.silent_ms, kSilentMsDefault), session_.keep_alive_ns * 2);
   session_.grace_ns = std::int64_t{welcome.grace_ms} * kNsPerMs;
   session_.hub_time_ns = welcome.hub_time_ns;
+  session_.retained_bytes_max = welcome.retained_bytes_max;
   session_.resume = resume_ && welcome.resume_buffer_bytes > 0;
   session_.resumed = session_.resume && welcome.resumed && former_hub_epoch_ != 0;
   if (session_.resumed && welcome.epoch != former_hub_epoch_) {

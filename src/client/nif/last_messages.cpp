@@ -60,7 +60,8 @@ bool LastMessages::keep(Entry& entry, Outgoing& message) {
   const std::size_t size = message.size();
   const std::size_t room = last.payload.capacity();
   if (size > room || (room > kRoomKept && size < room / 4)) clear(entry);
-  if (size > message_bytes_max_ || size > kBytesMax - bytes_ + last.payload.capacity())
+  const std::size_t data = message.application_bytes();
+  if (data > message_bytes_max_ || bytes_ - last.payload.capacity() + data > kBytesMax)
     return false;
   try {
     last.extensions.assign(parts.extensions.begin(), parts.extensions.end());

@@ -30,9 +30,10 @@ struct LastMessage {
 /// counted, nor is an older message in its place, which would not be the last.
 class LastMessages {
  public:
-  /// As much as a hub keeps of one service unless it is told otherwise (its `retained_bytes`).
-  static constexpr std::size_t kMessageBytesDefault = std::size_t{1} << 20;
-  /// Of all services of a node; as much as a hub can be told to keep of one.
+  /// Application data: as much as a hub keeps of one service unless it is told otherwise (its
+  /// `retained_message_bytes`).
+  static constexpr std::size_t kMessageBytesDefault = std::size_t{16} << 20;
+  /// Of all services of a node: as much as a hub keeps of all unless it is told otherwise.
   static constexpr std::size_t kBytesMax = std::size_t{64} << 20;
 
   /// REQUIRES: message_bytes_max <= kBytesMax.
@@ -50,6 +51,8 @@ class LastMessages {
   /// Nothing: no such service, no group, or nothing is kept of it. Valid until: the next call.
   [[nodiscard]] const LastMessage* find(const std::string& service) const;
   [[nodiscard]] bool empty() const { return by_group_.empty(); }
+  /// It is the group of a retained service.
+  [[nodiscard]] bool follows(std::uint32_t group) const { return by_group_.contains(group); }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   /// Messages of services with retain that were not kept: too large, or no memory.
   [[nodiscard]] std::uint64_t not_kept() const { return not_kept_; }

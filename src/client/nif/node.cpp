@@ -256,7 +256,7 @@ void Node::take_new_name() {
 }
 
 void Node::on_taken(std::uint32_t from, const proto::Taken& taken) {
-  outbound_.on_taken(from, taken);
+  if (const auto report = outbound_.on_taken(from, taken)) push_event(make_report(*report, from));
 }
 
 bool Node::on_report(const proto::Report& report) {

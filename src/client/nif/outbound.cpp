@@ -279,7 +279,7 @@ bool Outbound::on_confirm(std::uint64_t count) {
   return possible;
 }
 
-void Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
+std::optional<proto::Report> Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
   const MutexLock lock(mutex_);
   const auto report = held_.empty() ? std::nullopt : held_.report_of(from, taken);
   for (auto& [stream, progress] : in_progress_) {
@@ -295,6 +295,8 @@ void Outbound::on_taken(std::uint32_t from, const proto::Taken& taken) {
 bool Outbound::on_report(const proto::Report& report) {
   const MutexLock lock(mutex_);
   const proto::FrameHeader& header = report.header;
+  // About a service, and not about a message that was lost: the program did not have to ask.
+  if (report.reason == proto::DropReason::not_retained) return false;
   if (header.kind == proto::Kind::taken) {
     // Our own TAKENs ask for no reports, so this answers probe().
     for (auto& [stream, progress] : in_progress_) {

@@ -218,6 +218,8 @@ class Outbound {
   bool reports_wanted_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< the program sent something with NIF_FLAG_REPORT
   LastMessages last_ GIMNET_GUARDED_BY(mutex_);
+  std::optional<std::uint32_t> hub_retains_
+      GIMNET_GUARDED_BY(mutex_);  ///< Session::retained_bytes_max
   std::uint32_t waiting_ GIMNET_GUARDED_BY(mutex_) = 0;
   bool declaring_ GIMNET_GUARDED_BY(mutex_) = false;
   GroupMoves moves_ GIMNET_GUARDED_BY(mutex_);

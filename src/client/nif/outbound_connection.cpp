@@ -2,7 +2,7 @@
 
 #include "client/nif/outbound.hpp"
 
-// A connection comes, breaks, or is left for good.
+// A connection comes, breaks, or is left for good, and messages go on whose senders do not wait.
 
 namespace gimnet::nif {
 
@@ -85,6 +85,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
   if (!missing) return std::nullopt;
   id_ = session.id;
   frame_bytes_max_ = session.frame_bytes_max;
+  hub_retains_ = session.retained_bytes_max;
   pauses_.clear();
   socket_ = &socket;
   asked_ = false;

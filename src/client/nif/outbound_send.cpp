@@ -237,7 +237,7 @@ nif_status Outbound::put(Outgoing& message, std::optional<proto::FragmentHeader>
 /// For a message that has a fragment header.
 std::uint32_t Outbound::number_of(Outgoing& message, bool windowed) {
   const std::uint32_t number = next_message_++;
-  if (message.reported() || windowed) reported_.remember(number, message);
+  if (message.reported() || windowed || is_retained(message)) reported_.remember(number, message);
   return number;
 }
 
@@ -314,7 +314,8 @@ nif_status Outbound::send_fragments(Outgoing& message, Deadline deadline) {
     status =
         fail(NIF_NO_MEMORY, "no memory for the message; if it had begun, its receiver lost it");
   }
-  in_progress_.erase(message.stream());
+  const auto place = in_progress_.find(message.stream());
+  if (place->second == &progress) in_progress_.erase(place);
   notify_waiting();
   return status;
 }
@@ -328,9 +329,25 @@ nif_status Outbound::send(Outgoing& message, Deadline deadline) {
       whole ? send_whole(message, deadline) : send_fragments(message, deadline);
   if (status != NIF_OK) return status;
   ++messages_sent_;
-  if (message.parts().header.kind == proto::Kind::group && !last_.empty()) last_.keep(message);
+  const bool retained = is_retained(message);
+  if (retained) last_.keep(message);
   if (whole) write_or_leave(message.more());
-  return NIF_OK;
+  return retained ? check_retained(message) : NIF_OK;
+}
+
+bool Outbound::is_retained(const Outgoing& message) const {
+  return message.is_group() && last_.follows(message.parts().header.dst);
+}
+
+/// The message went; does the hub keep it, as far as its WELCOME tells?
+nif_status Outbound::check_retained(Outgoing& message) const {
+  const std::uint32_t data = message.application_bytes();
+  if (!hub_retains_ || data <= *hub_retains_) return NIF_OK;
+  return fail(NIF_NOT_RETAINED,
+              "the hub does not keep the message of " + std::to_string(data) +
+                  " bytes for those who subscribe later, only of " + std::to_string(*hub_retains_) +
+                  " bytes and less; send less, or raise its limits retained_message_bytes and "
+                  "retained_budget_bytes");
 }
 
 nif_status Outbound::flush() {

@@ -8,6 +8,7 @@
 #include "client/nif/pause_table.hpp"
 #include "client/nif/sized_struct.hpp"
 #include "proto/frame/fragmenter.hpp"
+#include "proto/gimi/message_header.hpp"
 
 namespace gimnet::nif {
 namespace {
@@ -105,6 +106,14 @@ std::optional<Failure> Outgoing::read(const nif_outgoing& given, HubClock* clock
   if (auto failure = read_payload(message)) return failure;
   if (message.age_ms_max != 0 || message.trace_slots != 0) read_extensions(message, clock);
   return std::nullopt;
+}
+
+std::uint32_t Outgoing::application_bytes() {
+  std::array<std::byte, proto::gimi::kMessageHeaderSize> start;
+  const auto bytes = std::min(size_, static_cast<std::uint32_t>(start.size()));
+  copy_payload(start.data(), 0, bytes);
+  return proto::gimi::application_bytes(parts_.key.has_value(), std::span(start).first(bytes),
+                                        size_);
 }
 
 void Outgoing::redirect(std::uint32_t dst) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,6 +26,8 @@ class Outgoing {
   [[nodiscard]] std::optional<Failure> read(const nif_outgoing& given, HubClock* clock = nullptr);
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
+  /// Without the GIMI header that a message with a key begins with.
+  [[nodiscard]] std::uint32_t application_bytes();
   /// Frame parts without fragment and payload size. Valid until: this goes.
   [[nodiscard]] const proto::FrameParts& parts() const { return parts_; }
   /// Kind, lane and destination; 0 for LIST, as its recipients see it.

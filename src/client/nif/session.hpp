@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct Session {
   bool resumed = false;          ///< the counts of the earlier connection go on
   std::uint64_t hub_taken = 0;   ///< data frames of this epoch that the hub took
   std::uint32_t hub_resume_bytes = 0;
+  std::optional<std::uint32_t> retained_bytes_max;  ///< as Welcome::retained_bytes_max
   std::string earlier_goodbye;  ///< why the hub closed the session's last connection
 };
 

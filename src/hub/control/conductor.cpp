@@ -148,6 +148,7 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
   welcome.resume_buffer_bytes = hello.resume ? static_cast<std::uint32_t>(limits_.resume_bytes) : 0;
   welcome.grace_ms = static_cast<std::uint32_t>(limits_.grace_ms);
   welcome.name = session.name.str();
+  welcome.retained_bytes_max = static_cast<std::uint32_t>(limits_.retained_most());
   welcome.name_provisional = membership_.directory().is_provisional(session.name);
   if (session.closing) {
     welcome.last_goodbye_code = static_cast<std::uint16_t>(session.closing->code);

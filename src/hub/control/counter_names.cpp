@@ -84,7 +84,9 @@ void for_each_counter(const ShardCounters& counters, const Take& take) {
   for (const Named& named : kCounters)
     take(std::string{named.name}, (counters.*named.field).value());
   for (std::size_t reason = 1; reason < proto::kDropReasonCount; ++reason) {
-    const auto* name = proto::drop_reason_name(static_cast<proto::DropReason>(reason));
+    const auto drop = static_cast<proto::DropReason>(reason);
+    if (drop == proto::DropReason::not_retained) continue;  // nothing is dropped
+    const auto* name = proto::drop_reason_name(drop);
     take(std::string{"dropped."} + name, counters.dropped[reason].value());
   }
 }

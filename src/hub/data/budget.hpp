@@ -8,7 +8,8 @@ namespace gimnet::hub {
 
 /// The bytes that waiting messages of the whole hub may keep from being freed (`budget_bytes`), and
 /// the number of connections that have data waiting. Shards lease bytes in pieces, so that no frame
-/// touches a shared word. Thread safety: any thread.
+/// touches a shared word. Another one is for retained messages (`retained_budget_bytes`), which
+/// lease what they count. Thread safety: any thread.
 class Budget {
  public:
   explicit Budget(std::uint64_t bytes)

@@ -29,9 +29,9 @@ class BufferPool {
   /// A chunk of at least `bytes`. Up to the largest frame with its header it is kept for the next
   /// time.
   [[nodiscard]] BufferRef take_chunk(std::uint32_t bytes);
-
-  /// A chunk of exactly `bytes`, which is freed after its use: for where memory is scarce. From
-  /// kExactBytesMin on a chunk of the next class could be 3.5 times as large.
+  /// A chunk of exactly `bytes`, which is freed after its use: for what is kept long, and where
+  /// memory is scarce. From kExactBytesMin on a chunk of the next class could be 3.5 times as
+  /// large.
   static constexpr std::uint32_t kExactBytesMin = 4 * 1024;
   [[nodiscard]] BufferRef take_exact(std::uint32_t bytes);
 

@@ -25,7 +25,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
       fanout(index, hub_shared.mailboxes, recipients, egress,
              {hub_shared.hub, hub_shared.nodes, hub_shared.groups}),
       pacer(fanout),
-      retained(hub_shared.groups, fanout, pacer),
+      retained(hub_shared.groups, fanout, pacer, hub_shared.retained_budget),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),
       receive_buffer(
           pool, tally,

@@ -42,6 +42,7 @@ struct HubShared {
   const GroupTable& groups;
   Quiescence& quiescence;
   Budget& budget;
+  Budget& retained_budget;
   ControlInbox& inbox;
   std::vector<Mailbox*> mailboxes;       ///< by shard
   std::vector<Waker*> wakers;            ///< by shard

@@ -47,6 +47,7 @@ enum : std::uint32_t {
   last_goodbye_code,
   last_goodbye_sentence,
   name,
+  retained_bytes_max,
 };
 }  // namespace welcome_key
 
@@ -124,6 +125,7 @@ void Welcome::write(bitestream::Writer& writer) const {
   if (last_goodbye_code != 0) writer.put_u16(key::last_goodbye_code, last_goodbye_code);
   put_clean_text(writer, key::last_goodbye_sentence, last_goodbye_sentence, kSentenceBytesMax);
   put_clean_text(writer, key::name, name, kNameBytesMax);
+  if (retained_bytes_max) writer.put_u32(key::retained_bytes_max, *retained_bytes_max);
 }
 
 Welcome Welcome::read(Fields& fields) {
@@ -152,6 +154,10 @@ Welcome Welcome::read(Fields& fields) {
   welcome.last_goodbye_sentence =
       fields.text(key::last_goodbye_sentence, "last sentence", kSentenceBytesMax);
   welcome.name = fields.text(key::name, "name", kNameBytesMax);
+  if (fields.has(key::retained_bytes_max)) {
+    welcome.retained_bytes_max =
+        fields.number<std::uint32_t>(key::retained_bytes_max, "largest retained message", 0);
+  }
   return welcome;
 }
 

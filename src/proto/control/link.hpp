@@ -93,6 +93,9 @@ struct Welcome {
       0;  ///< with which the hub closed the session's last connection; 0: it did not
   std::string last_goodbye_sentence;
   std::string name;  ///< as registered
+  /// Application data of the largest message of a retained service that the hub keeps; nothing: it
+  /// does not tell.
+  std::optional<std::uint32_t> retained_bytes_max;
 
   void write(bitestream::Writer& writer) const;
   [[nodiscard]] static Welcome read(Fields& fields);

@@ -101,6 +101,7 @@ inline void store_header(std::byte* bytes, const FrameHeader& header) {
 }
 
 /// What became of a frame that was not delivered: the closed list of docs/protocol.md, section 5.
+/// `not_retained` is of REPORTs only: such a frame is delivered all the same.
 enum class DropReason : std::uint8_t {
   none = 0,
   no_such_node = 1,
@@ -123,16 +124,17 @@ enum class DropReason : std::uint8_t {
   no_subscriber = 18,
   malformed = 19,
   wrong_source = 20,
+  not_retained = 21,
 };
-inline constexpr std::size_t kDropReasonCount = 21;
+inline constexpr std::size_t kDropReasonCount = 22;
 
 /// The reason's name as documents and tools print it, for example "queue_full".
 [[nodiscard]] constexpr const char* drop_reason_name(DropReason reason) {
   constexpr const char* kNames[kDropReasonCount] = {
-      "none",          "no_such_node",  "no_route",    "away",        "queue_full", "replaced",
-      "too_old",       "hop_limit",     "too_large",   "not_allowed", "wrong_way",  "link_lost",
-      "shard_full",    "no_such_group", "renumbered",  "over_budget", "timed_out",  "cut_message",
-      "no_subscriber", "malformed",     "wrong_source"};
+      "none",          "no_such_node",  "no_route",     "away",        "queue_full", "replaced",
+      "too_old",       "hop_limit",     "too_large",    "not_allowed", "wrong_way",  "link_lost",
+      "shard_full",    "no_such_group", "renumbered",   "over_budget", "timed_out",  "cut_message",
+      "no_subscriber", "malformed",     "wrong_source", "not_retained"};
   const auto index = static_cast<std::size_t>(reason);
   return index < kDropReasonCount ? kNames[index] : "unknown";
 }

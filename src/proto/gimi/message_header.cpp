@@ -36,6 +36,14 @@ std::optional<MessageView> parse_message(std::span<const std::byte> payload) {
   return view;
 }
 
+std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start, std::uint32_t size) {
+  if (!keyed || start.size() < kMessageHeaderSize) return size;
+  const MessageHeader header = load_message_header(start.data());
+  const std::uint32_t prefix =
+      static_cast<std::uint32_t>(kMessageHeaderSize) + header.extension_bytes;
+  return header.operation <= Operation::pong && prefix <= size ? size - prefix : size;
+}
+
 std::size_t write_message_prefix(MessageHeader header, std::optional<std::int64_t> timestamp_ns,
                                  std::span<std::byte, kMessagePrefixMax> bytes) {
   header.extension_bytes = timestamp_ns ? kTimestampSize : 0;

@@ -75,6 +75,11 @@ struct MessageView {
 /// without 8 bytes.
 [[nodiscard]] std::optional<MessageView> parse_message(std::span<const std::byte> payload);
 
+/// Bytes of the application in a message of `size` bytes, of which `start` is the beginning: all
+/// but the GIMI header and its extension, which a KEYED message has.
+[[nodiscard]] std::uint32_t application_bytes(bool keyed, std::span<const std::byte> start,
+                                              std::uint32_t size);
+
 /// What stands before the data: the header and, if `timestamp_ns` is given, an extension with it.
 /// Sets the flag and `extension_bytes` of the header. Returns the size, 12 or 20.
 inline constexpr std::size_t kMessagePrefixMax = kMessageHeaderSize + kTimestampSize;

@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "base/clock.hpp"
-#include "proto/gimi/message_header.hpp"
 #include "tools/gimnet/commands.hpp"
 #include "tools/gimnet/connection_watch.hpp"
 #include "tools/gimnet/json_writer.hpp"
@@ -18,9 +17,6 @@ namespace {
 
 /// How long the last lines may take to leave.
 constexpr Timeout kDrain{10'000};
-/// What a hub keeps of a retained service, unless its limit `retained_bytes` is another one, and
-/// its provider's library.
-constexpr std::size_t kRetainedMax = std::size_t{1} << 20;
 /// How long it may take the library to say why, at the longest.
 constexpr std::int64_t kWhyNs = 1'000'000'000;
 /// How often the connection is looked at.
@@ -69,23 +65,17 @@ class Standing {
   std::int64_t next_look_ns_ = 0;
 };
 
-/// Nobody else could say so to whoever publishes: a hub only counts what it does not keep.
+/// Says, once, that those who subscribe later do not get the last line.
 class Retaining {
  public:
-  explicit Retaining(const Options& options) : told_(!options.retain) {}
-
-  /// Says, once, what will not come to those who subscribe later.
-  void look_at(std::string_view line) {
-    if (told_ || line.size() + proto::gimi::kMessagePrefixMax <= kRetainedMax) return;
+  void look_at(const Outcome<void>& retained) {
+    if (!retained.is(Status::not_retained) || told_) return;
     told_ = true;
-    say("a line of " + std::to_string(line.size()) +
-        " bytes is too large to be kept for who subscribes later: at most " +
-        std::to_string(kRetainedMax - proto::gimi::kMessagePrefixMax) +
-        " bytes are, unless the hub's limit retained_bytes says otherwise");
+    say(retained.failure().sentence);
   }
 
  private:
-  bool told_;
+  bool told_ = false;
 };
 
 /// Whoever publishes may hear that the service was refused a moment before the library says why.
@@ -99,7 +89,7 @@ Outcome<void> why_refused(Session& session, const Publisher& publisher, const Ou
 }
 
 Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing,
-                            UnheardLines& unheard) {
+                            UnheardLines& unheard, Retaining& retaining) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
@@ -108,18 +98,18 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
     return std::to_string(publisher.published()) + " published to " +
            std::to_string(publisher.subscribers());
   });
-  Retaining retaining(session.options());
   std::string_view line;
   for (;;) {
     switch (input.next(line)) {
       case LineInput::State::line:
         if (!standing.stands_until(next_ns)) return standing.outcome();
         next_ns += period_ns;
-        retaining.look_at(line);
         unheard.before_line(publisher.subscribers());
         if (auto sent = publisher.publish(
                 line, kForever, period_ns == 0 && input.has_line() ? More::yes : More::no);
-            !sent) {
+            sent.is(Status::not_retained)) {
+          retaining.look_at(sent);
+        } else if (!sent) {
           return sent.is(Status::refused) ? why_refused(session, publisher, sent) : sent;
         }
         unheard.after_line(publisher.subscribers());
@@ -188,8 +178,11 @@ ExitCode run_pub(Session& session) {
   Standing standing(session, *publisher);
   auto sent = wait_for_subscribers(session, *publisher, standing);
   UnheardLines unheard;
-  if (sent && !session.stopped()) sent = publish_lines(session, *publisher, standing, unheard);
+  Retaining retaining;
+  if (sent && !session.stopped())
+    sent = publish_lines(session, *publisher, standing, unheard, retaining);
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
+  retaining.look_at(publisher->retained());
   // What is retained is for those who come later.
   const std::string unheard_words = unheard.sentence(options.target);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);

@@ -36,6 +36,7 @@ std::string wrong_call(const Node& node, const Publisher& publisher,
   if (!is_forked(publisher.publish("x", kForever))) return "publish";
   if (!is_forked(publisher.wait_for_subscribers(9))) return "wait_for_subscribers";
   if (!is_forked(publisher.standing())) return "Publisher::standing";
+  if (!is_forked(publisher.retained())) return "Publisher::retained";
   if (!is_forked(node.receive())) return "Node::receive";
   if (!is_forked(node.receive({1, 2}, kForever))) return "Node::receive(key)";
   if (!is_forked(node.queue({8, 8}).receive())) return "Node::queue";

@@ -45,10 +45,10 @@ TEST(Outcome, OfNothing) {
 
 TEST(Outcome, EveryStatusHasItsOwnText) {
   std::set<std::string_view> texts;
-  for (int status = 0; status <= static_cast<int>(Status::forked); ++status) {
+  for (int status = 0; status <= static_cast<int>(Status::not_retained); ++status) {
     texts.insert(status_text(static_cast<Status>(status)));
   }
-  EXPECT_EQ(texts.size(), static_cast<std::size_t>(Status::forked) + 1);
+  EXPECT_EQ(texts.size(), static_cast<std::size_t>(Status::not_retained) + 1);
   EXPECT_FALSE(texts.contains("unknown status"));
 }
 

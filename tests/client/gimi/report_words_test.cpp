@@ -38,7 +38,8 @@ TEST(ReportedLoss, IsWhatTheWireSays) {
       {LossReason::malformed, proto::DropReason::malformed},
       {LossReason::wrong_source, proto::DropReason::wrong_source},
   };
-  EXPECT_EQ(std::size(pairs) + 1, proto::kDropReasonCount) << "and none";
+  EXPECT_EQ(std::size(pairs) + 2, proto::kDropReasonCount)
+      << "and none, and not_retained, which is no loss";
   for (const auto& [known, wire] : pairs) {
     const auto reason = static_cast<std::uint32_t>(wire);
     EXPECT_EQ(reported_loss(reason, proto::drop_reason_name(wire)).reason, known);

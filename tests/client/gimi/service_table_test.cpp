@@ -75,6 +75,57 @@ TEST_F(Services, TheLatestWaitsAloneUnlessTheProgramChoseALength) {
   EXPECT_EQ(all.missed(), 0u);
 }
 
+TEST(RetainedServices, PublishSaysWhatIsNotKeptForLaterSubscribers) {
+  const HubProcess hub(
+      {"--limit", "retained_message_bytes=30000", "--limit", "retained_budget_bytes=70000"});
+  const Node robot("robot", hub.url());
+  const Node viewer("", hub.url());
+  PublishOptions options;
+  options.retain = true;
+  const Publisher map = robot.advertise("map", options).or_throw();
+  const Subscription early = viewer.subscribe("robot/map").or_throw();
+  map.wait_for_subscribers(1, kWait).or_throw();
+  const std::string largest(30'000, 'x');
+  map.publish(largest, kWait).or_throw();
+  EXPECT_EQ(early.receive(kWait).or_throw().size(), largest.size());
+  robot.drain(kWait).or_throw();
+  EXPECT_TRUE(map.retained());
+  const auto beyond = map.publish(largest + "x", kWait);
+  EXPECT_TRUE(beyond.is(Status::not_retained)) << "one byte beyond";
+  EXPECT_NE(beyond.failure().sentence.find("robot/map was published, but"), std::string::npos)
+      << beyond.failure().sentence;
+  EXPECT_NE(beyond.failure().sentence.find("30000 bytes and less"), std::string::npos);
+  EXPECT_EQ(early.receive(kWait).or_throw().size(), largest.size() + 1) << "it was published";
+  EXPECT_EQ(map.published(), 2u);
+  EXPECT_TRUE(map.retained().is(Status::not_retained));
+  map.publish("small", kWait).or_throw();
+  EXPECT_TRUE(map.retained());
+}
+
+TEST(RetainedServices, AHubWithoutRoomTellsTheProviderOfEachService) {
+  const HubProcess hub(
+      {"--limit", "retained_message_bytes=30000", "--limit", "retained_budget_bytes=70000"});
+  const Node robot("robot", hub.url());
+  PublishOptions options;
+  options.retain = true;
+  const Publisher map = robot.advertise("map", options).or_throw();
+  const Publisher plan = robot.advertise("plan", options).or_throw();
+  const Publisher route = robot.advertise("route", options).or_throw();
+  map.publish(std::string(30'000, 'm'), kWait).or_throw();
+  // One node has half of the budget: 5,000 bytes are left.
+  plan.publish(std::string(5'001, 'p'), kWait).or_throw();
+  route.publish(std::string(20'000, 'r'), kWait).or_throw();
+  EXPECT_TRUE(eventually([&] { return plan.retained().is(Status::not_retained); }));
+  EXPECT_TRUE(eventually([&] { return route.retained().is(Status::not_retained); }));
+  EXPECT_NE(plan.retained().failure().sentence.find("robot/plan"), std::string::npos);
+  EXPECT_TRUE(map.retained());
+  plan.publish(std::string(5'000, 'p'), kWait).or_throw();
+  robot.drain(kWait).or_throw();
+  EXPECT_TRUE(plan.retained());
+  const Node viewer("", hub.url());
+  EXPECT_EQ(viewer.subscribe("robot/plan").or_throw().receive(kWait).or_throw().size(), 5'000u);
+}
+
 TEST_F(Services, ASubscriptionMayComeFirst) {
   const Node viewer = join();
   const Subscription odometry = viewer.subscribe("robot/odom").or_throw();

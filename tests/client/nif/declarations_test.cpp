@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "client/nif/last_messages.hpp"
 #include "gimnet/nif_names.h"
+#include "proto/frame/report.hpp"
 #include "tests/client/nif/support/declaring.hpp"
 
 // Retained services and a hub that forgot their last message. The rest of it is in node_test.cpp
@@ -49,6 +52,56 @@ TEST(Declarations, GiveALargerLastMessageThatTheProgramWantsKept) {
     if (beyond == 0) expect_published(connected.hub, kGroup, last);
     EXPECT_EQ(publish(node, kGroup, "newer"), NIF_OK);
     expect_published(connected.hub, kGroup, "newer");
+  }
+}
+
+TEST(Declarations, SayWhichMessagesOfARetainedServiceTheHubDoesNotKeep) {
+  FakeHub hub;
+  for (const std::optional<std::uint32_t> most : {std::optional<std::uint32_t>{}, {0u}, {100u}}) {
+    proto::Welcome welcome = make_welcome(kResumeBytes);
+    welcome.retained_bytes_max = most;
+    Connected connected = connect_to(hub, default_options("robot"), welcome);
+    nif_node* const node = connected.node.get();
+    advertise(connected, "map", kGroup, true);
+    for (const std::size_t size : {0u, 1u, 100u, 101u, 10'000u}) {
+      const nif_status expected = most && size > *most ? NIF_NOT_RETAINED : NIF_OK;
+      const std::string payload(size, 'm');
+      EXPECT_EQ(publish(node, kGroup, payload), expected) << size;
+      if (size != 0) expect_published(connected.hub, kGroup, payload);
+    }
+    EXPECT_EQ(publish(node, 99, std::string(101, 'x')), NIF_OK) << "of no retained service";
+    EXPECT_EQ(counters_of(node).messages_sent, 6u);
+  }
+}
+
+TEST(Declarations, GiveOutReportsOfWhatIsNotKeptWithoutBeingAsked) {
+  FakeHub hub;
+  Connected connected = connect_to(hub, default_options("robot"), make_welcome());
+  advertise(connected, "map", kGroup, true);
+  for (const std::size_t size : {3u, 5'000u}) {
+    const std::string payload = pattern(size);
+    ASSERT_EQ(publish(connected.node.get(), kGroup, payload), NIF_OK);
+    const auto frame = connected.hub.next_message();
+    ASSERT_TRUE(frame);
+    std::array<std::byte, proto::kReportSizeMax> report;
+    const std::size_t bytes =
+        proto::encode_report({proto::DropReason::not_retained, 1, frame->header,
+                              std::span(frame->bytes).subspan(proto::kHeaderSize)},
+                             report);
+    proto::FrameParts parts;
+    parts.header.kind = proto::Kind::report;
+    parts.header.src = kHubNode;
+    parts.header.dst = kOwnId;
+    connected.hub.send(parts, {reinterpret_cast<const char*>(report.data()), bytes});
+    nif_incoming in{};
+    ASSERT_EQ(nif_receive(connected.node.get(), &in, NIF_FOREVER), NIF_OK);
+    EXPECT_EQ(in.type, static_cast<std::uint32_t>(NIF_REPORT));
+    EXPECT_EQ(in.reason, static_cast<std::uint32_t>(NIF_DROP_NOT_RETAINED));
+    EXPECT_EQ(in.to, kGroup);
+    EXPECT_EQ(in.kind, static_cast<std::uint8_t>(NIF_GROUP));
+    const std::string said(static_cast<const char*>(in.payload), in.size);
+    EXPECT_EQ(said.substr(proto::kHeaderSize, 3), payload.substr(0, 3)) << "how it began";
+    nif_release(&in);
   }
 }
 

@@ -15,10 +15,10 @@ namespace {
 
 TEST(Error, EveryStatusHasItsText) {
   std::set<std::string> texts;
-  for (int status = NIF_OK; status <= NIF_NO_HOST; ++status) {
+  for (int status = NIF_OK; status <= NIF_NOT_RETAINED; ++status) {
     EXPECT_TRUE(texts.insert(nif_status_text(static_cast<nif_status>(status))).second) << status;
   }
-  EXPECT_STREQ(nif_status_text(static_cast<nif_status>(NIF_NO_HOST + 1)), "unknown status");
+  EXPECT_STREQ(nif_status_text(static_cast<nif_status>(NIF_NOT_RETAINED + 1)), "unknown status");
 }
 
 TEST(Error, TheSentenceBelongsToItsThread) {
@@ -62,6 +62,7 @@ TEST(Error, DropReasonsAreThoseOfTheWire) {
       {NIF_DROP_NO_SUBSCRIBER, proto::DropReason::no_subscriber},
       {NIF_DROP_MALFORMED, proto::DropReason::malformed},
       {NIF_DROP_WRONG_SOURCE, proto::DropReason::wrong_source},
+      {NIF_DROP_NOT_RETAINED, proto::DropReason::not_retained},
   };
   EXPECT_EQ(std::size(pairs) + 1, proto::kDropReasonCount) << "and none";
   for (const auto& [known, wire] : pairs)

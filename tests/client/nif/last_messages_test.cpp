@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
+
+#include "proto/gimi/message_header.hpp"
 
 namespace gimnet::nif::test {
 namespace {
@@ -108,6 +111,18 @@ TEST(LastMessages, KeepsAsMuchOfOneAsItIsToldAndCountsTheRest) {
   keep(messages, std::string(11, 'x'));
   EXPECT_EQ(text_of(messages), "nothing");
   EXPECT_EQ(messages.not_kept(), 1u);
+}
+
+TEST(LastMessages, CountsApplicationDataOnly) {
+  std::array<std::byte, proto::gimi::kMessagePrefixMax> prefix;
+  const std::size_t size = proto::gimi::write_message_prefix({.sequence = 1}, 12'345, prefix);
+  const std::string head(reinterpret_cast<const char*>(prefix.data()), size);
+  LastMessages messages(10);
+  messages.follow("map", kGroup);
+  keep(messages, head + std::string(10, 'x'));
+  EXPECT_EQ(text_of(messages), head + std::string(10, 'x'));
+  keep(messages, head + std::string(11, 'x'));
+  EXPECT_EQ(text_of(messages), "nothing");
 }
 
 TEST(LastMessages, OfAllServicesKeepsWhatFitsIntoTheLimit) {

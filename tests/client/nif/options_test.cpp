@@ -23,7 +23,7 @@ TEST(Options, ZeroIsTheDefault) {
   EXPECT_EQ(options->reassembly.message_bytes_max, 64u << 20);
   EXPECT_EQ(options->send.queue_bytes, 256u << 10);
   EXPECT_EQ(options->send.retained_bytes, 512u << 10);
-  EXPECT_EQ(options->last_message_bytes, 1u << 20);
+  EXPECT_EQ(options->last_message_bytes, 16u << 20);
   EXPECT_EQ(options->connect_timeout_ms, 5'000);
   EXPECT_TRUE(options->reconnect);
   EXPECT_FALSE(options->resume) << "a node without a name";

@@ -30,6 +30,7 @@ TEST_F(ConductorTest, WelcomesWithWhatTheNodeNeedsToKnow) {
   EXPECT_EQ(robot.welcome.hub_time_ns, 1'000'000'000);
   EXPECT_EQ(robot.welcome.keep_alive_ms, limits.keep_alive_ms);
   EXPECT_EQ(robot.welcome.grace_ms, limits.grace_ms);
+  EXPECT_EQ(robot.welcome.retained_bytes_max, limits.retained_message_bytes);
   EXPECT_EQ(robot.welcome.last_goodbye_code, 0);
   EXPECT_FALSE(robot.welcome.token.empty());
 }

@@ -118,7 +118,7 @@ class World {
   static Limits limits(std::uint32_t seed) {
     Limits limits;
     limits.resume_bytes = 8 * 1024;
-    limits.retained_bytes = 8 * 1024;
+    limits.retained_message_bytes = 8 * 1024;
     if (seed % 3 != 1) {
       limits.lane0_bytes = limits.lane1_bytes = limits.lane2_bytes = limits.lane3_bytes = 16 * 1024;
     }

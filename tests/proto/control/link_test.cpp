@@ -112,6 +112,7 @@ TEST(WelcomeMessage, IsDecodedAndWrittenAsTheVectorSays) {
   welcome.last_goodbye_code = static_cast<std::uint16_t>(GoodbyeCode::silent);
   welcome.last_goodbye_sentence = "nothing heard for 3 s";
   welcome.name = "robot";
+  welcome.retained_bytes_max = 16 << 20;
   const auto payload = payload_of("link/welcome");
   const auto decoded = decode<Welcome>(payload);
   ASSERT_TRUE(decoded);

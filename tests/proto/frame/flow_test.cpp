@@ -92,7 +92,7 @@ TEST(Flow, TakesAReasonOfALaterVersionForNone) {
   auto payload = payload_of("flow/skip");
   payload[1] = std::byte{20};
   EXPECT_EQ(decode(payload), Message(Skip{DropReason::wrong_source, 12}));
-  payload[1] = std::byte{21};
+  payload[1] = std::byte{kDropReasonCount};
   EXPECT_EQ(decode(payload), Message(Skip{DropReason::none, 12}));
 }
 

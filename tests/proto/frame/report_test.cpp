@@ -57,7 +57,7 @@ TEST(Report, RefusesAShortPayload) {
 
 TEST(Report, TakesAReasonOfALaterVersionForNone) {
   auto payload = report_payload();
-  payload[0] = std::byte{21};
+  payload[0] = std::byte{kDropReasonCount};
   EXPECT_EQ(decode_report(payload)->reason, DropReason::none);
 }
 

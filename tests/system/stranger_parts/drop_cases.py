@@ -3,7 +3,7 @@
 import struct
 
 from stranger_parts import client as wire
-from stranger_parts.bitestream import U8, every, fields, put
+from stranger_parts.bitestream import BOOL, U8, every, fields, put
 from stranger_parts.case import PATIENT, Case
 from stranger_parts.client import CTRL, F_FRAGMENT, F_KEYED, F_REPORT, GROUP, LIST, REPORT, UNICAST, u32
 from support.waiting import wait_until
@@ -68,6 +68,19 @@ class Drops(Case):
         group = robot.advertise("odom", direction=put(6, U8, 0))[3]
         robot.write(GROUP, group, b"x", flags=F_REPORT)
         self.assertEqual(robot.report()[0], 18)
+
+    def test_a_last_message_that_is_not_kept(self):
+        hub = self.hub("--limit", "retained_message_bytes=100")
+        robot, viewer = self.stranger(hub, "robot"), self.stranger(hub)
+        self.assertEqual(robot.welcome[19], 100)
+        group = robot.advertise("map", retain=put(11, BOOL, True))[3]
+        robot.write(GROUP, group, bytes(100))
+        robot.write(GROUP, group, bytes(101))
+        reason, count, header = robot.report()
+        self.assertEqual((reason, count, header[4:8]), (21, 1, struct.pack("<I", group)))
+        viewer.subscribe("robot/map")
+        robot.write(GROUP, group, b"new")
+        self.assertEqual(viewer.data().body, b"new", "nor is an older one kept")
 
     def test_a_former_id(self):
         hub = self.hub()

@@ -33,13 +33,13 @@ void DropBook::drop_mixed(const std::byte* first, std::uint32_t size, proto::Dro
 
 void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason) {
   const proto::FrameHeader header = proto::load_header(frame);
-  const NodeId sender{header.src};
-  Note* note = find(sender, reason);
+  Note* note = find(subject_of(header, reason));
   if (note == nullptr) {
     if (notes_.size() == notes_max_) return;
     note = &notes_.emplace_back();
-    note->sender = sender;
+    note->sender = NodeId{header.src};
     note->reason = reason;
+    note->last = header;
     if (heads_.empty()) heads_.resize(std::bit_ceil(notes_max_));
     link(static_cast<std::uint32_t>(notes_.size()));
   }
@@ -50,25 +50,32 @@ void DropBook::remember(const std::byte* frame, std::uint32_t frames, proto::Dro
   std::memcpy(note->following, frame + proto::kHeaderSize, note->following_size);
 }
 
-DropBook::Note* DropBook::find(NodeId sender, proto::DropReason reason) {
+DropBook::Subject DropBook::subject_of(const proto::FrameHeader& header, proto::DropReason reason) {
+  const bool by_group = reason == proto::DropReason::not_retained;
+  return {NodeId{header.src}, reason, by_group ? header.dst : 0};
+}
+
+DropBook::Note* DropBook::find(const Subject& subject) {
   if (notes_.empty()) return nullptr;
-  for (std::uint32_t number = heads_[place_of(sender, reason)]; number != 0;
+  for (std::uint32_t number = heads_[place_of(subject)]; number != 0;
        number = notes_[number - 1].next) {
     Note& note = notes_[number - 1];
-    if (note.sender == sender && note.reason == reason) return &note;
+    if (subject_of(note.last, note.reason) == subject) return &note;
   }
   return nullptr;
 }
 
-std::size_t DropBook::place_of(NodeId sender, proto::DropReason reason) const {
+std::size_t DropBook::place_of(const Subject& subject) const {
   // Neighbouring ids, as those of nodes that joined together, have places of their own; so have a
-  // node's reasons.
-  return (sender.value() + static_cast<std::size_t>(reason) * 0x9E3779B1u) & (heads_.size() - 1);
+  // node's reasons and groups.
+  return (subject.sender.value() + subject.group * std::size_t{31} +
+          static_cast<std::size_t>(subject.reason) * 0x9E3779B1u) &
+         (heads_.size() - 1);
 }
 
 void DropBook::link(std::uint32_t number) {
   Note& note = notes_[number - 1];
-  std::uint32_t& head = heads_[place_of(note.sender, note.reason)];
+  std::uint32_t& head = heads_[place_of(subject_of(note.last, note.reason))];
   note.next = std::exchange(head, number);
 }
 

@@ -35,6 +35,11 @@ class DropBook {
   /// The same for frames with any headers.
   void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);
 
+  /// A frame that is delivered, and of which its sender has to know something all the same: it gets
+  /// a REPORT, whether it asked for reports or not. Nothing is counted. Of a group frame reports
+  /// are merged for each group.
+  void tell(const std::byte* frame, proto::DropReason reason) { remember(frame, 1, reason); }
+
   /// Of a frame that is dropped its sender is told.
   [[nodiscard]] static bool wants_report(const proto::FrameHeader& header) {
     return header.has(proto::kFlagReport) && header.kind != proto::Kind::report;
@@ -81,9 +86,18 @@ class DropBook {
   };
 
   void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
+  /// What reports are merged by.
+  struct Subject {
+    NodeId sender;
+    proto::DropReason reason{};
+    std::uint32_t group = 0;  ///< of `not_retained`; else 0
+    friend bool operator==(const Subject&, const Subject&) = default;
+  };
+  [[nodiscard]] static Subject subject_of(const proto::FrameHeader& header,
+                                          proto::DropReason reason);
   /// Found by a table, since who drops much has many notes.
-  [[nodiscard]] Note* find(NodeId sender, proto::DropReason reason);
-  [[nodiscard]] std::size_t place_of(NodeId sender, proto::DropReason reason) const;
+  [[nodiscard]] Note* find(const Subject& subject);
+  [[nodiscard]] std::size_t place_of(const Subject& subject) const;
   void link(std::uint32_t number);
   void link_all();
   static std::size_t encode(const Note& note, std::span<std::byte, proto::kReportSizeMax> payload);

@@ -1,6 +1,8 @@
 #include "hub/data/egress/kept_message.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace gimnet::hub {
 
@@ -10,6 +12,10 @@ void KeptMessage::append(const Run& frame, bool shared, EgressContext& context) 
       (small || context.budget.scarce()) && frame.buffer->kind != BufferKind::chunk;
   Run piece = by_copy ? copy(frame, context) : frame.share();
   context.pool.pin(*piece.buffer.get());
+  add(std::move(piece));
+}
+
+void KeptMessage::add(Run piece) {
   frames_ += piece.frames;
   bytes_ += piece.size;
   Run& last = more_.empty() ? first_ : more_.back();
@@ -28,6 +34,33 @@ Run KeptMessage::copy(const Run& frame, EgressContext& context) {
                    : context.pool.take_chunk(frames_ == 0 ? frame.size : kCopyBytesMax);
     chunk_used_ = 0;
   }
+  return copy_into_chunk(frame, context);
+}
+
+void KeptMessage::begin_copy(std::uint32_t bytes, EgressContext& context) {
+  first_ = Run{};
+  more_.clear();
+  chunk_used_ = frames_ = 0;
+  bytes_ = 0;
+  // acquire pairs with the release in BufferPool::end_loan(): no other shard reads it any more.
+  const bool own =
+      chunk_ && chunk_->references == 1 && chunk_->lent.load(std::memory_order_acquire) == 0;
+  const bool large = chunk_ && chunk_->capacity > kOwnRoomBytes;
+  const bool fits = own && bytes <= chunk_->capacity &&
+                    (!large || chunk_->capacity - bytes <= chunk_->capacity / 8);
+  if (!fits) chunk_ = context.pool.take_exact(bytes);
+}
+
+void KeptMessage::append_copy(const Run& frame, EgressContext& context) {
+  if (chunk_->capacity - chunk_used_ < frame.size) {
+    chunk_ = context.pool.take_exact(std::max(frame.size, kCopyBytesMax));
+    chunk_used_ = 0;
+  }
+  add(copy_into_chunk(frame, context));
+}
+
+/// REQUIRES: there is room.
+Run KeptMessage::copy_into_chunk(const Run& frame, EgressContext& context) {
   std::byte* place = chunk_->data + chunk_used_;
   std::memcpy(place, frame.bytes, frame.size);
   chunk_used_ += frame.size;

@@ -9,8 +9,8 @@
 namespace gimnet::hub {
 
 /// One message that is kept, whole or as far as it came: references to its frames, and small ones
-/// in memory of their own, so that they do not keep a read buffer. What it keeps counts against the
-/// budget. Cleared and filled again it does not allocate. Thread safety: one shard.
+/// in memory of their own, so that they do not keep a read buffer. What append() keeps counts
+/// against the budget. Cleared and filled again it does not allocate. Thread safety: one shard.
 class KeptMessage {
  public:
   KeptMessage() = default;
@@ -23,6 +23,11 @@ class KeptMessage {
 
   /// The next frame. `shared`: others keep the same bytes, so a reference costs nothing.
   void append(const Run& frame, bool shared, EgressContext& context);
+  /// Begins a message that is copied into memory of its own, about `bytes` of it, by
+  /// append_copy(). It does not count against the budget. Memory of the message before is used
+  /// again where it fits.
+  void begin_copy(std::uint32_t bytes, EgressContext& context);
+  void append_copy(const Run& frame, EgressContext& context);
   void clear();
 
   /// Calls take(const Run&) for each stretch of frames, in order.
@@ -36,7 +41,12 @@ class KeptMessage {
   /// A stretch below this is copied out of the slab that it lies in.
   static constexpr std::uint32_t kCopyBytesMax = kSharedChunkBytes;
 
+  /// So much memory of its own a message keeps for the next one, however small that is.
+  static constexpr std::uint32_t kOwnRoomBytes = 4 * 1024;
+
   [[nodiscard]] Run copy(const Run& frame, EgressContext& context);
+  [[nodiscard]] Run copy_into_chunk(const Run& frame, EgressContext& context);
+  void add(Run piece);
 
   Run first_;
   std::vector<Run> more_;

@@ -1,10 +1,11 @@
 #include "hub/data/fanout/retained_messages.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <type_traits>
 #include <utility>
 
-#include "proto/frame/frame_parser.hpp"
+#include "proto/gimi/message_header.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -17,6 +18,25 @@ Mail mail_about(MailKind kind, const GroupStart& start) {
   mail.small_size = sizeof start;
   std::memcpy(mail.small, &start, sizeof start);
   return mail;
+}
+
+/// What a message counts that begins with a frame of `frame_bytes` and has a payload of so many
+/// bytes.
+std::uint64_t charge_of(const proto::FrameView& frame, std::uint32_t payload_bytes,
+                        std::uint32_t frame_bytes) {
+  const std::uint32_t data =
+      proto::gimi::application_bytes(frame.key.has_value(), frame.payload, payload_bytes);
+  return std::max(data, frame_bytes / 2);
+}
+
+/// For all frames of a fragmented message, where they are as large as the first; at most twice the
+/// message and a frame.
+std::uint32_t room_for(const proto::FrameView& first, std::uint32_t frame_bytes) {
+  const std::uint64_t total = first.fragment->total;
+  const std::uint64_t payload = first.payload.size();
+  const std::uint64_t frames = (total + payload - 1) / payload;
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(total + frames * (frame_bytes - payload), 2 * total + frame_bytes));
 }
 
 }  // namespace
@@ -34,80 +54,132 @@ RetainedMessages::Entry& RetainedMessages::entry(const proto::FrameHeader& heade
 void RetainedMessages::set_provider(Entry& entry, NodeId provider) {
   leave_provider(entry);
   entry.provider = provider;
-  Entry*& first = first_of_[provider.value()];
-  entry.after = std::exchange(first, &entry);
+  Share& share = shares_[provider.value()];
+  share.charged += entry.charged();
+  entry.after = std::exchange(share.first, &entry);
   if (entry.after != nullptr) entry.after->before = &entry;
 }
 
 void RetainedMessages::leave_provider(Entry& entry) {
+  const auto share = shares_.find(entry.provider.value());
+  if (share != shares_.end()) share->second.charged -= entry.charged();
   if (entry.after != nullptr) entry.after->before = entry.before;
   if (entry.before != nullptr) {
     entry.before->after = entry.after;
   } else if (entry.after != nullptr) {
-    first_of_[entry.provider.value()] = entry.after;
-  } else {
-    first_of_.erase(entry.provider.value());  // none if it is new
+    share->second.first = entry.after;
+  } else if (share != shares_.end()) {
+    shares_.erase(share);
   }
   entry.before = entry.after = nullptr;
 }
 
-void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
-  Entry& kept = entry(header);
-  if (header.has(proto::kFlagFragment)) return keep_fragment(kept, run, header);
-  Arriving& arriving = kept.arriving[header.lane & proto::kLaneMask];
-  arriving.open = false;
-  arriving.message.clear();
-  Run last = run.share();
-  while (last.frames > 1) last.skip_frame();
-  kept.last.clear();
-  if (may_keep(kept, last.size - proto::kHeaderSize)) kept.last.append(last, false, context_);
+std::uint64_t RetainedMessages::Entry::charged() const {
+  std::uint64_t bytes = last.charged;
+  for (const Arriving& each : arriving) bytes += each.kept.charged;
+  return bytes;
 }
 
-void RetainedMessages::keep_fragment(Entry& kept, const Run& run,
-                                     const proto::FrameHeader& header) {
-  const auto frame = proto::parse_frame({run.bytes, run.size}, proto::Origin::hub);
-  GIMNET_CHECK(frame && frame->fragment);  // the gate parsed it
-  const proto::FragmentHeader& fragment = *frame->fragment;
-  Arriving& arriving = kept.arriving[header.lane & proto::kLaneMask];
-  if (fragment.offset == 0) {
-    arriving.message.clear();
-    arriving.open = may_keep(kept, fragment.total);
-    arriving.number = fragment.message;
-    arriving.next_offset = 0;
+bool RetainedMessages::charge(const Entry& entry, Kept& kept, std::uint64_t bytes) {
+  Share& share = shares_[entry.provider.value()];
+  if (bytes > kept.charged) {
+    const std::uint64_t more = bytes - kept.charged;
+    if (share.charged + more > context_.limits.retained_budget_bytes / 2) return false;
+    if (!budget_.lease(static_cast<std::int64_t>(more))) return false;
+  } else {
+    budget_.give_back(static_cast<std::int64_t>(kept.charged - bytes));
   }
+  share.charged += bytes - kept.charged;  // wraps where it becomes less
+  kept.charged = bytes;
+  return true;
+}
+
+void RetainedMessages::let_go(const Entry& entry, Kept& kept) {
+  kept.message.clear();
+  static_cast<void>(charge(entry, kept, 0));
+}
+
+void RetainedMessages::refuse(Entry& entry, const Run& run) {
+  let_go(entry, entry.last);
+  ++context_.tally.not_retained;
+  context_.drops.tell(run.bytes, proto::DropReason::not_retained);
+}
+
+void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
+  Entry& kept = entry(header);
+  Run last = run.share();
+  while (last.frames > 1) last.skip_frame();
+  const auto frame = proto::parse_frame({last.bytes, last.size}, proto::Origin::hub);
+  GIMNET_CHECK(frame);  // the gate parsed it
+  if (frame->fragment) return keep_fragment(kept, last, *frame);
+  Arriving& arriving = kept.arriving[header.lane & proto::kLaneMask];
+  arriving.open = false;
+  let_go(kept, arriving.kept);
+  const std::uint64_t bytes =
+      charge_of(*frame, static_cast<std::uint32_t>(frame->payload.size()), last.size);
+  if (bytes > context_.limits.retained_message_bytes || !charge(kept, kept.last, bytes))
+    return refuse(kept, last);
+  kept.last.message.begin_copy(last.size, context_);
+  kept.last.message.append_copy(last, context_);
+}
+
+void RetainedMessages::keep_fragment(Entry& entry, const Run& run, const proto::FrameView& frame) {
+  const proto::FragmentHeader& fragment = *frame.fragment;
+  Arriving& arriving = entry.arriving[frame.header.lane & proto::kLaneMask];
+  if (fragment.offset == 0) begin_fragments(entry, arriving, run, frame);
   const bool follows =
       arriving.number == fragment.message && arriving.next_offset == fragment.offset;
   if (!arriving.open || !follows) {
     arriving.open = false;
-    return arriving.message.clear();
+    return let_go(entry, arriving.kept);
   }
-  arriving.message.append(run, false, context_);
-  arriving.next_offset = fragment.offset + static_cast<std::uint32_t>(frame->payload.size());
-  if (!frame->ends_message()) return;
-  kept.last.clear();
-  std::swap(kept.last, arriving.message);
+  KeptMessage& message = arriving.kept.message;
+  // Of many small pieces the headers are more than the data.
+  const std::uint64_t half = (message.bytes() + run.size) / 2;
+  if (!charge(entry, arriving.kept, std::max(arriving.kept.charged, half))) {
+    arriving.open = false;
+    let_go(entry, arriving.kept);
+    return refuse(entry, run);
+  }
+  message.append_copy(run, context_);
+  arriving.next_offset = fragment.offset + static_cast<std::uint32_t>(frame.payload.size());
+  if (!frame.ends_message()) return;
+  let_go(entry, entry.last);
+  std::swap(entry.last, arriving.kept);
   arriving.open = false;
 }
 
-/// A message that cannot be kept leaves none behind: an older one would not be the last.
-bool RetainedMessages::may_keep(Entry& kept, std::uint64_t bytes) {
-  if (bytes <= context_.limits.retained_bytes && !context_.budget.exhausted()) return true;
-  kept.last.clear();
-  ++context_.tally.not_retained;
-  return false;
+/// Beside the last message where there is room for both, else in its place.
+void RetainedMessages::begin_fragments(Entry& entry, Arriving& arriving, const Run& run,
+                                       const proto::FrameView& frame) {
+  const proto::FragmentHeader& fragment = *frame.fragment;
+  let_go(entry, arriving.kept);
+  const std::uint64_t bytes = charge_of(frame, fragment.total, run.size);
+  arriving.open = bytes <= context_.limits.retained_message_bytes;
+  if (arriving.open && !charge(entry, arriving.kept, bytes)) {
+    let_go(entry, entry.last);
+    arriving.open = charge(entry, arriving.kept, bytes);
+  }
+  if (!arriving.open) return refuse(entry, run);
+  arriving.number = fragment.message;
+  arriving.next_offset = 0;
+  arriving.kept.message.begin_copy(room_for(frame, run.size), context_);
 }
 
 void RetainedMessages::forget(GroupId group) {
   const auto found = entries_.find(group.value());
   if (found == entries_.end()) return;
+  budget_.give_back(static_cast<std::int64_t>(found->second->charged()));
   leave_provider(*found->second);
   entries_.erase(found);
 }
 
 void RetainedMessages::forget_provider(NodeId provider) {
-  const auto found = first_of_.find(provider.value());
-  Entry* each = found == first_of_.end() ? nullptr : found->second;
-  first_of_.erase(provider.value());
+  const auto found = shares_.find(provider.value());
+  if (found == shares_.end()) return;
+  budget_.give_back(static_cast<std::int64_t>(found->second.charged));
+  Entry* each = found->second.first;
+  shares_.erase(found);
   while (each != nullptr) {
     const std::uint32_t group =
         std::exchange(each, each->after)->group;  // not the one that goes with its entry
@@ -117,9 +189,9 @@ void RetainedMessages::forget_provider(NodeId provider) {
 
 void RetainedMessages::renumber_provider(NodeId former, NodeId provider) {
   if (former == provider) return;
-  for (auto found = first_of_.find(former.value()); found != first_of_.end();
-       found = first_of_.find(former.value())) {
-    set_provider(*found->second, provider);
+  for (auto found = shares_.find(former.value()); found != shares_.end();
+       found = shares_.find(former.value())) {
+    set_provider(*found->second.first, provider);
   }
 }
 
@@ -133,15 +205,20 @@ void RetainedMessages::on_start_wanted(const GroupStart& start) {
   }
   const auto found = entries_.find(start.group.value());
   if (found == entries_.end()) return;
-  hand(start, found->second->last);
-  for (const Arriving& arriving : found->second->arriving) hand(start, arriving.message);
+  hand(start, found->second->last.message);
+  for (const Arriving& arriving : found->second->arriving) hand(start, arriving.kept.message);
 }
 
 void RetainedMessages::hand(const GroupStart& start, const KeptMessage& message) {
   message.for_each([&](const Run& run) {
     context_.tally.copies += run.frames;
     context_.tally.queued += run.frames;
-    if (start.shard == fanout_.self()) return on_handed(start, run);
+    if (start.shard == fanout_.self()) {
+      // As a loan, too: it counts as a waiting message only while it waits.
+      const Run lent{context_.pool.adopt(BufferPool::lend(*run.buffer.get())), run.bytes, run.size,
+                     run.frames};
+      return on_handed(start, lent);
+    }
     Mail mail = mail_about(MailKind::retained, start);
     mail.bytes = run.bytes;
     mail.size = run.size;

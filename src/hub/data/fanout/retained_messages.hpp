@@ -5,9 +5,11 @@
 #include <memory>
 #include <unordered_map>
 
+#include "hub/data/budget.hpp"
 #include "hub/data/egress/kept_message.hpp"
 #include "hub/data/fanout/pacer.hpp"
 #include "hub/data/route/group_table.hpp"
+#include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
 
@@ -20,11 +22,22 @@ namespace gimnet::hub {
 /// start the subscriber does not get, what comes after it does. Of a message that is just coming it
 /// gets what came so far behind the last one.
 ///
-/// Thread safety: one shard. Limits: retained_bytes for one message, and the budget.
+/// Kept messages lie in memory of their own and count by their application data, or by half of
+/// their bytes, where that is more: against retained_message_bytes, against retained_budget_bytes
+/// of the whole hub, and against half of that for their provider. Of one that is not kept the
+/// provider is told (`not_retained`), and an older one is kept no longer, as it would not be the
+/// last.
+///
+/// Thread safety: one shard.
 class RetainedMessages {
  public:
-  RetainedMessages(const GroupTable& groups, Fanout& fanout, Pacer& pacer)
-      : groups_(groups), fanout_(fanout), pacer_(pacer), context_(fanout.context()) {}
+  /// `budget`: of the whole hub.
+  RetainedMessages(const GroupTable& groups, Fanout& fanout, Pacer& pacer, Budget& budget)
+      : groups_(groups),
+        fanout_(fanout),
+        pacer_(pacer),
+        budget_(budget),
+        context_(fanout.context()) {}
 
   // ---- the provider's shard
 
@@ -49,39 +62,56 @@ class RetainedMessages {
   void on_handed(const GroupStart& start, const Run& frames);
 
  private:
+  /// A message and what it counts in the budget.
+  struct Kept {
+    KeptMessage message;
+    std::uint64_t charged = 0;
+  };
   /// A fragmented message of one lane of which the end has not come.
   struct Arriving {
     bool open = false;
     std::uint32_t number = 0;
     std::uint32_t next_offset = 0;
-    KeptMessage message;
+    Kept kept;
   };
   struct Entry {
     std::uint32_t group = 0;
     NodeId provider;
     Entry* before = nullptr;  ///< of the same provider
     Entry* after = nullptr;
-    KeptMessage last;
+    Kept last;
     std::array<Arriving, proto::kLaneCount> arriving;
+    [[nodiscard]] std::uint64_t charged() const;
+  };
+  /// Of one provider.
+  struct Share {
+    Entry* first = nullptr;
+    std::uint64_t charged = 0;
   };
 
   [[nodiscard]] Entry& entry(const proto::FrameHeader& header);
   void set_provider(Entry& entry, NodeId provider);
   void leave_provider(Entry& entry);
-  void keep_fragment(Entry& kept, const Run& run, const proto::FrameHeader& header);
-  [[nodiscard]] bool may_keep(Entry& kept, std::uint64_t bytes);
+  void keep_fragment(Entry& entry, const Run& run, const proto::FrameView& frame);
+  void begin_fragments(Entry& entry, Arriving& arriving, const Run& run,
+                       const proto::FrameView& frame);
+  /// The message counts as `bytes` from now on. False: it may not, and counts as before.
+  [[nodiscard]] bool charge(const Entry& entry, Kept& kept, std::uint64_t bytes);
+  void let_go(const Entry& entry, Kept& kept);
+  /// The message of this frame is not kept, nor any older one.
+  void refuse(Entry& entry, const Run& run);
   void hand(const GroupStart& start, const KeptMessage& message);
   [[nodiscard]] PacedSubscription* subscription_of(const GroupStart& start) const;
 
   const GroupTable& groups_;
   Fanout& fanout_;
   Pacer& pacer_;
+  Budget& budget_;
   EgressContext& context_;
   std::uint32_t starts_ = 0;  ///< asked for
   std::unordered_map<std::uint32_t, std::unique_ptr<Entry>> entries_;
-  /// The first entry of each provider: sessions end all the time, and most of them had provided
-  /// nothing.
-  std::unordered_map<std::uint32_t, Entry*> first_of_;
+  /// By provider: sessions end all the time, and most of them had provided nothing.
+  std::unordered_map<std::uint32_t, Share> shares_;
 };
 
 }  // namespace gimnet::hub

@@ -48,6 +48,25 @@ TEST(DropBook, CountsEverythingAndReportsWhatAskedForIt) {
   EXPECT_EQ(report->following.size(), 4u);
 }
 
+TEST(DropBook, TellsOfAFrameThatIsNotDroppedAndCountsNothing) {
+  Tally tally;
+  DropBook book(tally, 10, 4'096);
+  for (const std::uint32_t group : {1u, 2u, 1u}) {
+    auto bytes = EgressRig::bytes("map", {.kind = proto::Kind::group, .flags = 0, .src = 1});
+    store_le(bytes.data() + 4, group);
+    book.tell(bytes.data(), DropReason::not_retained);
+  }
+  EXPECT_FALSE(tally.any_dropped);
+  const auto sent = flush(book, 1'000);
+  ASSERT_EQ(sent.size(), 2u) << "one for each group";
+  for (const Sent& each : sent) {
+    const auto report = proto::decode_report(each.payload);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->reason, DropReason::not_retained);
+    EXPECT_EQ(report->count, report->header.dst == 1 ? 2u : 1u);
+  }
+}
+
 TEST(DropBook, CountsAFrameForEachOfItsRecipients) {
   Tally tally;
   DropBook book(tally, 10, 4'096);

@@ -22,7 +22,7 @@ class RetainedMessagesTest : public ::testing::Test {
  protected:
   static Limits limits() {
     Limits limits;
-    limits.retained_bytes = 100'000;
+    limits.retained_message_bytes = 100'000;
     return limits;
   }
   void SetUp() override { rig.publish_paced_group(1, provider.id, {}, true); }
@@ -180,15 +180,31 @@ TEST_F(RetainedMessagesTest, AStartUnderWayIsNotTakenForALaterGroupsOfThatId) {
   EXPECT_EQ(got(node), (Texts{"new"}));
 }
 
-TEST_F(RetainedMessagesTest, IsChargedAndFreedWithItsService) {
+TEST_F(RetainedMessagesTest, IsFreedWithItsServiceAndPinsNothing) {
   publish(std::string(5'000, 'x'));
   rig.turn();
-  EXPECT_GE(rig.sum(&ShardCounters::pinned_bytes), 5'000u);
+  EXPECT_EQ(rig.sum(&ShardCounters::pinned_bytes), 0u) << "it has a budget of its own";
   rig.withdraw_group(1);
   rig.command(0, ForgetRetainedCommand{GroupId{HubRig::group(1)}});
   rig.turn();
-  EXPECT_EQ(rig.sum(&ShardCounters::pinned_bytes), 0u);
   EXPECT_EQ(rig.state(0).retained.groups(), 0u);
+}
+
+TEST_F(RetainedMessagesTest, CountsAsAWaitingMessageWhileASubscriberReadsNothing) {
+  publish(std::string(20'000, 'x'));
+  for (const std::size_t shard : {0u, 1u}) {
+    FakeNode& slow = rig.join(shard);
+    slow.pipe.set_room(0);
+    members.push_back(&slow);
+    rig.publish_paced_group(1, provider.id, members, true);
+    rig.pace(slow, 1, {}, true);
+    rig.settle_without_reading();
+    EXPECT_GE(rig.sum(&ShardCounters::pinned_bytes), 20'000u) << "shard " << shard;
+    slow.pipe.set_room(MemoryPeer::kAll);
+    EXPECT_EQ(got(slow), Texts{std::string(20'000, 'x')});
+    rig.turn();
+    EXPECT_EQ(rig.sum(&ShardCounters::pinned_bytes), 0u) << "shard " << shard;
+  }
 }
 
 TEST_F(RetainedMessagesTest, LivesThroughItsProvidersGraceTimeAndNotLonger) {

@@ -20,7 +20,7 @@ class RouteRig {
         fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context,
                {HubId{7}, nodes, groups}),
         pacer(fanout),
-        retained(groups, fanout, pacer),
+        retained(groups, fanout, pacer, retained_budget),
         router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
   ~RouteRig() {
     for (const auto& recipient : recipients_made) {
@@ -103,6 +103,7 @@ class RouteRig {
   Mailbox mailbox_there;
   Fanout fanout;
   Pacer pacer;
+  Budget retained_budget{64 << 20};
   RetainedMessages retained;
   Router router;
   GroupMembers members;

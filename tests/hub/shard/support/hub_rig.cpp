@@ -99,8 +99,8 @@ HubRig::HubRig(std::size_t shards, Limits limits)
     sessions_.push_back(std::make_unique<SessionGauges>(kGaugedSlots));
     sessions.push_back(sessions_.back().get());
   }
-  shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, inbox_,
-                            mailboxes, wakers, counters, sessions});
+  shared_.emplace(HubShared{hub(), limits_, nodes_, groups_, quiescence_, budget_, retained_budget_,
+                            inbox_, mailboxes, wakers, counters, sessions});
   for (std::size_t i = 0; i < shards; ++i) {
     shards_.push_back(std::make_unique<IoShard>(ShardIndex{static_cast<std::uint8_t>(i)}, *shared_,
                                                 IoShard::Options{}));

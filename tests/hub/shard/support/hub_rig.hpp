@@ -178,6 +178,7 @@ class HubRig {
   GroupTable groups_;
   Quiescence quiescence_;
   Budget budget_;
+  Budget retained_budget_{limits_.retained_budget_bytes};
   ControlInbox inbox_;
   std::vector<std::unique_ptr<Waker>> wakers_;
   std::vector<std::unique_ptr<Mailbox>> mailboxes_;
