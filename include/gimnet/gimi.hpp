@@ -235,7 +235,11 @@ struct LostCounts {
   std::uint64_t unreadable = 0;
   /// Messages that came after their sender had begun the stream anew (Message::begins_stream()).
   std::uint64_t outdated = 0;
-  /// How many losses are known: messages, and frames where only those are.
+  /// Frames that the hub dropped because this node's queue there was full.
+  std::uint64_t queue_full = 0;
+  /// Who had sent most of the bytes in it, whoever lost frames. Id 0: nobody, or not known.
+  Peer queue_filled_by = {};
+  /// How many losses are known: messages, and frames where only those are. Without queue_full.
   [[nodiscard]] std::uint64_t all() const {
     return incomplete + too_large + frames_broken_off + unknown_service + unreadable + outdated;
   }
@@ -304,8 +308,8 @@ class Node {
   /// Messages dropped because of too many keys, or because they were no GIMI messages.
   [[nodiscard]] std::uint64_t dropped() const;
   /// Messages to this node, or of its subscriptions, that were lost on their way, as far as it
-  /// knows. What a service left out because this node was too slow is not among them:
-  /// Subscription::missed().
+  /// knows, and who filled its queue at the hub if that was full. What a service left out for this
+  /// node is counted by Subscription::missed().
   [[nodiscard]] LostCounts lost() const;
 
   // ---- services

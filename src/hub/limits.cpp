@@ -80,7 +80,7 @@ constexpr std::array kTable{
     LimitInfo{"control_bytes", "bytes", &Limits::control_bytes, 16 * kKiB, kGiB,
               "answers, events and keep-alive waiting for one node", true},
     LimitInfo{"reserve_bytes", "bytes", &Limits::reserve_bytes, 16 * kKiB, kGiB,
-              "above the limit of a lane, for what is under way when PAUSE is sent", true},
+              "above half of a lane, for what is under way when PAUSE is sent", true},
     LimitInfo{"budget_bytes", "bytes", &Limits::budget_bytes, 4 * kMiB, 1024 * kGiB,
               "kept from being freed by waiting messages, the whole hub"},
     LimitInfo{"lane0_bytes_per_s", "bytes/s", &Limits::lane0_bytes_per_s, kKiB, 1024 * kGiB,

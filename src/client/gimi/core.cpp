@@ -223,10 +223,12 @@ nif_verdict Core::dispatch(const nif_incoming& in) {
 }
 
 void Core::on_gap(const nif_incoming& in) {
+  const auto reason = static_cast<proto::DropReason>(in.reason);
+  if (reason == proto::DropReason::queue_full || reason == proto::DropReason::over_budget)
+    return losses_.add_queue_full(in.from, in.count);
   // From itself: what this node sent. Its streams learn of the break by themselves.
   if (in.from == nif_id(node())) return;
-  losses_.add(static_cast<proto::DropReason>(in.reason),
-              in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
+  losses_.add(reason, in.count == NIF_COUNT_UNKNOWN ? 1 : in.count);
 }
 
 void Core::on_connected(const nif_incoming& in) {

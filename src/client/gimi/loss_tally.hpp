@@ -14,6 +14,11 @@ class LossTally {
  public:
   /// `count` as NIF_GAP has it: messages, or frames that went with a connection.
   void add(proto::DropReason reason, std::uint64_t count) { add(place(reason), count); }
+  /// The hub dropped `frames` since this node's queue was full, mostly of what `source` had sent.
+  void add_queue_full(std::uint32_t source, std::uint64_t frames) {
+    add(queue_full_, frames);
+    queue_filled_by_.store(source, std::memory_order_relaxed);  // as add()
+  }
   /// A message of a group that no subscription of this node has.
   void add_unknown_service() { add(unknown_service_, 1); }
   /// A KEYED message without a GIMI header.
@@ -28,7 +33,9 @@ class LossTally {
             frames_broken_off_.load(std::memory_order_relaxed),
             unknown_service_.load(std::memory_order_relaxed),
             unreadable_.load(std::memory_order_relaxed),  // see add()
-            outdated_.load(std::memory_order_relaxed)};
+            outdated_.load(std::memory_order_relaxed),
+            queue_full_.load(std::memory_order_relaxed),  // see add()
+            Peer{queue_filled_by_.load(std::memory_order_relaxed)}};
   }
 
  private:
@@ -48,6 +55,8 @@ class LossTally {
   Count unknown_service_{0};
   Count unreadable_{0};
   Count outdated_{0};
+  Count queue_full_{0};
+  std::atomic<std::uint32_t> queue_filled_by_{0};
 };
 
 }  // namespace gimnet::gimi

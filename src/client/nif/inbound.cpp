@@ -261,6 +261,10 @@ Inbound::Verdict Inbound::take_flow(const proto::FrameView& view) {
     add_gap(0, unknown ? NIF_COUNT_UNKNOWN : skip->count, skip->reason);
     return Verdict::going;
   }
+  if (const auto* dropped = std::get_if<proto::flow::Dropped>(&*message)) {
+    add_gap(dropped->source.value(), dropped->count, dropped->reason);
+    return Verdict::going;
+  }
   return host_.on_flow(*message) ? Verdict::going
                                  : malformed("CONFIRM names more frames than were sent");
 }

@@ -43,6 +43,7 @@ bool Flusher::flush_dirty() {
 
 void Flusher::flush(Connection& connection) {
   if (!connection.connected || connection.blocked) return let_wait(connection);
+  if (connection.outbox.has_untold_losses()) tell_losses(connection);
   const std::uint64_t sent_before = state_.tally.sent_bytes;
   const std::uint64_t control_before = state_.tally.sent_control_bytes;
   const std::uint64_t delivered_before = state_.tally.delivered;
@@ -142,6 +143,12 @@ void Flusher::watch(Connection& connection) {
 void Flusher::end_watch(Connection& connection) {
   if (spare_.size() < kSpareMax) spare_.push_back(std::move(connection.progress));
   connection.progress.reset();
+}
+
+/// Control frames go first, so the node hears of a gap before the data behind it.
+void Flusher::tell_losses(Connection& connection) {
+  if (push_flow(state_, connection, connection.outbox.untold_losses()))
+    connection.outbox.on_losses_told();
 }
 
 void Flusher::on_writable(Connection& connection) {

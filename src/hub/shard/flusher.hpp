@@ -31,6 +31,8 @@ class Flusher {
  private:
   void ask_for_confirm(Connection& connection);
   void let_wait(Connection& connection);
+  /// Tells the node how many frames were dropped because its queue was full.
+  void tell_losses(Connection& connection);
   void on_blocked(Connection& connection);
   /// Nothing more can be written. What the peer sent before it went is still read to its end.
   void on_write_failed(Connection& connection);

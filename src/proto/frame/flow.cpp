@@ -22,6 +22,7 @@ constexpr std::size_t size_of(Operation operation) {
     case Operation::credit:
     case Operation::confirm:
     case Operation::skip:
+    case Operation::dropped:
       return kCountSize;
     case Operation::pause:
     case Operation::resume:
@@ -97,6 +98,13 @@ struct Encoder {
     store_le(bytes + 8, skip.count);
     return kCountSize;
   }
+  std::size_t operator()(const Dropped& dropped) const {
+    store_operation(bytes, Operation::dropped, kCountSize);
+    bytes[1] = static_cast<std::byte>(dropped.reason);
+    store_le(bytes + 4, dropped.source.value());
+    store_le(bytes + 8, dropped.count);
+    return kCountSize;
+  }
 };
 
 }  // namespace
@@ -125,6 +133,9 @@ std::optional<Message> decode(std::span<const std::byte> payload) {
       return Confirm{load_le<std::uint64_t>(bytes + 8)};
     case Operation::skip:
       return Skip{known_reason(bytes[1]), load_le<std::uint64_t>(bytes + 8)};
+    case Operation::dropped:
+      return Dropped{known_reason(bytes[1]), NodeId{load_le<std::uint32_t>(bytes + 4)},
+                     load_le<std::uint64_t>(bytes + 8)};
   }
   return std::nullopt;
 }

@@ -21,7 +21,8 @@ enum class Operation : std::uint8_t {
   pause = 4,
   resume = 5,
   confirm = 6,
-  skip = 7
+  skip = 7,
+  dropped = 8
 };
 
 /// Are you there? Times in ns since 1970.
@@ -81,7 +82,16 @@ struct Skip {
   friend constexpr bool operator==(const Skip&, const Skip&) = default;
 };
 
-using Message = std::variant<Ping, Pong, Credit, Pause, Resume, Confirm, Skip>;
+/// So many data frames for this node were dropped before they were sent, since the hub said so
+/// last.
+struct Dropped {
+  DropReason reason = DropReason::none;  ///< of the latest; none: as in Skip
+  NodeId source;                         ///< most bytes that waited were its; 0: not known
+  std::uint64_t count = 0;
+  friend constexpr bool operator==(const Dropped&, const Dropped&) = default;
+};
+
+using Message = std::variant<Ping, Pong, Credit, Pause, Resume, Confirm, Skip, Dropped>;
 
 inline constexpr std::size_t kSizeMax = 24;
 

@@ -7,7 +7,7 @@ namespace {
 
 struct Words {
   std::string what;
-  std::string_view why;
+  std::string why;
 };
 
 void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std::uint64_t told,
@@ -19,8 +19,15 @@ void add_sentence(std::vector<std::string>& sentences, std::uint64_t count, std:
 
 }  // namespace
 
+std::string queue_full_words(std::string_view whose, const Peer& filled_by) {
+  std::string words = "the queue of " + std::string(whose) + " at the hub was full";
+  if (filled_by) words += ", mostly of what " + filled_by.text() + " sent";
+  return words;
+}
+
 std::vector<std::string> LostMessages::news(std::int64_t now_ns) {
-  if (all() == told_.all() || !pace_.due(now_ns)) return {};
+  const bool known = all() == told_.all() && counts_.queue_full == told_.queue_full;
+  if (known || !pace_.due(now_ns)) return {};
   return rest();
 }
 
@@ -39,6 +46,8 @@ std::vector<std::string> LostMessages::rest() {
                {"frame", "another node broke the protocol, or sent a key without a GIMI header"});
   add_sentence(sentences, counts_.outdated, told_.outdated,
                {"message", "its sender had been started again, and had sent newer ones"});
+  add_sentence(sentences, counts_.queue_full, told_.queue_full,
+               {"frame", queue_full_words("this node", counts_.queue_filled_by)});
   told_ = counts_;
   return sentences;
 }

@@ -2,12 +2,16 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/news_pace.hpp"
 
 namespace gimnet::tool {
+
+/// Why messages did not come: a full queue, and who filled it, if that is known.
+[[nodiscard]] std::string queue_full_words(std::string_view whose, const Peer& filled_by);
 
 /// What was lost on its way to this node, and when to say so. Thread safety: one thread.
 class LostMessages {

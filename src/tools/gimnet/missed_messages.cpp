@@ -1,6 +1,9 @@
 #include "tools/gimnet/missed_messages.hpp"
 
 #include <algorithm>
+#include <utility>
+
+#include "tools/gimnet/lost_messages.hpp"
 
 namespace gimnet::tool {
 
@@ -50,7 +53,7 @@ void MissedMessages::count(Service& service, std::uint64_t missed, const Message
   }
   const std::uint64_t told = std::min(missed, told_as_lost_);
   told_as_lost_ -= told;
-  service.unknown.missed += missed - told;
+  cause_of(service, message).missed += missed - told;
   untold_ = untold_ || missed != told;
 }
 
@@ -59,7 +62,17 @@ std::uint64_t MissedMessages::skipped(std::string_view service) const {
   return found == services_.end() ? 0 : found->second.skipped.missed;
 }
 
+/// The hub tells of a full queue before it sends what waits in it, and what comes behind the gap.
+MissedMessages::Count& MissedMessages::cause_of(Service& service, const Message& message) {
+  if (std::exchange(service.queue_full, queue_full_) == queue_full_) return service.unknown;
+  if (queue_filled_by_.id == 0 || queue_filled_by_.id == message.from().id) return service.slow;
+  flooder_ = queue_filled_by_;
+  return service.flooded;
+}
+
 void MissedMessages::take_lost(const LostCounts& counts) {
+  queue_full_ = counts.queue_full;
+  queue_filled_by_ = counts.queue_filled_by;
   const std::uint64_t lost =
       counts.incomplete + counts.too_large + counts.unknown_service + counts.outdated;
   told_as_lost_ += lost - lost_;
@@ -80,6 +93,9 @@ std::vector<std::string> MissedMessages::rest() {
     add_sentence(sentences, service.broken, name,
                  " did not come: the connection to the hub was broken");
     add_sentence(sentences, service.skipped, name, " skipped for newer ones (delivery latest)");
+    add_sentence(sentences, service.slow, name, " did not come: this reader was too slow");
+    add_sentence(sentences, service.flooded, name,
+                 " did not come: " + queue_full_words("this reader", flooder_));
     // Nobody tells a reader whether it or the sender was in the way.
     add_sentence(sentences, service.unknown, name,
                  " did not come: this reader was too slow, or the sender's connection broke "

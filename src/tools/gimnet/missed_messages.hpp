@@ -46,14 +46,18 @@ class MissedMessages {
     std::uint32_t provider = 0;
     std::uint32_t sequence = 0;
     std::uint32_t reconnects = 0;
+    std::uint64_t queue_full = 0;  ///< as take_lost() had told at its last gap
     std::uint64_t missed = 0;
     Count early;    ///< before it was subscribed to
     Count broken;   ///< while the connection to the hub was
     Count skipped;  ///< of Delivery::latest: for newer ones
+    Count slow;     ///< the queue at the hub was full, mostly of what its provider sent
+    Count flooded;  ///< the same, of what another node sent
     Count unknown;  ///< by all that happens elsewhere
   };
   static void add_sentence(std::vector<std::string>& sentences, Count& count,
                            const std::string& service, std::string_view what);
+  Count& cause_of(Service& service, const Message& message);
   void count(Service& service, std::uint64_t missed, const Message& message);
 
   const TakeLateness take_lateness_;
@@ -61,6 +65,9 @@ class MissedMessages {
   NewsPace pace_;
   std::uint64_t lost_ = 0;          ///< as take_lost() was told last
   std::uint64_t told_as_lost_ = 0;  ///< of those that did not come yet in numbers
+  std::uint64_t queue_full_ = 0;    ///< as take_lost() was told last
+  Peer queue_filled_by_;
+  Peer flooder_;  ///< the last one that made somebody miss something
   bool untold_ = false;
 };
 

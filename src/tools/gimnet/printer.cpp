@@ -22,6 +22,12 @@ void print(Session& session, const Message& message, const Absent& absent) {
   }
 }
 
+/// What a full queue cost a service is told with what did not come of it.
+void take_lost(LostMessages& lost, LostCounts counts, const MissedMessages* missed) {
+  if (missed != nullptr) counts.queue_full = 0;
+  lost.take(counts);
+}
+
 void say_all(const std::vector<std::string>& sentences) {
   for (const std::string& sentence : sentences) say(sentence);
 }
@@ -70,8 +76,8 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
     watch.look_now_and_then(now_ns);
     if (message) watch.take(*message);
     const LostCounts counts = session.node().lost();
-    lost.take(counts);
     if (missed != nullptr) missed->take_lost(counts);
+    take_lost(lost, counts, missed);
     say_all(lost.news(now_ns));
     if (missed != nullptr) say_all(missed->news(now_ns));
     if (!message && message.is(Status::timeout)) continue;
@@ -89,7 +95,7 @@ ExitCode print_messages(Session& session, const Receive& receive, MissedMessages
     if (!session.output().ok()) break;
   }
   watch.look_at_end();  // it may have broken, and be back, since the last look
-  lost.take(session.node().lost());
+  take_lost(lost, session.node().lost(), missed);
   say_all(lost.rest());
   if (missed != nullptr) say_all(missed->rest());
   if (!failure.sentence.empty()) return session.fail(failure);

@@ -196,6 +196,17 @@ TEST_F(Lost, FramesOfOtherNodesThatCannotBeReadAreCounted) {
   EXPECT_EQ(node_->lost().unreadable, 1u);
 }
 
+TEST_F(Lost, FramesThatTheHubDroppedAreCountedWithWhoFilledTheQueue) {
+  hub_.send(proto::flow::Dropped{proto::DropReason::queue_full, NodeId{9}, 5});
+  hub_.send(proto::flow::Dropped{proto::DropReason::over_budget, NodeId{10}, 2});
+  const std::string text = "x";
+  answer({1, Operation::data, 0, 0}, std::as_bytes(std::span(text)));
+  ASSERT_TRUE(node_->receive());
+  EXPECT_EQ(node_->lost().queue_full, 7u);
+  EXPECT_EQ(node_->lost().queue_filled_by, Peer{10});
+  EXPECT_EQ(node_->lost().all(), 0u) << "those of a subscription are counted there";
+}
+
 TEST_F(Lost, MessagesOfNoSubscriptionAreCounted) {
   send_to_group(kGroup);
   send_to_group(kGroup + 1);

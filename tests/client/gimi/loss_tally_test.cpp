@@ -22,5 +22,15 @@ TEST(LossTally, CountsByWhy) {
   EXPECT_EQ(tally.counts().all(), 22u);
 }
 
+TEST(LossTally, KnowsWhoFilledTheQueueLast) {
+  LossTally tally;
+  EXPECT_EQ(tally.counts().queue_filled_by, Peer{});
+  tally.add_queue_full(9, 3);
+  tally.add_queue_full(10, 4);
+  EXPECT_EQ(tally.counts().queue_full, 7u);
+  EXPECT_EQ(tally.counts().queue_filled_by, Peer{10});
+  EXPECT_EQ(tally.counts().all(), 0u);
+}
+
 }  // namespace
 }  // namespace gimnet::gimi

@@ -183,6 +183,20 @@ TEST(Inbound, AnnouncesSkippedFramesAndCountsThem) {
   EXPECT_EQ(receiving.feed(impossible), Inbound::Verdict::malformed);
 }
 
+TEST(Inbound, TellsWhatTheHubDroppedAndWhoFilledTheQueue) {
+  Receiving receiving;
+  std::vector<std::byte> bytes;
+  add_flow(bytes, proto::flow::Dropped{proto::DropReason::queue_full, NodeId{7u << 20 | 9}, 5});
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.inbound.taken(), 0u) << "they had no number";
+  ASSERT_EQ(receiving.host.items.size(), 1u);
+  EXPECT_EQ(receiving.host.items[0].type, std::uint32_t{NIF_GAP});
+  EXPECT_EQ(receiving.host.items[0].from, 7u << 20 | 9);
+  EXPECT_EQ(receiving.host.items[0].count, 5u);
+  EXPECT_EQ(receiving.host.items[0].reason,
+            static_cast<std::uint32_t>(proto::DropReason::queue_full));
+}
+
 TEST(Inbound, LooksAtNothingBehindGoodbye) {
   Receiving receiving;
   std::vector<std::byte> bytes;

@@ -137,6 +137,20 @@ class Flow(Case):
         resumed = fast.wait(lambda got: got.kind == FLOW and got.body[0] == wire.RESUME)
         self.assertEqual(resumed.body[1:], paused.body[1:])
 
+    def test_who_is_flooded_hears_what_was_dropped_and_who_filled_the_queue(self):
+        hub = self.hub("--limit", "lane1_bytes=65536")
+        slow, flood = self.stranger(hub), self.stranger(hub)
+        sent = 300
+        for _ in range(sent):
+            flood.write(UNICAST, slow.id, bytes(60000), flags=wire.DROP)
+        flood.write(UNICAST, flood.id, b"all came", flags=wire.DROP)
+        flood.data()
+        dropped = slow.wait(lambda got: got.kind == FLOW and got.body[0] == wire.DROPPED)
+        reason, source, count = struct.unpack_from("<BxxIQ", dropped.body, 1)
+        self.assertEqual((reason, source), (4, flood.id))
+        self.assertLess(0, count)
+        self.assertLess(count, sent)
+
     def test_a_connection_is_resumed_without_loss(self):
         hub = self.hub()
         sender = self.stranger(hub)

@@ -23,7 +23,7 @@ OPERATIONS = {
     CTRL: {1: "HUB_INFO", 2: "STATISTICS", 3: "CONNECTIONS", 4: "KICK", 5: "REASSIGN", 6: "DRAIN", 7: "RELOAD",
            8: "LOG_LEVEL", 9: "ROUTES"},
 }
-FLOWS = ("", "PING", "PONG", "CREDIT", "PAUSE", "RESUME", "CONFIRM", "SKIP")
+FLOWS = ("", "PING", "PONG", "CREDIT", "PAUSE", "RESUME", "CONFIRM", "SKIP", "DROPPED")
 
 # What is another one each time: (kind, operation): paths of keys. Sentences are for people, and may be put in other words.
 VOLATILE = {

@@ -46,6 +46,19 @@ TEST(LostMessages, EachReasonIsSaidOnceWithItsSum) {
             Sentences{"4 messages were lost: a part did not come, or did not fit the others"});
 }
 
+TEST(LostMessages, AFullQueueIsSaidWithWhoFilledIt) {
+  LostMessages lost;
+  lost.take({.queue_full = 5, .queue_filled_by = Peer{7u << 20 | 9}});
+  EXPECT_EQ(lost.all(), 0u);
+  EXPECT_EQ(lost.news(100),
+            Sentences{"5 frames were lost: the queue of this node at the hub was full, mostly of "
+                      "what 7.9 sent"});
+  lost.take({.queue_full = 6, .queue_filled_by = {}});
+  EXPECT_EQ(lost.rest(),
+            Sentences{"6 frames were lost: the queue of this node at the hub was full"});
+  EXPECT_EQ(lost.rest(), Sentences{});
+}
+
 TEST(LostMessages, NewsComeAtMostOnceASecond) {
   LostMessages lost;
   lost.take({.incomplete = 1, .too_large = 0, .frames_broken_off = 0, .unknown_service = 0});

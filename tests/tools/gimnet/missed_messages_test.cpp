@@ -65,6 +65,26 @@ TEST_F(MissedMessagesTest, WhatIsToldAsLostIsNotToldTwice) {
   EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown});
 }
 
+TEST_F(MissedMessagesTest, WhoWasFloodedIsNotCalledSlow) {
+  take(1);
+  missed_.take_lost({.queue_full = 100, .queue_filled_by = Peer{7u << 20 | 9}});
+  EXPECT_EQ(take(2), 0u) << "had waited before the gap";
+  EXPECT_EQ(take(5), 2u);
+  EXPECT_EQ(missed_.rest(),
+            Sentences{"2 messages of r/s did not come: the queue of this reader at the hub was "
+                      "full, mostly of what 7.9 sent"});
+  EXPECT_EQ(take(7), 3u);
+  EXPECT_EQ(missed_.rest(), Sentences{std::string("1 message") + kUnknown})
+      << "nothing was said of this gap";
+}
+
+TEST_F(MissedMessagesTest, WhoseProviderFilledTheQueueWasTooSlow) {
+  take(1);
+  missed_.take_lost({.queue_full = 2, .queue_filled_by = make_message("x", 1, {}, "r/s").from()});
+  EXPECT_EQ(take(4), 2u);
+  EXPECT_EQ(missed_.rest(), Sentences{"2 messages of r/s did not come: this reader was too slow"});
+}
+
 TEST_F(MissedMessagesTest, WhatWasBeforeALateSubscriptionCounts) {
   std::vector<std::string> asked;
   bool late = true;

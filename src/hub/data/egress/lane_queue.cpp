@@ -39,6 +39,10 @@ void forget(std::unique_ptr<Index>& index) {
   }
 }
 
+bool is_droppable(const Entry& entry) {
+  return entry.frames != 0 && !entry.block && !entry.touched;
+}
+
 bool is_plain(const Entry& entry) {
   return !entry.fragmented && !entry.latest && !entry.extended && !entry.touched;
 }
@@ -68,6 +72,7 @@ LatestStream LaneQueue::stream_of(const Entry& entry) {
 
 void LaneQueue::count(const Entry& entry) {
   bytes_ += entry.size;
+  sources_.add(entry.source, entry.size);
   if (entry.block) block_bytes_ += entry.size;
   if (entry.latest) latest_bytes_ += entry.size;
   if (entry.touched) touched_bytes_ += entry.size;
@@ -75,6 +80,7 @@ void LaneQueue::count(const Entry& entry) {
 
 void LaneQueue::discount(const Entry& entry) {
   bytes_ -= entry.size;
+  sources_.take(entry.source, entry.size);
   if (entry.block) block_bytes_ -= entry.size;
   if (entry.latest) latest_bytes_ -= entry.size;
   if (entry.touched) touched_bytes_ -= entry.size;
@@ -148,10 +154,12 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
       if (each.frames != 0 && each.latest && !each.touched) (*streams_)[stream_of(each)] = number;
     }
   }
-  const auto found = streams_->find(stream_of(entry));
+  const LatestStream stream = stream_of(entry);
+  const auto found = streams_->find(stream);
   if (found == streams_->end() || found->second < entries_.first_number()) return false;
   Entry& waiting = entries_.at(found->second);
   if (waiting.frames == 0 || !waiting.latest || waiting.touched) return false;
+  if (stream_of(waiting) != stream) return false;  // it took the place of one that was dropped
   discount(waiting);
   count(entry);
   older = std::exchange(waiting, std::move(entry));
@@ -161,19 +169,52 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
 
 bool LaneQueue::drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped) {
   oldest_hint_ = std::max(oldest_hint_, entries_.first_number());
-  for (; oldest_hint_ != entries_.end_number(); ++oldest_hint_) {
-    Entry& entry = entries_.at(oldest_hint_);
-    if (entry.frames == 0 || entry.block || entry.touched) continue;
-    discount(entry);
-    // Of a message in fragments all go.
-    const Leading whole{entry.frames, entry.size};
-    dropped = entry.take_front(
-        entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
-    count(entry);
-    skip_dead();
-    return true;
+  while (oldest_hint_ != entries_.end_number() && !is_droppable(entries_.at(oldest_hint_)))
+    ++oldest_hint_;
+  if (oldest_hint_ == entries_.end_number()) return false;
+  const std::uint64_t number = find_oldest_of(sources_.loser());
+  Entry& entry = entries_.at(number);
+  discount(entry);
+  // Of a message in fragments all go.
+  const Leading whole{entry.frames, entry.size};
+  dropped = entry.take_front(
+      entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
+  count(entry);
+  if (entry.frames == 0) close_gap(number);
+  skip_dead();
+  return true;
+}
+
+std::uint64_t LaneQueue::find_oldest_of(std::uint8_t place) {
+  const std::uint64_t end = std::min(entries_.end_number(), oldest_hint_ + kSearchMax);
+  for (std::uint64_t number = oldest_hint_; number != end; ++number) {
+    const Entry& entry = entries_.at(number);
+    if (entry.source == place && is_droppable(entry)) return number;
   }
-  return false;
+  return oldest_hint_;
+}
+
+/// Moves the entries before an empty one up, at most 63. Else a lane whose first entry waits for
+/// long would fill with empty ones, and the search would find nothing else.
+void LaneQueue::close_gap(std::uint64_t number) {
+  for (; number != oldest_hint_; --number) {
+    Entry& moved = entries_.at(number);
+    moved = std::move(entries_.at(number - 1));
+    if (indexed_ && moved.frames != 0 && moved.latest && !moved.touched)
+      (*streams_)[stream_of(moved)] = number;
+    note_message(moved, number);
+  }
+  entries_.at(number) = Entry{};
+}
+
+NodeId LaneQueue::source_at(std::uint8_t place) {
+  const std::uint64_t end = std::min(entries_.end_number(), entries_.first_number() + kSearchMax);
+  for (std::uint64_t number = entries_.first_number(); number != end; ++number) {
+    const Entry& entry = entries_.at(number);
+    if (entry.frames != 0 && entry.source % SourceBytes::kFixed == place)
+      return NodeId{entry.run.header().src};
+  }
+  return NodeId{};
 }
 
 Entry& LaneQueue::front() {
@@ -183,6 +224,7 @@ Entry& LaneQueue::front() {
 
 void LaneQueue::on_left(const Entry& entry, std::uint32_t bytes) {
   bytes_ -= bytes;
+  sources_.take(entry.source, bytes);
   if (entry.block) block_bytes_ -= bytes;
   if (entry.latest) latest_bytes_ -= bytes;
   if (entry.touched) touched_bytes_ -= bytes;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "hub/data/egress/entry.hpp"
+#include "hub/data/egress/source_bytes.hpp"
 #include "hub/data/flat_map.hpp"
 #include "hub/data/ring_queue.hpp"
 
@@ -41,6 +42,10 @@ class LaneQueue {
     if (!entry.fragmented || entry.touched) return;
     entry.touched = true;
     touched_bytes_ += entry.size;
+    if (entry.block) return;
+    sources_.take(entry.source, entry.size);
+    entry.source += SourceBytes::kFixed;
+    sources_.add(entry.source, entry.size);
   }
   /// Bytes of entries that a newer message may replace.
   [[nodiscard]] std::uint64_t latest_bytes() const { return latest_bytes_; }
@@ -56,6 +61,7 @@ class LaneQueue {
     last.size += bytes;
     last.frames += frames;
     bytes_ += bytes;
+    sources_.add(last.source, bytes);
     if (last.block) block_bytes_ += bytes;
   }
   /// The entry that still waits for more fragments of that message, or nullptr.
@@ -73,8 +79,15 @@ class LaneQueue {
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Takes out the oldest entry that may be dropped for room; of a run as many frames as come to
-  /// `bytes`, if it has those. Returns false if there is none. REQUIRES: bytes is not 0.
+  /// Who sent what waits, and who loses messages when the lane is full.
+  [[nodiscard]] SourceBytes& sources() { return sources_; }
+  /// The node that sent what counts at that place, as the first entries show it; 0: none of them.
+  [[nodiscard]] NodeId source_at(std::uint8_t place);
+
+  /// Takes out the oldest entry that may be dropped for room of the source sources().loser(). If
+  /// none of the first 64 is of that source, it takes the oldest one that may be dropped. Of a run
+  /// it takes as many frames as come to `bytes`, if it has those. Returns false if nothing may be
+  /// dropped. REQUIRES: bytes is not 0.
   [[nodiscard]] bool drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped);
 
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
@@ -100,6 +113,9 @@ class LaneQueue {
   static constexpr std::size_t kSearchMax = 64;
 
   [[nodiscard]] static LatestStream stream_of(const Entry& entry);
+  /// REQUIRES: oldest_hint_ is the oldest entry that may be dropped.
+  [[nodiscard]] std::uint64_t find_oldest_of(std::uint8_t place);
+  void close_gap(std::uint64_t number);
   void count(const Entry& entry);
   void discount(const Entry& entry);
   void skip_dead();
@@ -115,6 +131,7 @@ class LaneQueue {
   std::uint64_t block_bytes_ = 0;
   std::uint64_t latest_bytes_ = 0;
   std::uint64_t touched_bytes_ = 0;
+  SourceBytes sources_;
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
   bool indexed_ = false;           ///< streams_ names every LATEST entry that waits
   std::unique_ptr<StreamIndex> streams_;

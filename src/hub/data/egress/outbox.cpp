@@ -39,12 +39,17 @@ bool Outbox::has_block() const {
          });
 }
 
-bool Outbox::fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const {
-  return lanes_->queues[lane].bytes() + bytes <= limits.lane_bytes(lane);
+std::uint64_t Outbox::room(std::size_t lane, bool block, const Limits& limits) const {
+  const LaneQueue& queue = lanes_->queues[lane];
+  const std::uint64_t half = limits.lane_bytes(lane) / 2;
+  if (block) return half - std::min(half, queue.block_bytes());
+  const std::uint64_t share = share_of_others(lane, limits);
+  return share - std::min(share, queue.bytes() - queue.block_bytes());
 }
 
-std::uint64_t Outbox::room(std::size_t lane, const Limits& limits) const {
-  return limits.lane_bytes(lane) - std::min(limits.lane_bytes(lane), lanes_->queues[lane].bytes());
+std::uint64_t Outbox::share_of_others(std::size_t lane, const Limits& limits) const {
+  const std::uint64_t whole = limits.lane_bytes(lane);
+  return whole - std::min(whole / 2, lanes_->queues[lane].block_bytes());
 }
 
 std::uint64_t Outbox::held_bytes() const {
@@ -112,6 +117,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   entry.latest = header.policy() == proto::Policy::latest;
   entry.shared = handover.fan_out;
   entry.shortest_bytes = handover.shortest_bytes;
+  entry.source = SourceBytes::place_of(NodeId{header.src});
   if (header.has(proto::kFlagFragment)) {
     const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
     if (frame && frame->fragment) {
@@ -121,6 +127,7 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
       entry.complete = frame->fragment->offset + frame->payload.size() == frame->fragment->total;
     }
   }
+  if (entry.block || entry.touched) entry.source += SourceBytes::kFixed;
   return entry;
 }
 
@@ -140,7 +147,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
     context.tally.queued -= run.frames;
     return push_in_pieces(run, header, handover, context);
   }
-  const bool has_room = fits(lane, run.size, context.limits);
+  const bool has_room = run.size <= room(lane, proto::is_block(header), context.limits);
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
@@ -160,10 +167,9 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
   Entry& last = lane.entries().back();
   last.shortest_bytes =
       proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
-  const std::uint64_t lane_room = limits.lane_bytes(lane_index) - lane.bytes();
-  const auto room = static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(chunk_->capacity - chunk_used_, lane_room));
-  lanes_->open = {room,
+  const auto open_room = static_cast<std::uint32_t>(std::min<std::uint64_t>(
+      chunk_->capacity - chunk_used_, room(lane_index, last.block, limits)));
+  lanes_->open = {open_room,
                   load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
                   load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),
                   chunk_->data + chunk_used_,
@@ -270,7 +276,7 @@ void Outbox::signal_room(EgressContext& context) {
   if (!paused_anyone()) return;
   if (context.budget.scarce() && data_bytes() > context.budget.share_bytes() / 2) return;
   for (std::size_t lane = 0; lane < proto::kLaneCount; ++lane) {
-    if (lanes_->queues[lane].bytes() <= context.limits.lane_bytes(lane) / 2) {
+    if (lanes_->queues[lane].block_bytes() <= context.limits.lane_bytes(lane) / 4) {
       lanes_->pauses.on_room(static_cast<proto::Lane>(lane), context.signals);
     }
   }
@@ -376,7 +382,8 @@ void Outbox::trim() {
   if (!lanes_) return;
   const bool idle = std::ranges::all_of(lanes_->queues, &LaneQueue::empty) &&
                     lanes_->replay.empty() && lanes_->pauses.empty() &&
-                    lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 && !backlog_;
+                    lanes_->open_messages.empty() && lanes_->first_control_bytes == 0 &&
+                    !backlog_ && !has_untold_losses_;
   if (idle) return lanes_.reset();
   lanes_->replay.trim();
   for (LaneQueue& queue : lanes_->queues) queue.trim();

@@ -12,6 +12,7 @@
 #include "hub/data/egress/open_run.hpp"
 #include "hub/data/egress/pause_book.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
+#include "hub/data/egress/untold_losses.hpp"
 #include "hub/observe/session_gauges.hpp"
 
 namespace gimnet::hub {
@@ -101,6 +102,15 @@ class Outbox {
   /// Frames that were for this connection did not get here. REQUIRES: as push().
   void tell_lost(const Run& run, const proto::FrameHeader& header) const;
 
+  /// Frames were dropped because a lane was full, and the node was not told yet.
+  [[nodiscard]] bool has_untold_losses() const { return has_untold_losses_; }
+  /// What the node is to be told of them. REQUIRES: there are some.
+  [[nodiscard]] proto::flow::Dropped untold_losses() const { return lanes_->losses.message(); }
+  void on_losses_told() {
+    has_untold_losses_ = false;
+    lanes_->losses = UntoldLosses{};
+  }
+
   /// Frames of an earlier connection, to be written again before all lanes.
   [[nodiscard]] RingQueue<Run>& replay() { return lanes().replay; }
   void set_replay(RingQueue<Run> frames);
@@ -170,6 +180,7 @@ class Outbox {
     std::uint64_t replay_bytes = 0;
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
+    UntoldLosses losses;
     std::vector<OpenMessage>
         open_messages;  ///< of which the beginning was taken and the end has not come, by age
     std::uint32_t first_control_bytes =
@@ -199,9 +210,14 @@ class Outbox {
                                  Handover handover, bool has_room, EgressContext& context);
   [[nodiscard]] Run copy(const Run& run, EgressContext& context);
   [[nodiscard]] static Run copy_alone(const Run& run, EgressContext& context);
-  [[nodiscard]] bool fits(std::size_t lane, std::uint32_t bytes, const Limits& limits) const;
-  /// Bytes that still fit.
-  [[nodiscard]] std::uint64_t room(std::size_t lane, const Limits& limits) const;
+  /// Bytes that still fit: of messages sent with BLOCK into half of the lane, of others into what
+  /// those leave, at least the other half.
+  [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const;
+  /// Bytes that may wait of messages that are not sent with BLOCK.
+  [[nodiscard]] std::uint64_t share_of_others(std::size_t lane, const Limits& limits) const;
+  [[nodiscard]] bool fits(const Entry& entry, std::size_t lane, const Limits& limits) const {
+    return entry.size <= room(lane, entry.block, limits);
+  }
 
   void note_waiting(EgressContext& context);
   /// While memory is scarce frames are taken in pieces that fit in a chunk: a longer one would stay
@@ -218,6 +234,14 @@ class Outbox {
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
   void admit_first(Entry entry, std::size_t lane_index, EgressContext& context);
   void admit_newest(Entry entry, std::size_t lane_index, EgressContext& context);
+  void admit_alone(Entry entry, std::size_t lane_index, EgressContext& context);
+  void admit_own(Entry entry, std::size_t lane_index, EgressContext& context);
+  [[nodiscard]] bool loses_own(const Entry& entry, std::size_t lane_index,
+                               const Limits& limits) const;
+  bool drop_for_room(std::uint64_t bytes, std::size_t lane_index, proto::DropReason reason,
+                     EgressContext& context);
+  void lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReason reason,
+                     EgressContext& context);
   /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns
   /// false if it came all the same, although it was held: the message is not to be taken.
   [[nodiscard]] bool ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
@@ -256,6 +280,7 @@ class Outbox {
   std::uint32_t control_bytes_ = 0;
   bool backlog_ = false;
   bool waits_ = false;  ///< counted among the connections that have data waiting
+  bool has_untold_losses_ = false;
 };
 
 }  // namespace gimnet::hub

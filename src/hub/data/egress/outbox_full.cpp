@@ -17,13 +17,13 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   // lane until it ends.
   if (message->touched && message != &lane.entries().back()) return false;
   if (backlog_ && memory_refuses(entry, context)) {
-    lose(entry, proto::DropReason::over_budget, context);
+    lose_for_room(entry, header.lane & proto::kLaneMask, proto::DropReason::over_budget, context);
     return true;
   }
-  const bool over = !fits(header.lane & proto::kLaneMask, entry.size, context.limits) ||
+  const bool over = !fits(entry, header.lane & proto::kLaneMask, context.limits) ||
                     (backlog_ && over_share(entry.size, context));
   if (over && entry.block && !ask_to_pause(entry, header, context)) {
-    lose(entry, proto::DropReason::queue_full, context);
+    lose_for_room(entry, header.lane & proto::kLaneMask, proto::DropReason::queue_full, context);
     return true;
   }
   // The message may have been settled already, and is not looked at again.
@@ -86,12 +86,12 @@ void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
   release_written(entry.size, context);
   if (entry.block || header.policy() == proto::Policy::drop) return;
   const std::uint64_t share = context.budget.share_bytes();
-  Entry older;
   for (std::size_t lane = proto::kLaneCount; lane-- > (header.lane & proto::kLaneMask);) {
+    SourceBytes& sources = lanes_->queues[lane].sources();
     for (std::uint64_t wanted = held_bytes() + entry.size; wanted > share;
          wanted = held_bytes() + entry.size) {
-      if (!lanes_->queues[lane].drop_oldest(wanted - share, context.starts, older)) break;
-      lose(older, proto::DropReason::over_budget, context);
+      if (sources.choice_due()) sources.choose(context.limits.lane_bytes(lane));
+      if (!drop_for_room(wanted - share, lane, proto::DropReason::over_budget, context)) break;
     }
   }
 }
@@ -108,20 +108,20 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
     }
   }
   if (memory_refuses(entry, context)) {
-    lose(entry, proto::DropReason::over_budget, context);
+    lose_for_room(entry, header.lane & proto::kLaneMask, proto::DropReason::over_budget, context);
     return;
   }
   const bool scarce = backlog_ && context.budget.scarce();
   // At once, or neighbours in the read buffer would become one run.
   if (scarce) settle_run(entry.run, entry.shared, context);
-  if (fits(header.lane & proto::kLaneMask, entry.size, context.limits) &&
+  if (fits(entry, header.lane & proto::kLaneMask, context.limits) &&
       !(scarce && over_share(entry.size, context))) {
     lane.push(std::move(entry));
   } else if (entry.block) {
     if (ask_to_pause(entry, header, context)) {
       lane.push(std::move(entry));
     } else {
-      lose(entry, proto::DropReason::queue_full, context);
+      lose_for_room(entry, header.lane & proto::kLaneMask, proto::DropReason::queue_full, context);
     }
   } else if (entry.touched) {
     lane.push(std::move(entry));
@@ -139,7 +139,8 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
   const auto beyond = [](std::uint64_t bytes, std::uint64_t limit) {
     return bytes - std::min(bytes, limit);
   };
-  std::uint64_t bytes = beyond(lanes_->queues[lane].bytes() + entry.size, limits.lane_bytes(lane));
+  std::uint64_t bytes =
+      beyond(lanes_->queues[lane].block_bytes() + entry.size, limits.lane_bytes(lane) / 2);
   std::uint64_t reserve = limits.reserve_bytes;
   if (backlog_ && context.budget.scarce()) {
     const std::uint64_t share = context.budget.share_bytes();
@@ -162,7 +163,7 @@ void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& con
   LaneQueue& lane = lanes_->queues[lane_index];
   while (entry.frames != 0) {
     Leading fitting = leading_within(entry.run, entry.shortest_bytes,
-                                     room(lane_index, context.limits), context.starts);
+                                     room(lane_index, false, context.limits), context.starts);
     // Besides what is being written one message may wait, however large it is.
     if (fitting.frames == 0 && !lane.holds_whole())
       fitting = leading_from(entry.run, entry.shortest_bytes, 1, context.starts);
@@ -170,30 +171,117 @@ void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& con
     if (entry.frames == 0) return;
     // Behind those that do not fit there may be shorter ones.
     Entry lost = entry.take_front(
-        leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, context.limits)));
-    lose(lost, proto::DropReason::queue_full, context);
+        leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, false, context.limits)));
+    lose_for_room(lost, lane_index, proto::DropReason::queue_full, context);
   }
 }
 
-/// As if each message came alone, and dropped as many older ones as it takes: what waits first,
-/// then the first of those that come.
+/// As if each message came alone, and dropped as many older ones as it takes, each of the source
+/// that loses then. Where it is always the same source, or does not change for a while, they are
+/// dropped together.
 void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
+  SourceBytes& sources = lane.sources();
   const std::uint64_t limit = context.limits.lane_bytes(lane_index);
-  Entry older;
-  while (!fits(lane_index, entry.size, context.limits) &&
-         lane.drop_oldest(lane.bytes() + entry.size - limit, context.starts, older)) {
-    lose(older, proto::DropReason::queue_full, context);
+  // Behind much of BLOCK the oldest messages would be dropped before their turn came, always.
+  const bool new_goes = lane.block_bytes() > limit / 4;
+  while (entry.frames != 0 && !fits(entry, lane_index, context.limits)) {
+    if (sources.is_alone(entry.source)) {
+      sources.choose(limit);
+      if (new_goes) return admit_first(std::move(entry), lane_index, context);
+      return admit_alone(std::move(entry), lane_index, context);
+    }
+    const std::uint64_t left = room(lane_index, false, context.limits);
+    const bool one_source = sources.at_most_one();
+    if (one_source || sources.choice_due()) {
+      // Those that still fit count in the choice.
+      const Leading fitting = leading_within(entry.run, entry.shortest_bytes, left, context.starts);
+      if (fitting.frames != 0) {
+        lane.push(entry.take_front(fitting));
+        continue;
+      }
+      sources.choose(limit);
+    }
+    const bool own = sources.loser() == entry.source;
+    if (own && new_goes) return admit_first(std::move(entry), lane_index, context);
+    if (own && entry.frames > 1) {
+      if (loses_own(entry, lane_index, context.limits))
+        return admit_own(std::move(entry), lane_index, context);
+      admit_newest(
+          entry.take_front(leading_from(entry.run, entry.shortest_bytes, 1, context.starts)),
+          lane_index, context);
+      continue;
+    }
+    // Once the first of them waits there are two sources.
+    const std::uint64_t wanted = one_source ? entry.run.header().frame_size() : entry.size;
+    std::uint64_t bytes = wanted - std::min(wanted, left);
+    if (!one_source) {
+      bytes = std::min<std::uint64_t>(bytes, sources.droppable(sources.loser()) - sources.floor());
+    }
+    if (!drop_for_room(bytes, lane_index, proto::DropReason::queue_full, context))
+      return admit_alone(std::move(entry), lane_index, context);
   }
-  if (const std::uint64_t left = room(lane_index, context.limits); entry.size > left) {
+  if (entry.frames != 0) lane.push(std::move(entry));
+}
+
+/// Nothing of another source may be dropped: what waits goes first, then the first of those that
+/// come.
+void Outbox::admit_alone(Entry entry, std::size_t lane_index, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  while (!fits(entry, lane_index, context.limits) &&
+         drop_for_room(entry.size - room(lane_index, false, context.limits), lane_index,
+                       proto::DropReason::queue_full, context))
+    continue;
+  if (const std::uint64_t left = room(lane_index, false, context.limits); entry.size > left) {
     Leading lost = leading_from(entry.run, entry.shortest_bytes, entry.size - left, context.starts);
     // Besides what is being written the newest message may wait, however large it is.
     if (lost.frames == entry.frames && !lane.holds_whole())
       lost = all_but_last(entry.run, entry.shortest_bytes, context.starts);
-    older = entry.take_front(lost);
-    lose(older, proto::DropReason::queue_full, context);
+    Entry older = entry.take_front(lost);
+    lose_for_room(older, lane_index, proto::DropReason::queue_full, context);
   }
   if (entry.frames != 0) lane.push(std::move(entry));
+}
+
+/// The source of a run loses, and will until all of it waits: before each message is dropped it has
+/// more than the floor.
+bool Outbox::loses_own(const Entry& entry, std::size_t lane_index, const Limits& limits) const {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  const SourceBytes& sources = lane.sources();
+  const std::uint64_t others = lane.bytes() - lane.block_bytes() - sources.droppable(entry.source);
+  const std::uint64_t longest =
+      entry.size - std::uint64_t{entry.shortest_bytes} * (entry.frames - 1);
+  return others + longest + sources.floor() <= share_of_others(lane_index, limits);
+}
+
+/// REQUIRES: loses_own().
+void Outbox::admit_own(Entry entry, std::size_t lane_index, EgressContext& context) {
+  LaneQueue& lane = lanes_->queues[lane_index];
+  while (!fits(entry, lane_index, context.limits) && lane.sources().droppable(entry.source) != 0)
+    static_cast<void>(drop_for_room(entry.size - room(lane_index, false, context.limits),
+                                    lane_index, proto::DropReason::queue_full, context));
+  if (const std::uint64_t left = room(lane_index, false, context.limits); entry.size > left) {
+    Entry older = entry.take_front(
+        leading_from(entry.run, entry.shortest_bytes, entry.size - left, context.starts));
+    lose_for_room(older, lane_index, proto::DropReason::queue_full, context);
+  }
+  if (entry.frames != 0) lane.push(std::move(entry));
+}
+
+bool Outbox::drop_for_room(std::uint64_t bytes, std::size_t lane_index, proto::DropReason reason,
+                           EgressContext& context) {
+  Entry older;
+  if (!lanes_->queues[lane_index].drop_oldest(bytes, context.starts, older)) return false;
+  lose_for_room(older, lane_index, reason, context);
+  return true;
+}
+
+void Outbox::lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReason reason,
+                           EgressContext& context) {
+  if (lost.frames == 0) return;
+  has_untold_losses_ = true;
+  lanes_->losses.add(lost, lanes_->queues[lane_index], reason);
+  lose(lost, reason, context);
 }
 
 void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {

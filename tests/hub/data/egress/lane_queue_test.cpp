@@ -19,7 +19,27 @@ class LaneQueueTest : public ::testing::Test {
     made.frames = 1;
     made.block = frame.flags == 1;
     made.latest = (frame.flags & 3) == 3;
+    made.source = SourceBytes::place_of(NodeId{7u << 20 | frame.src});
+    if (made.block) made.source += SourceBytes::kFixed;
     return made;
+  }
+  /// The payload of the entry that goes for room.
+  std::string drop() {
+    Entry dropped;
+    if (!lane.drop_oldest(1, starts, dropped)) return "none";
+    return {reinterpret_cast<const char*>(dropped.run.bytes + proto::kHeaderSize),
+            dropped.run.size - proto::kHeaderSize};
+  }
+  std::vector<std::string> waiting() {
+    std::vector<std::string> payloads;
+    const RingQueue<Entry>& entries = lane.entries();
+    for (std::uint64_t number = entries.first_number(); number != entries.end_number(); ++number) {
+      const Entry& each = lane.entries().at(number);
+      if (each.frames == 0) continue;
+      payloads.emplace_back(reinterpret_cast<const char*>(each.run.bytes + proto::kHeaderSize),
+                            each.run.size - proto::kHeaderSize);
+    }
+    return payloads;
   }
   EgressRig rig;
   FrameStarts starts;
@@ -83,6 +103,95 @@ TEST_F(LaneQueueTest, DropsAsManyFramesOfARunAsItTakes) {
   EXPECT_EQ(dropped.frames, 1u);
   EXPECT_FALSE(lane.drop_oldest(1, starts, dropped));
   EXPECT_TRUE(lane.empty());
+}
+
+TEST_F(LaneQueueTest, TheOldestOfTheSourceThatLosesGoes) {
+  lane.push(entry("quiet 1", {.src = 1}));
+  lane.push(entry("block", {.flags = 1, .src = 2}));
+  lane.push(entry("flood 1", {.src = 2}));
+  lane.push(entry("quiet 2", {.src = 1}));
+  lane.push(entry("flood 2, longer", {.src = 2}));
+  lane.sources().choose(1'000);
+  EXPECT_EQ(drop(), "flood 1");
+  EXPECT_EQ(drop(), "flood 2, longer");
+  EXPECT_EQ(waiting(), (std::vector<std::string>{"quiet 1", "block", "quiet 2"}));
+  EXPECT_EQ(drop(), "quiet 1") << "nothing of it is left";
+  EXPECT_EQ(drop(), "quiet 2");
+  EXPECT_EQ(drop(), "none");
+  EXPECT_EQ(lane.source_at(lane.sources().fullest()), (NodeId{7u << 20 | 2}));
+}
+
+TEST_F(LaneQueueTest, ItIsLookedForAmongTheFirst64Entries) {
+  for (const int before : {63, 64}) {
+    lane = LaneQueue{};
+    for (int i = 0; i < before; ++i)
+      lane.push(entry("quiet", {.src = static_cast<std::uint32_t>(i % 2 == 0 ? 1 : 3)}));
+    lane.push(entry(std::string(10'000, 'f'), {.src = 2}));
+    lane.sources().choose(1'000);
+    EXPECT_EQ(drop() == "quiet", before == 64) << before;
+  }
+}
+
+// Its first entry waits for long, and a flood passes: no entry is kept of what was dropped.
+TEST_F(LaneQueueTest, AFloodLeavesNoEntriesBehind) {
+  const std::string flood(100, 'f');
+  lane.push(entry("quiet", {.src = 1}));
+  lane.push(entry(flood, {.src = 2}));
+  for (int i = 0; i < 1'000; ++i) {
+    lane.push(entry("key_____", {.flags = proto::kFlagKeyed, .src = 2}));  // not of one run
+    lane.push(entry(flood, {.src = 2}));
+    for (int drops = 0; drops < 2; ++drops) {
+      lane.sources().choose(1'000);
+      static_cast<void>(drop());
+    }
+    // Empty ones are left in front at most, and go when the first one leaves.
+    ASSERT_LE(lane.entries().capacity_bytes(), 64 * sizeof(Entry));
+  }
+  EXPECT_EQ(waiting().front(), "quiet");
+}
+
+// Entries get other numbers when one behind them goes.
+TEST_F(LaneQueueTest, FindsWhatMovedUp) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed, .src = 1};
+  Entry older;
+  Entry first = entry("key____1old", latest);
+  EXPECT_FALSE(lane.replace_latest(first, older));
+  lane.push(std::move(first));
+  Entry part = entry("part", {.src = 3});
+  part.fragmented = true;
+  part.complete = false;
+  part.message_number = 77;
+  lane.push(std::move(part));
+  for (int i = 0; i < 100; ++i)
+    lane.push(entry("other", {.src = static_cast<std::uint32_t>(4 + i % 2)}));
+  ASSERT_NE(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "is indexed from here on";
+  while (lane.entries().size() > 4) {
+    lane.sources().choose(1'000);
+    ASSERT_EQ(drop(), "other");
+  }
+  Entry* found = lane.find_message(NodeId{7u << 20 | 3}, 77);
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->message_number, 77u);
+  Entry second = entry("key____1new", latest);
+  ASSERT_TRUE(lane.replace_latest(second, older));
+  EXPECT_EQ(waiting(), (std::vector<std::string>{"key____1new", "part", "other", "other"}));
+}
+
+TEST_F(LaneQueueTest, NothingIsReplacedInThePlaceOfALatestThatWasDropped) {
+  const auto latest = [](std::uint32_t src) {
+    return TestFrame{.flags = 3 | proto::kFlagKeyed, .src = src};
+  };
+  Entry older;
+  for (const std::uint32_t src : {1u, 2u}) {
+    Entry each = entry("key____1" + std::string(10 * src, 'x'), latest(src));
+    EXPECT_FALSE(lane.replace_latest(each, older));
+    lane.push(std::move(each));
+  }
+  lane.sources().choose(1'000);
+  EXPECT_EQ(drop().size(), 28u) << "that of source 2, in whose place stands now that of source 1";
+  Entry next = entry("key____1next", latest(2));
+  EXPECT_FALSE(lane.replace_latest(next, older));
+  EXPECT_EQ(waiting().size(), 1u);
 }
 
 TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {

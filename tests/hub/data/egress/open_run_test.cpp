@@ -154,7 +154,9 @@ TEST_F(OpenRunTest, AControlFrameBetweenDoesNotMixWithIt) {
 TEST_F(OpenRunTest, EndsWithTheLanesLimit) {
   rig.limits.lane1_bytes = 16 * 1'024;
   const std::string kilobyte(512 - proto::kHeaderSize, 'k');
-  for (int i = 0; i < 32; ++i) offer({kilobyte});
+  for (const std::uint8_t flags : {std::uint8_t{1}, std::uint8_t{2}}) {
+    for (int i = 0; i < 16; ++i) offer({kilobyte}, {.flags = flags});
+  }
   EXPECT_EQ(connection.outbox.lane(1).bytes(), 16u * 1'024);
   // The last one is beyond it: this takes the long way, where the policy decides.
   EXPECT_FALSE(offer({kilobyte}, {.flags = 2}));

@@ -13,6 +13,7 @@
 #include "proto/frame/extensions.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
+#include "tests/hub/data/support/lane_rule.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 using proto::DropReason;
 using proto::Kind;
 using testing::EgressRig;
+using testing::LaneRule;
 using testing::TestConnection;
 using testing::TestFrame;
 
@@ -45,7 +47,7 @@ struct Burst {
 
 class Dice {
  public:
-  explicit Dice(std::uint32_t seed) : random_(seed) {}
+  explicit Dice(std::uint32_t seed) : random_(seed), sources(1 + below(4)) {}
   std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(random_() % n); }
 
   std::string payload(std::size_t size) {
@@ -55,7 +57,7 @@ class Dice {
   }
   /// A run as a read may find it, with that policy.
   Burst burst(Kind kind, std::uint8_t policy) {
-    Burst burst{{.kind = kind, .flags = policy, .lane = kLane, .src = 1 + below(2)}, {}};
+    Burst burst{{.kind = kind, .flags = policy, .lane = kLane, .src = 1 + below(sources)}, {}};
     if (below(2) == 0) burst.frame.flags |= proto::kFlagReport;
     const std::uint32_t base = below(8) == 0 ? below(1'500) : below(60);
     const std::uint32_t spread = below(2) == 0 ? 1 : 1 + below(below(4) == 0 ? 1'200 : 40);
@@ -68,6 +70,9 @@ class Dice {
  private:
   std::mt19937 random_;
   std::uint32_t made_ = 0;
+
+ public:
+  const std::uint32_t sources;
 };
 
 /// Counts what is lost of the one group there is.
@@ -136,74 +141,33 @@ struct Side {
 // ---- against the rule, frame by frame
 // --------------------------------------------------------------------------
 
-/// One lane of an outbox that writes nothing: a message at a time, and dropped one at a time.
-class Rule {
- public:
-  /// What is being written, and is never dropped.
-  explicit Rule(std::uint64_t under_way) : bytes_(under_way), under_way_(under_way) {}
-
-  void come(std::uint32_t size, const std::string& payload, std::uint8_t policy) {
-    const bool block = policy == kBlock;
-    if (!block && policy != kDrop) {
-      while (bytes_ + size > kLaneBytes && drop_oldest()) continue;
-    }
-    if (block || bytes_ + size <= kLaneBytes || bytes_ == under_way_) {
-      bytes_ += size;
-      waiting_.push_back({size, block, payload});
-    } else {
-      ++dropped;
-    }
-  }
-  [[nodiscard]] std::vector<std::string> left() const {
-    std::vector<std::string> payloads;
-    for (const Waiting& each : waiting_) payloads.push_back(each.payload);
-    return payloads;
-  }
-  std::uint64_t dropped = 0;
-
- private:
-  struct Waiting {
-    std::uint32_t size;
-    bool block;
-    std::string payload;
-  };
-  bool drop_oldest() {
-    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(),
-                                     [](const Waiting& each) { return !each.block; });
-    if (oldest == waiting_.end()) return false;
-    bytes_ -= oldest->size;
-    waiting_.erase(oldest);
-    ++dropped;
-    return true;
-  }
-  std::vector<Waiting> waiting_;
-  std::uint64_t bytes_;
-  const std::uint64_t under_way_;
-};
-
 void run_against_the_rule(std::uint32_t seed) {
   Dice dice(seed);
   Side side;
-  std::uint32_t under_way = 0;
+  LaneRule::UnderWay under_way;
   if (dice.below(2) == 0) {
     // Of a message the first fragment is begun, and the second one is under way with it.
-    const std::string rest(dice.below(dice.below(2) == 0 ? 100 : 1'500), 'r');
-    side.rig.push_fragment(side.connection.outbox, 1, 0, 100'000, "begin", {.lane = kLane});
-    side.rig.push_fragment(side.connection.outbox, 1, 5, 100'000, rest, {.lane = kLane});
-    under_way =
+    const std::string rest(1 + dice.below(dice.below(2) == 0 ? 100 : 1'500), 'r');
+    under_way.block = dice.below(2) == 0;
+    const TestFrame frame{.kind = under_way.block ? Kind::unicast : Kind::group, .lane = kLane};
+    side.rig.push_fragment(side.connection.outbox, 1, 0, 100'000, "begin", frame);
+    side.rig.push_fragment(side.connection.outbox, 1, 5, 100'000, rest, frame);
+    under_way.size =
         proto::kHeaderSize + proto::kFragmentHeaderSize + static_cast<std::uint32_t>(rest.size());
   } else {
     side.rig.push(side.connection.outbox, "begun", {.lane = kLane});
   }
   side.drain(1);
-  Rule rule(under_way);
+  LaneRule rule(kLaneBytes, under_way);
   for (int i = 0; i < 20; ++i) {
     const std::uint8_t policy = dice.below(8) == 0   ? kBlock
                                 : dice.below(3) == 0 ? kDrop
                                                      : std::uint8_t{0};
     const Burst burst = dice.burst(Kind::group, policy);
     for (const std::string& payload : burst.payloads) {
-      rule.come(static_cast<std::uint32_t>(proto::kHeaderSize + payload.size()), payload, policy);
+      rule.come({NodeId{7u << 20 | burst.frame.src},
+                 static_cast<std::uint32_t>(proto::kHeaderSize + payload.size()), policy == kBlock,
+                 policy == kDrop, payload});
     }
     side.push_whole(burst, dice.below(2) == 0, dice.below(4) != 0);
     ASSERT_EQ(side.rig.dropped(DropReason::queue_full), rule.dropped)
@@ -214,7 +178,7 @@ void run_against_the_rule(std::uint32_t seed) {
   while (side.connection.flush() != Flush::emptied) continue;
   side.connection.stream = std::move(side.received);
   std::vector<std::string> came = side.connection.take();
-  came.erase(came.begin(), came.begin() + (under_way == 0 ? 1 : 2));
+  came.erase(came.begin(), came.begin() + (under_way.size == 0 ? 1 : 2));
   EXPECT_EQ(came, rule.left()) << "seed " << seed;
   EXPECT_TRUE(side.rig.ledger_exact());
 }
@@ -339,8 +303,9 @@ class Pair {
     if (used_up_) {
       both([](Side& side) { side.rig.lease.give_back(kMuch); });
       used_up_ = false;
-    } else if (dice_.below(3) == 0 && !whole_.connection.outbox.empty()) {
-      drain(0);
+    } else if (dice_.below(3) == 0) {
+      drain(0);  // which drops what is too old
+      if (whole_.connection.outbox.empty()) return;
       both([](Side& side) { side.rig.lease.take(kMuch); });
       used_up_ = true;
     }

@@ -136,12 +136,43 @@ TEST(FullOutbox, OldestNeverDropsBlock) {
   TestConnection connection(rig);
   block(connection);
   for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB, 'b'), {.flags = kBlock});
-  rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group});
+  rig.push(connection.outbox, sized(9 * kKiB, 'g'), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u)
       << "the new one, since there is no older one to drop";
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
   for (const std::string& text : connection.take()) EXPECT_NE(text[0], 'g');
+}
+
+// However much came of BLOCK before its senders heeded PAUSE.
+TEST(FullOutbox, BlockLeavesHalfOfTheLaneToOthers) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (int i = 0; i < 20; ++i) rig.push(connection.outbox, sized(kKiB, 'b'), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
+  for (int i = 0; i < 8; ++i)
+    rig.push(connection.outbox, sized(kKiB, 'g'), {.kind = Kind::group, .src = 2});
+  EXPECT_FALSE(rig.tally.any_dropped);
+  rig.push(connection.outbox, "", {.kind = Kind::group, .src = 2});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "one beyond it";
+  EXPECT_EQ(connection.outbox.untold_losses().source, NodeId{7u << 20 | 1});
+  EXPECT_TRUE(rig.ledger_exact());
+}
+
+TEST(FullOutbox, ALaneFullOfOthersTakesHalfOfItAgainInBlock) {
+  EgressRig rig(small_limits());
+  TestConnection connection(rig);
+  block(connection);
+  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB), {.kind = Kind::group});
+  for (int i = 0; i < 8; ++i) rig.push(connection.outbox, sized(kKiB), {.flags = kBlock});
+  EXPECT_THAT(rig.signals.take(), IsEmpty());
+  EXPECT_FALSE(rig.tally.any_dropped);
+  rig.push(connection.outbox, sized(kKiB), {.kind = Kind::group});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 1u) << "behind so much of BLOCK the new one";
+  rig.push(connection.outbox, sized(kKiB), {.kind = Kind::group, .src = 2});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 10u) << "down to the half that is left to them";
+  EXPECT_TRUE(rig.ledger_exact());
 }
 
 // Frames of a message under way wait in the order in which they came: others are not held up until
@@ -183,10 +214,10 @@ TEST(FullOutbox, TheRestOfAMessageUnderWayPausesItsSenderBeyondTheLimit) {
     rig.push_fragment(connection.outbox, 1, 8'000 * (i + 1), 100'000, std::string(8'000, 'a'));
     rig.push(connection.outbox, "between", {.src = 2});
     if (i == 0) {
-      EXPECT_THAT(rig.signals.take(), IsEmpty());
+      EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1", "pause 2")) << "beyond half of it";
     }
   }
-  EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1", "pause 2", "hold 1", "hold 2"));
+  EXPECT_THAT(rig.signals.take(), ElementsAre("hold 1", "hold 2"));
 }
 
 // Each of many senders is held in time, but all of them together had more under way than any
@@ -212,7 +243,7 @@ TEST(FullOutbox, BlockOfASenderThatComesThoughHeldIsDroppedBeyondWhatWasUnderWay
   const auto push = [&](std::uint32_t sender) {
     rig.push(connection.outbox, sized(kKiB), {.src = sender});
   };
-  for (int i = 0; i < 16 + 16; ++i) push(1);
+  for (int i = 0; i < 8 + 16; ++i) push(1);
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1")) << "within the reserve";
   for (int i = 0; i < 512 + 64 + 8 * 16; ++i) push(1);
   EXPECT_EQ(rig.signals.take()[0], "hold 1");

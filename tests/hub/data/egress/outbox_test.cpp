@@ -57,8 +57,8 @@ TEST(Outbox, BlockPausesOnceHoldsPastTheReserveAndLetsGo) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB));
-  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "exactly the limit";
+  for (int i = 0; i < 8; ++i) rig.push(connection.outbox, sized(kKiB));
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "exactly half of the lane";
   rig.push(connection.outbox, "");
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 1"));
   for (int i = 0; i < 15; ++i) rig.push(connection.outbox, sized(kKiB));
@@ -67,7 +67,7 @@ TEST(Outbox, BlockPausesOnceHoldsPastTheReserveAndLetsGo) {
   EXPECT_THAT(rig.signals.take(), ElementsAre("pause 2", "hold 2"));
   rig.push(connection.outbox, "", {.src = 1});
   EXPECT_THAT(rig.signals.take(), ElementsAre("hold 1"));
-  EXPECT_EQ(rig.tally.queued, 1 + 16 + 1 + 15 + 1 + 1);
+  EXPECT_EQ(rig.tally.queued, 1 + 8 + 1 + 15 + 1 + 1);
   connection.peer.set_room(MemoryPeer::kAll);
   connection.flush();
   EXPECT_THAT(rig.signals.take(), ElementsAre("resume 1", "release 1", "resume 2", "release 2"));
@@ -78,21 +78,21 @@ TEST(Outbox, RemindsASenderThatGoesOn) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  for (int i = 0; i < 16 + 1; ++i) rig.push(connection.outbox, sized(kKiB));
+  for (int i = 0; i < 8 + 1; ++i) rig.push(connection.outbox, sized(kKiB));
   rig.signals.take();
   for (int i = 0; i < 256; ++i) rig.push(connection.outbox, sized(kKiB));
   EXPECT_THAT(rig.signals.take(), ElementsAre("hold 1", "pause 1"));
 }
 
-TEST(Outbox, RoomIsToldAtHalfTheLane) {
+TEST(Outbox, RoomIsToldAtAQuarterOfTheLane) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  for (int i = 0; i < 17; ++i) rig.push(connection.outbox, sized(kKiB));
+  for (int i = 0; i < 9; ++i) rig.push(connection.outbox, sized(kKiB));
   rig.signals.take();
-  connection.peer.set_room(8 * kKiB);
+  connection.peer.set_room(4 * kKiB);
   connection.flush();
-  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "9 KiB still wait";
+  EXPECT_THAT(rig.signals.take(), IsEmpty()) << "5 KiB still wait";
   connection.take();
   connection.peer.set_room(1 * kKiB);
   connection.flush();
