@@ -64,17 +64,9 @@ void IoShard::send(ShardCommand command) {
 
 void IoShard::run() {
   meter_ = AllocationMeter();
-  std::span<const Ready> ready;
-  std::uint64_t received = 0;
   while (!stopped_) {
-    const bool guessed =
-        guess_.same_again(ready, received, flush_again_ || has_rest(), steady_now_ns);
-    if (!guessed) ready = wait();
-    const std::int64_t now_ns = steady_now_ns();
-    if (!guessed) guess_.woke(now_ns);
-    const std::uint64_t received_before = state_.counters.received_bytes.value();
-    turn(ready, static_cast<std::uint64_t>(now_ns / kNsPerMs));
-    received = state_.counters.received_bytes.value() - received_before;
+    const std::span<const Ready> ready = wait();
+    turn(ready, static_cast<std::uint64_t>(steady_now_ns() / kNsPerMs));
   }
   state_.shared.quiescence.leave(state_.self.value());
   state_.egress.owner.let_go();  // who joins this thread clears up

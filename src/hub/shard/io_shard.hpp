@@ -9,7 +9,6 @@
 #include "hub/shard/flusher.hpp"
 #include "hub/shard/keeper.hpp"
 #include "hub/shard/reader.hpp"
-#include "hub/shard/ready_guess.hpp"
 #include "hub/shard/shard_state.hpp"
 
 namespace gimnet::hub {
@@ -87,7 +86,6 @@ class IoShard {
   bool flush_again_ = false;
   bool room_came_ =
       false;  ///< in a mailbox, since connections that wait for room were last looked at
-  ReadyGuess guess_;
   AllocationMeter meter_;  ///< of the thread that takes the turns
   std::thread thread_;
 };
