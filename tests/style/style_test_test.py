@@ -5,6 +5,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import comments
 import rules
 from tree import Tree
 
@@ -237,6 +238,17 @@ CASES = {
             {rules.PLANTED_TABLE: "[[bug]\n"},
             {rules.PLANTED_TABLE: '[[bug]]\nname = "A"\n'},
             {rules.PLANTED_TABLE: '[[bug]]\nname = "A"\nbreaks = "b"\nprogram = "gimnet-sim"\n'},
+        ],
+    ),
+    rules.comments_open_with_their_subject: (
+        [{"src/a.hpp": GUARDED + "/// The way home.\n/// What follows is more of it.\nint a;  ///< the one\n"},
+         {"src/a.hpp": GUARDED + "// What is old.\n", comments.OLD_COMMENTS_LIST: "src/a.hpp\n"}],
+        [
+            {"src/a.hpp": GUARDED + "/// What comes.\n"},
+            {"src/a.hpp": GUARDED + "/** How to. */\n"},
+            {"src/a.hpp": GUARDED + "int a;  ///< Where it is\n"},
+            {"src/a.hpp": GUARDED + "int a;\n", comments.OLD_COMMENTS_LIST: "src/a.hpp\n"},
+            {comments.OLD_COMMENTS_LIST: "src/gone.hpp\n"},
         ],
     ),
     rules.links_resolve: (

@@ -86,6 +86,13 @@ class Tree:
                 if suffixes is None or path.suffix in suffixes:
                     yield SourceFile(self.root, path)
 
+    def list_entries(self, path):
+        """(line, text) of the lines of a list that are neither empty nor comments."""
+        file = self.file(path)
+        for number, line in enumerate(file.lines if file else (), 1):
+            if line.strip() and not line.startswith("#"):
+                yield number, line.strip()
+
     def top_level_files(self):
         for path in sorted(self.root.iterdir()):
             if path.is_file() and path.name != ".git":
