@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gimnet/gimi/message.hpp"
+#include "gimnet/gimi/node_state.hpp"
 #include "gimnet/gimi/options.hpp"
 #include "gimnet/gimi/outcome.hpp"
 #include "gimnet/gimi/records.hpp"
@@ -202,47 +203,6 @@ class Watch {
   friend class Node;
   explicit Watch(std::shared_ptr<gimi::WatchQueue> queue) : queue_(std::move(queue)) {}
   std::shared_ptr<gimi::WatchQueue> queue_;
-};
-
-/// How the connection is at one moment.
-struct NodeState {
-  Peer peer;  ///< changes only if a session could not be taken up again after a break
-  std::string name;
-  std::string hub_name;
-  std::uint32_t hub_id = 0;
-  bool connected = false;
-  bool ended = false;  ///< it will not connect again; `trouble` says why
-  std::uint32_t reconnects = 0;
-  std::int64_t hub_round_trip_ns = 0;    ///< 0: not measured yet
-  std::int64_t hub_clock_offset_ns = 0;  ///< hub's clock minus this one
-  std::string trouble;                   ///< why the connection broke last; "" if it never did
-  /// Messages published with `retain` that are not kept for a hub that is started again: larger
-  /// than NodeOptions::last_message_bytes or, with those of other services, than 64 MiB.
-  std::uint64_t last_messages_not_kept = 0;
-};
-
-/// What was on its way to a node and cannot be given out.
-struct LostCounts {
-  std::uint64_t incomplete =
-      0;  ///< messages of which a part did not come, or did not fit what came before
-  std::uint64_t too_large = 0;  ///< messages larger than NodeOptions::message_bytes_max
-  /// Frames that the hub could not send again after a break; a small message has one, a large one
-  /// many.
-  std::uint64_t frames_broken_off = 0;
-  /// Messages of a group that is none of a service this node subscribed, nor lately was.
-  std::uint64_t unknown_service = 0;
-  /// Frames of other nodes that break the protocol, and KEYED messages without a GIMI header.
-  std::uint64_t unreadable = 0;
-  /// Messages that came after their sender had begun the stream anew (Message::begins_stream()).
-  std::uint64_t outdated = 0;
-  /// Frames that the hub dropped because this node's queue there was full.
-  std::uint64_t queue_full = 0;
-  /// Who had sent most of the bytes in it, whoever lost frames. Id 0: nobody, or not known.
-  Peer queue_filled_by = {};
-  /// How many losses are known: messages, and frames where only those are. Without queue_full.
-  [[nodiscard]] std::uint64_t all() const {
-    return incomplete + too_large + frames_broken_off + unknown_service + unreadable + outdated;
-  }
 };
 
 /// A member of the network. Leaves for good when it is destroyed.

@@ -156,7 +156,7 @@ std::uint64_t received_in_flood(proto::Kind kind, std::uint64_t bytes_per_messag
     reader.take(bytes_per_message);
   }
   flood.end();
-  // What waits comes before a message that finds room again.
+  // Waiting messages come before a message that finds room again.
   const Deadline deadline;
   do {
     deadline.check("what waits for the reader");

@@ -21,8 +21,8 @@ NodeOptions options_of(std::string_view name, std::string_view hub) {
   return options;
 }
 
-/// What a Sender has: as long as it is there the table does not end the stream, nor the node its
-/// parts.
+/// A stream that a Sender holds: while it is held, the table does not end the stream, and the node
+/// does not end its parts.
 std::shared_ptr<gimi::SendStream> owned(std::shared_ptr<gimi::Core> core,
                                         gimi::StreamTable::Stream stream) {
   gimi::SendStream* const raw = stream.get();

@@ -14,7 +14,7 @@
 
 namespace gimnet::nif {
 
-/// How far the sending of a fragmented message is. A value type.
+/// Progress of sending a fragmented message. A value type.
 struct SendProgress {
   std::uint32_t number = 0;  ///< 0: not begun
   std::uint64_t epoch = 0;

@@ -22,7 +22,7 @@ void print(Session& session, const Message& message, const Absent& absent) {
   }
 }
 
-/// What a full queue cost a service is told with what did not come of it.
+/// Tells losses. Those that a full queue cost a service are told with its missed messages.
 void take_lost(LostMessages& lost, LostCounts counts, const MissedMessages* missed) {
   if (missed != nullptr) counts.queue_full = 0;
   lost.take(counts);

@@ -7,7 +7,7 @@
 #include "gimnet/gimi.hpp"
 #include "tests/client/gimi/support/hub_process.hpp"
 
-// How many services a node remembers that it sends to.
+// The number of services that a node remembers as those it sends to.
 
 namespace gimnet {
 namespace {

@@ -33,7 +33,7 @@ class Identity {
   std::uint32_t user_ = 0;  ///< 0 unless the kind is `user`
 };
 
-/// What a peer may do that not every peer may. A value type.
+/// Rights that not every peer has. A value type.
 struct Rights {
   bool administer = false;  ///< change the hub: root and the hub's own user, over a Unix socket
 };

@@ -79,7 +79,7 @@ class LaneQueue {
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Who sent what waits, and who loses messages when the lane is full.
+  /// Waiting bytes by source, and the source that loses messages when the lane is full.
   [[nodiscard]] SourceBytes& sources() { return sources_; }
   /// The node that sent what counts at that place, as the first entries show it; 0: none of them.
   [[nodiscard]] NodeId source_at(std::uint8_t place);

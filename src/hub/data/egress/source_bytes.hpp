@@ -45,7 +45,7 @@ class SourceBytes {
   /// REQUIRES: a byte may be dropped.
   void choose(std::uint64_t lane_bytes);
   void forget_choice() { chosen_ = false; }
-  /// Who loses. REQUIRES: choose() was called since the lane was empty.
+  /// The place of the source that loses. REQUIRES: choose() was called since the lane was empty.
   [[nodiscard]] std::uint8_t loser() const { return loser_; }
   /// It may be brought down to so many bytes before the next choice.
   [[nodiscard]] std::uint32_t floor() const { return floor_; }

@@ -45,7 +45,7 @@ TEST_F(UntoldLossesTest, WhatIsNeverDroppedFillsItToo) {
   EXPECT_EQ(losses_.message().source, node(4));
 }
 
-// What waits of it is far behind, or was the message that was dropped.
+// Its waiting messages are far behind, or it only had the message that was dropped.
 TEST_F(UntoldLossesTest, MayNotKnowWhoItWas) {
   for (int i = 0; i < 64; ++i) lane_.push(entry(1 + static_cast<std::uint32_t>(i % 2), 1));
   lane_.push(entry(3, 10'000));

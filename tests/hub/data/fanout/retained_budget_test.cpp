@@ -8,7 +8,7 @@
 #include "proto/gimi/message_header.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
 
-// What retained messages count, and what becomes of those that are not kept.
+// The budget of retained messages, and the fate of those that are not kept.
 
 namespace gimnet::hub {
 namespace {

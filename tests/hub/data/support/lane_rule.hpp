@@ -61,7 +61,7 @@ class LaneRule {
     for (const Message& each : waiting_) bytes += each.block ? each.size : 0;
     return bytes;
   }
-  /// What may be dropped, by the place of the source. The first place wins a tie.
+  /// Bytes that may be dropped, by the place of the source. The first place wins a tie.
   [[nodiscard]] std::map<std::uint8_t, std::uint64_t> droppable() const {
     std::map<std::uint8_t, std::uint64_t> bytes;
     for (const Message& each : waiting_) {
