@@ -174,12 +174,13 @@ Work topics(std::size_t count) {
   auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
   return [world, all] {
     for (std::size_t i = 0; i < all->size(); ++i) {
-      const auto node = static_cast<std::uint32_t>(i / kPerNode + 1);
+      const NodeIndex node{static_cast<std::uint32_t>(i / kPerNode + 1)};
       if (!world->services.subscribe(node, (*all)[i], {}, world->effects))
         wrong("a subscription was refused");
     }
     for (std::size_t node = 1; node <= all->size() / kPerNode; ++node) {
-      world->services.node_left(static_cast<std::uint32_t>(node), milliseconds{0}, world->effects);
+      world->services.node_left(NodeIndex{static_cast<std::uint32_t>(node)}, milliseconds{0},
+                                world->effects);
     }
     world->effects.clear();
   };
@@ -190,7 +191,7 @@ Work wrong_tokens(std::size_t count) {
   const Secret secret{};
   const TokenHolder holder{HubId{7}, "robot", Identity::open()};
   auto token = std::make_shared<std::vector<std::byte>>(
-      write_token({1, 2, milliseconds{3}}, holder, secret));
+      write_token({NodeIndex{1}, 2, milliseconds{3}}, holder, secret));
   constexpr std::size_t kMacBytes = 32;
   if (count > kMacBytes) wrong("a MAC has 32 bytes");
   (*token)[token->size() - kMacBytes + count - 1] ^= std::byte{1};
@@ -211,7 +212,7 @@ Work subscribers(std::size_t count) {
     GroupTable groups;
     Quiescence quiescence{2};
     TablePublisher publisher{HubId{7}, 2, {nodes, groups, quiescence}};
-    std::vector<std::uint32_t> subscribers;
+    std::vector<NodeIndex> subscribers;
     Effects effects;
   };
   auto world = std::make_shared<World>();
@@ -227,17 +228,19 @@ Work subscribers(std::size_t count) {
     if (!services.subscribe(world->subscribers[i], "robot/odom", {}, world->effects))
       wrong("a subscription");
   }
-  world->publisher.publish_group(1, world->membership);
+  world->publisher.publish_group(GroupIndex{1}, world->membership);
   world->effects.clear();
   return [world, &services, count] {
     for (std::size_t i = 0; i < count; ++i) {
       // In no order: a step that shares no factor with the number of them.
-      const std::uint32_t node = world->subscribers[1 + i * 7'919 % count];
+      const NodeIndex node = world->subscribers[1 + i * 7'919 % count];
       if (services.unsubscribe(node, "robot/odom", world->effects)) wrong("it had subscribed");
-      if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
+      if (!world->publisher.publish_member(GroupIndex{1}, node, world->membership))
+        wrong("the group is there");
       if (!services.subscribe(node, "robot/odom", {}, world->effects))
         wrong("a subscription was refused");
-      if (!world->publisher.publish_member(1, node, world->membership)) wrong("the group is there");
+      if (!world->publisher.publish_member(GroupIndex{1}, node, world->membership))
+        wrong("the group is there");
       world->effects.clear();
     }
   };
@@ -283,7 +286,7 @@ Work neighbours(std::size_t count) {
     join((i % 2 == 0 ? "hall-3-" : "hall-3") + std::to_string(i));
   const auto pattern = proto::Pattern::parse(std::string{"hall-3/"} + '*');
   return [world, pattern, count] {
-    const ListingRequest request{&*pattern, 0, false, 10, world->limits.scan_records};
+    const ListingRequest<NodeIndex> request{&*pattern, {}, false, 10, world->limits.scan_records};
     for (std::size_t i = 0; i < count; ++i) {
       if (list_nodes(world->membership, request).indices.size() != 1)
         wrong("one node is in hall-3");

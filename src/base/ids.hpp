@@ -28,6 +28,11 @@ using HubId = StrongId<struct HubIdTag, std::uint16_t>;
 using NodeId = StrongId<struct NodeIdTag, std::uint32_t>;
 /// A group (one per service): owner hub << 20 | index, in a number space of its own.
 using GroupId = StrongId<struct GroupIdTag, std::uint32_t>;
+/// A node among those of one hub: the index in its NodeId, 1..kIndexMost. 0: the hub itself, or
+/// none.
+using NodeIndex = StrongId<struct NodeIndexTag, std::uint32_t>;
+/// A group among those of one hub: the index in its GroupId, 1..kIndexMost.
+using GroupIndex = StrongId<struct GroupIndexTag, std::uint32_t>;
 /// One of the hub's io threads, 0..shards-1.
 using ShardIndex = StrongId<struct ShardIndexTag, std::uint8_t>;
 /// The place of a session in its shard's table.
@@ -38,6 +43,7 @@ inline constexpr std::uint32_t kIndexMask = (1u << kIndexBits) - 1;
 inline constexpr std::uint32_t kHubIndex = 0;             ///< the hub itself
 inline constexpr std::uint32_t kEveryIndex = kIndexMask;  ///< every node of a hub
 inline constexpr std::uint32_t kIndexMost = kEveryIndex - 1;
+inline constexpr GroupIndex kNoGroup{0};  ///< what a service that nobody provides has
 inline constexpr HubId kOwnHub{0};
 inline constexpr HubId kEveryHub{4095};
 inline constexpr std::uint16_t kHubIdMax = 4094;
@@ -54,6 +60,19 @@ template <class Id>
 template <class Id>
 [[nodiscard]] constexpr std::uint32_t index_of(Id id) {
   return id.value() & kIndexMask;
+}
+
+/// The node of that hub. REQUIRES: hub <= 4095, index < 2^20.
+[[nodiscard]] constexpr NodeId make_id(HubId hub, NodeIndex index) {
+  return make_id<NodeId>(hub, index.value());
+}
+/// The group of that hub. REQUIRES: as above.
+[[nodiscard]] constexpr GroupId make_id(HubId hub, GroupIndex index) {
+  return make_id<GroupId>(hub, index.value());
+}
+[[nodiscard]] constexpr NodeIndex node_index_of(NodeId node) { return NodeIndex{index_of(node)}; }
+[[nodiscard]] constexpr GroupIndex group_index_of(GroupId group) {
+  return GroupIndex{index_of(group)};
 }
 
 }  // namespace gimnet

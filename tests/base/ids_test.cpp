@@ -26,7 +26,19 @@ TEST(Ids, OfDifferentKindsDoNotMix) {
   static_assert(!std::is_convertible_v<NodeId, GroupId>);
   static_assert(!std::is_convertible_v<std::uint32_t, NodeId>);
   static_assert(!std::is_constructible_v<GroupId, NodeId>);
+  static_assert(!std::is_convertible_v<std::uint32_t, NodeIndex>);
+  static_assert(!std::is_constructible_v<GroupIndex, NodeIndex>);
+  static_assert(!std::is_constructible_v<NodeIndex, NodeId>);
   SUCCEED();
+}
+
+TEST(Ids, OfOneHubAreTheIndicesOfTheirKind) {
+  static_assert(std::is_same_v<decltype(make_id(HubId{7}, NodeIndex{17})), NodeId>);
+  static_assert(std::is_same_v<decltype(make_id(HubId{7}, GroupIndex{17})), GroupId>);
+  EXPECT_EQ(make_id(HubId{7}, NodeIndex{17}), make_id<NodeId>(HubId{7}, 17));
+  EXPECT_EQ(make_id(HubId{7}, GroupIndex{17}), make_id<GroupId>(HubId{7}, 17));
+  EXPECT_EQ(node_index_of(make_id(kEveryHub, NodeIndex{kEveryIndex})), NodeIndex{kEveryIndex});
+  EXPECT_EQ(group_index_of(make_id(HubId{7}, kNoGroup)), kNoGroup);
 }
 
 TEST(Ids, AreOrderedAndHashed) {

@@ -83,7 +83,7 @@ void Checks::before_it_leaves(ShardIndex shard, const hub::ShardCommand& command
 
 std::string Checks::stale() const {
   for (const auto& [group, topic] : conductor_->membership().services().groups()) {
-    const hub::GroupMembers* members = subject_.groups.find(group);
+    const hub::GroupMembers* members = subject_.groups.find(group.value());
     std::size_t count = 0;
     for (std::size_t i = 0; members != nullptr && i < members->by_shard.size(); ++i) {
       count += members->by_shard[i].size();
@@ -195,8 +195,8 @@ void Checks::sessions() const {
           "the hub has more nodes than its limit");
   auto actual = all.begin();
   for (const auto& [index, expected] : model_.sessions()) {
-    if (actual != all.end() && actual->first < index) break;
-    if (actual == all.end() || actual->first != index) {
+    if (actual != all.end() && actual->first.value() < index) break;
+    if (actual == all.end() || actual->first.value() != index) {
       broken(Checker::grace, "the session of node " + std::to_string(index) + " is gone too early");
     }
     if (actual->second.connected != expected.connected) {
@@ -208,7 +208,7 @@ void Checks::sessions() const {
   }
   if (actual != all.end()) {
     broken(Checker::grace,
-           "the session of node " + std::to_string(actual->first) + " ought to be over");
+           "the session of node " + std::to_string(actual->first.value()) + " ought to be over");
   }
 }
 
@@ -216,7 +216,8 @@ void Checks::names() const {
   const hub::Membership& membership = conductor_->membership();
   std::size_t named = 0;
   auto expected = model_.sessions().begin();
-  for (const auto& [index, session] : membership.sessions().all()) {
+  for (const auto& [node, session] : membership.sessions().all()) {
+    const std::uint32_t index = node.value();
     const std::string& name = (expected++)->second.name;
     if (session.name != name) {
       broken(Checker::names, "node " + std::to_string(index) + " has the name '" +
@@ -224,7 +225,7 @@ void Checks::names() const {
     }
     if (name.empty()) continue;
     ++named;
-    if (membership.directory().find(name) != index) {
+    if (membership.directory().find(name) != node) {
       broken(Checker::names, "the directory says of '" + name + "' another owner than node " +
                                  std::to_string(index));
     }
@@ -236,16 +237,16 @@ void Checks::names() const {
 void Checks::node_table() const {
   const auto& all = conductor_->membership().sessions().all();
   for (const auto& [index, session] : all) {
-    const NodePlace place = subject_.nodes.find(index);
+    const NodePlace place = subject_.nodes.find(index.value());
     const hub::Place& right = session.place;
     if (!place.exists())
-      broken(Checker::node_table, "the table lacks node " + std::to_string(index));
+      broken(Checker::node_table, "the table lacks node " + std::to_string(index.value()));
     require(place.shard == right.shard && place.slot == right.slot &&
                 place.generation == right.generation,
             Checker::node_table, "the table has a node in another place than it is");
   }
   for (const std::uint32_t index : model_.nodes_given()) {
-    if (subject_.nodes.find(index).exists() && !all.contains(index)) {
+    if (subject_.nodes.find(index).exists() && !all.contains(NodeIndex{index})) {
       broken(Checker::node_table,
              "the table has node " + std::to_string(index) + ", which is not there");
     }

@@ -132,7 +132,7 @@ void World::start_hub() {
   std::erase_if(past.kicked, [this](const Kicked& one) {
     return std::none_of(disk_.kicked.begin(), disk_.kicked.end(),
                         [&one](const hub::SessionToken& kept) {
-                          return kept.index == one.index && kept.expiry == one.expiry;
+                          return kept.index.value() == one.index && kept.expiry == one.expiry;
                         });
   });
   begin_life(std::move(past));

@@ -46,7 +46,7 @@ struct World {
   }
   void advertise(std::size_t i) {
     const std::string full_name = name(i / kServicesPerNode) + "/service-" + std::to_string(i);
-    const auto provider = static_cast<std::uint32_t>(i / kServicesPerNode + 1);
+    const NodeIndex provider{static_cast<std::uint32_t>(i / kServicesPerNode + 1)};
     static_cast<void>(
         membership.services().advertise(provider, full_name, {}, milliseconds{0}, effects));
     note();
@@ -100,7 +100,8 @@ BENCHMARK(join_and_leave)->Apply(sizes);
 /// A node that is there takes another name, and its own again.
 void register_name(benchmark::State& state) {
   World& hub = world(state);
-  Session& session = *hub.membership.sessions().find(static_cast<std::uint32_t>(state.range(0)));
+  Session& session =
+      *hub.membership.sessions().find(NodeIndex{static_cast<std::uint32_t>(state.range(0))});
   const std::string own = World::name(static_cast<std::size_t>(state.range(0)) - 1);
   for (auto _ : state) {
     static_cast<void>(
@@ -116,8 +117,9 @@ void advertise_and_withdraw(benchmark::State& state) {
   Services& services = hub.membership.services();
   std::size_t step = 0;
   for (auto _ : state) {
-    const auto provider = static_cast<std::uint32_t>(scattered(++step, state.range(0)) + 1);
-    const auto added = services.advertise(provider, World::name(provider - 1) + "/extra", {},
+    const std::size_t robot = scattered(++step, state.range(0));
+    const NodeIndex provider{static_cast<std::uint32_t>(robot + 1)};
+    const auto added = services.advertise(provider, World::name(robot) + "/extra", {},
                                           milliseconds{0}, hub.effects);
     static_cast<void>(services.withdraw(provider, added->group, milliseconds{0}, hub.effects));
     hub.note();
@@ -129,8 +131,8 @@ void list_page(benchmark::State& state, const char* text) {
   const World& hub = world(state);
   const auto pattern = proto::Pattern::parse(text);
   for (auto _ : state) {
-    const ListingRequest request{&*pattern, 0, false, hub.limits.page_records,
-                                 hub.limits.scan_records};
+    const ListingRequest<NodeIndex> request{
+        &*pattern, {}, false, hub.limits.page_records, hub.limits.scan_records};
     benchmark::DoNotOptimize(list_nodes(hub.membership, request));
   }
 }
@@ -143,8 +145,9 @@ void list_whole(benchmark::State& state) {
   const World& hub = world(state);
   const auto pattern = proto::Pattern::parse("*/robot-7");
   for (auto _ : state) {
-    ListingRequest request{&*pattern, 0, false, hub.limits.page_records, hub.limits.scan_records};
-    for (Listed listed = list_nodes(hub.membership, request); listed.more;
+    ListingRequest<NodeIndex> request{
+        &*pattern, {}, false, hub.limits.page_records, hub.limits.scan_records};
+    for (Listed<NodeIndex> listed = list_nodes(hub.membership, request); listed.more;
          listed = list_nodes(hub.membership, request)) {
       request.after = listed.next;
     }
@@ -160,16 +163,16 @@ void watch_snapshot(benchmark::State& state, const char* pattern) {
     proto::ns::Watch wanted;
     wanted.watch = 1;
     wanted.pattern = pattern;
-    static_cast<void>(hub.watches.watch(1, wanted));
+    static_cast<void>(hub.watches.watch(NodeIndex{1}, wanted));
     std::size_t frames = 1;
     while (frames != 0) {
       frames = 0;
       static_cast<void>(
           hub.watches.serve(hub.membership, milliseconds{0},
-                            [&frames](std::uint32_t, const proto::Payload&) { ++frames; }));
-      hub.watches.taken(1, {1, 4});
+                            [&frames](NodeIndex, const proto::Payload&) { ++frames; }));
+      hub.watches.taken(NodeIndex{1}, {1, 4});
     }
-    static_cast<void>(hub.watches.unwatch(1, 1));
+    static_cast<void>(hub.watches.unwatch(NodeIndex{1}, 1));
   }
 }
 BENCHMARK_CAPTURE(watch_snapshot, all, "")->Apply(sizes)->Unit(benchmark::kMillisecond);
@@ -181,7 +184,7 @@ BENCHMARK_CAPTURE(watch_snapshot, one_hall, "hall-3/**")
 void tell_100_watches(benchmark::State& state) {
   World& hub = world(state);
   const auto serve = [&hub] {
-    const auto send = [](std::uint32_t, const proto::Payload&) {};
+    const auto send = [](NodeIndex, const proto::Payload&) {};
     while (hub.watches.serve(hub.membership, milliseconds{0}, send)) {
     }
   };
@@ -193,14 +196,14 @@ void tell_100_watches(benchmark::State& state) {
     wanted.pattern =
         "hall-" +
         std::to_string(static_cast<std::size_t>(state.range(0)) / kRobotsPerHall + node - 1) + "/*";
-    static_cast<void>(hub.watches.watch(node, wanted));
+    static_cast<void>(hub.watches.watch(NodeIndex{node}, wanted));
   }
   for (auto _ : state) {
     hub.leave(hub.join(static_cast<std::size_t>(state.range(0)) + 5));
     serve();
-    hub.watches.taken(1, {1, 4});
+    hub.watches.taken(NodeIndex{1}, {1, 4});
   }
-  for (std::uint32_t node = 1; node <= 100; ++node) hub.watches.connection_ended(node);
+  for (std::uint32_t node = 1; node <= 100; ++node) hub.watches.connection_ended(NodeIndex{node});
 }
 BENCHMARK(tell_100_watches)->Apply(sizes);
 

@@ -40,7 +40,7 @@ struct World {
     facts.shards = shards.shards();
     provider = &join("robot");
     for (std::size_t i = 0; i < kSubscribers; ++i) {
-      const std::uint32_t reader = join("reader-" + std::to_string(i)).index;
+      const NodeIndex reader = join("reader-" + std::to_string(i)).index;
       for (std::size_t k = 0; k < services; ++k)
         static_cast<void>(membership.services().subscribe(reader, full_name(k), {}, effects));
     }

@@ -15,7 +15,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr HubId kHub{7};
-constexpr std::uint32_t kGroup = 1;
+constexpr GroupIndex kGroup{1};
 
 struct World {
   explicit World(std::size_t count) {
@@ -37,7 +37,7 @@ struct World {
   GroupTable groups;
   Quiescence quiescence{2};
   TablePublisher publisher{kHub, 2, {nodes, groups, quiescence}};
-  std::vector<std::uint32_t> subscribers;
+  std::vector<NodeIndex> subscribers;
 };
 
 World& world(benchmark::State& state) {
@@ -54,7 +54,7 @@ void change(benchmark::State& state, Publish publish) {
   Services& services = hub.membership.services();
   std::size_t step = 0;
   for (auto _ : state) {
-    const std::uint32_t node =
+    const NodeIndex node =
         hub.subscribers[1 + ++step * 7'919 % static_cast<std::size_t>(state.range(0))];
     static_cast<void>(services.unsubscribe(node, "robot/odom", hub.effects));
     publish(hub, node);
@@ -65,13 +65,12 @@ void change(benchmark::State& state, Publish publish) {
 }
 
 void change_member(benchmark::State& state) {
-  change(state, [](World& hub, std::uint32_t node) {
+  change(state, [](World& hub, NodeIndex node) {
     benchmark::DoNotOptimize(hub.publisher.publish_member(kGroup, node, hub.membership));
   });
 }
 void change_group(benchmark::State& state) {
-  change(state,
-         [](World& hub, std::uint32_t) { hub.publisher.publish_group(kGroup, hub.membership); });
+  change(state, [](World& hub, NodeIndex) { hub.publisher.publish_group(kGroup, hub.membership); });
 }
 
 void sizes(benchmark::internal::Benchmark* bench) { bench->Arg(10)->Arg(1'000)->Arg(10'000); }

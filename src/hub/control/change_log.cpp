@@ -35,8 +35,8 @@ const char* happening(ChangeKind kind) {
   return "has changed";
 }
 
-std::string node_text(HubId hub, std::uint32_t index, const std::string& name) {
-  const std::string id = "node " + to_string(make_id<NodeId>(hub, index));
+std::string node_text(HubId hub, NodeIndex index, const std::string& name) {
+  const std::string id = "node " + to_string(make_id(hub, index));
   return name.empty() ? id : id + " '" + name + "'";
 }
 
@@ -62,8 +62,7 @@ void log_change(const ServiceNoted& noted, const Membership& membership, HubId h
   const Topic* topic =
       noted.kind == ChangeKind::withdrawn ? nullptr : membership.services().find_group(noted.group);
   const std::string name = topic != nullptr ? std::string{topic->full_name} : noted.full_name;
-  say(happening(noted.kind),
-      "service " + to_string(make_id<GroupId>(hub, noted.group)) + " '" + name + "'",
+  say(happening(noted.kind), "service " + to_string(make_id(hub, noted.group)) + " '" + name + "'",
       ", of " + node_text(hub, noted.provider, {}));
 }
 
@@ -72,7 +71,7 @@ void log_change(const RenumberDue& due, const Membership& membership, HubId hub)
   const Session* session = membership.sessions().find(due.index);
   say("has another id",
       node_text(hub, due.former, session != nullptr ? session->name.str() : std::string{}),
-      ", " + to_string(make_id<NodeId>(hub, due.index)));
+      ", " + to_string(make_id(hub, due.index)));
 }
 
 }  // namespace gimnet::hub

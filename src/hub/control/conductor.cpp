@@ -332,7 +332,7 @@ void Conductor::log_level_set(LogLevel level) {
 Session* Conductor::find(const SessionRef& ref, NodeId node) {
   // The shard may have said it before it heard of a new id.
   Session* session =
-      membership_.sessions().find(membership_.sessions().present_index(index_of(node)));
+      membership_.sessions().find(membership_.sessions().present_index(node_index_of(node)));
   if (session == nullptr || session->place.generation != ref.generation) return nullptr;
   return session;
 }
@@ -344,7 +344,7 @@ NodeId Conductor::node_id(const Session& session) const {
 bool Conductor::serve_watches(milliseconds now) {
   const std::uint64_t resyncs = watches_.resyncs();
   const bool more =
-      watches_.serve(membership_, now, [this](std::uint32_t node, const proto::Payload& events) {
+      watches_.serve(membership_, now, [this](NodeIndex node, const proto::Payload& events) {
         const Session* session = membership_.sessions().find(node);
         if (session != nullptr) runner_.send_event(*session, events);
       });

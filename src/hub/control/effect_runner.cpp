@@ -15,8 +15,8 @@ namespace ns = proto::ns;
 
 }  // namespace
 
-GroupId EffectRunner::group_id(std::uint32_t group) const {
-  return group == 0 ? GroupId{} : make_id<GroupId>(parts_.facts.id, group);
+GroupId EffectRunner::group_id(GroupIndex group) const {
+  return group == kNoGroup ? GroupId{} : make_id(parts_.facts.id, group);
 }
 
 void EffectRunner::carry_out(const Effects& effects, milliseconds now) {
@@ -71,7 +71,7 @@ void EffectRunner::run(const MemberChanged& effect) {
 }
 
 void EffectRunner::fence_passed(const FencePassedEvent& event) {
-  for (const std::uint32_t group : endings_.on_passed(event)) {
+  for (const GroupIndex group : endings_.on_passed(event)) {
     parts_.publisher.clear_group(group);
     endings_.finish(group);
   }
@@ -84,10 +84,9 @@ void EffectRunner::run(const SessionEnded& effect) {
 void EffectRunner::run(const RenumberDue& effect) {
   log_change(effect, parts_.membership, parts_.facts.id);
   parts_.watches.connection_ended(effect.former);
-  parts_.shards.send(
-      effect.place.shard,
-      RenumberCommand{ref_of(effect.place), make_id<NodeId>(parts_.facts.id, effect.index),
-                      effect.sentence});
+  parts_.shards.send(effect.place.shard,
+                     RenumberCommand{ref_of(effect.place), make_id(parts_.facts.id, effect.index),
+                                     effect.sentence});
 }
 
 void EffectRunner::run(const ServiceMovedDue& effect) {
@@ -97,7 +96,7 @@ void EffectRunner::run(const ServiceMovedDue& effect) {
     TellCommand command{std::exchange(by_shard[shard], {}), frame, effect.move};
     parts_.shards.send(ShardIndex{static_cast<std::uint8_t>(shard)}, std::move(command));
   };
-  for (const std::uint32_t subscriber : effect.subscribers) {
+  for (const NodeIndex subscriber : effect.subscribers) {
     const Session* session = find(subscriber);
     // When it is back it is told by tell_again().
     if (session == nullptr || !session->connected) continue;
@@ -132,7 +131,7 @@ proto::Payload EffectRunner::payload_of(const ServiceMovedDue& effect) const {
   event.retain = effect.retain;
   event.direction = effect.direction;
   event.again = effect.again;
-  for (const std::uint32_t group : effect.between) event.between.push_back(group_id(group));
+  for (const GroupIndex group : effect.between) event.between.push_back(group_id(group));
   return proto::encode(event);
 }
 
@@ -166,7 +165,7 @@ void EffectRunner::run(const SubscriberDue& effect) {
   if (session == nullptr) return;
   const auto fill = [&](auto event) {
     event.group = group_id(effect.group);
-    event.node = make_id<NodeId>(parts_.facts.id, effect.subscriber);
+    event.node = make_id(parts_.facts.id, effect.subscriber);
     event.subscribers = effect.subscribers_now;
     return proto::encode(event);
   };

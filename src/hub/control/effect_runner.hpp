@@ -53,10 +53,10 @@ class EffectRunner {
   void run(const CloseDue& effect);
   void run(const StateDue& effect);
   void run(const NameDecided& effect);
-  [[nodiscard]] const Session* find(std::uint32_t node) const {
+  [[nodiscard]] const Session* find(NodeIndex node) const {
     return parts_.membership.sessions().find(node);
   }
-  [[nodiscard]] GroupId group_id(std::uint32_t group) const;
+  [[nodiscard]] GroupId group_id(GroupIndex group) const;
   [[nodiscard]] proto::Payload payload_of(const ServiceMovedDue& effect) const;
 
   const Parts parts_;

@@ -30,15 +30,15 @@ class GroupEndings {
 
   /// The table says that this group has no provider any more. REQUIRES: !contains(group), two
   /// shards at least.
-  void begin(std::uint32_t group, ShardIndex provider_shard);
-  [[nodiscard]] bool contains(std::uint32_t group) const { return endings_.contains(group); }
+  void begin(GroupIndex group, ShardIndex provider_shard);
+  [[nodiscard]] bool contains(GroupIndex group) const { return endings_.contains(group); }
   /// To be sent once the group is cleared. REQUIRES: contains(group).
-  void defer(std::uint32_t group, ShardIndex shard, const EndPaceCommand& command);
+  void defer(GroupIndex group, ShardIndex shard, const EndPaceCommand& command);
   /// Returns the groups that are to be cleared now, each followed by finish().
-  [[nodiscard]] std::vector<std::uint32_t> on_passed(const FencePassedEvent& event);
+  [[nodiscard]] std::vector<GroupIndex> on_passed(const FencePassedEvent& event);
   /// The group was cleared, or is about to be another one's: sends what was deferred. Nothing if it
   /// does not end.
-  void finish(std::uint32_t group);
+  void finish(GroupIndex group);
 
  private:
   struct Ending {
@@ -48,15 +48,15 @@ class GroupEndings {
   /// The fence of one shard.
   struct UnderWay {
     std::uint32_t ticket = 0;
-    std::size_t awaited = 0;            ///< shards that have not answered; 0: none is under way
-    std::vector<std::uint32_t> groups;  ///< that wait for it
-    std::vector<std::uint32_t> next;    ///< that wait for the one behind it
+    std::size_t awaited = 0;         ///< shards that have not answered; 0: none is under way
+    std::vector<GroupIndex> groups;  ///< that wait for it
+    std::vector<GroupIndex> next;    ///< that wait for the one behind it
   };
   void post(ShardIndex shard, UnderWay& fence);
 
   ShardProxy& shards_;
   std::vector<UnderWay> fences_;  ///< by shard
-  std::unordered_map<std::uint32_t, Ending> endings_;
+  std::unordered_map<GroupIndex, Ending> endings_;
 };
 
 }  // namespace gimnet::hub

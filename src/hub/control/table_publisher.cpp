@@ -17,10 +17,10 @@ TablePublisher::TablePublisher(HubId hub, std::size_t shards, const Tables& tabl
 
 TablePublisher::~TablePublisher() {
   for (const auto& [index, members] : published_)
-    static_cast<void>(tables_.groups.exchange(index, nullptr));
+    static_cast<void>(tables_.groups.exchange(index.value(), nullptr));
 }
 
-void TablePublisher::publish_node(std::uint32_t index, const Membership& membership) {
+void TablePublisher::publish_node(NodeIndex index, const Membership& membership) {
   const Session* session = membership.sessions().find(index);
   NodePlace place;
   if (session != nullptr) {
@@ -28,21 +28,21 @@ void TablePublisher::publish_node(std::uint32_t index, const Membership& members
   } else if (membership.sessions().present_index(index) != index) {
     place = NodePlace::renumbered();
   }
-  tables_.nodes.publish(index, place);
+  tables_.nodes.publish(index.value(), place);
 }
 
-void TablePublisher::publish_group(std::uint32_t index, const Membership& membership) {
+void TablePublisher::publish_group(GroupIndex index, const Membership& membership) {
   std::unique_ptr<GroupMembers> members;
   if (const Topic* topic = membership.services().find_group(index); topic != nullptr) {
     members = std::make_unique<GroupMembers>();
     const Session* provider = membership.sessions().find(topic->service->provider);
     GIMNET_CHECK(provider != nullptr);
-    members->provider = make_id<NodeId>(hub_, topic->service->provider);
+    members->provider = make_id(hub_, topic->service->provider);
     members->provider_place = node_place(*provider);
     members->by_shard.resize(shards_);
     members->retain = topic->service->terms.retain;
     members->accepts = topic->service->terms.direction == proto::ns::Direction::accepts;
-    for (const std::uint32_t subscriber : topic->subscribers) {
+    for (const NodeIndex subscriber : topic->subscribers) {
       const NodePlace place = place_of(subscriber, membership);
       GIMNET_CHECK(place.exists());
       put(*members, *topic, subscriber, place);
@@ -51,7 +51,7 @@ void TablePublisher::publish_group(std::uint32_t index, const Membership& member
   replace(index, std::move(members));
 }
 
-bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscriber,
+bool TablePublisher::publish_member(GroupIndex index, NodeIndex subscriber,
                                     const Membership& membership) {
   const auto found = published_.find(index);
   const Topic* topic = membership.services().find_group(index);
@@ -70,13 +70,13 @@ bool TablePublisher::publish_member(std::uint32_t index, std::uint32_t subscribe
   return true;
 }
 
-NodePlace TablePublisher::place_of(std::uint32_t node, const Membership& membership) const {
+NodePlace TablePublisher::place_of(NodeIndex node, const Membership& membership) const {
   const Session* session = membership.sessions().find(node);
-  if (session == nullptr) return tables_.nodes.find(node);
+  if (session == nullptr) return tables_.nodes.find(node.value());
   return node_place(*session);
 }
 
-void TablePublisher::put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber,
+void TablePublisher::put(GroupMembers& members, const Topic& topic, NodeIndex subscriber,
                          const NodePlace& place) const {
   if (!topic.pace_of(subscriber)) {
     members.by_shard[place.shard.value()].put({place.slot, place.generation});
@@ -87,7 +87,7 @@ void TablePublisher::put(GroupMembers& members, const Topic& topic, std::uint32_
   members.paced_by_shard[place.shard.value()].put({place.slot, place.generation, was_plain});
 }
 
-std::optional<ShardIndex> TablePublisher::end_group(std::uint32_t index) {
+std::optional<ShardIndex> TablePublisher::end_group(GroupIndex index) {
   const auto found = published_.find(index);
   if (found == published_.end()) return std::nullopt;
   const GroupMembers& before = *found->second;
@@ -108,10 +108,10 @@ std::optional<ShardIndex> TablePublisher::end_group(std::uint32_t index) {
   return provider_shard;
 }
 
-void TablePublisher::clear_group(std::uint32_t index) { replace(index, nullptr); }
+void TablePublisher::clear_group(GroupIndex index) { replace(index, nullptr); }
 
-void TablePublisher::replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members) {
-  static_cast<void>(tables_.groups.exchange(index, members.get()));
+void TablePublisher::replace(GroupIndex index, std::unique_ptr<const GroupMembers> members) {
+  static_cast<void>(tables_.groups.exchange(index.value(), members.get()));
   std::unique_ptr<const GroupMembers>& current = published_[index];
   if (current != nullptr) garbage_.push_back({tables_.quiescence.ticket(), std::move(current)});
   if (members == nullptr) {

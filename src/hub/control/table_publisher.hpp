@@ -30,21 +30,21 @@ class TablePublisher {
   TablePublisher& operator=(const TablePublisher&) = delete;
 
   /// Publishes what `membership` says of the node now.
-  void publish_node(std::uint32_t index, const Membership& membership);
+  void publish_node(NodeIndex index, const Membership& membership);
   /// Publishes what `membership` says of the group now: as much work as the group has members.
-  void publish_group(std::uint32_t index, const Membership& membership);
+  void publish_group(GroupIndex index, const Membership& membership);
   /// Publishes what `membership` says of that subscriber of the group, and of nothing else: little
   /// work, whatever the group's size. False: nothing was done, since the group, or where the node
   /// lives, is not published; publish_group() is due. REQUIRES: the node lives where the table of
   /// nodes says, if its session is over.
-  [[nodiscard]] bool publish_member(std::uint32_t index, std::uint32_t subscriber,
+  [[nodiscard]] bool publish_member(GroupIndex index, NodeIndex subscriber,
                                     const Membership& membership);
 
   /// The group has no provider any more. Where it has members on other shards than its provider's,
   /// the table says so and keeps them for what is on its way there, until clear_group(): returns
   /// the provider's shard. Otherwise it is cleared.
-  [[nodiscard]] std::optional<ShardIndex> end_group(std::uint32_t index);
-  void clear_group(std::uint32_t index);
+  [[nodiscard]] std::optional<ShardIndex> end_group(GroupIndex index);
+  void clear_group(GroupIndex index);
 
   /// Frees what nobody looks at any more.
   void collect();
@@ -56,15 +56,15 @@ class TablePublisher {
     std::unique_ptr<const GroupMembers> members;
   };
   /// Where the node lives, or lived until now.
-  [[nodiscard]] NodePlace place_of(std::uint32_t node, const Membership& membership) const;
-  void put(GroupMembers& members, const Topic& topic, std::uint32_t subscriber,
+  [[nodiscard]] NodePlace place_of(NodeIndex node, const Membership& membership) const;
+  void put(GroupMembers& members, const Topic& topic, NodeIndex subscriber,
            const NodePlace& place) const;
-  void replace(std::uint32_t index, std::unique_ptr<const GroupMembers> members);
+  void replace(GroupIndex index, std::unique_ptr<const GroupMembers> members);
 
   const HubId hub_;
   const std::size_t shards_;
   const Tables tables_;
-  std::unordered_map<std::uint32_t, std::unique_ptr<const GroupMembers>> published_;
+  std::unordered_map<GroupIndex, std::unique_ptr<const GroupMembers>> published_;
   std::deque<Garbage> garbage_;  ///< Limit: what was replaced within one turn of the slowest shard
 };
 

@@ -40,32 +40,33 @@ class ChangeLog : public ::testing::Test {
 
 TEST_F(ChangeLog, SaysWhoCameAndWent) {
   const Session& robot = join("robot");
-  const std::string who = "debug node 7." + std::to_string(robot.index) + " 'robot' ";
+  const std::string who = "debug node 7." + std::to_string(robot.index.value()) + " 'robot' ";
   EXPECT_THAT(line_of(NodeNoted{ChangeKind::joined, robot.index, {}, {}}),
               HasSubstr(who + "has joined\n"));
   EXPECT_THAT(line_of(NodeNoted{ChangeKind::away, robot.index, {}, {}}),
               HasSubstr(who + "is away"));
   EXPECT_THAT(line_of(NodeNoted{ChangeKind::renamed, robot.index, {}, "cam"}),
               HasSubstr(who + "has another name, before 'cam'\n"));
-  EXPECT_THAT(line_of(NodeNoted{ChangeKind::left, 999, "gone", {}}),
+  EXPECT_THAT(line_of(NodeNoted{ChangeKind::left, NodeIndex{999}, "gone", {}}),
               HasSubstr("debug node 7.999 'gone' has left for good"));
 }
 
 TEST_F(ChangeLog, SaysWhoHasAnotherId) {
   const Session& robot = join("robot");
-  EXPECT_THAT(
-      line_of(RenumberDue{robot.place, 5, robot.index, {}}),
-      HasSubstr("node 7.5 'robot' has another id, 7." + std::to_string(robot.index) + "\n"));
+  EXPECT_THAT(line_of(RenumberDue{robot.place, NodeIndex{5}, robot.index, {}}),
+              HasSubstr("node 7.5 'robot' has another id, 7." +
+                        std::to_string(robot.index.value()) + "\n"));
 }
 
 TEST_F(ChangeLog, SaysWhichServiceWent) {
-  EXPECT_THAT(line_of(ServiceNoted{ChangeKind::withdrawn, 3, 5, "robot/odom"}),
-              HasSubstr("debug service 7#3 'robot/odom' was withdrawn, of node 7.5\n"));
+  EXPECT_THAT(
+      line_of(ServiceNoted{ChangeKind::withdrawn, GroupIndex{3}, NodeIndex{5}, "robot/odom"}),
+      HasSubstr("debug service 7#3 'robot/odom' was withdrawn, of node 7.5\n"));
 }
 
 TEST_F(ChangeLog, IsSilentAtOtherLevels) {
   set_log_level(LogLevel::info);
-  EXPECT_EQ(line_of(NodeNoted{ChangeKind::left, 999, "gone", {}}), "");
+  EXPECT_EQ(line_of(NodeNoted{ChangeKind::left, NodeIndex{999}, "gone", {}}), "");
 }
 
 }  // namespace

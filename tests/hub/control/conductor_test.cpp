@@ -122,9 +122,9 @@ TEST_F(ConductorTest, TheEndOfAReplacedConnectionIsNotTheEndOfTheNewOne) {
   hello.token = robot.welcome.token;
   const Node newer = join(hello);
   detach(robot);
-  EXPECT_TRUE(conductor.membership().sessions().find(1)->connected);
+  EXPECT_TRUE(conductor.membership().sessions().find(NodeIndex{1})->connected);
   detach(newer);
-  EXPECT_FALSE(conductor.membership().sessions().find(1)->connected);
+  EXPECT_FALSE(conductor.membership().sessions().find(NodeIndex{1})->connected);
 }
 
 TEST_F(ConductorTest, RequestsOfAReplacedConnectionChangeNothing) {
@@ -162,7 +162,7 @@ TEST_F(ConductorTest, AnswersARequestForAnotherHub) {
   EXPECT_EQ(status(make_id<NodeId>(HubId{7}, 0)), proto::Status::done) << "this hub by its id";
   EXPECT_EQ(status(make_id<NodeId>(HubId{8}, 0)), proto::Status::not_found);
   EXPECT_EQ(status(robot.id), proto::Status::not_found) << "a node is no hub";
-  EXPECT_TRUE(conductor.membership().sessions().find(1)->connected);
+  EXPECT_TRUE(conductor.membership().sessions().find(NodeIndex{1})->connected);
 }
 
 TEST_F(ConductorTest, RefusesWithAReason) {

@@ -34,7 +34,7 @@ class World final : private ShardProxy {
     settle();
     const auto& groups = conductor_.membership().services().groups();
     ASSERT_EQ(groups.size(), 1u);
-    group_ = groups.begin()->first;
+    group_ = groups.begin()->first.value();
   }
 
   void send_some() {

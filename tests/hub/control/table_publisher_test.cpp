@@ -33,13 +33,13 @@ class TablePublisherTest : public ::testing::Test {
 
 TEST_F(TablePublisherTest, PublishesWhereANodeLivesAndThatItLeft) {
   Session& robot = join("robot");
-  const std::uint32_t index = robot.index;
+  const NodeIndex index = robot.index;
   publisher_.publish_node(index, membership_);
-  EXPECT_EQ(nodes_.find(index),
+  EXPECT_EQ(nodes_.find(index.value()),
             (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
   membership_.connection_ended(robot, {true, proto::GoodbyeCode::done, ""}, 0ms, effects_);
   publisher_.publish_node(index, membership_);
-  EXPECT_FALSE(nodes_.find(index).exists());
+  EXPECT_FALSE(nodes_.find(index.value()).exists());
 }
 
 TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
@@ -47,14 +47,14 @@ TEST_F(TablePublisherTest, PublishesTheMembersOfAGroupByShard) {
   const Session& viewer = join("viewer");
   ASSERT_NE(robot.place.shard, viewer.place.shard);
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   ASSERT_NE(groups_.find(1), nullptr);
-  EXPECT_EQ(groups_.find(1)->provider, make_id<NodeId>(HubId{7}, robot.index));
+  EXPECT_EQ(groups_.find(1)->provider, make_id(HubId{7}, robot.index));
   EXPECT_EQ(groups_.find(1)->provider_place,
             (NodePlace{robot.place.shard, robot.place.slot, robot.place.generation}));
   ASSERT_EQ(groups_.find(1)->by_shard.size(), 2u);
   subscribe(viewer, "robot/odom");
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   const auto& members = groups_.find(1)->by_shard[viewer.place.shard.value()];
   ASSERT_EQ(members.size(), 1u);
   ASSERT_NE(members.find(viewer.place.slot), nullptr);
@@ -68,7 +68,8 @@ TEST_F(TablePublisherTest, PublishesWhichServicesTakeData) {
   ServiceTerms terms;
   terms.direction = proto::ns::Direction::accepts;
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/drive", terms, 0ms, effects_));
-  for (const std::uint32_t group : {1u, 2u}) publisher_.publish_group(group, membership_);
+  for (const std::uint32_t group : {1u, 2u})
+    publisher_.publish_group(GroupIndex{group}, membership_);
   EXPECT_FALSE(groups_.find(1)->accepts);
   EXPECT_TRUE(groups_.find(2)->accepts);
 }
@@ -81,18 +82,18 @@ TEST_F(TablePublisherTest, AGroupEndsInTwoStepsWhereItHasMembersElsewhere) {
   ASSERT_EQ(robot.place.shard, near.place.shard);
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   subscribe(near, "robot/odom");
-  publisher_.publish_group(1, membership_);
-  EXPECT_FALSE(publisher_.end_group(1)) << "nothing can be on its way";
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  EXPECT_FALSE(publisher_.end_group(GroupIndex{1})) << "nothing can be on its way";
   EXPECT_EQ(groups_.find(1), nullptr);
   subscribe(far, "robot/odom");
-  publisher_.publish_group(1, membership_);
-  EXPECT_EQ(publisher_.end_group(1), robot.place.shard);
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  EXPECT_EQ(publisher_.end_group(GroupIndex{1}), robot.place.shard);
   ASSERT_NE(groups_.find(1), nullptr);
   EXPECT_TRUE(groups_.find(1)->ends());
   EXPECT_EQ(groups_.find(1)->by_shard[far.place.shard.value()].size(), 1u);
-  publisher_.clear_group(1);
+  publisher_.clear_group(GroupIndex{1});
   EXPECT_EQ(groups_.find(1), nullptr);
-  EXPECT_FALSE(publisher_.end_group(1));
+  EXPECT_FALSE(publisher_.end_group(GroupIndex{1}));
 }
 
 TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeStaysAsItWas) {
@@ -100,36 +101,37 @@ TEST_F(TablePublisherTest, OneMemberMoreOrLessIsPublishedAloneAndTheListBeforeSt
   const Session& far = join("far");
   const Session& near = join("near");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  EXPECT_FALSE(publisher_.publish_member(1, far.index, membership_)) << "all of it is due";
-  publisher_.publish_group(1, membership_);
+  EXPECT_FALSE(publisher_.publish_member(GroupIndex{1}, far.index, membership_))
+      << "all of it is due";
+  publisher_.publish_group(GroupIndex{1}, membership_);
   quiescence_.enter(0);
   subscribe(far, "robot/odom");
   subscribe(near, "robot/odom");
-  ASSERT_TRUE(publisher_.publish_member(1, far.index, membership_));
+  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, far.index, membership_));
   const GroupMembers* before = groups_.find(1);
   EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
   EXPECT_TRUE(before->by_shard[near.place.shard.value()].empty()) << "its own effect is to come";
-  ASSERT_TRUE(publisher_.publish_member(1, near.index, membership_));
+  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, near.index, membership_));
   EXPECT_EQ(groups_.find(1)->by_shard[near.place.shard.value()].size(), 1u);
   ASSERT_FALSE(membership_.services().unsubscribe(far.index, "robot/odom", effects_));
-  ASSERT_TRUE(publisher_.publish_member(1, far.index, membership_));
+  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, far.index, membership_));
   EXPECT_TRUE(groups_.find(1)->by_shard[far.place.shard.value()].empty());
   EXPECT_EQ(before->by_shard[far.place.shard.value()].size(), 1u);
-  EXPECT_EQ(groups_.find(1)->provider, make_id<NodeId>(HubId{7}, robot.index));
+  EXPECT_EQ(groups_.find(1)->provider, make_id(HubId{7}, robot.index));
 }
 
 TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
   const Session& robot = join("robot");
   const Session& viewer = join("viewer");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   const auto paced = [&]() -> const PacedMember* {
     const auto& lists = groups_.find(1)->paced_by_shard;
     return lists.empty() ? nullptr : lists[viewer.place.shard.value()].find(viewer.place.slot);
   };
   const auto want = [&](const SubscriberTerms& terms) {
     ASSERT_TRUE(membership_.services().subscribe(viewer.index, "robot/odom", terms, effects_));
-    ASSERT_TRUE(publisher_.publish_member(1, viewer.index, membership_));
+    ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, viewer.index, membership_));
   };
   want({});
   EXPECT_EQ(paced(), nullptr);
@@ -138,38 +140,39 @@ TEST_F(TablePublisherTest, AMemberThatIsPacedIsInTheOtherList) {
   EXPECT_TRUE(paced()->was_plain);
   EXPECT_TRUE(groups_.find(1)->by_shard[viewer.place.shard.value()].empty());
   ASSERT_FALSE(membership_.services().unsubscribe(viewer.index, "robot/odom", effects_));
-  ASSERT_TRUE(publisher_.publish_member(1, viewer.index, membership_));
+  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, viewer.index, membership_));
   EXPECT_TRUE(groups_.find(1)->paced_by_shard.empty()) << "a group without any pays nothing for it";
 }
 
 TEST_F(TablePublisherTest, AMemberWhoseSessionIsOverIsFoundWhereItLived) {
   const Session& robot = join("robot");
   Session& viewer = join("viewer");
-  const std::uint32_t index = viewer.index;
+  const NodeIndex index = viewer.index;
   const Place place = viewer.place;
   publisher_.publish_node(index, membership_);
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
   subscribe(viewer, "robot/odom");
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   membership_.connection_ended(viewer, {true, proto::GoodbyeCode::done, ""}, 0ms, effects_);
   ASSERT_EQ(membership_.sessions().find(index), nullptr);
-  ASSERT_TRUE(publisher_.publish_member(1, index, membership_));
+  ASSERT_TRUE(publisher_.publish_member(GroupIndex{1}, index, membership_));
   EXPECT_TRUE(groups_.find(1)->by_shard[place.shard.value()].empty());
   publisher_.publish_node(index, membership_);
-  EXPECT_FALSE(publisher_.publish_member(1, index, membership_)) << "nobody knows where it lived";
+  EXPECT_FALSE(publisher_.publish_member(GroupIndex{1}, index, membership_))
+      << "nobody knows where it lived";
 }
 
 TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {
   const Session& robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   quiescence_.enter(0);
   const GroupMembers* seen = groups_.find(1);
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
   publisher_.collect();
   EXPECT_EQ(publisher_.garbage(), 1u);
   EXPECT_EQ(seen->provider,
-            make_id<NodeId>(HubId{7}, robot.index));  // still there, as a sanitizer would tell
+            make_id(HubId{7}, robot.index));  // still there, as a sanitizer would tell
   quiescence_.enter(0);
   publisher_.collect();
   EXPECT_EQ(publisher_.garbage(), 0u);
@@ -178,12 +181,12 @@ TEST_F(TablePublisherTest, FreesOldMembersOnlyWhenNoShardCanLookAtThem) {
 TEST_F(TablePublisherTest, AWithdrawnGroupIsNoGroup) {
   const Session& robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot.index, "robot/odom", {}, 0ms, effects_));
-  publisher_.publish_group(1, membership_);
-  ASSERT_FALSE(membership_.services().withdraw(robot.index, 1, 0ms, effects_));
-  publisher_.publish_group(1, membership_);
+  publisher_.publish_group(GroupIndex{1}, membership_);
+  ASSERT_FALSE(membership_.services().withdraw(robot.index, GroupIndex{1}, 0ms, effects_));
+  publisher_.publish_group(GroupIndex{1}, membership_);
   EXPECT_EQ(groups_.find(1), nullptr);
   EXPECT_EQ(publisher_.garbage(), 0u);
-  publisher_.publish_group(2, membership_);
+  publisher_.publish_group(GroupIndex{2}, membership_);
   EXPECT_EQ(groups_.find(2), nullptr);
 }
 

@@ -23,7 +23,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const TokenHolder holder{gimnet::HubId{7}, "robot1/base", Identity::of_user(1000)};
   Secret secret;
   secret.fill(std::byte{0x42});
-  const SessionToken said{17, first_number(3) + 5, std::chrono::milliseconds{1'700'000'000'000}};
+  const SessionToken said{gimnet::NodeIndex{17}, first_number(3) + 5,
+                          std::chrono::milliseconds{1'700'000'000'000}};
   const std::vector<std::byte> genuine = write_token(said, holder, secret);
   require(read_token(genuine) == said && is_genuine(genuine, holder, secret));
 

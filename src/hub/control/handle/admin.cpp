@@ -55,10 +55,10 @@ ctrl::ConnectionsAnswer connections(const HandlerContext& context,
   ctrl::ConnectionsAnswer answer;
   PageBudget budget(context.limits, wanted.records_max);
   const auto& all = context.membership.sessions().all();
-  for (auto entry = all.upper_bound(index_of(wanted.after)); entry != all.end(); ++entry) {
+  for (auto entry = all.upper_bound(node_index_of(wanted.after)); entry != all.end(); ++entry) {
     const Session& session = entry->second;
     ctrl::ConnectionRecord record;
-    record.node = make_id<NodeId>(context.facts.id, session.index);
+    record.node = make_id(context.facts.id, session.index);
     record.name = session.name.str();
     record.shard = session.place.shard.value();
     record.transport = session.origin.transport.str();

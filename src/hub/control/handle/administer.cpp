@@ -15,7 +15,7 @@ using proto::Status;
 /// The session of a node of this hub, also by an id that it had before; or why there is none.
 Result<Session*, Refusal> find_node(const HandlerContext& context, NodeId node) {
   Sessions& sessions = context.membership.sessions();
-  const std::optional<std::uint32_t> index = own_index(context.facts, node);
+  const std::optional<NodeIndex> index = own_index(context.facts, node);
   Session* session = index ? sessions.find(sessions.present_index(*index)) : nullptr;
   if (session != nullptr) return session;
   return Refusal{Status::not_found, "there is no node " + to_string(node) +
@@ -55,7 +55,7 @@ Result<ctrl::ReassignAnswer, Refusal> reassign(HandlerContext& context, const Re
                                                const ctrl::Reassign& wanted) {
   const auto session = find_node(context, wanted.node);
   if (!session) return session.error();
-  const std::optional<std::uint32_t> index = own_index(context.facts, wanted.new_node);
+  const std::optional<NodeIndex> index = own_index(context.facts, wanted.new_node);
   if (!index) {
     return Refusal{Status::bad_request, "the id " + to_string(wanted.new_node) +
                                             " is not one of this hub's, which begin with " +

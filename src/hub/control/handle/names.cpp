@@ -19,16 +19,16 @@ Result<ns::ListAnswer, proto::Refusal> list(const HandlerContext& context, const
                               "' is no pattern: write a name of at most 16 parts and 255 bytes in "
                               "which a part may be * or **"};
   }
-  const Listed listed =
+  const Listed<NodeIndex> listed =
       list_nodes(context.membership,
-                 {pattern ? &*pattern : nullptr, index_of(wanted.after), wanted.connected_only,
+                 {pattern ? &*pattern : nullptr, node_index_of(wanted.after), wanted.connected_only,
                   context.limits.page_records, context.limits.scan_records});
   ns::ListAnswer answer;
   answer.more = listed.more;
-  answer.next = listed.more ? make_id<NodeId>(context.facts.id, listed.next) : NodeId{};
+  answer.next = listed.more ? make_id(context.facts.id, listed.next) : NodeId{};
   PageBudget budget(context.limits, wanted.records_max);
   const HubTitle title{context.facts.id, context.facts.name};
-  for (const std::uint32_t index : listed.indices) {
+  for (const NodeIndex index : listed.indices) {
     const Session& session = *context.membership.sessions().find(index);
     ns::NodeRecord record = record_of(title, session, context.membership.services(), context.now);
     if (!budget.take(ns::page_bytes_max(record))) {
@@ -78,26 +78,25 @@ proto::Payload handle_unregister(HandlerContext& context, const Request& request
 proto::Payload handle_resolve(HandlerContext& context, const Request& request) {
   return answer_to<ns::Resolve>(
       request, [&context](const ns::Resolve& wanted) -> Result<ns::ResolveAnswer, proto::Refusal> {
-        const std::optional<std::uint32_t> index = context.membership.directory().find(wanted.name);
+        const std::optional<NodeIndex> index = context.membership.directory().find(wanted.name);
         if (!index) {
           return proto::Refusal{Status::not_found,
                                 "no node has the name '" + escaped(wanted.name, kQuotedMax) +
                                     "'; `gimnet nodes` shows those that are there"};
         }
-        return ns::ResolveAnswer{make_id<NodeId>(context.facts.id, *index)};
+        return ns::ResolveAnswer{make_id(context.facts.id, *index)};
       });
 }
 
 proto::Payload handle_reverse(HandlerContext& context, const Request& request) {
   return answer_to<ns::Reverse>(
       request, [&context](const ns::Reverse& wanted) -> Result<ns::ReverseAnswer, proto::Refusal> {
-        const std::optional<std::uint32_t> index = own_index(context.facts, wanted.node);
-        if (index == kHubIndex)
-          return ns::ReverseAnswer{context.facts.name, make_id<NodeId>(context.facts.id, 0)};
+        const std::optional<NodeIndex> index = own_index(context.facts, wanted.node);
+        if (index == NodeIndex{kHubIndex})
+          return ns::ReverseAnswer{context.facts.name, make_id(context.facts.id, *index)};
         const Session* session = index ? context.membership.sessions().find(*index) : nullptr;
         if (session == nullptr) return proto::Refusal{Status::not_found, "no node has that id"};
-        return ns::ReverseAnswer{session->name.str(),
-                                 make_id<NodeId>(context.facts.id, session->index)};
+        return ns::ReverseAnswer{session->name.str(), make_id(context.facts.id, session->index)};
       });
 }
 

@@ -15,7 +15,7 @@ std::optional<proto::Refusal> count_declaration(HandlerContext& context, const S
   // All that a node may have it may also declare at once: it does after a restart of the hub.
   const std::uint64_t burst =
       std::max(limits.declarations_burst, limits.services_per_node + limits.subscriptions_per_node);
-  const std::uint32_t account = session.index;
+  const NodeIndex account = session.index;
   Session& counted = *context.membership.sessions().find(account);
   if (counted.declarations.take({limits.declarations_per_s, burst}, context.now))
     return std::nullopt;

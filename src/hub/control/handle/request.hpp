@@ -87,12 +87,16 @@ class PageBudget {
   std::size_t bytes_;
 };
 
+/// Does that hub id stand for this hub?
+[[nodiscard]] inline bool is_own(const HubFacts& facts, HubId hub) {
+  return hub == kOwnHub || hub == facts.id;
+}
 /// The index of a node or group of this hub; nothing for those of another hub.
-template <class Id>
-[[nodiscard]] std::optional<std::uint32_t> own_index(const HubFacts& facts, Id id) {
-  const HubId hub = hub_of(id);
-  if (hub != kOwnHub && hub != facts.id) return std::nullopt;
-  return index_of(id);
+[[nodiscard]] inline std::optional<NodeIndex> own_index(const HubFacts& facts, NodeId node) {
+  return is_own(facts, hub_of(node)) ? std::optional{node_index_of(node)} : std::nullopt;
+}
+[[nodiscard]] inline std::optional<GroupIndex> own_index(const HubFacts& facts, GroupId group) {
+  return is_own(facts, hub_of(group)) ? std::optional{group_index_of(group)} : std::nullopt;
 }
 
 }  // namespace gimnet::hub

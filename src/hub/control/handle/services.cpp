@@ -15,8 +15,8 @@ namespace {
 using proto::Status;
 namespace ns = proto::ns;
 
-GroupId group_id(const HandlerContext& context, std::uint32_t index) {
-  return make_id<GroupId>(context.facts.id, index);
+GroupId group_id(const HandlerContext& context, GroupIndex index) {
+  return make_id(context.facts.id, index);
 }
 
 proto::Refusal out_of_range(std::string_view what, const std::string& range,
@@ -108,8 +108,8 @@ Result<ns::AdvertiseAnswer, proto::Refusal> advertise(HandlerContext& context,
   if (standing == nullptr || *standing != terms) {
     if (auto refusal = count_declaration(context, session)) return *refusal;
   }
-  const Services::FormerGroup former{own_index(context.facts, offer.former_group).value_or(0),
-                                     offer.former_proof};
+  const Services::FormerGroup former{
+      own_index(context.facts, offer.former_group).value_or(kNoGroup), offer.former_proof};
   const auto done = context.membership.services().advertise(session.index, full_name, terms,
                                                             context.now, context.effects, former);
   if (!done) return done.error();
@@ -126,15 +126,16 @@ Result<ns::ServicesAnswer, proto::Refusal> services(const HandlerContext& contex
                               "' is no pattern: write a full name of at most 16 parts and 255 "
                               "bytes in which a part may be * or **"};
   }
-  const Listed listed = list_services(context.membership.services(),
-                                      {pattern ? &*pattern : nullptr, index_of(wanted.after), false,
-                                       context.limits.page_records, context.limits.scan_records});
+  const Listed<GroupIndex> listed =
+      list_services(context.membership.services(),
+                    {pattern ? &*pattern : nullptr, group_index_of(wanted.after), false,
+                     context.limits.page_records, context.limits.scan_records});
   ns::ServicesAnswer answer;
   answer.more = listed.more;
   answer.next = listed.more ? group_id(context, listed.next) : GroupId{};
   PageBudget budget(context.limits, wanted.records_max);
   const HubTitle title{context.facts.id, context.facts.name};
-  for (const std::uint32_t index : listed.indices) {
+  for (const GroupIndex index : listed.indices) {
     ns::ServiceRecord record = record_of(title, *context.membership.services().find_group(index));
     if (!budget.take(ns::page_bytes_max(record))) {
       answer.more = true;
@@ -157,7 +158,7 @@ proto::Payload handle_advertise(HandlerContext& context, const Request& request)
 proto::Payload handle_withdraw(HandlerContext& context, const Request& request) {
   return answer_to<ns::Withdraw>(
       request, [&](const ns::Withdraw& wanted) -> Result<ns::WithdrawAnswer, proto::Refusal> {
-        const std::optional<std::uint32_t> group = own_index(context.facts, wanted.group);
+        const std::optional<GroupIndex> group = own_index(context.facts, wanted.group);
         if (!group) return proto::Refusal{Status::not_found, "that group belongs to another hub"};
         const std::optional<proto::Refusal> failed = context.membership.services().withdraw(
             request.session.index, *group, context.now, context.effects);

@@ -17,7 +17,7 @@ std::string age_text(std::chrono::milliseconds age) {
 
 }  // namespace
 
-std::optional<std::uint32_t> Directory::find(std::string_view name) const {
+std::optional<NodeIndex> Directory::find(std::string_view name) const {
   const auto found = names_.find(name);
   return found == names_.end() ? std::nullopt : std::optional{found->second.index};
 }
@@ -35,7 +35,7 @@ std::optional<proto::Goodbye> Directory::refusal(std::string_view name, const Se
                                                             "' cannot be taken: " + fault +
                                                             "; choose another one"};
   }
-  const std::optional<std::uint32_t> index = find(name);
+  const std::optional<NodeIndex> index = find(name);
   if (!index || (claimant != nullptr && claimant->index == *index)) return std::nullopt;
   const Session* holder = sessions.find(*index);
   GIMNET_CHECK(holder != nullptr);
@@ -48,7 +48,7 @@ std::optional<proto::Goodbye> Directory::refusal(std::string_view name, const Se
           age_text(now - holder->connected_at) + "; end that one, or choose another name"};
 }
 
-void Directory::put(std::string_view name, std::uint32_t index, NameStanding standing) {
+void Directory::put(std::string_view name, NodeIndex index, NameStanding standing) {
   const bool added = names_.emplace(std::string{name}, Holder{index, standing}).second;
   GIMNET_CHECK(added);
 }

@@ -25,13 +25,13 @@ enum class NameStanding : std::uint8_t { final, provisional };
 class Directory {
  public:
   struct Holder {
-    std::uint32_t index = 0;  ///< of the node
+    NodeIndex index;
     NameStanding standing = NameStanding::final;
   };
   using Names = std::map<std::string, Holder, std::less<>>;
 
   /// The index of the node that holds the name.
-  [[nodiscard]] std::optional<std::uint32_t> find(std::string_view name) const;
+  [[nodiscard]] std::optional<NodeIndex> find(std::string_view name) const;
   [[nodiscard]] bool is_provisional(std::string_view name) const;
 
   /// Why `claimant` (nullptr: somebody new) cannot have the name; nothing if it can, perhaps from a
@@ -42,7 +42,7 @@ class Directory {
                                                       std::chrono::milliseconds now) const;
 
   /// REQUIRES: nobody holds the name.
-  void put(std::string_view name, std::uint32_t index, NameStanding standing = NameStanding::final);
+  void put(std::string_view name, NodeIndex index, NameStanding standing = NameStanding::final);
   /// The name is its holder's for good. Nothing happens for a name that nobody holds.
   void confirm(std::string_view name);
   /// Nothing happens for a name that nobody holds, the empty one included.

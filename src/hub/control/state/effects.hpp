@@ -17,16 +17,16 @@ namespace gimnet::hub {
 
 /// Publish the place of this node, or that there is none any more.
 struct NodeChanged {
-  std::uint32_t index = 0;
+  NodeIndex index;
 };
 /// Publish the members of this group, or that there is none any more.
 struct GroupChanged {
-  std::uint32_t index = 0;
+  GroupIndex index;
 };
 /// Publish whether and how that node is a member of this group.
 struct MemberChanged {
-  std::uint32_t group = 0;
-  std::uint32_t subscriber = 0;
+  GroupIndex group;
+  NodeIndex subscriber;
 };
 /// Tell the shard that the session is over.
 struct SessionEnded {
@@ -42,17 +42,16 @@ struct CloseDue {
 /// learn it: GOODBYE `renumbered`, after which the node comes back with its token.
 struct RenumberDue {
   Place place;
-  std::uint32_t former = 0;
-  std::uint32_t index = 0;
+  NodeIndex former;
+  NodeIndex index;
   std::string sentence;
 };
 /// Tell subscribers that a service has another group id: all those that have the same window.
-/// Groups and nodes are named by index here; 0: none.
 struct ServiceMovedDue {
-  std::vector<std::uint32_t> subscribers;
+  std::vector<NodeIndex> subscribers;
   std::string full_name;
-  std::uint32_t old_group = 0;
-  std::uint32_t new_group = 0;
+  GroupIndex old_group;  ///< or kNoGroup
+  GroupIndex new_group;  ///< or kNoGroup
   std::uint32_t message_type = 0;
   std::uint32_t instance = 0;
   proto::ns::Delivery delivery = proto::ns::Delivery::stream;
@@ -62,7 +61,7 @@ struct ServiceMovedDue {
   std::uint64_t move = 0;  ///< numbers the moves of a hub's services: that one and those before it
   // Told once more, to a node that came back
   bool again = false;
-  std::vector<std::uint32_t> between;  ///< groups that the service had since `old_group`, in order
+  std::vector<GroupIndex> between;  ///< groups that the service had since `old_group`, in order
 };
 /// What a subscriber asked for. 0: not.
 struct SubscriberTerms {
@@ -74,28 +73,28 @@ struct SubscriberTerms {
 /// Have the subscriber's shard pace what it gets of a group: after the group was published. `terms`
 /// are in force.
 struct PaceDue {
-  std::uint32_t subscriber = 0;
-  std::uint32_t group = 0;
+  NodeIndex subscriber;
+  GroupIndex group;
   SubscriberTerms terms;
   bool retained = false;   ///< it begins with the last message
   bool was_plain = false;  ///< it got everything before, in this group
 };
 /// A subscription that was paced ended; `group_gone`: so did the group.
 struct PaceEnded {
-  std::uint32_t subscriber = 0;
-  std::uint32_t group = 0;
+  NodeIndex subscriber;
+  GroupIndex group;
   bool group_gone = false;
 };
 /// A retained group is gone: its last message is kept no longer.
 struct RetainedDropped {
-  std::uint32_t provider = 0;
-  std::uint32_t group = 0;
+  NodeIndex provider;
+  GroupIndex group;
 };
 /// Tell a provider that somebody came or went.
 struct SubscriberDue {
-  std::uint32_t provider = 0;
-  std::uint32_t group = 0;
-  std::uint32_t subscriber = 0;
+  NodeIndex provider;
+  GroupIndex group;
+  NodeIndex subscriber;
   std::uint32_t subscribers_now = 0;
   bool joined = false;
 };
@@ -104,7 +103,7 @@ struct StateDue {};
 
 /// Tell a node what became of its claim to a name.
 struct NameDecided {
-  std::uint32_t node = 0;
+  NodeIndex node;
   std::string name;
   bool confirmed = false;
   NodeId holder{};  ///< who has it, if it is not confirmed
@@ -114,15 +113,15 @@ struct NameDecided {
 /// has left.
 struct NodeNoted {
   proto::ns::ChangeKind kind{};
-  std::uint32_t index = 0;
+  NodeIndex index;
   std::string name;
   std::string former_name;
 };
 /// Those who watch are to hear of a service.
 struct ServiceNoted {
   proto::ns::ChangeKind kind{};
-  std::uint32_t group = 0;
-  std::uint32_t provider = 0;
+  GroupIndex group;
+  NodeIndex provider;
   std::string full_name;
 };
 

@@ -9,7 +9,7 @@ namespace gimnet::hub {
 GroupProof write_group_proof(const GroupGrant& grant, const Secret& secret) {
   MacText text("GIMnet group proof");
   text.add_number(grant.hub.value())
-      .add_number(grant.group)
+      .add_number(grant.group.value())
       .add_number(grant.forgettings)
       .add(grant.full_name);
   const Digest mac = hmac_sha256(secret, text.bytes());

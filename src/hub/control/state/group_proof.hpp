@@ -17,7 +17,7 @@ namespace gimnet::hub {
 /// That a service had a group.
 struct GroupGrant {
   HubId hub;
-  std::uint32_t group = 0;  ///< index
+  GroupIndex group;
   std::string_view full_name;
   /// How often the hub had forgotten groups until then: between two times no two services get the
   /// same group.

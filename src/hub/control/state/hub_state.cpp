@@ -43,14 +43,14 @@ static_assert(kHubStateBytesMax ==
               kHeadSize + kKickedMax * kKickedSize + 3 * kSetBytesMax + std::tuple_size_v<Digest>);
 
 void write_kicked(std::byte* to, const SessionToken& token) {
-  store_le(to, token.index);
+  store_le(to, token.index.value());
   store_le(to + 8, token.number);
   store_le(to + 16, static_cast<std::uint64_t>(token.expiry.count()));
 }
 
 SessionToken read_kicked(const std::byte* from) {
   SessionToken token;
-  token.index = load_le<std::uint32_t>(from);
+  token.index = NodeIndex{load_le<std::uint32_t>(from)};
   token.number = load_le<std::uint64_t>(from + 8);
   token.expiry =
       std::chrono::milliseconds{static_cast<std::int64_t>(load_le<std::uint64_t>(from + 16))};
@@ -185,7 +185,7 @@ Result<HubState> read_hub_state(std::span<const std::byte> bytes) {
   for (std::size_t i = 0; i < lengths->kicked; ++i) {
     const std::byte* at = bytes.data() + lengths->head + i * kKickedSize;
     const SessionToken token = read_kicked(at);
-    if (!is_index(token.index) || load_le<std::uint32_t>(at + 4) != 0) return Error{kNoHub};
+    if (!is_index(token.index.value()) || load_le<std::uint32_t>(at + 4) != 0) return Error{kNoHub};
     state.kicked.push_back(token);
   }
   if (!read_sets(bytes.subspan(lengths->head + lengths->kicked * kKickedSize), *lengths, state))

@@ -30,7 +30,8 @@ struct IndexRange {
 /// and kept as used. A later start that goes on from what was kept gives newcomers none that
 /// anybody may have. Used indices that nobody has any more are forgotten when few others are left,
 /// but never while nodes of before a restart may still come back. Between two forgettings no index
-/// is handed out twice. Thread safety: none. Limits: `most` indices; two bits each.
+/// is handed out twice. Thread safety: none. Limits: `most` indices; two bits each. It serves nodes
+/// and groups alike: its indices get their type (NodeIndex, GroupIndex) where they leave it.
 class IndexPool {
  public:
   /// What is granted at a time.

@@ -12,9 +12,13 @@ void Journal::add(proto::ns::Change change) {
   proto::ns::write_change(writer, change);
   GIMNET_CHECK(writer.finish() == BITESTREAM_OK);
   Note note;
-  note.of_service = change.service.has_value();
-  note.index = note.of_service ? index_of(change.service->group) : index_of(change.node->node);
-  note.name = note.of_service ? change.service->name : change.node->name;
+  if (change.service) {
+    note.subject = group_index_of(change.service->group);
+    note.name = change.service->name;
+  } else {
+    note.subject = node_index_of(change.node->node);
+    note.name = change.node->name;
+  }
   note.former_name = change.former_name;
   note.bytes.assign(writer.bytes().begin(), writer.bytes().end());
   bytes_ += size_of(note);

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "base/ids.hpp"
 #include "hub/limits.hpp"
 #include "proto/control/ns_watch.hpp"
 
@@ -19,9 +21,8 @@ class Journal {
  public:
   /// A change as it travels, and what decides who hears of it.
   struct Note {
-    bool of_service = false;
-    std::uint32_t index = 0;  ///< of the node or the group
-    std::string name;         ///< "" for a node without one
+    std::variant<NodeIndex, GroupIndex> subject;
+    std::string name;  ///< "" for a node without one
     std::string former_name;
     std::vector<std::byte> bytes;  ///< a value of WATCH_EVENTS
   };

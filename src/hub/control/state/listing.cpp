@@ -8,9 +8,10 @@ namespace gimnet::hub {
 namespace {
 
 /// Takes the first `most` of what was found.
-Listed first_of(std::vector<std::uint32_t> indices, std::size_t most) {
+template <class Index>
+Listed<Index> first_of(std::vector<Index> indices, std::size_t most) {
   std::ranges::sort(indices);
-  Listed listed;
+  Listed<Index> listed;
   listed.more = indices.size() > most;
   if (listed.more) indices.resize(most);
   if (listed.more) listed.next = indices.back();
@@ -19,18 +20,18 @@ Listed first_of(std::vector<std::uint32_t> indices, std::size_t most) {
 }
 
 /// By name: all whose names begin with the same parts as the pattern, if those are few. `wanted`
-/// says the index of an entry that is to be listed, or 0. Nothing: they are too many.
-template <class ByName, class Wanted>
-std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& request,
-                                   Wanted wanted) {
+/// says the index of an entry that is to be listed, or its 0. Nothing: they are too many.
+template <class Index, class ByName, class Wanted>
+std::optional<Listed<Index>> list_by_name(const ByName& by_name,
+                                          const ListingRequest<Index>& request, Wanted wanted) {
   if (request.pattern == nullptr || request.pattern->beginning().empty()) return std::nullopt;
   const std::string_view beginning = request.pattern->beginning();
-  std::vector<std::uint32_t> found;
+  std::vector<Index> found;
   std::size_t work = request.work;
   const auto look_at = [&](const auto& entry) {
     --work;
     if (!request.pattern->matches(entry.first)) return;
-    const std::uint32_t index = wanted(entry.second);
+    const Index index = wanted(entry.second);
     if (index > request.after) found.push_back(index);
   };
   // What only begins with the same letters, as hall-30 does for hall-3/*, may be any number of
@@ -47,15 +48,15 @@ std::optional<Listed> list_by_name(const ByName& by_name, const ListingRequest& 
       look_at(*entry);
     }
   }
-  Listed listed = first_of(std::move(found), request.most);
+  Listed<Index> listed = first_of(std::move(found), request.most);
   listed.looked_at = request.work - work;
   return listed;
 }
 
 /// By id, from where the last piece ended.
-template <class ById, class Wanted>
-Listed list_by_id(const ById& by_id, const ListingRequest& request, Wanted wanted) {
-  Listed listed;
+template <class Index, class ById, class Wanted>
+Listed<Index> list_by_id(const ById& by_id, const ListingRequest<Index>& request, Wanted wanted) {
+  Listed<Index> listed;
   std::size_t work = request.work;
   for (auto entry = by_id.upper_bound(request.after); entry != by_id.end(); ++entry) {
     if (work == 0 || listed.indices.size() == request.most) {
@@ -66,29 +67,32 @@ Listed list_by_id(const ById& by_id, const ListingRequest& request, Wanted wante
     listed.next = entry->first;
     if (wanted(entry->second)) listed.indices.push_back(entry->first);
   }
-  if (!listed.more) listed.next = 0;
+  if (!listed.more) listed.next = Index{};
   listed.looked_at = request.work - work;
   return listed;
 }
 
 }  // namespace
 
-std::optional<Listed> list_few_nodes(const Membership& membership, const ListingRequest& request) {
+std::optional<Listed<NodeIndex>> list_few_nodes(const Membership& membership,
+                                                const ListingRequest<NodeIndex>& request) {
   const auto& sessions = membership.sessions();
   return list_by_name(
-      membership.directory().names(), request,
-      [&](const Directory::Holder& holder) -> std::uint32_t {
-        return request.connected_only && !sessions.find(holder.index)->connected ? 0 : holder.index;
+      membership.directory().names(), request, [&](const Directory::Holder& holder) {
+        return request.connected_only && !sessions.find(holder.index)->connected ? NodeIndex{}
+                                                                                 : holder.index;
       });
 }
 
-std::optional<Listed> list_few_services(const Services& services, const ListingRequest& request) {
-  return list_by_name(services.by_name(), request, [](const Topic& topic) -> std::uint32_t {
-    return topic.service ? topic.service->group : 0;
+std::optional<Listed<GroupIndex>> list_few_services(const Services& services,
+                                                    const ListingRequest<GroupIndex>& request) {
+  return list_by_name(services.by_name(), request, [](const Topic& topic) {
+    return topic.service ? topic.service->group : kNoGroup;
   });
 }
 
-Listed list_nodes(const Membership& membership, const ListingRequest& request) {
+Listed<NodeIndex> list_nodes(const Membership& membership,
+                             const ListingRequest<NodeIndex>& request) {
   if (const auto few = list_few_nodes(membership, request)) return *few;
   return list_by_id(membership.sessions().all(), request, [&](const Session& session) {
     if (request.connected_only && !session.connected) return false;
@@ -97,7 +101,8 @@ Listed list_nodes(const Membership& membership, const ListingRequest& request) {
   });
 }
 
-Listed list_services(const Services& services, const ListingRequest& request) {
+Listed<GroupIndex> list_services(const Services& services,
+                                 const ListingRequest<GroupIndex>& request) {
   if (const auto few = list_few_services(services, request)) return *few;
   return list_by_id(services.groups(), request, [&](const Topic* topic) {
     return request.pattern == nullptr || request.pattern->matches(topic->full_name);

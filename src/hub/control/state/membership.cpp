@@ -183,9 +183,9 @@ void Membership::state_kept(const Durable& durable) {
   services_.group_indices().grant(durable.groups);
 }
 
-std::optional<proto::Refusal> Membership::take_for(const Session& session, std::uint32_t index,
+std::optional<proto::Refusal> Membership::take_for(const Session& session, NodeIndex index,
                                                    milliseconds now, const KeepNow& keep) {
-  if (index == kHubIndex || index >= kEveryIndex) {
+  if (index.value() == kHubIndex || index.value() >= kEveryIndex) {
     return proto::Refusal{proto::Status::bad_request,
                           "a node's id ends in a number from 1 to " + std::to_string(kIndexMost)};
   }
@@ -201,27 +201,28 @@ std::optional<proto::Refusal> Membership::take_for(const Session& session, std::
                           "this node was given the id " + to_string(sessions_.node_id(session)) +
                               " and has not come back under it yet; try again when it has"};
   }
-  const bool awaited = sessions_.find(index) == nullptr && sessions_.indices().used(index) &&
+  const bool awaited = sessions_.find(index) == nullptr &&
+                       sessions_.indices().used(index.value()) &&
                        sessions_.returns_expected_for(now) > milliseconds{0};
-  const NodeId node = make_id<NodeId>(hub_of(sessions_.node_id(session)), index);
+  const NodeId node = make_id(hub_of(sessions_.node_id(session)), index);
   IndexPool& indices = sessions_.indices();
-  if (awaited || !indices.take_free(index, now))
+  if (awaited || !indices.take_free(index.value(), now))
     return proto::Refusal{proto::Status::taken, why_taken(node, now)};
   if (!keep || !indices.unkept()) return std::nullopt;
   const std::string failure = keep();
   if (failure.empty()) return std::nullopt;
-  indices.let_go(index);
+  indices.let_go(index.value());
   return proto::Refusal{proto::Status::limit,
                         "the hub cannot keep that a node has the id " + to_string(node) +
                             ", and would give it to another one after a restart: " + failure +
                             "; mend that and try again"};
 }
 
-std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32_t index,
+std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex index,
                                                    milliseconds now, Effects& effects,
                                                    const KeepNow& keep) {
   if (auto failure = take_for(session, index, now, keep)) return failure;
-  const std::uint32_t former = session.index;
+  const NodeIndex former = session.index;
   sessions_.renumber(session, index, now);
   if (keeping_due(now)) effects.emplace_back(StateDue{});
   const NameStanding standing =
@@ -249,7 +250,7 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, std::uint32
 
 std::string Membership::why_taken(NodeId node, milliseconds now) const {
   const std::string id = to_string(node);
-  if (const Session* holder = sessions_.find(index_of(node))) {
+  if (const Session* holder = sessions_.find(node_index_of(node))) {
     const std::string held = holder->name.empty() ? "" : " '" + holder->name.str() + "'";
     return "the id " + id + " is that of another node" + held + "; choose a free one";
   }
@@ -319,7 +320,7 @@ std::optional<proto::Goodbye> Membership::check(const JoinRequest& request) cons
 
 void Membership::end_absent_holder(const std::string& name, const Session* claimant,
                                    milliseconds now, Effects& effects) {
-  const std::optional<std::uint32_t> holder = directory_.find(name);
+  const std::optional<NodeIndex> holder = directory_.find(name);
   if (!holder || (claimant != nullptr && claimant->index == *holder)) return;
   end(*sessions_.find(*holder), now, effects);
 }
@@ -329,7 +330,7 @@ std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& reques
                                                        milliseconds now) {
   // The limit may have been lowered, so that more would have to go than make way. The absent holder
   // of the name goes first, and one more at most.
-  const std::optional<std::uint32_t> index = directory_.find(request.name);
+  const std::optional<NodeIndex> index = directory_.find(request.name);
   const Session* holder = index ? sessions_.find(*index) : nullptr;
   const std::size_t held = holder != nullptr ? 1 : 0;
   const std::size_t others = sessions_.away() > held ? 1 : 0;
@@ -364,12 +365,12 @@ void Membership::take_name(Session& session, const std::string& name, millisecon
 void Membership::end(Session& session, milliseconds now, Effects& effects) {
   services_.node_left(session.index, now, effects);
   directory_.remove(session.name);
-  const std::vector<std::uint32_t> former = sessions_.former_indices(session);
+  const std::vector<NodeIndex> former = sessions_.former_indices(session);
   effects.emplace_back(NodeChanged{session.index});
   effects.emplace_back(SessionEnded{session.place});
   if (session.attachment > 0)
     effects.emplace_back(NodeNoted{ChangeKind::left, session.index, session.name.str(), {}});
-  for (const std::uint32_t index : former) effects.emplace_back(NodeChanged{index});
+  for (const NodeIndex index : former) effects.emplace_back(NodeChanged{index});
   sessions_.end(session, now);
 }
 

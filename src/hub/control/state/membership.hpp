@@ -74,7 +74,7 @@ class Membership {
   /// Errors: taken (held, at rest, or perhaps that of a node that has not come back since a
   /// restart), bad_request (no index of a node), limit (it cannot be kept, and the hub could give
   /// the index to another node after a restart). nullopt: done.
-  [[nodiscard]] std::optional<proto::Refusal> renumber(Session& session, std::uint32_t index,
+  [[nodiscard]] std::optional<proto::Refusal> renumber(Session& session, NodeIndex index,
                                                        std::chrono::milliseconds now,
                                                        Effects& effects, const KeepNow& keep = {});
 
@@ -127,7 +127,7 @@ class Membership {
  private:
   struct Redeclaring {
     std::chrono::milliseconds until;
-    std::uint32_t index;
+    NodeIndex index;
     std::uint32_t generation;
     std::uint32_t attachment;
   };
@@ -142,7 +142,7 @@ class Membership {
   /// Is nobody waiting for the session's node to come back?
   [[nodiscard]] static bool ends_with_connection(const Session& session, const Ending& ending);
   /// Takes an index for a session that there is. Errors: as of renumber().
-  [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, std::uint32_t index,
+  [[nodiscard]] std::optional<proto::Refusal> take_for(const Session& session, NodeIndex index,
                                                        std::chrono::milliseconds now,
                                                        const KeepNow& keep);
   /// Why that id cannot be given to another node.

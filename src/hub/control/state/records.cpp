@@ -7,7 +7,7 @@ namespace ns = proto::ns;
 ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Services& services,
                          std::chrono::milliseconds now) {
   ns::NodeRecord record;
-  record.node = make_id<NodeId>(hub.id, session.index);
+  record.node = make_id(hub.id, session.index);
   record.name = session.name.str();
   record.hub = hub.id;
   record.hub_name = hub.name;
@@ -22,9 +22,9 @@ ns::NodeRecord record_of(const HubTitle& hub, const Session& session, const Serv
 ns::ServiceRecord record_of(const HubTitle& hub, const Topic& topic) {
   const Service& service = *topic.service;
   ns::ServiceRecord record;
-  record.group = make_id<GroupId>(hub.id, service.group);
+  record.group = make_id(hub.id, service.group);
   record.name = std::string{topic.full_name};
-  record.node = make_id<NodeId>(hub.id, service.provider);
+  record.node = make_id(hub.id, service.provider);
   record.message_type = service.terms.message_type;
   record.instance = service.terms.instance;
   record.direction = service.terms.direction;

@@ -46,7 +46,7 @@ proto::Refusal limit_reached(std::string_view what, std::uint64_t limit, std::st
 
 }  // namespace
 
-std::optional<SubscriberTerms> Topic::pace_of(std::uint32_t subscriber) const {
+std::optional<SubscriberTerms> Topic::pace_of(NodeIndex subscriber) const {
   if (!service) return std::nullopt;
   const auto asked = terms.find(subscriber);
   SubscriberTerms pace = asked != terms.end() ? asked->second : SubscriberTerms{};
@@ -65,7 +65,7 @@ Services::Services(HubId hub, const Limits& limits, const IndexRange& groups,
       secret_(secret),
       group_indices_(kIndexMost, resting_time(limits), groups, returns_until) {}
 
-GroupGrant Services::grant_of(std::uint32_t group, std::string_view full_name) const {
+GroupGrant Services::grant_of(GroupIndex group, std::string_view full_name) const {
   return {hub_, group, full_name, group_indices_.forgettings()};
 }
 
@@ -76,21 +76,23 @@ GroupGrant Services::grant_of(std::uint32_t group, std::string_view full_name) c
 bool Services::is_proven(const FormerGroup& former, std::string_view full_name) const {
   GroupGrant grant = grant_of(former.group, full_name);
   if (proves(former.proof, grant, secret_)) return true;
-  if (grant.forgettings == 0 || !group_indices_.outlasted_forgetting(former.group)) return false;
+  if (grant.forgettings == 0 || !group_indices_.outlasted_forgetting(former.group.value()))
+    return false;
   --grant.forgettings;
   return proves(former.proof, grant, secret_);
 }
 
-std::optional<std::uint32_t> Services::take_group(const FormerGroup& former,
-                                                  std::string_view full_name, milliseconds now) {
-  if (former.group != 0 && is_proven(former, full_name) &&
-      group_indices_.take_free(former.group, now)) {
+std::optional<GroupIndex> Services::take_group(const FormerGroup& former,
+                                               std::string_view full_name, milliseconds now) {
+  if (former.group != kNoGroup && is_proven(former, full_name) &&
+      group_indices_.take_free(former.group.value(), now)) {
     return former.group;
   }
-  return group_indices_.take(now);
+  const std::optional<std::uint32_t> index = group_indices_.take(now);
+  return index ? std::optional{GroupIndex{*index}} : std::nullopt;
 }
 
-Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t provider,
+Result<Services::Advertised, proto::Refusal> Services::advertise(NodeIndex provider,
                                                                  std::string_view full_name,
                                                                  const ServiceTerms& terms,
                                                                  milliseconds now, Effects& effects,
@@ -101,7 +103,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
   if (provided && known->second.service->provider != provider) {
     return proto::Refusal{Status::taken,
                           "the service '" + std::string{full_name} + "' is provided by node " +
-                              to_string(make_id<NodeId>(hub_, known->second.service->provider)) +
+                              to_string(make_id(hub_, known->second.service->provider)) +
                               "; choose another name"};
   }
   Node& node = nodes_[provider];
@@ -112,7 +114,7 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
   Topic& entry = topic(full_name);
   if (provided) find_topic(node.provides, entry)->life = node.life;
   if (!provided || !same_stream(entry.service->terms, terms)) {
-    const std::optional<std::uint32_t> group =
+    const std::optional<GroupIndex> group =
         take_group(provided ? FormerGroup{} : former, full_name, now);
     if (group_indices_.keeping_due(now)) effects.emplace_back(StateDue{});
     if (!group) {
@@ -121,11 +123,11 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
       return proto::Refusal{Status::limit, shortage("group ids", group_indices_, now)};
     }
     if (!provided) node.provides.push_back({&entry, node.life});
-    std::uint32_t old_group = 0;
+    GroupIndex old_group;
     if (provided) {
       old_group = entry.service->group;
       groups_.erase(old_group);
-      group_indices_.give_back(old_group, now);
+      group_indices_.give_back(old_group.value(), now);
       end_group(entry, effects);
     }
     open_group(entry, Service{*group, provider, terms}, old_group, effects);
@@ -134,17 +136,17 @@ Result<Services::Advertised, proto::Refusal> Services::advertise(std::uint32_t p
     entry.service->terms.metadata = terms.metadata;
     effects.emplace_back(service_noted(ChangeKind::changed, entry));
   }
-  const std::uint32_t group = entry.service->group;
+  const GroupIndex group = entry.service->group;
   return Advertised{group, static_cast<std::uint32_t>(entry.subscribers.size()),
                     write_group_proof(grant_of(group, full_name), secret_)};
 }
 
-std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::uint32_t group,
+std::optional<proto::Refusal> Services::withdraw(NodeIndex provider, GroupIndex group,
                                                  milliseconds now, Effects& effects) {
   const auto found = groups_.find(group);
   if (found == groups_.end()) {
     return proto::Refusal{Status::not_found,
-                          "no service has the group " + to_string(make_id<GroupId>(hub_, group))};
+                          "no service has the group " + to_string(make_id(hub_, group))};
   }
   Topic& entry = *found->second;
   if (entry.service->provider != provider) {
@@ -159,7 +161,7 @@ std::optional<proto::Refusal> Services::withdraw(std::uint32_t provider, std::ui
   return std::nullopt;
 }
 
-Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_index,
+Result<const Topic*, proto::Refusal> Services::subscribe(NodeIndex node_index,
                                                          std::string_view full_name,
                                                          const SubscriberTerms& terms,
                                                          Effects& effects) {
@@ -191,7 +193,7 @@ Result<const Topic*, proto::Refusal> Services::subscribe(std::uint32_t node_inde
   return &entry;
 }
 
-std::optional<proto::Refusal> Services::unsubscribe(std::uint32_t node_index,
+std::optional<proto::Refusal> Services::unsubscribe(NodeIndex node_index,
                                                     std::string_view full_name, Effects& effects) {
   const auto known = topics_.find(full_name);
   const auto node = nodes_.find(node_index);
@@ -216,11 +218,11 @@ std::vector<Services::Declared> Services::take_undeclared(std::vector<Declared>&
   return taken;
 }
 
-void Services::node_returned(std::uint32_t node) {
+void Services::node_returned(NodeIndex node) {
   if (const auto found = nodes_.find(node); found != nodes_.end()) ++found->second.life;
 }
 
-void Services::drop_undeclared(std::uint32_t node_index, milliseconds now, Effects& effects) {
+void Services::drop_undeclared(NodeIndex node_index, milliseconds now, Effects& effects) {
   const auto found = nodes_.find(node_index);
   if (found == nodes_.end()) return;
   Node& node = found->second;
@@ -235,7 +237,7 @@ void Services::drop_undeclared(std::uint32_t node_index, milliseconds now, Effec
   forget_if_idle(node_index);
 }
 
-void Services::node_renamed(std::uint32_t node_index, milliseconds now, Effects& effects) {
+void Services::node_renamed(NodeIndex node_index, milliseconds now, Effects& effects) {
   const auto found = nodes_.find(node_index);
   if (found == nodes_.end()) return;
   const std::vector<Declared> provides = std::move(found->second.provides);
@@ -247,8 +249,7 @@ void Services::node_renamed(std::uint32_t node_index, milliseconds now, Effects&
   forget_if_idle(node_index);
 }
 
-void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index,
-                               Effects& effects) {
+void Services::node_renumbered(NodeIndex node_index, NodeIndex new_index, Effects& effects) {
   auto node = nodes_.extract(node_index);
   if (node.empty()) return;
   node.key() = new_index;
@@ -282,24 +283,24 @@ void Services::node_renumbered(std::uint32_t node_index, std::uint32_t new_index
   }
 }
 
-void Services::node_left(std::uint32_t node_index, milliseconds now, Effects& effects) {
+void Services::node_left(NodeIndex node_index, milliseconds now, Effects& effects) {
   node_returned(node_index);
   drop_undeclared(node_index, now, effects);
 }
 
-const Topic* Services::find_group(std::uint32_t group) const {
+const Topic* Services::find_group(GroupIndex group) const {
   const auto found = groups_.find(group);
   return found == groups_.end() ? nullptr : found->second;
 }
 
-const ServiceTerms* Services::provided(std::uint32_t node, std::string_view full_name) const {
+const ServiceTerms* Services::provided(NodeIndex node, std::string_view full_name) const {
   const auto known = topics_.find(full_name);
   if (known == topics_.end() || !known->second.service || known->second.service->provider != node)
     return nullptr;
   return &known->second.service->terms;
 }
 
-std::optional<SubscriberTerms> Services::subscribed(std::uint32_t node,
+std::optional<SubscriberTerms> Services::subscribed(NodeIndex node,
                                                     std::string_view full_name) const {
   const auto known = topics_.find(full_name);
   if (known == topics_.end() || !std::ranges::binary_search(known->second.subscribers, node))
@@ -308,7 +309,7 @@ std::optional<SubscriberTerms> Services::subscribed(std::uint32_t node,
   return asked != known->second.terms.end() ? asked->second : SubscriberTerms{};
 }
 
-std::size_t Services::services_of(std::uint32_t node) const {
+std::size_t Services::services_of(NodeIndex node) const {
   const auto found = nodes_.find(node);
   return found == nodes_.end() ? 0 : found->second.provides.size();
 }
@@ -326,13 +327,13 @@ void Services::forget_if_unused(Topic& topic) {
   topics_.erase(topics_.find(topic.full_name));
 }
 
-void Services::forget_if_idle(std::uint32_t node) {
+void Services::forget_if_idle(NodeIndex node) {
   const auto found = nodes_.find(node);
   if (found == nodes_.end()) return;
   if (found->second.provides.empty() && found->second.subscribes.empty()) nodes_.erase(found);
 }
 
-void Services::change_terms(Topic& topic, std::uint32_t subscriber, const SubscriberTerms& terms,
+void Services::change_terms(Topic& topic, NodeIndex subscriber, const SubscriberTerms& terms,
                             Effects& effects) {
   const std::optional<SubscriberTerms> before = topic.pace_of(subscriber);
   topic.terms.erase(subscriber);
@@ -347,14 +348,14 @@ void Services::change_terms(Topic& topic, std::uint32_t subscriber, const Subscr
   begin_pace(topic, subscriber, effects);
 }
 
-void Services::forget_subscriber(Topic& topic, std::uint32_t subscriber) {
+void Services::forget_subscriber(Topic& topic, NodeIndex subscriber) {
   topic.terms.erase(subscriber);
   topic.once_plain.erase(subscriber);
   topic.once_paced.erase(subscriber);
   topic.untold.forget(subscriber);
 }
 
-void Services::remove_subscriber(Topic& topic, std::uint32_t node, Effects& effects) {
+void Services::remove_subscriber(Topic& topic, NodeIndex node, Effects& effects) {
   auto& list = topic.subscribers;
   const auto place = std::lower_bound(list.begin(), list.end(), node);
   GIMNET_CHECK(place != list.end() && *place == node);

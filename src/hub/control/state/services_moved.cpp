@@ -14,8 +14,8 @@ using std::chrono::milliseconds;
 
 static_assert(UntoldMoves::kBetweenMax == proto::ns::kGroupsBetweenMax);
 
-ServiceMovedDue moved(const Topic& topic, const Service& service, std::uint32_t old_group,
-                      std::uint32_t new_group) {
+ServiceMovedDue moved(const Topic& topic, const Service& service, GroupIndex old_group,
+                      GroupIndex new_group) {
   ServiceMovedDue event;
   event.full_name = std::string{topic.full_name};
   event.old_group = old_group;
@@ -34,13 +34,13 @@ ServiceNoted Services::service_noted(ChangeKind kind, const Topic& topic) {
   return {kind, topic.service->group, topic.service->provider, std::string{topic.full_name}};
 }
 
-void Services::open_group(Topic& topic, const Service& service, std::uint32_t old_group,
+void Services::open_group(Topic& topic, const Service& service, GroupIndex old_group,
                           Effects& effects) {
   topic.service = service;
   topic.once_plain.clear();
   topic.once_paced.clear();
   groups_[service.group] = &topic;
-  if (old_group != 0) {
+  if (old_group != kNoGroup) {
     effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, old_group, service.provider,
                                       std::string{topic.full_name}});
   }
@@ -50,11 +50,11 @@ void Services::open_group(Topic& topic, const Service& service, std::uint32_t ol
   if (accepts) effects.emplace_back(GroupChanged{service.group});
   tell_subscribers(topic, moved(topic, service, old_group, service.group), effects);
   if (!accepts) effects.emplace_back(GroupChanged{service.group});
-  for (const std::uint32_t subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
+  for (const NodeIndex subscriber : topic.subscribers) begin_pace(topic, subscriber, effects);
   effects.emplace_back(service_noted(ChangeKind::advertised, topic));
 }
 
-void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects& effects) {
+void Services::begin_pace(const Topic& topic, NodeIndex subscriber, Effects& effects) {
   const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
   if (!pace) return;
   effects.emplace_back(PaceDue{subscriber, topic.service->group, *pace, topic.service->terms.retain,
@@ -66,7 +66,7 @@ void Services::begin_pace(const Topic& topic, std::uint32_t subscriber, Effects&
 void Services::end_group(const Topic& topic, Effects& effects) {
   const Service& service = *topic.service;
   effects.emplace_back(GroupChanged{service.group});
-  for (const std::uint32_t subscriber : topic.subscribers) {
+  for (const NodeIndex subscriber : topic.subscribers) {
     if (topic.pace_of(subscriber)) effects.emplace_back(PaceEnded{subscriber, service.group, true});
   }
   if (service.terms.retain) effects.emplace_back(RetainedDropped{service.provider, service.group});
@@ -77,16 +77,16 @@ void Services::close_group(Topic& topic, milliseconds now, Effects& effects) {
   end_group(topic, effects);
   topic.service.reset();
   groups_.erase(service.group);
-  group_indices_.give_back(service.group, now);
-  tell_subscribers(topic, moved(topic, service, service.group, 0), effects);
+  group_indices_.give_back(service.group.value(), now);
+  tell_subscribers(topic, moved(topic, service, service.group, kNoGroup), effects);
   effects.emplace_back(ServiceNoted{ChangeKind::withdrawn, service.group, service.provider,
                                     std::string{topic.full_name}});
 }
 
 void Services::tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& effects) {
   event.move = ++moves_;
-  std::map<std::uint32_t, std::vector<std::uint32_t>> by_window;
-  for (const std::uint32_t subscriber : topic.subscribers)
+  std::map<std::uint32_t, std::vector<NodeIndex>> by_window;
+  for (const NodeIndex subscriber : topic.subscribers)
     by_window[window_of(topic, subscriber)].push_back(subscriber);
   for (auto& [window, subscribers] : by_window) {
     event.subscribers = std::move(subscribers);
@@ -96,12 +96,12 @@ void Services::tell_subscribers(Topic& topic, ServiceMovedDue event, Effects& ef
   topic.untold.on_moved(topic.subscribers, event.old_group, event.move);
 }
 
-std::uint32_t Services::window_of(const Topic& topic, std::uint32_t subscriber) {
+std::uint32_t Services::window_of(const Topic& topic, NodeIndex subscriber) {
   const std::optional<SubscriberTerms> pace = topic.pace_of(subscriber);
   return pace ? pace->window : 0;
 }
 
-std::vector<ServiceMovedDue> Services::untold_moves(std::uint32_t node) const {
+std::vector<ServiceMovedDue> Services::untold_moves(NodeIndex node) const {
   std::vector<ServiceMovedDue> events;
   const auto found = nodes_.find(node);
   if (found == nodes_.end()) return events;
@@ -110,16 +110,16 @@ std::vector<ServiceMovedDue> Services::untold_moves(std::uint32_t node) const {
     const std::optional<UntoldMoves::Untold> untold = topic.untold.of(node);
     if (!untold) continue;
     // An id that was given back may be another service's by now, and would be taken from that.
-    const auto is_another = [&](std::uint32_t group) { return groups_.contains(group); };
+    const auto is_another = [&](GroupIndex group) { return groups_.contains(group); };
     ServiceMovedDue event;
-    if (topic.service) event = moved(topic, *topic.service, 0, topic.service->group);
+    if (topic.service) event = moved(topic, *topic.service, kNoGroup, topic.service->group);
     event.full_name = std::string{topic.full_name};
-    event.old_group = is_another(untold->known) ? 0 : untold->known;
+    event.old_group = is_another(untold->known) ? kNoGroup : untold->known;
     event.subscribers = {node};
     event.window = window_of(topic, node);
     event.move = untold->move;
     event.again = true;
-    for (const std::uint32_t group : untold->between) {
+    for (const GroupIndex group : untold->between) {
       if (!is_another(group)) event.between.push_back(group);
     }
     events.push_back(std::move(event));
@@ -127,7 +127,7 @@ std::vector<ServiceMovedDue> Services::untold_moves(std::uint32_t node) const {
   return events;
 }
 
-void Services::moves_read(std::uint32_t node, std::uint64_t move) {
+void Services::moves_read(NodeIndex node, std::uint64_t move) {
   const auto found = nodes_.find(node);
   if (found == nodes_.end()) return;
   for (const Declared& declared : found->second.subscribes)

@@ -38,7 +38,7 @@ std::vector<std::byte> write_token(const SessionToken& token, const TokenHolder&
                                    const Secret& secret) {
   std::vector<std::byte> bytes(kMacAt);
   store_le(bytes.data(), kVersion);
-  store_le(bytes.data() + kIndexAt, token.index);
+  store_le(bytes.data() + kIndexAt, token.index.value());
   store_le(bytes.data() + kNumberAt, token.number);
   store_le(bytes.data() + kExpiryAt, static_cast<std::uint64_t>(token.expiry.count()));
   const Digest mac = mac_of(bytes, holder, secret);
@@ -50,7 +50,7 @@ std::optional<SessionToken> read_token(std::span<const std::byte> bytes) {
   if (bytes.size() != kSessionTokenBytes || load_le<std::uint32_t>(bytes.data()) != kVersion)
     return std::nullopt;
   SessionToken token;
-  token.index = load_le<std::uint32_t>(bytes.data() + kIndexAt);
+  token.index = NodeIndex{load_le<std::uint32_t>(bytes.data() + kIndexAt)};
   token.number = load_le<std::uint64_t>(bytes.data() + kNumberAt);
   token.expiry = std::chrono::milliseconds{
       static_cast<std::int64_t>(load_le<std::uint64_t>(bytes.data() + kExpiryAt))};

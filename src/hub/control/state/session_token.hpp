@@ -26,7 +26,7 @@ inline constexpr std::uint64_t kBootMax = (1u << 24) - 1;
 
 /// What a token says in clear.
 struct SessionToken {
-  std::uint32_t index = 0;             ///< of the node id
+  NodeIndex index;                     ///< of the node id
   SessionNumber number = 0;            ///< of the session
   std::chrono::milliseconds expiry{};  ///< since 1970: not honoured from then on
   friend bool operator==(const SessionToken&, const SessionToken&) = default;

@@ -65,7 +65,7 @@ Sessions::Claim Sessions::claim(const Presented& presented) {
   if (token->expiry <= presented.wall) return {};
   if (token->number < floor_.at(token->index)) return {};
   if (holds) return {holder, std::nullopt};
-  if (holder != nullptr || indices_.held(token->index)) return {};
+  if (holder != nullptr || indices_.held(token->index.value())) return {};
   return {nullptr, token};
 }
 
@@ -75,7 +75,7 @@ Result<Session*, proto::Goodbye> Sessions::create(std::optional<std::uint16_t> s
   if (std::optional<proto::Goodbye> refusal = id_refusal(now)) return std::move(*refusal);
   const std::optional<std::uint32_t> index = indices_.take(now);
   GIMNET_CHECK(index.has_value());
-  return &put(*index, ++last_number_, shard_hint, now);
+  return &put(NodeIndex{*index}, ++last_number_, shard_hint, now);
 }
 
 std::optional<proto::Goodbye> Sessions::id_refusal(milliseconds now) {
@@ -88,7 +88,7 @@ Result<Session*, proto::Goodbye> Sessions::restore(const SessionToken& token,
                                                    std::optional<std::uint16_t> shard_hint,
                                                    milliseconds now, Places places) {
   if (std::optional<proto::Goodbye> refusal = full_refusal(places)) return std::move(*refusal);
-  const bool taken = indices_.take_back(token.index);
+  const bool taken = indices_.take_back(token.index.value());
   GIMNET_CHECK(taken);
   return &put(token.index, token.number, shard_hint, now);
 }
@@ -115,7 +115,7 @@ std::optional<proto::Goodbye> Sessions::crowd_refusal(std::string_view crowd,
                             "the hub with a larger --limit nodes"};
 }
 
-Session& Sessions::put(std::uint32_t index, SessionNumber number,
+Session& Sessions::put(NodeIndex index, SessionNumber number,
                        std::optional<std::uint16_t> shard_hint, milliseconds now) {
   const bool hinted = placement_ == Placement::hint && shard_hint && *shard_hint < slots_.shards();
   renumbered_.erase(index);
@@ -132,7 +132,7 @@ Session& Sessions::put(std::uint32_t index, SessionNumber number,
 bool Sessions::remember_kicked(const Session& session) {
   spend_token(session);
   std::vector<SessionToken> tokens;
-  for (const std::uint32_t former : former_indices(session)) {
+  for (const NodeIndex former : former_indices(session)) {
     tokens.push_back({former, renumbered_.at(former).number, session.token_expiry});
   }
   tokens.push_back({session.index, session.number, session.token_expiry});
@@ -171,9 +171,9 @@ void Sessions::stood_still(milliseconds time, milliseconds now) {
   indices_.put_off_returns(time, latest);
 }
 
-void Sessions::renumber(Session& session, std::uint32_t index, milliseconds now) {
-  GIMNET_CHECK(indices_.held(index) && !sessions_.contains(index));
-  const std::uint32_t former = session.index;
+void Sessions::renumber(Session& session, NodeIndex index, milliseconds now) {
+  GIMNET_CHECK(indices_.held(index.value()) && !sessions_.contains(index));
+  const NodeIndex former = session.index;
   renumbered_.erase(index);
   for (auto& [earlier, moved] : renumbered_) {
     if (moved.index == former) moved.index = index;
@@ -193,16 +193,16 @@ void Sessions::renumber(Session& session, std::uint32_t index, milliseconds now)
   // Not older than any that had this index before.
   session.number = ++last_number_;
   floor_.raise(index, session.number);
-  indices_.give_back(former, now);
+  indices_.give_back(former.value(), now);
 }
 
-std::uint32_t Sessions::present_index(std::uint32_t index) const {
+NodeIndex Sessions::present_index(NodeIndex index) const {
   const auto found = renumbered_.find(index);
   return found == renumbered_.end() ? index : found->second.index;
 }
 
-std::vector<std::uint32_t> Sessions::former_indices(const Session& session) const {
-  std::vector<std::uint32_t> former;
+std::vector<NodeIndex> Sessions::former_indices(const Session& session) const {
+  std::vector<NodeIndex> former;
   for (const auto& [earlier, moved] : renumbered_) {
     if (moved.index == session.index) former.push_back(earlier);
   }
@@ -211,21 +211,21 @@ std::vector<std::uint32_t> Sessions::former_indices(const Session& session) cons
 
 void Sessions::spend_token(const Session& session) {
   floor_.raise(session.index, session.number + 1);
-  for (const std::uint32_t former : former_indices(session))
+  for (const NodeIndex former : former_indices(session))
     floor_.raise(former, renumbered_.at(former).number + 1);
 }
 
 void Sessions::end(Session& session, milliseconds now) {
   // It may come back under the id that it had last, and no other: else one node could be two.
-  for (const std::uint32_t former : former_indices(session)) {
+  for (const NodeIndex former : former_indices(session)) {
     floor_.raise(former, renumbered_.at(former).number + 1);
     renumbered_.erase(former);
   }
   if (session.connected) --connected_;
   crowds_.leave(session.crowd);
-  const std::uint32_t index = session.index;
+  const NodeIndex index = session.index;
   slots_.give_back(session.place);
-  indices_.give_back(index, now);
+  indices_.give_back(index.value(), now);
   sessions_.erase(index);
 }
 
@@ -259,12 +259,12 @@ bool Sessions::still_away(const Away& away) const {
          session->place.generation == away.generation && session->attachment == away.attachment;
 }
 
-Session* Sessions::find(std::uint32_t index) {
+Session* Sessions::find(NodeIndex index) {
   const auto found = sessions_.find(index);
   return found == sessions_.end() ? nullptr : &found->second;
 }
 
-const Session* Sessions::find(std::uint32_t index) const {
+const Session* Sessions::find(NodeIndex index) const {
   const auto found = sessions_.find(index);
   return found == sessions_.end() ? nullptr : &found->second;
 }

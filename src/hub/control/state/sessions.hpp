@@ -44,7 +44,7 @@ struct Closing {
 /// A node's membership of this hub: outlives its connections by the grace time. There are as many
 /// as nodes, most of them idle: what few of them have takes a pointer, no more.
 struct Session {
-  std::uint32_t index = 0;       ///< of its node id
+  NodeIndex index;               ///< of its node id
   std::uint32_t attachment = 0;  ///< of the latest connection, counted from 1
   SessionNumber number = 0;
   Place place;
@@ -101,7 +101,7 @@ class Sessions {
   Sessions(const Options& options, const Limits& limits);
 
   [[nodiscard]] NodeId node_id(const Session& session) const {
-    return make_id<NodeId>(hub_, session.index);
+    return make_id(hub_, session.index);
   }
 
   /// What a node shows to get its session back. REQUIRES: renew_token() was called for the session.
@@ -153,7 +153,7 @@ class Sessions {
   [[nodiscard]] const std::vector<SessionToken>& kicked() const { return kicked_; }
   /// The session goes on under another index, which indices() gave; the former one rests, and leads
   /// here until somebody else has it.
-  void renumber(Session& session, std::uint32_t index, std::chrono::milliseconds now);
+  void renumber(Session& session, NodeIndex index, std::chrono::milliseconds now);
   /// Until when nodes that were here before a restart may still be on their way back, each under an
   /// index that counts as used. Nothing: there were none.
   [[nodiscard]] std::optional<std::chrono::milliseconds> returns_until() const {
@@ -169,9 +169,9 @@ class Sessions {
   void stood_still(std::chrono::milliseconds time, std::chrono::milliseconds now);
   /// Under which index a node goes on that had this one: the same, unless renumber() gave it
   /// another.
-  [[nodiscard]] std::uint32_t present_index(std::uint32_t index) const;
+  [[nodiscard]] NodeIndex present_index(NodeIndex index) const;
   /// The indices that the session's node had before.
-  [[nodiscard]] std::vector<std::uint32_t> former_indices(const Session& session) const;
+  [[nodiscard]] std::vector<NodeIndex> former_indices(const Session& session) const;
 
   /// The session is over: its slot is free at once, its index after it has rested. Tokens of
   /// indices that it had before count as none from now on.
@@ -196,10 +196,10 @@ class Sessions {
   /// When to ask next_expired() again; nothing if nobody is away.
   [[nodiscard]] std::optional<std::chrono::milliseconds> next_expiry() const;
 
-  [[nodiscard]] Session* find(std::uint32_t index);
-  [[nodiscard]] const Session* find(std::uint32_t index) const;
+  [[nodiscard]] Session* find(NodeIndex index);
+  [[nodiscard]] const Session* find(NodeIndex index) const;
   /// By ascending index.
-  [[nodiscard]] const std::map<std::uint32_t, Session>& all() const { return sessions_; }
+  [[nodiscard]] const std::map<NodeIndex, Session>& all() const { return sessions_; }
   [[nodiscard]] std::size_t connected() const { return connected_; }
   [[nodiscard]] IndexPool& indices() { return indices_; }
   [[nodiscard]] const IndexPool& indices() const { return indices_; }
@@ -207,18 +207,18 @@ class Sessions {
  private:
   /// Where a session went, and the number that its tokens had when it was there.
   struct Moved {
-    std::uint32_t index = 0;
+    NodeIndex index;
     SessionNumber number = 0;
   };
   struct Away {
     std::chrono::milliseconds until;
-    std::uint32_t index;
+    NodeIndex index;
     std::uint32_t generation;
     std::uint32_t attachment;
   };
   /// The next of `away` that is due at `now`, taken off the list, or nullptr.
   [[nodiscard]] Session* take_due(DueList<Away>& away, std::chrono::milliseconds now);
-  Session& put(std::uint32_t index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
+  Session& put(NodeIndex index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                std::chrono::milliseconds now);
   /// Is it still the absence that was noted?
   [[nodiscard]] bool still_away(const Away& away) const;
@@ -233,8 +233,8 @@ class Sessions {
   NumberFloor floor_;
   std::vector<SessionToken> kicked_;  ///< the latest last
   SlotPool slots_;
-  std::map<std::uint32_t, Session> sessions_;
-  std::map<std::uint32_t, Moved> renumbered_;  ///< by former index
+  std::map<NodeIndex, Session> sessions_;
+  std::map<NodeIndex, Moved> renumbered_;  ///< by former index
   Crowds crowds_;
   // All grace times are equal, so each list is in the order of absence. There are two, so that
   // longest_away() finds one that declared nothing at once.

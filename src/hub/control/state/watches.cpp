@@ -36,7 +36,7 @@ void Watches::note(const NodeNoted& noted, const Membership& membership, millise
     change.node = record_of(hub_, *session, membership.services(), now);
   } else {
     change.node.emplace();
-    change.node->node = make_id<NodeId>(hub_.id, noted.index);
+    change.node->node = make_id(hub_.id, noted.index);
     change.node->hub = hub_.id;
     change.node->name = noted.name;
   }
@@ -54,15 +54,14 @@ void Watches::note(const ServiceNoted& noted, const Membership& membership, mill
     change.service = record_of(hub_, *topic);
   } else {
     change.service.emplace();
-    change.service->group = make_id<GroupId>(hub_.id, noted.group);
-    change.service->node = make_id<NodeId>(hub_.id, noted.provider);
+    change.service->group = make_id(hub_.id, noted.group);
+    change.service->node = make_id(hub_.id, noted.provider);
     change.service->name = noted.full_name;
   }
   journal_.add(std::move(change));
 }
 
-Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node,
-                                                       const ns::Watch& wanted) {
+Result<ns::WatchAnswer, proto::Refusal> Watches::watch(NodeIndex node, const ns::Watch& wanted) {
   if (wanted.watch == 0)
     return proto::Refusal{Status::bad_request, "a watch has a number other than 0"};
   Watch watch;
@@ -104,7 +103,7 @@ Result<ns::WatchAnswer, proto::Refusal> Watches::watch(std::uint32_t node,
   return ns::WatchAnswer{!goes_on};
 }
 
-std::optional<proto::Refusal> Watches::unwatch(std::uint32_t node, std::uint32_t number) {
+std::optional<proto::Refusal> Watches::unwatch(NodeIndex node, std::uint32_t number) {
   const auto unknown = [number] {
     return proto::Refusal{Status::not_found, "this node has no watch " + std::to_string(number)};
   };
@@ -120,7 +119,7 @@ std::optional<proto::Refusal> Watches::unwatch(std::uint32_t node, std::uint32_t
   return std::nullopt;
 }
 
-void Watches::taken(std::uint32_t node, const ns::WatchTaken& taken) {
+void Watches::taken(NodeIndex node, const ns::WatchTaken& taken) {
   const auto found = watchers_.find(node);
   if (found == watchers_.end()) return;
   const auto watch = std::ranges::find(found->second.watches, taken.watch, &Watch::number);
@@ -130,7 +129,7 @@ void Watches::taken(std::uint32_t node, const ns::WatchTaken& taken) {
   found->second.under_way -= frames;
 }
 
-void Watches::connection_ended(std::uint32_t node) {
+void Watches::connection_ended(NodeIndex node) {
   const auto found = watchers_.find(node);
   if (found == watchers_.end()) return;
   watches_ -= found->second.watches.size();
@@ -149,7 +148,7 @@ bool Watches::serve(const Membership& membership, milliseconds now, const Send& 
 }
 
 /// True: the work for this turn is done, and this node has more.
-bool Watches::serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send) {
+bool Watches::serve_one(NodeIndex node, Watcher& watcher, Turn& turn, const Send& send) {
   for (std::size_t idle = 0; idle < watcher.watches.size();) {
     watcher.next = (watcher.next + 1) % watcher.watches.size();
     Watch& watch = watcher.watches[watcher.next];
@@ -182,7 +181,8 @@ bool Watches::is_idle(const Watcher& watcher, const Watch& watch) const {
 
 void Watches::begin(Watch& watch) {
   watch.phase = Phase::nodes;
-  watch.cursor = 0;
+  watch.last_node = {};
+  watch.last_group = {};
   watch.few = true;
   watch.seen = watch.told = journal_.version();
 }
@@ -223,9 +223,9 @@ void Watches::add_nodes(Watch& watch, Page& page, Turn& turn) const {
   if ((watch.subjects & ns::kWatchNodes) == 0) return next_phase(watch);
   if (add_few(watch, page, turn)) return;
   const auto& all = turn.membership.sessions().all();
-  auto entry = all.upper_bound(watch.cursor);
+  auto entry = all.upper_bound(watch.last_node);
   for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
-    watch.cursor = entry->first;
+    watch.last_node = entry->first;
     if (fits(watch, entry->second.name)) add_node(entry->second, page, turn);
   }
   if (entry == all.end()) next_phase(watch);
@@ -235,9 +235,9 @@ void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
   if ((watch.subjects & ns::kWatchServices) == 0) return next_phase(watch);
   if (add_few(watch, page, turn)) return;
   const auto& all = turn.membership.services().groups();
-  auto entry = all.upper_bound(watch.cursor);
+  auto entry = all.upper_bound(watch.last_group);
   for (; entry != all.end() && turn.work > 0 && !page.full; ++entry, --turn.work) {
-    watch.cursor = entry->first;
+    watch.last_group = entry->first;
     if (fits(watch, entry->second->full_name)) add_service(*entry->second, page);
   }
   if (entry == all.end()) next_phase(watch);
@@ -246,23 +246,35 @@ void Watches::add_services(Watch& watch, Page& page, Turn& turn) const {
 bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
   if (!watch.few || !watch.pattern) return false;
   if (page.full || turn.work == 0) return true;  // at another time
-  const bool of_nodes = watch.phase == Phase::nodes;
   const std::size_t records = (limits_.watch_event_bytes - kChangeBytesMax) / kRecordBytesLeast;
-  const ListingRequest request{&*watch.pattern, watch.cursor, false, records, limits_.scan_records};
-  const std::optional<Listed> listed = of_nodes
-                                           ? list_few_nodes(turn.membership, request)
-                                           : list_few_services(turn.membership.services(), request);
+  const proto::Pattern* const pattern = &*watch.pattern;
+  const std::size_t work = limits_.scan_records;
+  if (watch.phase == Phase::nodes) {
+    const auto listed =
+        list_few_nodes(turn.membership, {pattern, watch.last_node, false, records, work});
+    return add_listed(watch, page, turn, listed, [&](NodeIndex index) {
+      watch.last_node = index;
+      add_node(*turn.membership.sessions().find(index), page, turn);
+    });
+  }
+  const Services& services = turn.membership.services();
+  const auto listed =
+      list_few_services(services, {pattern, watch.last_group, false, records, work});
+  return add_listed(watch, page, turn, listed, [&](GroupIndex index) {
+    watch.last_group = index;
+    add_service(*services.find_group(index), page);
+  });
+}
+
+template <class List, class Add>
+bool Watches::add_listed(Watch& watch, Page& page, Turn& turn, const std::optional<List>& listed,
+                         Add add) {
   watch.few = listed.has_value();
   if (!listed) return false;
   turn.work -= std::min(turn.work, listed->looked_at);
-  for (const std::uint32_t index : listed->indices) {
+  for (const auto index : listed->indices) {
     if (page.full) return true;
-    watch.cursor = index;
-    if (of_nodes) {
-      add_node(*turn.membership.sessions().find(index), page, turn);
-    } else {
-      add_service(*turn.membership.services().find_group(index), page);
-    }
+    add(index);
   }
   if (!listed->more) next_phase(watch);
   return true;
@@ -270,7 +282,6 @@ bool Watches::add_few(Watch& watch, Page& page, Turn& turn) const {
 
 void Watches::next_phase(Watch& watch) {
   watch.phase = watch.phase == Phase::nodes ? Phase::services : Phase::end;
-  watch.cursor = 0;
   watch.few = true;
 }
 
@@ -322,11 +333,13 @@ proto::Payload Watches::finish(Watch& watch, Page page) const {
 }
 
 bool Watches::wants(const Watch& watch, const Journal::Note& note) {
-  if ((watch.subjects & (note.of_service ? ns::kWatchServices : ns::kWatchNodes)) == 0)
+  const NodeIndex* const node = std::get_if<NodeIndex>(&note.subject);
+  const GroupIndex* const group = std::get_if<GroupIndex>(&note.subject);
+  if ((watch.subjects & (group != nullptr ? ns::kWatchServices : ns::kWatchNodes)) == 0)
     return false;
   // What the snapshot has yet to look at, it will show as it is then.
-  if (watch.phase == Phase::nodes && (note.of_service || note.index > watch.cursor)) return false;
-  if (watch.phase == Phase::services && note.of_service && note.index > watch.cursor) return false;
+  if (watch.phase == Phase::nodes && (node == nullptr || *node > watch.last_node)) return false;
+  if (watch.phase == Phase::services && group != nullptr && *group > watch.last_group) return false;
   return fits(watch, note.name) || (!note.former_name.empty() && fits(watch, note.former_name));
 }
 

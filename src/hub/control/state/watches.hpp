@@ -29,16 +29,16 @@ class Watches {
 
   /// Begins a watch, or one of that number anew. Errors: bad_request, limit.
   [[nodiscard]] Result<proto::ns::WatchAnswer, proto::Refusal> watch(
-      std::uint32_t node, const proto::ns::Watch& wanted);
+      NodeIndex node, const proto::ns::Watch& wanted);
   /// Errors: not_found. nullopt: done.
-  [[nodiscard]] std::optional<proto::Refusal> unwatch(std::uint32_t node, std::uint32_t number);
+  [[nodiscard]] std::optional<proto::Refusal> unwatch(NodeIndex node, std::uint32_t number);
   /// The node took so many WATCH_EVENTS of a watch: it may have as many more.
-  void taken(std::uint32_t node, const proto::ns::WatchTaken& taken);
+  void taken(NodeIndex node, const proto::ns::WatchTaken& taken);
   /// The node's connection ended, and its watches with it.
-  void connection_ended(std::uint32_t node);
+  void connection_ended(NodeIndex node);
 
   /// Gives `send` what is due, a piece of it. True: there is more to do at once.
-  using Send = std::function<void(std::uint32_t node, proto::Payload events)>;
+  using Send = std::function<void(NodeIndex node, proto::Payload events)>;
   [[nodiscard]] bool serve(const Membership& membership, std::chrono::milliseconds now,
                            const Send& send);
 
@@ -55,7 +55,8 @@ class Watches {
     std::uint8_t subjects = proto::ns::kWatchAll;
     std::optional<proto::Pattern> pattern;  ///< nothing: all
     Phase phase = Phase::begin;
-    std::uint32_t cursor = 0;   ///< index of the last node or group that the snapshot looked at
+    NodeIndex last_node;        ///< that the snapshot looked at
+    GroupIndex last_group;      ///< the same of services
     bool few = true;            ///< may what the snapshot is about be found by name?
     std::uint64_t seen = 0;     ///< version up to which changes were looked at
     std::size_t under_way = 0;  ///< WATCH_EVENTS that were not taken yet
@@ -78,7 +79,7 @@ class Watches {
     std::size_t work;  ///< records and changes that may yet be looked at
   };
 
-  [[nodiscard]] bool serve_one(std::uint32_t node, Watcher& watcher, Turn& turn, const Send& send);
+  [[nodiscard]] bool serve_one(NodeIndex node, Watcher& watcher, Turn& turn, const Send& send);
   [[nodiscard]] bool is_idle(const Watcher& watcher, const Watch& watch) const;
   [[nodiscard]] bool is_full(const Page& page) const;
   void begin(Watch& watch);
@@ -89,6 +90,10 @@ class Watches {
   /// By name, where those whose names begin as the pattern does are few. False: they are not, and
   /// nothing was added.
   [[nodiscard]] bool add_few(Watch& watch, Page& page, Turn& turn) const;
+  /// Calls `add` with each index of the list until the page is full. False: there is no list.
+  template <class List, class Add>
+  [[nodiscard]] static bool add_listed(Watch& watch, Page& page, Turn& turn,
+                                       const std::optional<List>& listed, Add add);
   void add_node(const Session& session, Page& page, const Turn& turn) const;
   void add_service(const Topic& topic, Page& page) const;
   /// What the snapshot is about next, behind the nodes or the services.
@@ -102,8 +107,8 @@ class Watches {
   const HubTitle hub_;
   const Limits& limits_;
   Journal journal_;
-  std::map<std::uint32_t, Watcher> watchers_;
-  std::uint32_t last_served_ = 0;
+  std::map<NodeIndex, Watcher> watchers_;
+  NodeIndex last_served_;
   std::size_t watches_ = 0;
   std::uint64_t resyncs_ = 0;
 };

@@ -65,7 +65,7 @@ TEST_F(FullDisk, NoIdIsGivenThatTheNextStartCouldGiveToAnother) {
   }
   EXPECT_THAT(shards.all<RenumberCommand>(), IsEmpty());
   EXPECT_FALSE(nodes.find(kNobodys).exists());
-  EXPECT_EQ(conductor.membership().sessions().find(kNobodys), nullptr);
+  EXPECT_EQ(conductor.membership().sessions().find(NodeIndex{kNobodys}), nullptr);
   EXPECT_TRUE(nodes.find(index_of(robot_.id)).exists());
   keep_error.clear();
   ASSERT_TRUE(reassign(kNobodys));

@@ -143,7 +143,7 @@ TEST_F(AdministerTest, ANodeGoesOnUnderAnotherId) {
   EXPECT_TRUE(nodes.find(index_of(robot_.id)).is_renumbered());
   // Its shard closed the connection, and said so under the id that it knew then.
   detach(robot_, false, proto::GoodbyeCode::renumbered);
-  EXPECT_FALSE(conductor.membership().sessions().find(77)->connected);
+  EXPECT_FALSE(conductor.membership().sessions().find(NodeIndex{77})->connected);
   const Node again = rejoin(robot_, "robot");
   EXPECT_EQ(again.id, wanted);
   EXPECT_EQ(again.welcome.name, "robot");
@@ -342,7 +342,7 @@ TEST_F(AdministerTest, WhoIsAwayAndRenumberedIsEndedAfterItsGraceTime) {
   ASSERT_TRUE(request(admin_, ctrl::Reassign{robot_.id, make_id<NodeId>(kHub, 70)}));
   now += std::chrono::milliseconds{limits.grace_ms};
   conductor.tick(now);
-  EXPECT_EQ(conductor.membership().sessions().find(70), nullptr);
+  EXPECT_EQ(conductor.membership().sessions().find(NodeIndex{70}), nullptr);
   EXPECT_FALSE(nodes.find(index_of(robot_.id)).is_renumbered());
 }
 

@@ -315,7 +315,7 @@ TEST_F(NamesTest, WhatItHasAlreadyIsNoNewName) {
   EXPECT_TRUE(ask<ns::RegisterNameAnswer>(robot, ns::RegisterName{"crane"}));
   EXPECT_EQ(ask<ns::UnregisterNameAnswer>(robot, ns::UnregisterName{}).error().status,
             Status::rate);
-  EXPECT_EQ(conductor.membership().directory().find("crane"), index_of(robot.id));
+  EXPECT_EQ(conductor.membership().directory().find("crane"), node_index_of(robot.id));
 }
 
 }  // namespace

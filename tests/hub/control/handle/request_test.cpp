@@ -30,9 +30,11 @@ TEST(PageBudget, KeepsTheAnswerWithinAFrame) {
 TEST(OwnIndex, TakesThisHubsIdsAndThoseWithoutAHub) {
   HubFacts facts;
   facts.id = HubId{7};
-  EXPECT_EQ(own_index(facts, make_id<NodeId>(HubId{7}, 5)), 5u);
-  EXPECT_EQ(own_index(facts, NodeId{5}), 5u);
+  EXPECT_EQ(own_index(facts, make_id<NodeId>(HubId{7}, 5)), NodeIndex{5});
+  EXPECT_EQ(own_index(facts, NodeId{5}), NodeIndex{5});
   EXPECT_EQ(own_index(facts, make_id<NodeId>(HubId{8}, 5)), std::nullopt);
+  EXPECT_EQ(own_index(facts, make_id<GroupId>(HubId{7}, 5)), GroupIndex{5});
+  EXPECT_EQ(own_index(facts, make_id<GroupId>(HubId{8}, 5)), std::nullopt);
 }
 
 }  // namespace

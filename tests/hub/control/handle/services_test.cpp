@@ -291,7 +291,7 @@ TEST_F(ServiceRequestsTest, ANodeHasAsManyServicesAsTheLimitSaysAndNoMore) {
                 i + 1);
     }
   }
-  EXPECT_EQ(conductor.membership().services().services_of(index_of(robot.id)), 1'024u);
+  EXPECT_EQ(conductor.membership().services().services_of(node_index_of(robot.id)), 1'024u);
   const auto one_more = ask<ns::AdvertiseAnswer>(robot, ns::Advertise{.service = "one-more"});
   ASSERT_FALSE(one_more);
   EXPECT_EQ(one_more.error().status, Status::limit);

@@ -15,9 +15,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr HubId kHub{7};
-constexpr std::uint32_t kOwner = 1;
-constexpr std::uint32_t kThief = 2;
-constexpr std::uint32_t kOther = 3;
+constexpr NodeIndex kOwner{1};
+constexpr NodeIndex kThief{2};
+constexpr NodeIndex kOther{3};
 
 /// A hub that is killed now and then, and goes on from what it kept.
 class FormerGroupsTest : public ::testing::Test {
@@ -45,17 +45,18 @@ class FormerGroupsTest : public ::testing::Test {
     ASSERT_TRUE(keep().forgets_gone);
     ASSERT_EQ(forgettings_, before + 1);
   }
-  Services::Advertised advertise(std::uint32_t node, const std::string& name,
-                                 std::uint32_t group = 0, std::span<const std::byte> proof = {}) {
+  Services::Advertised advertise(NodeIndex node, const std::string& name,
+                                 GroupIndex group = kNoGroup,
+                                 std::span<const std::byte> proof = {}) {
     const auto done = services_->advertise(node, name, {}, now_, effects_, {group, proof});
     EXPECT_TRUE(done);
     return done ? *done : Services::Advertised{};
   }
-  Services::Advertised come_back(std::uint32_t node, const std::string& name,
+  Services::Advertised come_back(NodeIndex node, const std::string& name,
                                  const Services::Advertised& before) {
     return advertise(node, name, before.group, before.proof);
   }
-  void withdraw(std::uint32_t node, std::uint32_t group) {
+  void withdraw(NodeIndex node, GroupIndex group) {
     ASSERT_EQ(services_->withdraw(node, group, now_, effects_), std::nullopt);
     now_ += 1h;  // long enough at rest
   }
@@ -94,7 +95,7 @@ TEST_F(FormerGroupsTest, AProofOfAnotherSecretIsNone) {
   const auto mine = advertise(kOwner, "robot/odom");
   secret_.fill(std::byte{0x12});
   start(5'000);
-  EXPECT_EQ(come_back(kOwner, "robot/odom", mine).group, 5'000u);
+  EXPECT_EQ(come_back(kOwner, "robot/odom", mine).group, GroupIndex{5'000});
 }
 
 TEST_F(FormerGroupsTest, EachAnswerBringsAProofThatCounts) {
@@ -115,9 +116,10 @@ TEST_F(FormerGroupsTest, AGroupThatRestsOrThatTheServiceHasAnotherOneForIsNotGiv
   const auto mine = advertise(kOwner, "robot/odom");
   ASSERT_EQ(services_->withdraw(kOwner, mine.group, now_, effects_), std::nullopt);
   const auto second = come_back(kOwner, "robot/odom", mine);
-  EXPECT_EQ(second.group, 2u) << "the first one rests";
+  EXPECT_EQ(second.group, GroupIndex{2}) << "the first one rests";
   now_ += 1h;
-  EXPECT_EQ(come_back(kOwner, "robot/odom", mine).group, 2u) << "a service has one group";
+  EXPECT_EQ(come_back(kOwner, "robot/odom", mine).group, GroupIndex{2})
+      << "a service has one group";
 }
 
 // Of two that had the same group one after the other the later one has it, whoever comes first.
@@ -128,11 +130,11 @@ TEST_F(FormerGroupsTest, WhoseGroupWasForgottenLosesIt) {
   withdraw(kOwner, old.group);
   forget();
   EXPECT_EQ(come_back(kOther, "other/held", held).group, held.group);
-  start(old.group);
+  start(old.group.value());
   const auto later = advertise(kThief, "thief/odom");
   ASSERT_EQ(later.group, old.group) << "it is nobody's";
   start(800'000);
-  EXPECT_EQ(come_back(kOwner, "robot/odom", old).group, 800'000u);
+  EXPECT_EQ(come_back(kOwner, "robot/odom", old).group, GroupIndex{800'000});
   EXPECT_EQ(come_back(kThief, "thief/odom", later).group, old.group);
   EXPECT_EQ(come_back(kOther, "other/held", held).group, held.group) << "it had it all the time";
 }
@@ -156,15 +158,16 @@ TEST_F(FormerGroupsTest, AProofCountsUntilTheSecondForgettingAndItsNextOneFurthe
   EXPECT_NE(renewed.proof, old.proof);
   // Many came and went since.
   IndexSet used = more_than_half();
-  used.insert(old.group);
-  used.insert(asleep.group);
+  used.insert(old.group.value());
+  used.insert(asleep.group.value());
   start(800'000, used);
   ASSERT_EQ(come_back(kOwner, "robot/odom", renewed).group, old.group);
   ASSERT_EQ(come_back(kOther, "other/held", asleep).group, asleep.group) << "one forgetting";
   forget();
   start(900'000);
   EXPECT_EQ(come_back(kOwner, "robot/odom", renewed).group, old.group);
-  EXPECT_EQ(come_back(kOther, "other/held", asleep).group, 900'000u) << "two forgettings";
+  EXPECT_EQ(come_back(kOther, "other/held", asleep).group, GroupIndex{900'000})
+      << "two forgettings";
 }
 
 }  // namespace

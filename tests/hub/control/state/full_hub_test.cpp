@@ -59,7 +59,7 @@ TEST_F(FullHub, NobodyMakesWayForOneWhoIsRefused) {
   Session* idle = join("idle");
   lose(*away, 1s);
   lose(*idle, 1s);
-  const std::uint32_t index = idle->index;
+  const NodeIndex index = idle->index;
   limits_.nodes = 2;
   effects_.clear();
   EXPECT_EQ(refused("c", 2s), GoodbyeCode::hub_full);
@@ -76,7 +76,7 @@ TEST_F(FullHub, AsManyMakeWayAsHaveTo) {
   Session* idle = join("idle");
   lose(*away, 1s);
   lose(*idle, 1s);
-  const std::uint32_t index = idle->index;
+  const NodeIndex index = idle->index;
   limits_.nodes = 3;
   EXPECT_EQ(refused("c", 2s), GoodbyeCode::done);
   EXPECT_EQ(membership_.sessions().find(index), nullptr);

@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::ElementsAreArray;
 
-constexpr GroupGrant kGrant{HubId{7}, 5, "robot1/base/odom", 3};
+constexpr GroupGrant kGrant{HubId{7}, GroupIndex{5}, "robot1/base/odom", 3};
 
 Secret secret_of(int value) {
   Secret secret{};
@@ -36,10 +36,10 @@ TEST(GroupProof, IsForItsGroupItsServiceItsHubAndItsTimeOnly) {
   const GroupProof proof = write_group_proof(kGrant, secret_of(1));
   EXPECT_TRUE(proves(proof, kGrant, secret_of(1)));
   EXPECT_FALSE(proves(proof, kGrant, secret_of(2)));
-  EXPECT_FALSE(proves(proof, {HubId{8}, 5, "robot1/base/odom", 3}, secret_of(1)));
-  EXPECT_FALSE(proves(proof, {HubId{7}, 6, "robot1/base/odom", 3}, secret_of(1)));
-  EXPECT_FALSE(proves(proof, {HubId{7}, 5, "robot1/base/odo", 3}, secret_of(1)));
-  EXPECT_FALSE(proves(proof, {HubId{7}, 5, "robot1/base/odom", 4}, secret_of(1)));
+  EXPECT_FALSE(proves(proof, {HubId{8}, GroupIndex{5}, "robot1/base/odom", 3}, secret_of(1)));
+  EXPECT_FALSE(proves(proof, {HubId{7}, GroupIndex{6}, "robot1/base/odom", 3}, secret_of(1)));
+  EXPECT_FALSE(proves(proof, {HubId{7}, GroupIndex{5}, "robot1/base/odo", 3}, secret_of(1)));
+  EXPECT_FALSE(proves(proof, {HubId{7}, GroupIndex{5}, "robot1/base/odom", 4}, secret_of(1)));
 }
 
 TEST(GroupProof, OneBitChangedOrAByteMoreOrLessProvesNothing) {

@@ -18,7 +18,7 @@ HubState some_state() {
   state.boot = 9;
   state.node_mark = 8'193;
   state.group_mark = 4'097;
-  state.kicked = {{3, 77, 5s}, {1'048'574, 78, 6s}};
+  state.kicked = {{NodeIndex{3}, 77, 5s}, {NodeIndex{1'048'574}, 78, 6s}};
   for (std::uint32_t index = 1; index < state.node_mark; ++index) state.nodes_used.insert(index);
   state.nodes_used.insert(8'200);
   state.groups_used.insert(3);
@@ -57,7 +57,7 @@ TEST(HubState, IsReadAsItWasWritten) {
   ASSERT_TRUE(state);
   EXPECT_EQ(*state, some_state());
   HubState full = some_state();
-  full.kicked.assign(kKickedMax, {1, 2, 3s});
+  full.kicked.assign(kKickedMax, {NodeIndex{1}, 2, 3s});
   full.nodes_used.insert(1'048'574);
   full.groups_used.insert(1'048'574);
   full.groups_outlasting.insert(1'048'574);
@@ -148,7 +148,7 @@ TEST(HubState, TheNextStartHandsOutWhatIsAboveTheMarks) {
   EXPECT_EQ(start->state.secret, some_state().secret);
   EXPECT_EQ(start->state.unique_id, some_state().unique_id);
   ASSERT_EQ(start->state.kicked.size(), 1u) << "the other one's token has expired";
-  EXPECT_EQ(start->state.kicked[0].index, 1'048'574u);
+  EXPECT_EQ(start->state.kicked[0].index, NodeIndex{1'048'574});
 }
 
 TEST(HubState, MarksComeRound) {

@@ -7,6 +7,8 @@ namespace {
 
 namespace ns = proto::ns;
 
+using Subject = std::variant<NodeIndex, GroupIndex>;
+
 ns::Change node_change(std::uint32_t index, std::size_t name_bytes = 5) {
   ns::Change change;
   change.kind = ns::ChangeKind::joined;
@@ -25,7 +27,7 @@ TEST(Journal, NumbersChangesWithoutGaps) {
   for (std::uint32_t i = 1; i <= 5; ++i) journal.add(node_change(i));
   EXPECT_EQ(journal.version(), 5u);
   EXPECT_EQ(journal.epoch(), 9u);
-  for (std::uint32_t i = 1; i <= 5; ++i) EXPECT_EQ(journal.at(i).index, i);
+  for (std::uint32_t i = 1; i <= 5; ++i) EXPECT_EQ(journal.at(i).subject, Subject{NodeIndex{i}});
   EXPECT_FALSE(journal.reaches(6)) << "the future";
 }
 
@@ -39,8 +41,8 @@ TEST(Journal, KeepsSoManyChanges) {
   journal.add(node_change(4));
   EXPECT_FALSE(journal.reaches(0));
   EXPECT_TRUE(journal.reaches(1));
-  EXPECT_EQ(journal.at(2).index, 2u);
-  EXPECT_EQ(journal.at(4).index, 4u);
+  EXPECT_EQ(journal.at(2).subject, Subject{NodeIndex{2}});
+  EXPECT_EQ(journal.at(4).subject, Subject{NodeIndex{4}});
 }
 
 TEST(Journal, KeepsSoManyBytes) {
@@ -66,7 +68,7 @@ TEST(Journal, OnlyCountsUntilItBegins) {
   journal.add(node_change(4));
   EXPECT_FALSE(journal.reaches(2)) << "what was only counted";
   EXPECT_TRUE(journal.reaches(3));
-  EXPECT_EQ(journal.at(4).index, 4u);
+  EXPECT_EQ(journal.at(4).subject, Subject{NodeIndex{4}});
 }
 
 TEST(Journal, TellsServicesFromNodes) {
@@ -79,8 +81,7 @@ TEST(Journal, TellsServicesFromNodes) {
   change.service->group = make_id<GroupId>(HubId{7}, 3);
   change.service->name = "robot/odom";
   journal.add(std::move(change));
-  EXPECT_TRUE(journal.at(1).of_service);
-  EXPECT_EQ(journal.at(1).index, 3u);
+  EXPECT_EQ(journal.at(1).subject, Subject{GroupIndex{3}});
   EXPECT_EQ(journal.at(1).name, "robot/odom");
 }
 

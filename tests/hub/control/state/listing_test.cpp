@@ -20,19 +20,19 @@ class ListingTest : public ::testing::Test {
     request.name = name;
     return *membership_.join(request, 0ms, effects_)->session;
   }
-  std::uint32_t advertise(const std::string& full_name) {
-    return membership_.services().advertise(1, full_name, {}, 0ms, effects_)->group;
+  GroupIndex advertise(const std::string& full_name) {
+    return membership_.services().advertise(NodeIndex{1}, full_name, {}, 0ms, effects_)->group;
   }
   /// All pieces, each of bounded work, with what `between` does between them.
   template <class Between>
-  std::vector<std::uint32_t> all(const char* pattern, std::size_t most, std::size_t work,
-                                 Between between) {
+  std::vector<NodeIndex> all(const char* pattern, std::size_t most, std::size_t work,
+                             Between between) {
     const auto parsed = proto::Pattern::parse(pattern);
-    std::vector<std::uint32_t> found;
-    ListingRequest request{
+    std::vector<NodeIndex> found;
+    ListingRequest<NodeIndex> request{
         .pattern = *pattern == '\0' ? nullptr : &*parsed, .most = most, .work = work};
     for (int pieces = 0; pieces < 10'000; ++pieces) {
-      const Listed listed = list_nodes(membership_, request);
+      const Listed<NodeIndex> listed = list_nodes(membership_, request);
       EXPECT_LE(listed.indices.size(), most);
       found.insert(found.end(), listed.indices.begin(), listed.indices.end());
       if (!listed.more) return found;
@@ -43,8 +43,7 @@ class ListingTest : public ::testing::Test {
     ADD_FAILURE() << "no end";
     return found;
   }
-  std::vector<std::uint32_t> all(const char* pattern, std::size_t most = 10,
-                                 std::size_t work = 64) {
+  std::vector<NodeIndex> all(const char* pattern, std::size_t most = 10, std::size_t work = 64) {
     return all(pattern, most, work, [] {});
   }
 
@@ -54,7 +53,7 @@ class ListingTest : public ::testing::Test {
 };
 
 TEST_F(ListingTest, FindsTheSameByNameAndById) {
-  std::vector<std::uint32_t> hall;
+  std::vector<NodeIndex> hall;
   for (int i = 0; i < 300; ++i) {
     hall.push_back(join("hall/robot-" + std::to_string(i)).index);
     join("yard/robot-" + std::to_string(i));
@@ -86,9 +85,9 @@ TEST_F(ListingTest, FindsTheSameByNameAndById) {
 }
 
 TEST_F(ListingTest, LooksAtNothingThatOnlyBeginsWithTheSameLetters) {
-  const std::uint32_t hall = join("hall-3").index;
-  const std::uint32_t robot = join("hall-3/robot").index;
-  const std::uint32_t arm = join("hall-3/robot/arm").index;
+  const NodeIndex hall = join("hall-3").index;
+  const NodeIndex robot = join("hall-3/robot").index;
+  const NodeIndex arm = join("hall-3/robot/arm").index;
   for (int i = 0; i < 100; ++i) {
     // In the order of names, '-' and '.' stand before '/', digits and letters behind it.
     for (const char* between : {"-", ".", "", "x"})
@@ -114,7 +113,7 @@ TEST_F(ListingTest, LooksAtNothingThatOnlyBeginsWithTheSameLetters) {
 }
 
 TEST_F(ListingTest, WhatChangesBetweenPiecesHidesAndRepeatsNothingElse) {
-  std::set<std::uint32_t> stay;
+  std::set<NodeIndex> stay;
   std::vector<Session*> go;
   for (int i = 0; i < 200; ++i) {
     stay.insert(join("stay/" + std::to_string(i)).index);
@@ -129,9 +128,9 @@ TEST_F(ListingTest, WhatChangesBetweenPiecesHidesAndRepeatsNothingElse) {
     join("late/" + std::to_string(joined++));
   });
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-  const std::set<std::uint32_t> seen(found.begin(), found.end());
+  const std::set<NodeIndex> seen(found.begin(), found.end());
   EXPECT_EQ(seen.size(), found.size()) << "nobody twice";
-  for (const std::uint32_t index : stay) EXPECT_TRUE(seen.contains(index));
+  for (const NodeIndex index : stay) EXPECT_TRUE(seen.contains(index));
 }
 
 TEST_F(ListingTest, LeavesOutWhoIsAwayIfTold) {
@@ -152,9 +151,10 @@ TEST_F(ListingTest, LeavesOutWhoIsAwayIfTold) {
 
 TEST_F(ListingTest, FindsServicesByTheirFullNames) {
   join("robot");
-  const std::uint32_t odom = advertise("robot/odom");
-  const std::uint32_t pose = advertise("robot/pose");
-  ASSERT_TRUE(membership_.services().subscribe(1, "robot/nobody-offers-that", {}, effects_));
+  const GroupIndex odom = advertise("robot/odom");
+  const GroupIndex pose = advertise("robot/pose");
+  ASSERT_TRUE(
+      membership_.services().subscribe(NodeIndex{1}, "robot/nobody-offers-that", {}, effects_));
   const auto robot = proto::Pattern::parse("robot/*");
   const auto any = proto::Pattern::parse("**/pose");
   EXPECT_EQ(
@@ -163,7 +163,7 @@ TEST_F(ListingTest, FindsServicesByTheirFullNames) {
   EXPECT_EQ(
       list_services(membership_.services(), {.pattern = &*any, .most = 10, .work = 64}).indices,
       std::vector{pose});
-  const Listed first = list_services(membership_.services(), {.most = 1, .work = 64});
+  const Listed<GroupIndex> first = list_services(membership_.services(), {.most = 1, .work = 64});
   EXPECT_EQ(first.indices, std::vector{odom});
   EXPECT_TRUE(first.more);
   EXPECT_EQ(

@@ -72,7 +72,7 @@ TEST_F(MembershipTest, ASecondLiveHolderOfANameIsRefused) {
 
 TEST_F(MembershipTest, ATokenBringsIdAndNameBackWithinTheGraceTime) {
   Session* robot = join("robot");
-  const std::uint32_t index = robot->index;
+  const NodeIndex index = robot->index;
   lose(*robot, 1s);
   const std::vector<std::byte> token = token_of(*robot);
   JoinRequest again = request("");
@@ -87,7 +87,7 @@ TEST_F(MembershipTest, ATokenBringsIdAndNameBackWithinTheGraceTime) {
 
 TEST_F(MembershipTest, AfterTheGraceTimeATokenBringsTheIdBackWhileItIsFree) {
   Session* robot = join("robot");
-  const std::uint32_t index = robot->index;
+  const NodeIndex index = robot->index;
   const std::vector<std::byte> token = token_of(*robot);
   lose(*robot, 1s);
   EXPECT_EQ(membership_.next_deadline(), 1s + kGrace);
@@ -105,7 +105,7 @@ TEST_F(MembershipTest, AfterTheGraceTimeATokenBringsTheIdBackWhileItIsFree) {
 
 TEST_F(MembershipTest, AfterGoodbyeATokenCountsAsNone) {
   Session* robot = join("robot");
-  const std::uint32_t index = robot->index;
+  const NodeIndex index = robot->index;
   const std::vector<std::byte> token = token_of(*robot);
   membership_.connection_ended(*robot, {true, GoodbyeCode::done, ""}, 1s, effects_);
   JoinRequest again = request("robot");
@@ -117,7 +117,7 @@ TEST_F(MembershipTest, AfterGoodbyeATokenCountsAsNone) {
 
 TEST_F(MembershipTest, AKickedNodesTokenCountsAsNoneAndIsRemembered) {
   Session* robot = join("robot");
-  const std::uint32_t index = robot->index;
+  const NodeIndex index = robot->index;
   const std::vector<std::byte> token = token_of(*robot);
   membership_.kick(*robot, "kicked by an administrator", 1s, effects_);
   EXPECT_EQ(count<StateDue>(), 1u);
@@ -146,7 +146,7 @@ TEST_F(MembershipTest, ALiveSessionMovesToItsNewerConnection) {
 
 TEST_F(MembershipTest, ANewcomerTakesTheNameOfSomebodyAway) {
   Session* robot = join("robot");
-  const std::uint32_t index = robot->index;
+  const NodeIndex index = robot->index;
   const std::vector<std::byte> token = token_of(*robot);
   lose(*robot, 1s);
   const Session* newcomer = join("robot", 2s);
@@ -222,10 +222,10 @@ TEST_F(MembershipTest, ServicesStayThroughTheGraceTimeAndGoWithIt) {
   ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
   lose(*robot, 1s);
   membership_.tick(1s + kGrace - 1ms, effects_);
-  EXPECT_NE(membership_.services().find_group(1), nullptr);
+  EXPECT_NE(membership_.services().find_group(GroupIndex{1}), nullptr);
   effects_.clear();
   membership_.tick(1s + kGrace, effects_);
-  EXPECT_EQ(membership_.services().find_group(1), nullptr);
+  EXPECT_EQ(membership_.services().find_group(GroupIndex{1}), nullptr);
   EXPECT_EQ(count<ServiceMovedDue>(), 1u);
 }
 
@@ -240,10 +240,10 @@ TEST_F(MembershipTest, WhatAReturnedNodeDoesNotDeclareAgainIsDropped) {
   ASSERT_TRUE(membership_.join(again, 2s, effects_));
   const auto odom = membership_.services().advertise(robot->index, "robot/odom", {}, 3s, effects_);
   ASSERT_TRUE(odom);
-  EXPECT_EQ(odom->group, 1u);
+  EXPECT_EQ(odom->group, GroupIndex{1});
   membership_.tick(2s + kGrace, effects_);
-  EXPECT_NE(membership_.services().find_group(1), nullptr);
-  EXPECT_EQ(membership_.services().find_group(2), nullptr);
+  EXPECT_NE(membership_.services().find_group(GroupIndex{1}), nullptr);
+  EXPECT_EQ(membership_.services().find_group(GroupIndex{2}), nullptr);
 }
 
 TEST_F(MembershipTest, RolesAreAdmittedByWhoTheyAre) {
@@ -301,7 +301,7 @@ TEST_F(MembershipTest, ANodeWithNeitherNameNorResumeIsGoneWithItsConnection) {
   Session* robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot->index, "robot/odom", {}, 0ms, effects_));
   ASSERT_TRUE(membership_.services().subscribe(viewer->index, "robot/odom", {}, effects_));
-  const std::uint32_t index = viewer->index;
+  const NodeIndex index = viewer->index;
   const std::vector<std::byte> token = token_of(*viewer);
   effects_.clear();
   lose(*viewer, 1s);
@@ -319,14 +319,14 @@ TEST_F(MembershipTest, ANodeWithNeitherNameNorResumeIsGoneWithItsConnection) {
 TEST_F(MembershipTest, ANamelessNodeComesBackToLearnItsNewId) {
   Session* viewer = join("");
   const std::vector<std::byte> token = token_of(*viewer);
-  ASSERT_FALSE(membership_.renumber(*viewer, 50, 1s, effects_));
+  ASSERT_FALSE(membership_.renumber(*viewer, NodeIndex{50}, 1s, effects_));
   membership_.connection_ended(*viewer, {false, GoodbyeCode::renumbered, "50"}, 1s, effects_);
   JoinRequest again = request("");
   again.token = token;
   const auto joined = membership_.join(again, 2s, effects_);
   ASSERT_TRUE(joined);
   EXPECT_EQ(joined->session, viewer);
-  EXPECT_EQ(joined->session->index, 50u);
+  EXPECT_EQ(joined->session->index, NodeIndex{50});
 }
 
 TEST_F(MembershipTest, AtTheLimitTheOneThatIsAwayLongestMakesWay) {
@@ -408,7 +408,7 @@ TEST_F(MembershipTest, ANewNameWithdrawsWhatTheNodeProvides) {
   for (const Effect& effect : effects_) {
     if (const auto* moved = std::get_if<ServiceMovedDue>(&effect)) {
       EXPECT_EQ(moved->subscribers.at(0), viewer->index);
-      EXPECT_EQ(moved->new_group, 0u);
+      EXPECT_EQ(moved->new_group, GroupIndex{0});
     }
   }
   EXPECT_EQ(membership_.services().services_of(robot->index), 0u);

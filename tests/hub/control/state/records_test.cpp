@@ -29,7 +29,7 @@ TEST(Records, TellAllThatIsKnown) {
   ASSERT_TRUE(membership.services().subscribe(session.index, "robot/odom", {}, effects));
 
   ns::NodeRecord node;
-  node.node = make_id<NodeId>(HubId{7}, session.index);
+  node.node = make_id(HubId{7}, session.index);
   node.name = "robot";
   node.hub = HubId{7};
   node.hub_name = "lab";
@@ -42,7 +42,7 @@ TEST(Records, TellAllThatIsKnown) {
 
   const ns::ServiceRecord record =
       record_of(title, *membership.services().find_group(service->group));
-  EXPECT_EQ(record.group, make_id<GroupId>(HubId{7}, service->group));
+  EXPECT_EQ(record.group, make_id(HubId{7}, service->group));
   EXPECT_EQ(record.name, "robot/odom");
   EXPECT_EQ(record.node, node.node);
   EXPECT_EQ(record.message_type, 3u);

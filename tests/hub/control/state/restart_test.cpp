@@ -17,7 +17,7 @@ using proto::GoodbyeCode;
 /// A hub that was killed, and starts again with what it had kept.
 class RestartTest : public ::testing::Test {
  protected:
-  using Node = std::pair<std::uint32_t, std::vector<std::byte>>;  ///< index, token
+  using Node = std::pair<NodeIndex, std::vector<std::byte>>;  ///< index, token
 
   std::unique_ptr<Membership> start(std::uint32_t mark, std::uint64_t boot) {
     Durable kept;
@@ -112,8 +112,8 @@ TEST_F(RestartTest, NoIdIsGivenAwayThatANodeMayComeBackUnder) {
   ASSERT_TRUE(held);
   EXPECT_NE(held->sentence.find("another node 'absent'"), std::string::npos) << held->sentence;
   Session& third = *after->sessions().find(join(*after, "third").first);
-  EXPECT_FALSE(after->renumber(third, 500'000, over - 1ms, effects)) << "nobody had it";
-  EXPECT_FALSE(after->renumber(other, absent.first + 1, over, effects))
+  EXPECT_FALSE(after->renumber(third, NodeIndex{500'000}, over - 1ms, effects)) << "nobody had it";
+  EXPECT_FALSE(after->renumber(other, NodeIndex{absent.first.value() + 1}, over, effects))
       << "nobody is expected any more";
 }
 
@@ -121,13 +121,12 @@ TEST_F(RestartTest, AnIdThatAnAdministratorGaveIsNoNewcomers) {
   const auto before = start(1, 1);
   const Node robot = join(*before, "robot");
   Effects effects;
-  const std::uint32_t given =
-      before->durable(0ms).nodes.mark;  // what the next start hands out first
+  const NodeIndex given{before->durable(0ms).nodes.mark};  // what the next start hands out first
   ASSERT_FALSE(before->renumber(*before->sessions().find(robot.first), given, 0ms, effects));
   EXPECT_TRUE(std::holds_alternative<StateDue>(effects.front())) << "a crash must not forget it";
   const std::vector<std::byte> token = before->sessions().token_of(*before->sessions().find(given));
   const auto after = start(before->durable(0ms), 2);
-  EXPECT_EQ(join(*after, "newcomer").first, given + 1);
+  EXPECT_EQ(join(*after, "newcomer").first, NodeIndex{given.value() + 1});
   EXPECT_EQ(join(*after, "robot", token).first, given);
 }
 
@@ -153,7 +152,8 @@ TEST_F(RestartTest, WhereEachIdMayBeSomebodysNewcomersWait) {
 TEST_F(RestartTest, OfAHubsFirstStartNobodyIsExpectedBack) {
   const auto hub = start(1, 1);
   Effects effects;
-  EXPECT_FALSE(hub->renumber(*hub->sessions().find(join(*hub, "A").first), 100, 0ms, effects));
+  EXPECT_FALSE(
+      hub->renumber(*hub->sessions().find(join(*hub, "A").first), NodeIndex{100}, 0ms, effects));
 }
 
 TEST_F(RestartTest, AnotherNameAnotherIdentityOrAnotherHubIsNotHonoured) {
@@ -193,7 +193,7 @@ TEST_F(RestartTest, StateIsDueBeforeTheBlockIsUsedUpAndNothingIsHandedOutBeyondI
   hub->state_kept(hub->durable(0ms));
   const auto next = hub->join(request, 0ms, effects);
   ASSERT_TRUE(next);
-  EXPECT_EQ(next->session->index, IndexPool::kBlock + 1);
+  EXPECT_EQ(next->session->index, NodeIndex{IndexPool::kBlock + 1});
 }
 
 }  // namespace

@@ -10,15 +10,15 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr std::uint32_t kRobot = 1;
-constexpr std::uint32_t kViewer = 2;
-constexpr std::uint32_t kOther = 4;
+constexpr NodeIndex kRobot{1};
+constexpr NodeIndex kViewer{2};
+constexpr NodeIndex kOther{4};
 
 class ServicesMovedTest : public ::testing::Test {
  protected:
   /// Another message type, and so another group.
-  std::uint32_t advertise(std::uint32_t type, const std::string& name = "robot/odom",
-                          std::uint32_t former_group = 0) {
+  GroupIndex advertise(std::uint32_t type, const std::string& name = "robot/odom",
+                       GroupIndex former_group = kNoGroup) {
     ServiceTerms terms;
     terms.message_type = type;
     terms.delivery = proto::ns::Delivery::sync;
@@ -27,13 +27,13 @@ class ServicesMovedTest : public ::testing::Test {
     const auto done =
         services_.advertise(kRobot, name, terms, now_, effects_, {former_group, proof});
     EXPECT_TRUE(done);
-    return done ? done->group : 0;
+    return done ? done->group : kNoGroup;
   }
   void subscribe(const std::string& name = "robot/odom") {
     EXPECT_TRUE(services_.subscribe(kViewer, name, {}, effects_));
   }
   /// What the node is told at its return, if that is one service.
-  ServiceMovedDue told(std::uint32_t node = kViewer) {
+  ServiceMovedDue told(NodeIndex node = kViewer) {
     const std::vector<ServiceMovedDue> all = services_.untold_moves(node);
     EXPECT_EQ(all.size(), 1u);
     return all.empty() ? ServiceMovedDue{} : all.front();
@@ -68,11 +68,11 @@ TEST_F(ServicesMovedTest, WhoHasReadItsEventsIsToldNothing) {
 }
 
 TEST_F(ServicesMovedTest, SeveralMovesAreToldAsOneWithWhatIsTrueNow) {
-  const std::uint32_t known = advertise(5);
+  const GroupIndex known = advertise(5);
   subscribe();
-  const std::uint32_t between = advertise(6);
+  const GroupIndex between = advertise(6);
   EXPECT_EQ(services_.withdraw(kRobot, between, now_, effects_), std::nullopt);
-  const std::uint32_t present = advertise(7);
+  const GroupIndex present = advertise(7);
   const ServiceMovedDue event = told();
   EXPECT_THAT(event.subscribers, ElementsAre(kViewer));
   EXPECT_EQ(event.full_name, "robot/odom");
@@ -86,33 +86,33 @@ TEST_F(ServicesMovedTest, SeveralMovesAreToldAsOneWithWhatIsTrueNow) {
 }
 
 TEST_F(ServicesMovedTest, AServiceThatIsGoneIsToldAsGone) {
-  const std::uint32_t known = advertise(5);
+  const GroupIndex known = advertise(5);
   subscribe();
   EXPECT_EQ(services_.withdraw(kRobot, known, now_, effects_), std::nullopt);
   EXPECT_EQ(told().old_group, known);
-  EXPECT_EQ(told().new_group, 0u);
+  EXPECT_EQ(told().new_group, kNoGroup);
   EXPECT_EQ(told().window, 0u);
 }
 
 TEST_F(ServicesMovedTest, AnIdThatIsAnotherServicesNowIsNotTakenFromThat) {
-  const std::uint32_t known = advertise(5);
+  const GroupIndex known = advertise(5);
   subscribe();
-  const std::uint32_t between = advertise(6);
+  const GroupIndex between = advertise(6);
   advertise(7);
   now_ += std::chrono::hours{1};  // long enough at rest
   EXPECT_EQ(advertise(5, "robot/laser", known), known);
   EXPECT_EQ(advertise(5, "robot/scan", between), between);
-  EXPECT_EQ(told().old_group, 0u);
+  EXPECT_EQ(told().old_group, kNoGroup);
   EXPECT_THAT(told().between, IsEmpty());
 }
 
 TEST_F(ServicesMovedTest, AServiceThatHasItsFormerGroupAgainIsThere) {
-  const std::uint32_t known = advertise(5);
+  const GroupIndex known = advertise(5);
   subscribe();
   EXPECT_EQ(services_.withdraw(kRobot, known, now_, effects_), std::nullopt);
   now_ += std::chrono::hours{1};
   EXPECT_EQ(advertise(5, "robot/odom", known), known);
-  EXPECT_EQ(told().old_group, 0u);
+  EXPECT_EQ(told().old_group, kNoGroup);
   EXPECT_EQ(told().new_group, known);
 }
 
@@ -129,7 +129,7 @@ TEST_F(ServicesMovedTest, GoesWithTheSubscriptionAndWithTheNode) {
 }
 
 TEST_F(ServicesMovedTest, ASubscriptionThatIsDeclaredAgainDoesNotProveThatTheEventWasRead) {
-  const std::uint32_t known = advertise(5);
+  const GroupIndex known = advertise(5);
   subscribe();
   advertise(6);
   services_.node_returned(kViewer);

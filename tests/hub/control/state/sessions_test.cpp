@@ -36,8 +36,8 @@ class SessionsTest : public ::testing::Test {
 TEST_F(SessionsTest, NewOnesGetIdsAndAlternatingShards) {
   const Session& a = create();
   const Session& b = create();
-  EXPECT_EQ(a.index, 1u);
-  EXPECT_EQ(b.index, 2u);
+  EXPECT_EQ(a.index, NodeIndex{1});
+  EXPECT_EQ(b.index, NodeIndex{2});
   EXPECT_EQ(sessions_.node_id(a), make_id<NodeId>(HubId{7}, 1));
   EXPECT_NE(a.place.shard, b.place.shard);
   EXPECT_NE(a.place.generation, b.place.generation);
@@ -151,7 +151,7 @@ TEST_F(SessionsTest, ATokenOutlivesARenamingAndIsForTheNewNameOnceRenewed) {
 TEST_F(SessionsTest, AnEndedSessionsTokenBringsItBackUntilItIsSpent) {
   Session& session = create();
   const std::vector<std::byte> token = sessions_.token_of(session);
-  const std::uint32_t index = session.index;
+  const NodeIndex index = session.index;
   sessions_.end(session, 0ms);
   const auto claim_again = sessions_.claim({token, "", Identity::open(), 0ms});
   EXPECT_EQ(claim_again.session, nullptr);
@@ -167,22 +167,23 @@ TEST_F(SessionsTest, AnEndedSessionsTokenBringsItBackUntilItIsSpent) {
 
 TEST_F(SessionsTest, RemembersAsManyKickedOnesAsTheLimitAllows) {
   limits_.kicked_tokens = 2;
-  const std::uint32_t first = create().index;
-  for (std::uint32_t index = first; index < first + 3; ++index) {
-    if (index > first) create();
-    EXPECT_TRUE(sessions_.remember_kicked(*sessions_.find(index)));
-    sessions_.end(*sessions_.find(index), 0ms);
+  std::vector<NodeIndex> kicked;
+  for (int i = 0; i < 3; ++i) {
+    Session& session = create();
+    kicked.push_back(session.index);
+    EXPECT_TRUE(sessions_.remember_kicked(session));
+    sessions_.end(session, 0ms);
   }
   ASSERT_EQ(sessions_.kicked().size(), 2u);
-  EXPECT_EQ(sessions_.kicked()[0].index, first + 1);
-  EXPECT_EQ(sessions_.kicked()[1].index, first + 2);
+  EXPECT_EQ(sessions_.kicked()[0].index, kicked[1]);
+  EXPECT_EQ(sessions_.kicked()[1].index, kicked[2]);
 }
 
 TEST_F(SessionsTest, SaysWhereNotAllTokensOfAKickedOneHaveRoom) {
   Session& session = create();
   sessions_.renew_token(session, 0ms);
-  const std::uint32_t given = session.index + 50;
-  ASSERT_TRUE(sessions_.indices().take_free(given, 0ms));
+  const NodeIndex given{session.index.value() + 50};
+  ASSERT_TRUE(sessions_.indices().take_free(given.value(), 0ms));
   sessions_.renumber(session, given, 0ms);
   limits_.kicked_tokens = 0;
   EXPECT_FALSE(sessions_.remember_kicked(session));
@@ -198,9 +199,9 @@ TEST_F(SessionsTest, AFormerIdsTokenIsGoodAsLongAsTheSession) {
   Session& session = create();
   sessions_.renew_token(session, 0ms);
   const std::vector<std::byte> former = sessions_.token_of(session);
-  const std::uint32_t former_index = session.index;
+  const NodeIndex former_index = session.index;
   ASSERT_TRUE(sessions_.indices().take_free(70, 0ms));
-  sessions_.renumber(session, 70, 0ms);
+  sessions_.renumber(session, NodeIndex{70}, 0ms);
   const std::vector<std::byte> latest = sessions_.token_of(session);
   EXPECT_EQ(claim(former), &session) << "it may not know of the other id yet";
   EXPECT_EQ(claim(latest), &session);
@@ -208,7 +209,8 @@ TEST_F(SessionsTest, AFormerIdsTokenIsGoodAsLongAsTheSession) {
   for (const std::chrono::milliseconds later : {0ms, 1'000'000ms}) {
     const auto forgotten = sessions_.claim({former, "", Identity::open(), later});
     EXPECT_EQ(forgotten.session, nullptr);
-    EXPECT_FALSE(forgotten.token) << "the node would have two ids: " << former_index << " and 70";
+    EXPECT_FALSE(forgotten.token) << "the node would have two ids: " << former_index.value()
+                                  << " and 70";
     EXPECT_TRUE(sessions_.claim({latest, "", Identity::open(), later}).token);
   }
 }
@@ -219,7 +221,7 @@ TEST_F(SessionsTest, ASpentTokenClaimsNothing) {
   sessions_.spend_token(session);
   sessions_.end(session, 0ms);
   EXPECT_EQ(claim(token), nullptr);
-  EXPECT_EQ(sessions_.find(1), nullptr);
+  EXPECT_EQ(sessions_.find(NodeIndex{1}), nullptr);
   EXPECT_EQ(sessions_.connected(), 0u);
 }
 
@@ -259,7 +261,7 @@ TEST_F(SessionsTest, AnIndexRestsForGraceAndTheLongestWait) {
   sessions.end(**first, 0ms);
   const auto second = sessions.create(std::nullopt, 1ms);
   ASSERT_TRUE(second);
-  EXPECT_EQ((*second)->index, 2u);
+  EXPECT_EQ((*second)->index, NodeIndex{2});
   EXPECT_EQ((*second)->place.slot,
             place.slot);  // slots are free at once, told apart by their generation
   EXPECT_NE((*second)->place.generation, place.generation);

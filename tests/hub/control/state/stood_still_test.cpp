@@ -22,16 +22,16 @@ class StoodStill : public ::testing::Test {
     result.identity = Identity::open();
     return result;
   }
-  std::uint32_t join(const std::string& name) {
+  NodeIndex join(const std::string& name) {
     const auto joined = membership_.join(request(name), 0ms, effects_);
     EXPECT_TRUE(joined);
-    return joined ? joined->session->index : 0;
+    return joined ? joined->session->index : NodeIndex{};
   }
-  void lose(std::uint32_t index, std::chrono::milliseconds now) {
+  void lose(NodeIndex index, std::chrono::milliseconds now) {
     membership_.connection_ended(*membership_.sessions().find(index),
                                  {false, GoodbyeCode::done, ""}, now, effects_);
   }
-  bool is_member(std::uint32_t index, std::chrono::milliseconds now) {
+  bool is_member(NodeIndex index, std::chrono::milliseconds now) {
     membership_.tick(now, effects_);
     return membership_.sessions().find(index) != nullptr;
   }
@@ -43,7 +43,7 @@ class StoodStill : public ::testing::Test {
 
 TEST_F(StoodStill, GraceTimesStandStillToo) {
   for (const std::string name : {"robot", "reader"}) {
-    const std::uint32_t robot = join(name);
+    const NodeIndex robot = join(name);
     if (name == "reader") {
       ASSERT_TRUE(membership_.services().subscribe(robot, "robot/odom", {}, effects_));
     }
@@ -56,8 +56,8 @@ TEST_F(StoodStill, GraceTimesStandStillToo) {
 }
 
 TEST_F(StoodStill, WhatBeganMeanwhileHasAllItsTimeAndNoMore) {
-  const std::uint32_t early = join("early");
-  const std::uint32_t late = join("late");
+  const NodeIndex early = join("early");
+  const NodeIndex late = join("late");
   lose(early, 1s);
   lose(late, 61s);
   membership_.stood_still(60s, 62s);
@@ -67,7 +67,7 @@ TEST_F(StoodStill, WhatBeganMeanwhileHasAllItsTimeAndNoMore) {
 }
 
 TEST_F(StoodStill, WhoCameBackHasItsTimeToDeclare) {
-  const std::uint32_t robot = join("robot");
+  const NodeIndex robot = join("robot");
   ASSERT_TRUE(membership_.services().advertise(robot, "robot/odom", {}, 0ms, effects_));
   JoinRequest again = request("robot");
   const std::vector<std::byte> token =
@@ -77,9 +77,9 @@ TEST_F(StoodStill, WhoCameBackHasItsTimeToDeclare) {
   ASSERT_TRUE(membership_.join(again, 2s, effects_));
   membership_.stood_still(60s, 63s);
   membership_.tick(92s - 1ms, effects_);
-  EXPECT_NE(membership_.services().find_group(1), nullptr);
+  EXPECT_NE(membership_.services().find_group(GroupIndex{1}), nullptr);
   membership_.tick(92s, effects_);
-  EXPECT_EQ(membership_.services().find_group(1), nullptr);
+  EXPECT_EQ(membership_.services().find_group(GroupIndex{1}), nullptr);
 }
 
 TEST_F(StoodStill, AfterARestartThoseOfBeforeHaveTheirTime) {

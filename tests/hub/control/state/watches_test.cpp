@@ -25,7 +25,7 @@ TEST_F(WatchesTest, TellWhatThereIsAndThenWhatChanges) {
   EXPECT_EQ(take(viewer), (Texts{"begin", "present viewer", "present hall/robot",
                                  "present hall/robot/odom", "end"}));
   EXPECT_EQ(take(viewer), Texts{});
-  const std::uint32_t group = advertise(robot, "pose", "x y");
+  const GroupIndex group = advertise(robot, "pose", "x y");
   advertise(robot, "pose", "x y theta");
   end(robot, false);
   Effects effects;
@@ -111,26 +111,24 @@ TEST_F(WatchesTest, AreTrueThoughTheWorldChangesBetweenThePages) {
   bool complete = false;
   for (int step = 0; !complete; ++step) {
     ASSERT_LT(step, 1'000);
-    static_cast<void>(
-        watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
-          const auto events = proto::decode<ns::WatchEvents>(payload);
-          ASSERT_TRUE(events);
-          for (const Change& change : events->changes) {
-            complete |= change.kind == ChangeKind::end;
-            const std::string name = change.node      ? change.node->name
-                                     : change.service ? change.service->name
-                                                      : "";
-            if (name.empty()) continue;
-            const bool gone =
-                change.kind == ChangeKind::left || change.kind == ChangeKind::withdrawn;
-            if (gone) {
-              EXPECT_EQ(known.erase(name), 1u) << name << " left, and was never shown";
-            } else if (change.kind == ChangeKind::present || change.kind == ChangeKind::joined ||
-                       change.kind == ChangeKind::advertised) {
-              EXPECT_TRUE(known.insert(name).second) << name << " was shown twice";
-            }
-          }
-        }));
+    static_cast<void>(watches.serve(membership, now, [&](NodeIndex, const proto::Payload& payload) {
+      const auto events = proto::decode<ns::WatchEvents>(payload);
+      ASSERT_TRUE(events);
+      for (const Change& change : events->changes) {
+        complete |= change.kind == ChangeKind::end;
+        const std::string name = change.node      ? change.node->name
+                                 : change.service ? change.service->name
+                                                  : "";
+        if (name.empty()) continue;
+        const bool gone = change.kind == ChangeKind::left || change.kind == ChangeKind::withdrawn;
+        if (gone) {
+          EXPECT_EQ(known.erase(name), 1u) << name << " left, and was never shown";
+        } else if (change.kind == ChangeKind::present || change.kind == ChangeKind::joined ||
+                   change.kind == ChangeKind::advertised) {
+          EXPECT_TRUE(known.insert(name).second) << name << " was shown twice";
+        }
+      }
+    }));
     watches.taken(viewer.index, {1, 1});
     if (!robots.empty()) {
       end(*robots[(static_cast<std::size_t>(step) * 7919) % robots.size()], true);
@@ -332,7 +330,7 @@ TEST_F(WatchesTest, OneServingIsABoundedPieceOfWork) {
                                       "/nobody"}),
             Status::done);
   int pieces = 1;
-  const auto send = [](std::uint32_t, const proto::Payload&) {};
+  const auto send = [](NodeIndex, const proto::Payload&) {};
   while (watches.serve(membership, now, send)) ++pieces;
   EXPECT_GE(pieces, 1'000 / 64);
 }
@@ -349,12 +347,11 @@ TEST_F(WatchesTest, FewThatBeginAsThePatternDoesAreNotLookedForAmongAll) {
             Status::done);
   int pieces = 0;
   for (; told[ChangeKind::end] == 0 && pieces < 1'000; ++pieces) {
-    static_cast<void>(
-        watches.serve(membership, now, [&](std::uint32_t, const proto::Payload& payload) {
-          const auto events = proto::decode<ns::WatchEvents>(payload);
-          ASSERT_TRUE(events);
-          for (const Change& change : events->changes) ++told[change.kind];
-        }));
+    static_cast<void>(watches.serve(membership, now, [&](NodeIndex, const proto::Payload& payload) {
+      const auto events = proto::decode<ns::WatchEvents>(payload);
+      ASSERT_TRUE(events);
+      for (const Change& change : events->changes) ++told[change.kind];
+    }));
     watches.taken(viewer.index, {1, 4});
   }
   EXPECT_EQ(told[ChangeKind::begin], 1);

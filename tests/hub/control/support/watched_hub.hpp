@@ -32,8 +32,8 @@ class WatchedHub {
     membership.connection_ended(session, {for_good, proto::GoodbyeCode::done, ""}, now, effects);
     note(effects);
   }
-  std::uint32_t advertise(const Session& session, const std::string& service,
-                          const std::string& metadata = {}) {
+  GroupIndex advertise(const Session& session, const std::string& service,
+                       const std::string& metadata = {}) {
     Effects effects;
     ServiceTerms terms;
     terms.metadata = metadata;
@@ -55,13 +55,12 @@ class WatchedHub {
     return answer ? proto::Status::done : answer.error().status;
   }
   void serve() {
-    while (
-        watches.serve(membership, now, [this](std::uint32_t node, const proto::Payload& payload) {
-          EXPECT_LE(payload.size(), limits.watch_event_bytes);
-          const auto events = proto::decode<proto::ns::WatchEvents>(payload);
-          ASSERT_TRUE(events) << events.error().sentence;
-          waiting[node].push_back(*events);
-        })) {
+    while (watches.serve(membership, now, [this](NodeIndex node, const proto::Payload& payload) {
+      EXPECT_LE(payload.size(), limits.watch_event_bytes);
+      const auto events = proto::decode<proto::ns::WatchEvents>(payload);
+      ASSERT_TRUE(events) << events.error().sentence;
+      waiting[node].push_back(*events);
+    })) {
     }
   }
   /// What a node was told and has not taken yet, as "kind name"; it takes all of it.
@@ -103,7 +102,7 @@ class WatchedHub {
   std::chrono::milliseconds now{1'000};
   Membership membership{Sessions::Options{kHub, 2, Placement::spread}, limits};
   Watches watches{HubTitle{kHub, "hub-7"}, kEpoch, limits};
-  std::map<std::uint32_t, std::deque<proto::ns::WatchEvents>> waiting;
+  std::map<NodeIndex, std::deque<proto::ns::WatchEvents>> waiting;
 };
 
 }  // namespace gimnet::hub
