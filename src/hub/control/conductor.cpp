@@ -90,7 +90,7 @@ std::optional<Goodbye> Conductor::admit(Stranger& stranger, const proto::Hello& 
   request.origin = Origin{stranger.peer.transport, stranger.peer.address};
   // Root and the hub's own user need no bound: they can end the hub.
   if (!stranger.rights.administer)
-    request.crowd = crowd_of(stranger.peer.transport, stranger.peer.address);
+    request.crowd = crowd_of(stranger.identity, stranger.peer.address);
   request.resumes = hello.resume;
   request.rights = stranger.rights;
   request.identity = stranger.identity;

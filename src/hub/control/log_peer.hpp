@@ -1,10 +1,13 @@
 #pragma once
 
+#include <string>
 #include <string_view>
+
+#include "hub/control/state/identity.hpp"
 
 namespace gimnet::hub {
 
-/// Who a peer is for the log's rates: the address without its port, or the user behind a Unix
+/// The name of a peer for the log's rates: the address without its port, or the user behind a Unix
 /// socket without its process, so that a new connection is no new peer. `address` is as PeerInfo
 /// has it. Valid until: `address` changes.
 [[nodiscard]] constexpr std::string_view log_peer(std::string_view transport,
@@ -14,8 +17,8 @@ namespace gimnet::hub {
   return user == std::string_view::npos ? address : address.substr(user);
 }
 
-/// Who a peer is for limits on strangers: its address without the port; "" over loopback or a Unix
-/// socket, where many are behind one address by right. Valid until: `address` changes.
+/// The name of a peer for limits on strangers: its address without the port; "" over loopback or a
+/// Unix socket, where many are behind one address by right. Valid until: `address` changes.
 [[nodiscard]] constexpr std::string_view remote_address(std::string_view transport,
                                                         std::string_view address) {
   if (transport != "tcp") return {};
@@ -24,11 +27,11 @@ namespace gimnet::hub {
   return local ? std::string_view{} : log_peer(transport, address);
 }
 
-/// The crowd that a peer counts in, of which none may have more than half of the places: as
-/// remote_address(), and over a Unix socket the user. Valid until: `address` changes.
-[[nodiscard]] constexpr std::string_view crowd_of(std::string_view transport,
-                                                  std::string_view address) {
-  return transport == "unix" ? log_peer(transport, address) : remote_address(transport, address);
+/// The crowd that a peer counts in, of which none may have more than half of the places: the user
+/// of a Unix socket, and of TCP peers the remote_address().
+[[nodiscard]] inline std::string crowd_of(const Identity& identity, std::string_view address) {
+  return identity == Identity::open() ? std::string{remote_address("tcp", address)}
+                                      : identity.text();
 }
 
 }  // namespace gimnet::hub

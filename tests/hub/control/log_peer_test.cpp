@@ -34,10 +34,10 @@ TEST(RemoteAddress, IsNoneForThisMachinesOwn) {
 }
 
 TEST(CrowdOf, IsTheAddressOfAnotherMachineOrTheUser) {
-  EXPECT_EQ(crowd_of("tcp", "10.0.0.1:5000"), "10.0.0.1");
-  EXPECT_EQ(crowd_of("tcp", "127.0.0.1:5000"), "");
-  EXPECT_EQ(crowd_of("unix", "pid 77 uid 1000"), "uid 1000");
-  EXPECT_EQ(crowd_of("unix", "unknown"), "unknown");
+  EXPECT_EQ(crowd_of(Identity::open(), "10.0.0.1:5000"), "10.0.0.1");
+  EXPECT_EQ(crowd_of(Identity::open(), "127.0.0.1:5000"), "");
+  EXPECT_EQ(crowd_of(Identity::of_user(1000), "pid 77 uid 1000"), "uid 1000");
+  EXPECT_EQ(crowd_of(Identity{}, "unknown"), "unknown");
 }
 
 }  // namespace
