@@ -272,6 +272,9 @@ std::size_t LaneQueue::capacity_bytes() const {
 void LaneQueue::trim() {
   entries_.trim();
   if (!entries_.empty()) return;
+  // An empty lane has indexes if the message that was looked up in it was then refused.
+  forget_streams();
+  forget_messages();
   streams_.reset();
   messages_.reset();
 }

@@ -354,5 +354,19 @@ TEST_F(LaneQueueTest, RemembersNoStreamOfAnEarlierBurst) {
   EXPECT_FALSE(lane.replace_latest(again, older));
 }
 
+// A message that was looked up in an empty lane and then refused leaves indexes behind.
+TEST_F(LaneQueueTest, CanBeTrimmedBetweenALookUpAndTheNextMessage) {
+  const TestFrame latest{.flags = 3 | proto::kFlagKeyed};
+  Entry older;
+  Entry refused = entry("key____1", latest);
+  EXPECT_FALSE(lane.replace_latest(refused, older));
+  lane.trim();
+  Entry next = entry("key____1", latest);
+  EXPECT_FALSE(lane.replace_latest(next, older));
+  lane.push(std::move(next));
+  Entry newest = entry("key____1", latest);
+  EXPECT_TRUE(lane.replace_latest(newest, older));
+}
+
 }  // namespace
 }  // namespace gimnet::hub
