@@ -43,6 +43,7 @@ enum class Happening : std::uint8_t {
   gone_with_connection,
   hub_full,
   crowd_full,
+  crowd_made_room,
   room_made,
   declarer_made_room,
   services_limit,

@@ -201,7 +201,8 @@ void Model::make_way(const Hello& hello, const Verdict& verdict, milliseconds no
     census_.add(Happening::name_taken_over);
     end(holder->second, now);
   }
-  if (verdict.session == 0) make_room(hello.hello.role, now);
+  if (verdict.session != 0) return;
+  make_room(crowd_of(hello.place, hello.may_administer), hello.hello.role, now);
 }
 
 void Model::take_name(std::uint32_t index, const std::string& name, milliseconds now) {

@@ -255,9 +255,11 @@ class Model final : public Witness {
   [[nodiscard]] bool is_full_for(const Hello& hello) const;
   [[nodiscard]] std::size_t size_of(const std::string& crowd) const;
   [[nodiscard]] bool declares_something(std::uint32_t index) const;
-  void make_room(proto::Role role, milliseconds now);
+  void make_room(const std::string& crowd, proto::Role role, milliseconds now);
   /// The next one to make way, but not that one; nothing: nobody is away.
   [[nodiscard]] std::optional<std::uint32_t> longest_away(std::uint32_t but) const;
+  [[nodiscard]] std::optional<std::uint32_t> longest_away_of(const std::string& crowd,
+                                                             std::uint32_t but) const;
   void take_new_index(std::uint32_t index, milliseconds now);
   /// `granted`: that was kept before.
   void give_node(std::uint32_t index, bool granted);

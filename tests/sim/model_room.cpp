@@ -36,10 +36,17 @@ bool Model::is_full_for(const Hello& hello) const {
   const std::string crowd = crowd_of(hello.place, hello.may_administer);
   const bool joins_its_own = holder != 0 && sessions_.at(holder).crowd == crowd;
   if (crowd.empty()) return false;
-  return size_of(crowd) - (joins_its_own ? 1 : 0) >= limits_.nodes - limits_.nodes / 2;
+  const std::size_t own = (joins_its_own ? 1u : 0u) + (longest_away_of(crowd, holder) ? 1u : 0u);
+  return size_of(crowd) - own >= limits_.nodes - limits_.nodes / 2;
 }
 
-void Model::make_room(Role role, milliseconds now) {
+void Model::make_room(const std::string& crowd, Role role, milliseconds now) {
+  if (has_half(crowd)) {
+    const std::optional<std::uint32_t> own = longest_away_of(crowd, 0);
+    require(own.has_value(), Checker::limits, "a crowd is let in beyond its half of the places");
+    census_.add(Happening::crowd_made_room);
+    end(*own, now);
+  }
   if (sessions_.size() < limits_.nodes) return;
   const std::optional<std::uint32_t> away = longest_away(0);
   if (!away && sessions_.size() < places_for(role)) return;
@@ -61,6 +68,16 @@ std::optional<std::uint32_t> Model::longest_away(std::uint32_t but) const {
   for (const auto& [index, session] : sessions_) {
     if (session.connected || index == but) continue;
     if (!found || rank(index) < rank(*found)) found = index;
+  }
+  return found;
+}
+
+std::optional<std::uint32_t> Model::longest_away_of(const std::string& crowd,
+                                                    std::uint32_t but) const {
+  std::optional<std::uint32_t> found;
+  for (const auto& [index, session] : sessions_) {
+    if (session.connected || index == but || session.crowd != crowd) continue;
+    if (!found || session.away_order < sessions_.at(*found).away_order) found = index;
   }
   return found;
 }

@@ -82,7 +82,7 @@ Result<Membership::Joined, proto::Goodbye> Membership::session_for(const JoinReq
     claim.session->came_back = true;
     return Joined{claim.session, false};
   }
-  make_room(now, effects);
+  make_room(request.crowd, now, effects);
   const Result<Session*, proto::Goodbye> created =
       claim.token ? sessions_.restore(*claim.token, request.shard_hint, now, places_for(request))
                   : sessions_.create(request.shard_hint, now, places_for(request));
@@ -338,12 +338,18 @@ std::optional<proto::Goodbye> Membership::room_refusal(const JoinRequest& reques
   if (!request.crowd.empty()) {
     const bool of_crowd =
         holder != nullptr && holder->crowd != nullptr && holder->crowd->first == request.crowd;
-    if (auto refusal = sessions_.crowd_refusal(request.crowd, of_crowd ? 1 : 0)) return refusal;
+    // The same holds within its crowd.
+    const std::size_t own = of_crowd ? 1 : 0;
+    const std::size_t more = sessions_.away_of(request.crowd) > own ? 1 : 0;
+    if (auto refusal = sessions_.crowd_refusal(request.crowd, own + more)) return refusal;
   }
   return claim.token ? std::nullopt : sessions_.id_refusal(now);
 }
 
-void Membership::make_room(milliseconds now, Effects& effects) {
+void Membership::make_room(std::string_view crowd, milliseconds now, Effects& effects) {
+  if (!crowd.empty() && sessions_.crowd_refusal(crowd)) {
+    if (Session* away = sessions_.longest_away_of(crowd)) end(*away, now, effects);
+  }
   if (!sessions_.full()) return;
   if (Session* away = sessions_.longest_away()) end(*away, now, effects);
 }

@@ -158,7 +158,7 @@ class Membership {
                                                            std::chrono::milliseconds now);
   /// At the limit on nodes, the session that is away longest makes way for a newcomer: first of
   /// those that declared nothing, then of all.
-  void make_room(std::chrono::milliseconds now, Effects& effects);
+  void make_room(std::string_view crowd, std::chrono::milliseconds now, Effects& effects);
   void take_name(Session& session, const std::string& name, std::chrono::milliseconds now,
                  Effects& effects);
   void end(Session& session, std::chrono::milliseconds now, Effects& effects);

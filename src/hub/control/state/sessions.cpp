@@ -103,11 +103,11 @@ std::optional<proto::Goodbye> Sessions::full_refusal(Places places, std::size_t 
                             limit};
 }
 
-std::optional<proto::Goodbye> Sessions::crowd_refusal(std::string_view crowd,
-                                                      std::size_t ending) const {
+std::optional<proto::Goodbye> Sessions::crowd_refusal(std::string_view crowd, std::size_t ending) {
   // Rounded up, so that a hub of one place is of use to others.
   const std::uint64_t most = (limits_.nodes + 1) / 2;
-  if (crowds_.size_of(crowd) < most + ending) return std::nullopt;
+  const Crowd* found = crowds_.find(crowd);
+  if (found == nullptr || found->sessions < most + ending) return std::nullopt;
   return proto::Goodbye{proto::GoodbyeCode::hub_full,
                         "nodes of " + std::string{crowd} + " have half of this hub's places (" +
                             std::to_string(most) + " of " + std::to_string(limits_.nodes) +
@@ -149,7 +149,7 @@ void Sessions::attach(Session& session, milliseconds now) {
 }
 
 void Sessions::move_to_crowd(Session& session, std::string_view crowd) {
-  crowds_.leave(std::exchange(session.crowd, nullptr));
+  crowds_.leave(std::exchange(session.crowd, nullptr), !session.connected);
   session.crowd = crowds_.join(crowd);
 }
 
@@ -157,10 +157,15 @@ void Sessions::begin_grace(Session& session, milliseconds now, Declared declared
   GIMNET_CHECK(session.connected);
   session.connected = false;
   --connected_;
-  DueList<Away>& away = declared == Declared::nothing ? away_idle_ : away_declared_;
-  away.add({now + milliseconds{limits_.grace_ms}, session.index, session.place.generation,
-            session.attachment},
-           sessions_.size(), [this](const Away& each) { return !still_away(each); });
+  DueList<Absence>& away = declared == Declared::nothing ? away_idle_ : away_declared_;
+  const Absence absence{now + milliseconds{limits_.grace_ms}, session.index,
+                        session.place.generation, session.attachment};
+  const auto is_void = [this](const Absence& each) { return !still_away(each); };
+  away.add(absence, sessions_.size(), is_void);
+  if (session.crowd == nullptr) return;
+  Crowd& crowd = session.crowd->second;
+  ++crowd.away;
+  crowd.absences.add(absence, crowd.sessions, is_void);
 }
 
 void Sessions::stood_still(milliseconds time, milliseconds now) {
@@ -179,8 +184,10 @@ void Sessions::renumber(Session& session, NodeIndex index, milliseconds now) {
     if (moved.index == former) moved.index = index;
   }
   renumbered_[former] = {index, session.number};
-  for (DueList<Away>* list : {&away_idle_, &away_declared_}) {
-    for (Away& away : *list) {
+  DueList<Absence>* of_crowd = session.crowd == nullptr ? nullptr : &session.crowd->second.absences;
+  for (DueList<Absence>* list : {&away_idle_, &away_declared_, of_crowd}) {
+    if (list == nullptr) continue;
+    for (Absence& away : *list) {
       if (away.index == former && away.generation == session.place.generation) away.index = index;
     }
   }
@@ -222,7 +229,7 @@ void Sessions::end(Session& session, milliseconds now) {
     renumbered_.erase(former);
   }
   if (session.connected) --connected_;
-  crowds_.leave(session.crowd);
+  crowds_.leave(session.crowd, !session.connected);
   const NodeIndex index = session.index;
   slots_.give_back(session.place);
   indices_.give_back(index.value(), now);
@@ -236,9 +243,19 @@ Session* Sessions::next_expired(milliseconds now) {
 
 Session* Sessions::longest_away() { return next_expired(milliseconds::max()); }
 
-Session* Sessions::take_due(DueList<Away>& away, milliseconds now) {
+std::size_t Sessions::away_of(std::string_view crowd) {
+  const Crowd* found = crowds_.find(crowd);
+  return found == nullptr ? 0 : found->away;
+}
+
+Session* Sessions::longest_away_of(std::string_view crowd) {
+  Crowd* found = crowds_.find(crowd);
+  return found == nullptr ? nullptr : take_due(found->absences, milliseconds::max());
+}
+
+Session* Sessions::take_due(DueList<Absence>& away, milliseconds now) {
   while (!away.empty() && away.front().until <= now) {
-    const Away due = away.front();
+    const Absence due = away.front();
     away.pop_front();
     if (still_away(due)) return find(due.index);
   }
@@ -247,13 +264,13 @@ Session* Sessions::take_due(DueList<Away>& away, milliseconds now) {
 
 std::optional<milliseconds> Sessions::next_expiry() const {
   std::optional<milliseconds> expiry;
-  for (const DueList<Away>* away : {&away_idle_, &away_declared_}) {
+  for (const DueList<Absence>* away : {&away_idle_, &away_declared_}) {
     if (!away->empty() && (!expiry || away->front().until < *expiry)) expiry = away->front().until;
   }
   return expiry;
 }
 
-bool Sessions::still_away(const Away& away) const {
+bool Sessions::still_away(const Absence& away) const {
   const Session* session = find(away.index);
   return session != nullptr && !session->connected &&
          session->place.generation == away.generation && session->attachment == away.attachment;

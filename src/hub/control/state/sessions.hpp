@@ -187,10 +187,14 @@ class Sessions {
   /// Why nobody can be taken in, though so many sessions end first; nothing: there is room.
   [[nodiscard]] std::optional<proto::Goodbye> full_refusal(Places places,
                                                            std::size_t ending = 0) const;
+  /// The session of that crowd that is away longest, or nullptr. The caller ends it.
+  [[nodiscard]] Session* longest_away_of(std::string_view crowd);
+  /// Sessions of that crowd within their grace time.
+  [[nodiscard]] std::size_t away_of(std::string_view crowd);
   /// Why nobody of that crowd can be taken in, though so many of its sessions end first; nothing:
   /// it has less than half of the places.
   [[nodiscard]] std::optional<proto::Goodbye> crowd_refusal(std::string_view crowd,
-                                                            std::size_t ending = 0) const;
+                                                            std::size_t ending = 0);
   /// Are there as many sessions as the limit allows?
   [[nodiscard]] bool full() const { return sessions_.size() >= limits_.nodes; }
   /// When to ask next_expired() again; nothing if nobody is away.
@@ -210,18 +214,12 @@ class Sessions {
     NodeIndex index;
     SessionNumber number = 0;
   };
-  struct Away {
-    std::chrono::milliseconds until;
-    NodeIndex index;
-    std::uint32_t generation;
-    std::uint32_t attachment;
-  };
   /// The next of `away` that is due at `now`, taken off the list, or nullptr.
-  [[nodiscard]] Session* take_due(DueList<Away>& away, std::chrono::milliseconds now);
+  [[nodiscard]] Session* take_due(DueList<Absence>& away, std::chrono::milliseconds now);
   Session& put(NodeIndex index, SessionNumber number, std::optional<std::uint16_t> shard_hint,
                std::chrono::milliseconds now);
   /// Is it still the absence that was noted?
-  [[nodiscard]] bool still_away(const Away& away) const;
+  [[nodiscard]] bool still_away(const Absence& away) const;
 
   const Limits& limits_;
   const HubId hub_;
@@ -238,8 +236,8 @@ class Sessions {
   Crowds crowds_;
   // All grace times are equal, so each list is in the order of absence. There are two, so that
   // longest_away() finds one that declared nothing at once.
-  DueList<Away> away_idle_;
-  DueList<Away> away_declared_;
+  DueList<Absence> away_idle_;
+  DueList<Absence> away_declared_;
   std::size_t connected_ = 0;
 };
 

@@ -134,13 +134,27 @@ TEST_F(FullHub, OneCrowdHasHalfOfThePlaces) {
   EXPECT_EQ(refused("a", 1s, "10.0.0.1"), GoodbyeCode::done);
 }
 
-TEST_F(FullHub, WhoIsAwayCountsInItsCrowdAndMakesWayForItsOwnName) {
+TEST_F(FullHub, OneThatIsAwayMakesWayForItsOwnName) {
   refused("a", 0ms, "10.0.0.1");
   refused("b", 0ms, "10.0.0.1");
   lose(*membership_.sessions().find(*membership_.directory().find("a")), 1s);
-  EXPECT_EQ(refused("c", 2s, "10.0.0.1"), GoodbyeCode::hub_full);
   EXPECT_EQ(refused("a", 2s, "10.0.0.1"), GoodbyeCode::done);
-  EXPECT_EQ(refused("c", 2s, "10.0.0.2"), GoodbyeCode::done);
+  EXPECT_TRUE(membership_.directory().find("b"));
+}
+
+TEST_F(FullHub, OneThatIsAwayLongestMakesWayInItsCrowd) {
+  refused("elsewhere", 0ms, "10.0.0.2");
+  lose(*membership_.sessions().find(*membership_.directory().find("elsewhere")), 0ms);
+  refused("a", 0ms, "10.0.0.1");
+  refused("b", 0ms, "10.0.0.1");
+  lose(*membership_.sessions().find(*membership_.directory().find("b")), 1s);
+  lose(*membership_.sessions().find(*membership_.directory().find("a")), 2s);
+  EXPECT_EQ(refused("c", 3s, "10.0.0.1"), GoodbyeCode::done);
+  EXPECT_FALSE(membership_.directory().find("b"));
+  EXPECT_TRUE(membership_.directory().find("elsewhere")) << "of another crowd";
+  EXPECT_EQ(refused("d", 3s, "10.0.0.1"), GoodbyeCode::done);
+  EXPECT_FALSE(membership_.directory().find("a"));
+  EXPECT_EQ(refused("e", 3s, "10.0.0.1"), GoodbyeCode::hub_full) << "nobody of it is away";
 }
 
 TEST_F(FullHub, ANodeThatComesBackFromElsewhereCountsThere) {
