@@ -93,8 +93,10 @@ struct Limits {
   }
   /// Those of the four fields laneN_bytes. REQUIRES: lane < 4.
   [[nodiscard]] std::uint64_t lane_bytes(std::size_t lane) const {
-    const std::uint64_t by_lane[] = {lane0_bytes, lane1_bytes, lane2_bytes, lane3_bytes};
-    return by_lane[lane];
+    // A table of members, not of values: each message that is queued asks.
+    static constexpr std::uint64_t Limits::* kByLane[] = {
+        &Limits::lane0_bytes, &Limits::lane1_bytes, &Limits::lane2_bytes, &Limits::lane3_bytes};
+    return this->*kByLane[lane];
   }
 };
 

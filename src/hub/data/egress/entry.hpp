@@ -20,7 +20,7 @@ struct Entry {
       0;  ///< of all pieces; 0: this entry was dropped or replaced and is skipped
   std::uint32_t message_number = 0;                   ///< of a fragmented message
   std::uint32_t shortest_bytes = proto::kHeaderSize;  ///< no frame is shorter
-  std::uint8_t source = 0;                            ///< its place in the lane's SourceBytes
+  std::uint8_t source = 0;  ///< its place in the lane's SourceBytes, once those are counted
   bool fragmented = false;
   bool complete = true;   ///< the last fragment is here
   bool touched = false;   ///< a fragment of it was handed to the kernel: it is finished

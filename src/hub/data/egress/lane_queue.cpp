@@ -72,7 +72,7 @@ LatestStream LaneQueue::stream_of(const Entry& entry) {
 
 void LaneQueue::count(const Entry& entry) {
   bytes_ += entry.size;
-  sources_.add(entry.source, entry.size);
+  if (counts_sources_) sources_.add(entry.source, entry.size);
   if (entry.block) block_bytes_ += entry.size;
   if (entry.latest) latest_bytes_ += entry.size;
   if (entry.touched) touched_bytes_ += entry.size;
@@ -80,13 +80,14 @@ void LaneQueue::count(const Entry& entry) {
 
 void LaneQueue::discount(const Entry& entry) {
   bytes_ -= entry.size;
-  sources_.take(entry.source, entry.size);
+  if (counts_sources_) sources_.take(entry.source, entry.size);
   if (entry.block) block_bytes_ -= entry.size;
   if (entry.latest) latest_bytes_ -= entry.size;
   if (entry.touched) touched_bytes_ -= entry.size;
 }
 
 void LaneQueue::push(Entry entry) {
+  if (counts_sources_) note_source(entry);
   count(entry);
   if (!entries_.empty()) {
     Entry& last = entries_.back();
@@ -161,6 +162,7 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   if (waiting.frames == 0 || !waiting.latest || waiting.touched) return false;
   if (stream_of(waiting) != stream) return false;  // it took the place of one that was dropped
   discount(waiting);
+  if (counts_sources_) note_source(entry);
   count(entry);
   older = std::exchange(waiting, std::move(entry));
   note_message(waiting, found->second);
@@ -224,7 +226,7 @@ Entry& LaneQueue::front() {
 
 void LaneQueue::on_left(const Entry& entry, std::uint32_t bytes) {
   bytes_ -= bytes;
-  sources_.take(entry.source, bytes);
+  if (counts_sources_) sources_.take(entry.source, bytes);
   if (entry.block) block_bytes_ -= bytes;
   if (entry.latest) latest_bytes_ -= bytes;
   if (entry.touched) touched_bytes_ -= bytes;
@@ -238,8 +240,20 @@ void LaneQueue::pop_front() {
 void LaneQueue::skip_dead() {
   while (!entries_.empty() && entries_.front().frames == 0) entries_.pop_front();
   if (!entries_.empty()) return;
+  counts_sources_ = false;
   forget_streams();
   forget_messages();
+}
+
+void LaneQueue::count_sources() {
+  sources_ = SourceBytes{};
+  for (std::uint64_t number = entries_.first_number(); number != entries_.end_number(); ++number) {
+    Entry& each = entries_.at(number);
+    if (each.frames == 0) continue;
+    note_source(each);
+    sources_.add(each.source, each.size);
+  }
+  counts_sources_ = true;
 }
 
 /// From here on LATEST entries that are pushed are remembered by their stream.

@@ -42,7 +42,7 @@ class LaneQueue {
     if (!entry.fragmented || entry.touched) return;
     entry.touched = true;
     touched_bytes_ += entry.size;
-    if (entry.block) return;
+    if (entry.block || !counts_sources_) return;
     sources_.take(entry.source, entry.size);
     entry.source += SourceBytes::kFixed;
     sources_.add(entry.source, entry.size);
@@ -61,7 +61,7 @@ class LaneQueue {
     last.size += bytes;
     last.frames += frames;
     bytes_ += bytes;
-    sources_.add(last.source, bytes);
+    if (counts_sources_) sources_.add(last.source, bytes);
     if (last.block) block_bytes_ += bytes;
   }
   /// The entry that still waits for more fragments of that message, or nullptr.
@@ -79,8 +79,17 @@ class LaneQueue {
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Waiting bytes by source, and the source that loses messages when the lane is full.
-  [[nodiscard]] SourceBytes& sources() { return sources_; }
+  /// Waiting bytes by source, and the source that loses messages when the lane is full. Counted
+  /// from the first call on until the lane is empty, since most lanes are never full.
+  [[nodiscard]] SourceBytes& sources() {
+    if (!counts_sources_) count_sources();
+    return sources_;
+  }
+  /// Fills in the place at which the entry counts. REQUIRES: it is not empty.
+  static void note_source(Entry& entry) {
+    entry.source = SourceBytes::place_of(NodeId{entry.run.header().src});
+    if (entry.block || entry.touched) entry.source += SourceBytes::kFixed;
+  }
   /// The node that sent what counts at that place, as the first entries show it; 0: none of them.
   [[nodiscard]] NodeId source_at(std::uint8_t place);
 
@@ -116,6 +125,7 @@ class LaneQueue {
   /// REQUIRES: oldest_hint_ is the oldest entry that may be dropped.
   [[nodiscard]] std::uint64_t find_oldest_of(std::uint8_t place);
   void close_gap(std::uint64_t number);
+  void count_sources();
   void count(const Entry& entry);
   void discount(const Entry& entry);
   void skip_dead();
@@ -131,6 +141,7 @@ class LaneQueue {
   std::uint64_t block_bytes_ = 0;
   std::uint64_t latest_bytes_ = 0;
   std::uint64_t touched_bytes_ = 0;
+  bool counts_sources_ = false;  ///< sources_ has all that waits
   SourceBytes sources_;
   std::uint64_t oldest_hint_ = 0;  ///< no droppable entry has a lower number
   bool indexed_ = false;           ///< streams_ names every LATEST entry that waits

@@ -117,7 +117,6 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   entry.latest = header.policy() == proto::Policy::latest;
   entry.shared = handover.fan_out;
   entry.shortest_bytes = handover.shortest_bytes;
-  entry.source = SourceBytes::place_of(NodeId{header.src});
   if (header.has(proto::kFlagFragment)) {
     const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
     if (frame && frame->fragment) {
@@ -127,7 +126,6 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
       entry.complete = frame->fragment->offset + frame->payload.size() == frame->fragment->total;
     }
   }
-  if (entry.block || entry.touched) entry.source += SourceBytes::kFixed;
   return entry;
 }
 
@@ -147,7 +145,8 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
     context.tally.queued -= run.frames;
     return push_in_pieces(run, header, handover, context);
   }
-  const bool has_room = run.size <= room(lane, proto::is_block(header), context.limits);
+  const bool has_room = surely_fits(lanes.queues[lane].bytes() + run.size, lane, context.limits) ||
+                        run.size <= room(lane, proto::is_block(header), context.limits);
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
@@ -167,8 +166,11 @@ void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_in
   Entry& last = lane.entries().back();
   last.shortest_bytes =
       proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
-  const auto open_room = static_cast<std::uint32_t>(std::min<std::uint64_t>(
-      chunk_->capacity - chunk_used_, room(lane_index, last.block, limits)));
+  std::uint32_t open_room = chunk_->capacity - chunk_used_;
+  if (!surely_fits(lane.bytes() + open_room, lane_index, limits)) {
+    open_room = static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(open_room, room(lane_index, last.block, limits)));
+  }
   lanes_->open = {open_room,
                   load_le<std::uint32_t>(last.run.bytes + proto::kAttributesOffset),
                   load_le<std::uint64_t>(last.run.bytes + proto::kAddressesOffset),

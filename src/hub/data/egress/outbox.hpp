@@ -213,6 +213,11 @@ class Outbox {
   /// Bytes that still fit: of messages sent with BLOCK into half of the lane, of others into what
   /// those leave, at least the other half.
   [[nodiscard]] std::uint64_t room(std::size_t lane, bool block, const Limits& limits) const;
+  /// Does so much fit in the lane, whatever of it is sent with BLOCK?
+  [[nodiscard]] static bool surely_fits(std::uint64_t bytes, std::size_t lane,
+                                        const Limits& limits) {
+    return bytes <= limits.lane_bytes(lane) / 2;
+  }
   /// Bytes that may wait of messages that are not sent with BLOCK.
   [[nodiscard]] std::uint64_t share_of_others(std::size_t lane, const Limits& limits) const;
   [[nodiscard]] bool fits(const Entry& entry, std::size_t lane, const Limits& limits) const {

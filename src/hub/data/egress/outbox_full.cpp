@@ -182,6 +182,7 @@ void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& con
 void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
   SourceBytes& sources = lane.sources();
+  LaneQueue::note_source(entry);
   const std::uint64_t limit = context.limits.lane_bytes(lane_index);
   // Behind much of BLOCK the oldest messages would be dropped before their turn came, always.
   const bool new_goes = lane.block_bytes() > limit / 4;
