@@ -188,7 +188,8 @@ Result<RobotLog> load_robot_log(const std::string& path) {
     if (!more) return more.error();
     if (!*more) break;
     LogRecord record;
-    const Result<LineKind> kind = parse_carmen_line(line, record);
+    const Result<LineKind> kind = reader->is_too_long() ? Error{"the line is longer than 1 MiB"}
+                                                        : parse_carmen_line(line, record);
     if (!kind) {
       if (log.skipped++ == 0) {
         log.first_skipped =
@@ -204,7 +205,12 @@ Result<RobotLog> load_robot_log(const std::string& path) {
           fmt::format("{}: more than {} ODOM and FLASER lines; cut the log", path, kLogRecordsMax)};
     }
   }
+  if (reader->is_cut()) {
+    log.cut = fmt::format("{}: the gzip archive ends too early; {} lines were read", path,
+                          reader->line_number());
+  }
   if (log.records.empty()) {
+    if (!log.cut.empty()) return Error{log.cut + ", none of them ODOM or FLASER"};
     std::string sentence =
         fmt::format("{}: no ODOM and no FLASER line in {} lines; is it a CARMEN log?", path,
                     reader->line_number());

@@ -38,6 +38,8 @@ struct RobotLog {
   std::uint64_t skipped = 0;
   /// The first of them: file, line number and what is wrong with it. Empty: there is none.
   std::string first_skipped;
+  /// A sentence that the archive ends too early, with the number of lines read. Empty: it is whole.
+  std::string cut;
 
   [[nodiscard]] double duration_s() const { return records.empty() ? 0.0 : records.back().due_s; }
 };

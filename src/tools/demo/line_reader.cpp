@@ -41,11 +41,7 @@ Result<bool> LineReader::fill() {
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
-  if (end_ == buffer_.size()) {
-    if (buffer_.size() >= kLineBytesMax)
-      return failure("the line is longer than 1 MiB; is this a text file?");
-    buffer_.resize(buffer_.size() * 2);
-  }
+  if (end_ == buffer_.size()) buffer_.resize(buffer_.size() * 2);
   const int got =
       gzread(file_.get(), buffer_.data() + end_, static_cast<unsigned>(buffer_.size() - end_));
   if (got <= 0) {
@@ -53,7 +49,10 @@ Result<bool> LineReader::fill() {
     const char* text = gzerror(file_.get(), &code);
     // zlib tells of an archive that was cut only by this code, after it has given what it could
     // read.
-    if (code == Z_BUF_ERROR) return failure("the gzip archive ends too early; copy the file again");
+    if (code == Z_BUF_ERROR) {
+      is_cut_ = true;
+      return false;
+    }
     if (got < 0)
       return failure(fmt::format("damaged gzip archive ({}); copy the file again", text));
     return false;
@@ -66,25 +65,36 @@ Result<bool> LineReader::fill() {
 
 Result<bool> LineReader::next(std::string_view& line) {
   std::size_t searched = begin_;
+  is_too_long_ = false;
   while (true) {
     const void* found = std::memchr(buffer_.data() + searched, '\n', end_ - searched);
-    if (found != nullptr || (at_end_ && begin_ < end_)) {
+    if (found != nullptr || (at_end_ && (begin_ < end_ || is_too_long_))) {
       const std::size_t stop =
           found == nullptr
               ? end_
               : static_cast<std::size_t>(static_cast<const char*>(found) - buffer_.data());
       line = std::string_view(buffer_.data() + begin_, stop - begin_);
+      if (is_too_long_) line = {};
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       begin_ = found == nullptr ? end_ : stop + 1;
       ++line_number_;
       return true;
     }
     if (at_end_) return false;
+    if (end_ - begin_ >= kLineBytesMax) {
+      is_too_long_ = true;
+      begin_ = end_;
+    }
     searched = end_ - begin_;
     const Result<bool> more = fill();
     if (!more) return more.error();
     if (!*more) {
       at_end_ = true;
+      // The last line of a cut archive is a part of a line.
+      if (is_cut_) {
+        begin_ = end_;
+        is_too_long_ = false;
+      }
       searched = begin_;
     }
   }

@@ -26,12 +26,17 @@ class LineReader {
   static Result<LineReader> open(const std::string& path);
 
   /// Stores the next line without its end in `line`; false at the end of the file.
-  /// Errors: damaged or cut archive, a limit passed; the sentence names file and line. Valid until:
-  /// the next call.
+  /// A line beyond kLineBytesMax is given empty, with is_too_long(). A cut archive ends after its
+  /// last whole line, with is_cut(). Errors: damaged archive, `kFileBytesMax` passed; the sentence
+  /// names file and line. Valid until: the next call.
   [[nodiscard]] Result<bool> next(std::string_view& line);
 
   /// Number of the line that next() gave last, from 1.
   [[nodiscard]] std::uint64_t line_number() const { return line_number_; }
+  /// The line that next() gave last was longer than kLineBytesMax.
+  [[nodiscard]] bool is_too_long() const { return is_too_long_; }
+  /// The gzip archive ended too early.
+  [[nodiscard]] bool is_cut() const { return is_cut_; }
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
@@ -51,6 +56,8 @@ class LineReader {
   std::uint64_t line_number_ = 0;
   std::uint64_t bytes_read_ = 0;
   bool at_end_ = false;
+  bool is_too_long_ = false;
+  bool is_cut_ = false;
 };
 
 }  // namespace gimnet::demo

@@ -37,6 +37,7 @@ void complain(const Error& error) { say(fmt::format("gimnet-demo: {}\n", error.s
 // Says which lines of a log are left out; a recording that is cut or damaged in one place still
 // plays.
 void say_skipped(const RobotLog& log) {
+  if (!log.cut.empty()) say(fmt::format("gimnet-demo: {}\n", log.cut));
   if (log.skipped == 0) return;
   say(fmt::format("gimnet-demo: skipped {} {} of the log that cannot be read; the first is {}\n",
                   log.skipped, log.skipped == 1 ? "line" : "lines", log.first_skipped));

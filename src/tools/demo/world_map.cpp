@@ -117,8 +117,12 @@ Result<WorldMap> WorldMap::load(const std::string& path) {
     const Result<bool> more = reader->next(line);
     if (!more) return more.error();
     if (!*more) break;
+    if (reader->is_too_long())
+      return Error{fmt::format("{}: a line is longer than 1 MiB; is this a text file?", path)};
     text.append(line).push_back('\n');
   }
+  if (reader->is_cut())
+    return Error{fmt::format("{}: the gzip archive ends too early; copy the file again", path)};
   Result<WorldMap> map = parse(text);
   if (!map) return Error{fmt::format("{}: {}", path, map.error().sentence)};
   return map;

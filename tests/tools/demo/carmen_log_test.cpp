@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "tests/tools/demo/temporary_file.hpp"
 
 namespace gimnet::demo {
@@ -110,6 +112,29 @@ TEST(RobotLog, SkipsLinesThatCannotBeReadAndNamesTheFirst) {
   EXPECT_EQ(log->skipped, 2U);
   EXPECT_THAT(log->pacing_note, HasSubstr("skipped 2 lines that cannot be read"));
   EXPECT_EQ(log->first_skipped, file.path() + ":3: ODOM: the line ends before theta; was it cut?");
+}
+
+TEST(RobotLog, CountsALineThatIsTooLongAsOneBadLine) {
+  const TemporaryFile file(std::string(kOdom) + "\n" + std::string(2U << 20, '\0') + "\n" +
+                           std::string(kOdom) + "\n");
+  const auto log = load_robot_log(file.path());
+  ASSERT_TRUE(log.has_value());
+  EXPECT_EQ(log->records.size(), 2U);
+  EXPECT_EQ(log->skipped, 1U);
+  EXPECT_EQ(log->first_skipped, file.path() + ":2: the line is longer than 1 MiB");
+}
+
+TEST(RobotLog, PlaysTheWholeLinesOfACutArchiveAndSaysSo) {
+  std::string text;
+  for (int number = 0; number < 5'000; ++number)
+    text += std::string(kOdom) + "\n# " + std::to_string(number * 7919) + "\n";
+  const TemporaryFile file(text, true);
+  std::filesystem::resize_file(file.path(), std::filesystem::file_size(file.path()) / 2);
+  const auto log = load_robot_log(file.path());
+  ASSERT_TRUE(log.has_value());
+  EXPECT_FALSE(log->records.empty());
+  EXPECT_THAT(log->cut, testing::HasSubstr("the gzip archive ends too early; "));
+  EXPECT_THAT(log->cut, testing::HasSubstr(" lines were read"));
 }
 
 TEST(RobotLog, RefusesALogInWhichNothingHappens) {
