@@ -184,7 +184,7 @@ ExitCode run_pub(Session& session) {
   if (sent && !session.stopped()) sent = session.node().drain(kDrain);
   retaining.look_at(publisher->retained());
   // What is retained is for those who come later.
-  const std::string unheard_words = unheard.sentence(options.target);
+  const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
   write_counts(session, *publisher);
   if (sent && options.stay && !session.stopped()) sent = stay(session, standing);

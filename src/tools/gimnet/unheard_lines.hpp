@@ -17,8 +17,9 @@ class UnheardLines {
     ++lines_;
     if (alone_ && subscribers == 0) ++unheard_;
   }
-  /// What to say about them; "" if there are none.
-  [[nodiscard]] std::string sentence(const std::string& service) const;
+  /// The sentence about them; "" if there are none. `waited`: the first line was held until
+  /// somebody had subscribed.
+  [[nodiscard]] std::string sentence(const std::string& service, bool waited) const;
 
  private:
   bool alone_ = false;

@@ -11,7 +11,7 @@ class UnheardLinesTest : public testing::Test {
     lines_.before_line(before);
     lines_.after_line(after);
   }
-  [[nodiscard]] std::string said() const { return lines_.sentence("r/s"); }
+  [[nodiscard]] std::string said() const { return lines_.sentence("r/s", false); }
 
   UnheardLines lines_;
 };
@@ -36,6 +36,13 @@ TEST_F(UnheardLinesTest, SomeOfThem) {
   publish(1, 0);
   publish(0, 0);
   EXPECT_EQ(said(), std::string("2 of 5 lines") + kWhy);
+}
+
+TEST_F(UnheardLinesTest, AfterAWaitTheLastSubscriberHadLeft) {
+  publish(1, 1);
+  publish(0, 0);
+  EXPECT_EQ(lines_.sentence("r/s", true),
+            "1 of 2 lines went to nobody: the last subscriber of r/s had left");
 }
 
 TEST_F(UnheardLinesTest, WhomSomebodyMayHaveHeardIsNotAmongThem) {
