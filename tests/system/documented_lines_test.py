@@ -145,6 +145,12 @@ class Documented(unittest.TestCase):
         line = next(line for line in all_lines() if line.page == "README.md" and line.text.startswith("g++ "))
         folder = self.compile(line)
         folder = self.compile(line._replace(text=line.text.replace("publisher", "subscriber")))
+        for name in ("publisher", "subscriber"):
+            alone = Process([folder / name], env={"GIMNET_HUB": "tcp://127.0.0.1:1"})
+            self.addCleanup(alone.end)
+            self.assertEqual(alone.wait(), 1, alone.err)
+            self.assertIn("tcp://127.0.0.1:1", alone.err)
+            self.assertNotIn("terminate called", alone.err)
         hub = Hub(self)
         subscriber = self.start(hub, folder / "subscriber")
         publisher = self.start(hub, folder / "publisher")
