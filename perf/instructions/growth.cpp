@@ -109,7 +109,7 @@ Work names(std::size_t count) {
   auto directory = std::make_shared<Directory>();
   auto all = std::make_shared<std::vector<std::string>>(colliding_names(count));
   return [directory, all] {
-    for (const std::string& name : *all) directory->put(name, 1);
+    for (const std::string& name : *all) directory->put(name, NodeIndex{1});
     for (const std::string& name : *all) {
       if (!directory->find(name)) wrong("a name was lost");
     }
