@@ -141,10 +141,13 @@ Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publ
 
 /// The service stands, and with it what is retained, until a signal comes or the hub wants this
 /// node no more.
-Outcome<void> stay(Session& session, Standing& standing) {
+Outcome<void> stay(Session& session, const Publisher& publisher, Standing& standing,
+                   Retaining& retaining) {
   session.output().flush();
   say("the input has ended; the service stays until Ctrl-C");
   while (session.stop().wait_until(steady_now_ns() + kLookNs)) {
+    // The hub's word on the last message may come after the message was taken.
+    retaining.look_at(publisher.retained());
     if (!standing.goes_on()) break;
   }
   return standing.outcome();
@@ -187,7 +190,7 @@ ExitCode run_pub(Session& session) {
   const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
   write_counts(session, *publisher);
-  if (sent && options.stay && !session.stopped()) sent = stay(session, standing);
+  if (sent && options.stay && !session.stopped()) sent = stay(session, *publisher, standing, retaining);
   if (!sent) return session.fail(sent.failure());
   return session.finish();
 }
