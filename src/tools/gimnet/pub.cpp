@@ -190,7 +190,8 @@ ExitCode run_pub(Session& session) {
   const std::string unheard_words = unheard.sentence(options.target, options.subscribers > 0);
   if (sent && !session.stopped() && !options.retain && !unheard_words.empty()) say(unheard_words);
   write_counts(session, *publisher);
-  if (sent && options.stay && !session.stopped()) sent = stay(session, *publisher, standing, retaining);
+  if (sent && options.stay && !session.stopped())
+    sent = stay(session, *publisher, standing, retaining);
   if (!sent) return session.fail(sent.failure());
   return session.finish();
 }
