@@ -294,11 +294,12 @@ void SimNode::sees_the_end(const WirePointer& wire) {
   if (wire_ == wire) {
     // Refused beside its own earlier connection: then that one is of no use either.
     const bool refused = !link().welcomed;
-    // Without a word the hub is not there; it may be soon. A bad name or role it says in error
-    // only.
+    // Without a word the hub is not there; it may be soon. A full hub may have room soon, or can
+    // write its state again. A bad name or role it says in error only.
     const GoodbyeCode told = link().told.value_or(GoodbyeCode::draining);
     const bool in_error = told == GoodbyeCode::bad_name || told == GoodbyeCode::not_allowed;
-    const bool soon_again = refused && (told == GoodbyeCode::draining || in_error);
+    const bool for_now = told == GoodbyeCode::draining || told == GoodbyeCode::hub_full;
+    const bool soon_again = refused && (for_now || in_error);
     lose_connection();
     // Half of those who were kicked show their token all the same.
     if (std::exchange(was_kicked_, false) && around_.setting.random.chance(500)) forget_life();
