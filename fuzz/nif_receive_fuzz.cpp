@@ -69,7 +69,7 @@ class Witness final : public InboundHost {
   }
   void on_taken(std::uint32_t from, const proto::Taken& taken) override {
     note("taken " + std::to_string(taken.message));
-    outbound_.on_taken(from, taken);
+    static_cast<void>(outbound_.on_taken(from, taken));
   }
   bool on_report(const proto::Report& report) override { return outbound_.on_report(report); }
   [[nodiscard]] std::optional<ReportedMessages::Start> message_of(
