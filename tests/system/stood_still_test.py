@@ -88,8 +88,9 @@ class Stopped(unittest.TestCase):
         wait_until(lambda: "the connection broke" in sender.err, "a sender that hears nothing")
         hub.process.signal(signal.SIGKILL)
         hub.process.wait()
-        self.assertEqual(sender.wait(), 1, sender.err)
+        self.assertEqual(sender.wait(), 3, sender.err)
         self.assertIn("lost the connection to the hub", sender.err)
+        self.assertIn("1 of 1 messages were acknowledged, and the rest of the input was not sent", sender.err)
 
 
 if __name__ == "__main__":

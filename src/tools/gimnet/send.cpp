@@ -173,6 +173,12 @@ ExitCode run_send(Session& session) {
   session.output().flush();
   const ExitCode code = session.fail(reason(session, counts, unsent, sent.failure()));
   if (session.stopped()) return code;
+  if (code == ExitCode::no_connection) {
+    say(std::to_string(counts.acknowledged) + " of " + std::to_string(counts.sent) +
+        " messages were acknowledged" +
+        (unsent == Unsent::nothing ? "" : ", and the rest of the input was not sent"));
+    return code;
+  }
   return nobody_there(counts) ? ExitCode::not_found : ExitCode::failed;
 }
 
