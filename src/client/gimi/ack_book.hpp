@@ -48,7 +48,7 @@ class AckBook {
   };
   /// What is to be acknowledged, now: it is no longer due. Zeros if nothing came from there.
   Entry acknowledge(const StreamName& sender);
-  /// What was to be acknowledged could not be sent: it is due still. True: it had become due anew.
+  /// An acknowledgement could not be sent: it stays due. True: it had become due anew.
   bool hold(const StreamName& sender);
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
 

@@ -19,7 +19,7 @@ constexpr auto kTooLarge = static_cast<std::uint16_t>(proto::Status::limit);
 /// Of what another node says, so many bytes are kept.
 constexpr std::size_t kPeerWordsMax = 256;
 
-/// What another node says, fit for a terminal.
+/// Another node's words, fit for a terminal.
 std::string plain_words(std::string_view sentence) {
   std::string words(sentence.substr(0, kPeerWordsMax));
   std::ranges::replace_if(words, [](char c) { return c < ' ' || c > '~'; }, '?');
@@ -183,8 +183,7 @@ nif_verdict Reception::refuse(const nif_incoming& in, const proto::gimi::Message
   const StreamName name = received_stream_of(in);
   const Envelope envelope{
       in.from, NIF_UNICAST, NIF_POLICY_DEFAULT, static_cast<Lane>(in.lane), name.key, 0, 0};
-  // Where there is no room for it, the sender learns from the next PONG that the message is not
-  // here.
+  // If there is no room for it, the sender learns from the next PONG that the message is missing.
   static_cast<void>(uplink_.transmit(
       envelope, {view.header.sequence, proto::gimi::Operation::error, 0, 0, view.header.epoch},
       false, proto::gimi::encode_failure({kTooLarge, sentence, name.group}), 0));

@@ -213,7 +213,7 @@ void ServiceTable::unsubscribe(const Subscribed& service) {
 void ServiceTable::leave(const Subscribed& service) {
   if (--service->handles != 0) return;
   stop_reading(*service);
-  // Where the hub is not told in time, because of a break, NIF tells it with the next connection.
+  // If the hub is not told in time, because of a break, NIF tells it with the next connection.
   if (service->followed) {
     const Asking asking(*this);                            // for what is told behind the answer
     static_cast<void>(ask(service, {}, kLeaveTimeoutMs));  // without a pace
@@ -296,7 +296,7 @@ void ServiceTable::unfollow(const std::string& full_name, const std::function<bo
   }
   service->followed = false;
   if (service->handles != 0) return;
-  // Where the hub is not told in time, NIF tells it with the next connection.
+  // If the hub is not told in time, NIF tells it with the next connection.
   static_cast<void>(nif_unsubscribe(uplink_.node(), full_name.c_str(), kLeaveTimeoutMs));
   forget_unused(service);
 }

@@ -34,8 +34,8 @@ class MessageAssembler {
   /// `now_ns`: steady_now_ns() when it was read. REQUIRES: view.fragment.
   [[nodiscard]] Step take(const proto::FrameView& view, std::int64_t now_ns);
 
-  /// What the sender is to know by now of its large messages; of nobody: what all senders are to
-  /// know. For TAKENs that could not be sent when they were due.
+  /// The present progress of the sender's large messages; of nobody: of those of all senders. For
+  /// TAKENs that could not be sent when they were due.
   [[nodiscard]] std::vector<Notice> notices_again(std::optional<NodeId> sender);
 
   /// A frame without fragment header came in that stream. Returns messages lost by it.

@@ -237,9 +237,9 @@ void Node::redial() {
 
 bool Node::dials_again(const Failure& failure) const {
   if (failure.status == NIF_REPLACED) return false;
-  // Who dials only because it was given another id (`renumbered`) has one try.
+  // A node that dials only because it was given another id (`renumbered`) has one try.
   if (!resumes_only_) return options_.reconnect;
-  // What a hub keeps of a session is gone with its process.
+  // A session that a hub keeps is gone with its process.
   return !failure.nobody_listens && steady_now_ns() - broke_ns_ < session_.grace_ns;
 }
 

@@ -41,7 +41,7 @@ void give_to_user_above(const std::string& path) {
   const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
   if (::geteuid() != 0 || ::fstatat(folder.get(), "..", &above, 0) != 0 || above.st_uid == 0)
     return;
-  // Where the system refuses, the folder stays root's, which can use it.
+  // If the system refuses, the folder stays root's, which can use it.
   static_cast<void>(!::fchown(folder.get(), above.st_uid, above.st_gid));
 }
 

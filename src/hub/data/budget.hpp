@@ -91,7 +91,7 @@ class BudgetLease {
   /// Once a turn: finds out whether memory is scarce, and how large a connection's share is then.
   void begin_turn(std::uint64_t now_ms) {
     if (now_ms - told_ms_ >= kTellMs) tell(now_ms);
-    // What this shard has leased and does not use is free, too.
+    // Bytes that this shard has leased and does not use are free, too.
     const std::int64_t free = budget_.left() + std::max<std::int64_t>(leased_ - used_, 0);
     scarce_ = free < budget_.total() / kScarcePart;
     if (scarce_) update_share();

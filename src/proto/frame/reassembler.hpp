@@ -82,7 +82,7 @@ class Reassembler {
   /// The connection is new: everything unfinished is lost. Returns how many messages.
   std::uint32_t clear();
 
-  /// How far one stream is.
+  /// Progress of one stream.
   struct Standing {
     FragmentStream stream;
     std::optional<FragmentHeader> open;  ///< the unfinished message; `offset`: bytes taken so far

@@ -25,7 +25,7 @@ class MissedMessages {
 
   /// Returns how many of its service did not come up to this one. REQUIRES: it is of a service.
   std::uint64_t take(const Message& message);
-  /// How many of those were skipped for newer ones (Delivery::latest).
+  /// Number of those that were skipped for newer ones (Delivery::latest).
   [[nodiscard]] std::uint64_t skipped(std::string_view service) const;
   /// As the node counts now what it cannot give out. So many of what did not come since the last
   /// time count as missed, but are told by LostMessages. REQUIRES: the node receives nothing but

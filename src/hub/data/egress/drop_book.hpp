@@ -86,7 +86,7 @@ class DropBook {
   };
 
   void remember(const std::byte* frame, std::uint32_t frames, proto::DropReason reason);
-  /// What reports are merged by.
+  /// Reports of one subject are merged.
   struct Subject {
     NodeId sender;
     proto::DropReason reason{};

@@ -74,8 +74,8 @@ class Outbox {
     if (counters_ != nullptr) counters_->dropped.add(frames);
   }
 
-  /// What was written and is not confirmed counts as this connection's bytes; nullptr: nothing is
-  /// kept. Valid until: the next call, which comes before the buffer goes.
+  /// The buffer of frames that were written and are not confirmed: they count as this connection's
+  /// bytes. Null: nothing is kept. Valid until: the next call, which comes before the buffer goes.
   void set_resume(ResumeBuffer* resume) { resume_ = resume; }
   /// So many bytes more, or fewer, are held by the pacer for this connection.
   void add_paced(std::uint64_t bytes, EgressContext& context) {
@@ -104,7 +104,7 @@ class Outbox {
 
   /// Frames were dropped because a lane was full, and the node was not told yet.
   [[nodiscard]] bool has_untold_losses() const { return has_untold_losses_; }
-  /// What the node is to be told of them. REQUIRES: there are some.
+  /// The message that tells the node of them. REQUIRES: there are some.
   [[nodiscard]] proto::flow::Dropped untold_losses() const { return lanes_->losses.message(); }
   void on_losses_told() {
     has_untold_losses_ = false;
@@ -231,7 +231,7 @@ class Outbox {
                       EgressContext& context);
   /// Makes room for the entry in the connection's share, as far as its policy allows.
   void make_share(const Entry& entry, const proto::FrameHeader& header, EgressContext& context);
-  /// What waits is at its limit, whatever the entry's lane has room for.
+  /// Is memory for waiting data used up, whatever room the entry's lane has?
   [[nodiscard]] bool memory_refuses(const Entry& entry, EgressContext& context) const {
     return context.budget.exhausted() ||
            (backlog_ && !entry.block && over_share(entry.size, context));

@@ -78,8 +78,8 @@ void Outbox::release_written(std::uint64_t bytes, EgressContext& context) {
   if (resume_ != nullptr && wanted > share) resume_->let_go(wanted - share, counted_);
 }
 
-/// What was written goes first: a connection that holds loses nothing by it. Then what waits, of
-/// the least urgent lane first, and of none that is more urgent than the entry's.
+/// Frames that were written go first: a connection that holds loses nothing by it. Then waiting
+/// messages go, of the least urgent lane first, and of none more urgent than the entry's.
 void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
                         EgressContext& context) {
   if (!over_share(entry.size, context)) return;

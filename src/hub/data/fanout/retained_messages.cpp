@@ -20,8 +20,7 @@ Mail mail_about(MailKind kind, const GroupStart& start) {
   return mail;
 }
 
-/// What a message counts that begins with a frame of `frame_bytes` and has a payload of so many
-/// bytes.
+/// Bytes that a message counts. It begins with a frame of `frame_bytes`.
 std::uint64_t charge_of(const proto::FrameView& frame, std::uint32_t payload_bytes,
                         std::uint32_t frame_bytes) {
   const std::uint32_t data =
