@@ -29,6 +29,12 @@ class Sending(unittest.TestCase):
         self.assertEqual(send.code, NOT_FOUND, send.err)
         self.assertIn("cannot send to 'bot/odom': it gives data and takes none; subscribe to it", send.err)
 
+    def test_a_service_that_a_node_does_not_have(self):
+        send = run_gimnet(self.hub, "send", "bot/driv", data=b"one\n")
+        self.assertEqual(send.code, NOT_FOUND, send.err)
+        self.assertIn("there is no node 'bot/driv', and the node 'bot' has no service 'driv'; did you mean bot/drive?",
+                      send.err)
+
     def test_a_node_of_that_name_goes_first(self):
         receiver = start_gimnet(self, self.hub, "recv", "--name", "bot/drive", "--raw", "-n", "1")
         self.hub.wait_for_node("bot/drive")

@@ -7,6 +7,7 @@ import subprocess
 import unittest
 
 from support.processes import Hub, run_gimnet, start_gimnet, start_recv
+from support.waiting import wait_until
 from support.wire import FLAG_KEYED, Client
 
 DATA, ACK, PING = 0, 1, 5  # operations of GIMI
@@ -40,6 +41,14 @@ class Pings(unittest.TestCase):
         lost = run_gimnet(hub, "ping", "7.999", "-c", "1", "--json")
         self.assertEqual(json.loads(lost.out), {"target": "7.999", "id": "7.999", "sent": 1, "lost": 1, "min": None,
                                                 "mean": None, "p50": None, "p99": None, "p99.9": None, "max": None})
+
+    def test_one_that_is_away_is_told(self):
+        hub = Hub(self)
+        Client(self, hub).join("B").socket.close()
+        wait_until(lambda: any(not node["connected"] for node in hub.nodes()), "B away")
+        ping = run_gimnet(hub, "ping", "B", "-c", "1", "-W", "0.1")
+        self.assertNotEqual(ping.code, 0)
+        self.assertIn("the node 'B' is away: its connection broke", ping.err)
 
 
 class Acknowledgements(unittest.TestCase):

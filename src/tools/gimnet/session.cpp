@@ -70,12 +70,14 @@ std::optional<Peer> Session::find(std::string_view name) {
   auto peer = node_->find(name);
   if (peer.is(Status::not_found) && is_listed(name))
     peer = node_->find(name);  // it came in between
-  if (peer) return *peer;
+  if (peer) {
+    tell_if_away(name);
+    return *peer;
+  }
   Failure failure = peer.failure();
   if (failure.status == Status::not_found) {
     failure.sentence = "there is no node '" + std::string(name) + "'";
-    failure.sentence +=
-        is_service(name) ? service_words(name) : id_words(name) + nearest_name("node", name);
+    failure.sentence += words_for_no_node(name);
   }
   code_ = fail(failure);
   return std::nullopt;
@@ -85,6 +87,22 @@ std::string Session::id_words(std::string_view name) {
   if (name.empty() || name.find_first_not_of("0123456789") != std::string_view::npos) return {};
   const std::string own = node_->peer().text();
   return "; the id is written " + own.substr(0, own.find('.') + 1) + std::string(name);
+}
+
+std::string Session::words_for_no_node(std::string_view name) {
+  if (is_service(name)) return service_words(name);
+  const std::size_t slash = name.rfind('/');
+  if (slash == std::string_view::npos || !is_listed(name.substr(0, slash)))
+    return id_words(name) + nearest_name("node", name);
+  return ", and the node '" + std::string(name.substr(0, slash)) + "' has no service '" +
+         std::string(name.substr(slash + 1)) + "'" + nearest_name("service", name);
+}
+
+void Session::tell_if_away(std::string_view name) {
+  const auto nodes = node_->nodes(name);
+  if (!nodes || nodes->empty() || nodes->front().name != name || nodes->front().connected) return;
+  say("the node '" + std::string(name) +
+      "' is away: its connection broke; `gimnet watch` shows when it is back");
 }
 
 bool Session::is_listed(std::string_view name) {

@@ -71,6 +71,10 @@ class Session {
   [[nodiscard]] NodeOptions options_for(NodeOptions how) const;
   [[nodiscard]] std::optional<ExitCode> settle(Outcome<Node> joined);
   [[nodiscard]] std::string advice(std::string remedy) const;
+  /// Words beside "there is no node": the service of that name, the node before the slash, or
+  /// the nearest name.
+  [[nodiscard]] std::string words_for_no_node(std::string_view name);
+  void tell_if_away(std::string_view name);
   [[nodiscard]] bool is_listed(std::string_view name);
   /// Of a word that is a number: how an id is written; "" of any other.
   [[nodiscard]] std::string id_words(std::string_view name);
