@@ -46,9 +46,8 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
       continue;  // so many letters differ at least
     const std::size_t distance = distance_between(
         word, candidate, [](char one, char other) { return lower(one) == lower(other); });
-    // Where every letter is another one nothing is near: a name of one letter is two steps from any
-    // two.
-    if (distance < least && distance < longer) {
+    // Half of the letters must be right: of three letters two steps lead nearly anywhere.
+    if (distance < least && 2 * distance <= longer) {
       least = distance;
       best = candidate;
     }

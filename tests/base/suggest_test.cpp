@@ -46,6 +46,7 @@ TEST(DidYouMean, IsSilentWhenNothingIsNear) {
   EXPECT_EQ(did_you_mean("x", {}), "");
   constexpr std::array<std::string_view, 2> kShort{"B", "hz"};
   for (const char* word : {"7", "99", "zq", "x"}) EXPECT_EQ(did_you_mean(word, kShort), "") << word;
+  EXPECT_EQ(did_you_mean("foo", std::array<std::string_view, 1>{"log"}), "");
   EXPECT_EQ(did_you_mean("b1", kShort), "; did you mean B?");
   EXPECT_EQ(did_you_mean("h", kShort), "; did you mean hz?");
 }
