@@ -19,15 +19,14 @@ from collections.abc import Callable
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
+import report  # noqa: E402
 from driver import against, catalogue, control, instructions, suite, usage  # noqa: E402
 from driver.judgement import faults_of  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
-from driver.report import write_report  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus, remove_left_folders  # noqa: E402
 from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "performance.md"
 QUICK_SECONDS = 0.4
 WHOLE_SECONDS = 0.5
 RUNS = 3
@@ -45,7 +44,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="the scenarios that decide, in a few minutes")
     parser.add_argument("--smoke", action="store_true", help="every scenario for a second, with 200 clients for 10,000: is anything lost? times mean nothing")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
-    parser.add_argument("--report", action="store_true", help="write docs/performance.md and its pictures, of the whole suite")
+    parser.add_argument("--report", action="store_true", help="fill docs/performance.md, its plots and full tables, of the whole suite")
     parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
                         metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; default: all; the null relay is always among them")
     parser.add_argument("--against", metavar="REV", help="build that version too, and say which is faster; --runs are pairs")
@@ -53,7 +52,7 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
                         help="instructions per frame against the budget; of one script: where they go")
     parser.add_argument("--update", action="store_true", help="with --instructions: make what is counted the budget")
     parser.add_argument("--control", action="store_true",
-                        help="what the control plane takes, into perf/control.json; with --report into docs/performance.md, too")
+                        help="what the control plane takes, into docs/performance/control.json; with --report into docs/performance.md, too")
     parser.add_argument("--packages", action="store_true", help="only print the Debian packages that the run needs")
     parser.add_argument("--scenario", nargs="+", action="extend", choices=list(suite.SCENARIOS), default=[],
                         metavar="NAME", help=", ".join(suite.SCENARIOS))
@@ -200,7 +199,7 @@ def measure(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(document, indent=1))
     if arguments.report:
-        write_report(document, DOCUMENT)
+        report.write_report(document, report.PAGE)
     return judge(outcomes, rows, arguments.smoke)
 
 
@@ -250,10 +249,10 @@ def measure_control(arguments: argparse.Namespace) -> int:
     figures |= {"date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(), "machine": describe_machine(),
                 "version": program_version()}
     control.FIGURES.write_text(json.dumps(figures, indent=1) + "\n")
-    section = control.make_section(figures)
-    say(section)
+    text = control.describe(figures)
+    say(text)
     if arguments.report:
-        DOCUMENT.write_text(control.put_into(DOCUMENT.read_text(), section))
+        report.PAGE.write_text(report.fill(report.PAGE.read_text(), "control", text))
     return 0
 
 

@@ -1,6 +1,5 @@
 """What the control plane takes: how long until everybody is back after kill -9, how the work on names and services grows with
-their number, how soon the tool answers. `./dev perf --control` measures it and keeps it in perf/control.json; docs/performance.md
-has it as a section. What bystanders notice of joins every run measures: that is the next section."""
+their number, how soon the tool answers. `./dev perf --control` measures it and keeps it in docs/performance/control.json."""
 
 import json
 import os
@@ -8,21 +7,19 @@ import pathlib
 import re
 import statistics
 import subprocess
+import textwrap
 import time
 
-from driver.figures import shown, shown_with_spread
-from driver.markdown import table
+from driver.figures import shown
 from driver.subjects import SubjectError, TcpHub, allowed_cpus
 
-FIGURES = pathlib.Path(__file__).resolve().parent.parent / "control.json"
-SECTION = "## The control plane"
-NEXT_SECTIONS = ("## Joins and bystanders", "## All figures")
+FIGURES = pathlib.Path(__file__).resolve().parents[2] / "docs" / "performance" / "control.json"
 PATIENCE_SECONDS = 600
 REJOINS = 3
 ANSWERS = 20
 REJOIN_GOAL_SECONDS = 10
 ANSWER_GOAL_MS = 50
-SIZES = (1_000, 10_000, 100_000)
+SIZES = ("1000", "100000")  # names on the hub
 COMMANDS = ("status", "nodes", "services", "ping")
 _REJOIN = re.compile(r"^(\d+) nodes were back ([\d.]+) s after kill -9$", re.MULTILINE)
 _UNITS_NS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
@@ -89,56 +86,16 @@ def measure(build: pathlib.Path) -> dict:
     return {"rejoin": rejoin, "growth": read_growth(json.loads(names)), "answers_ms": time_answers(build)}
 
 
-def _growth_table(growth: dict) -> str:
-    def cells(of_size: dict) -> list[str]:
-        times = [of_size.get(str(size)) for size in SIZES]
-        ratio = times[-1] / times[0] if times[0] and times[-1] else None
-        return [shown(value / 1e3 if value is not None else None) for value in times] + [shown(ratio)]
-
-    return table(["operation", *(f"{size:,}: us" for size in SIZES), f"{SIZES[-1]:,} to {SIZES[0]:,}"],
-                 [[name, *cells(of_size)] for name, of_size in growth.items()])
-
-
-def bystanders_lines(rows: list[dict]) -> list[str]:
-    """A section; nothing where that was not measured."""
-    rows = [row for row in rows if row["scenario"] == "ping_beside_joins" and "p99_us_alone" in row]
-    if not rows:
-        return []
-    names = ("p50_us_alone", "p50_us", "p99_us_alone", "p99_us")
-    return [NEXT_SECTIONS[0], "", "Round trips of two nodes, alone and while 1,000 others connect and join (`ping_beside_joins`).", "",
-            table(["subject", "p50 alone, us", "p50 beside joins, us", "p99 alone, us", "p99 beside joins, us"],
-                  [[row["subject"], *(shown_with_spread(row, name) for name in names)] for row in rows]), ""]
-
-
-def make_section(figures: dict) -> str:
-    """Of docs/performance.md."""
+def describe(figures: dict) -> str:
+    """One paragraph for docs/performance.md, of what is kept."""
     machine, rejoin = figures["machine"], figures["rejoin"]
     seconds = [each["seconds"] for each in rejoin]
-    answers = [[f"gimnet {command}", shown(statistics.median(times)), shown(max(times))]
-               for command, times in figures["answers_ms"].items()]
-    parts = [SECTION, f"Measured by `./dev perf --control`: {figures['date']}, {machine['processor']}, {machine['cpus_allowed']} processors; "
-             f"GIMnet {figures['version']}.",
-             f"**Everybody is back** {shown(statistics.median(seconds))} s ({shown(min(seconds))} to {shown(max(seconds))}) after `kill -9` of the "
-             f"hub with {rejoin[0]['nodes']:,} nodes, under their ids and names (`tests/stress/rejoin_test.cpp`; goal {REJOIN_GOAL_SECONDS} s).",
-             "**Growth** with the number of names, and as many services, on one hub (`bench/hub/control/names_bench.cpp`), CPU time of one "
-             "operation; `list_whole`\nand `watch_snapshot/all` are about all of them.", _growth_table(figures["growth"]),
-             f"**The tool answers**: from the start of the program to its end, a hub on the same machine, {ANSWERS} times (goal {ANSWER_GOAL_MS} ms).",
-             table(["command", "median, ms", "longest, ms"], answers)]
-    return "\n\n".join(parts) + "\n"
-
-
-def section_lines(kept: pathlib.Path | None = None) -> list[str]:
-    """The section, from what is kept; nothing where nothing is."""
-    kept = kept or FIGURES
-    return [make_section(json.loads(kept.read_text()))] if kept.exists() else []
-
-
-def put_into(page: str, section: str) -> str:
-    """docs/performance.md with that section in place of the one that it has, or where it belongs."""
-    before, found, behind = page.partition(f"\n{SECTION}\n")
-    if found:
-        behind = behind[behind.index("\n## ") + 1:]
-    else:
-        at = min(page.index(f"\n{name}\n") for name in NEXT_SECTIONS if f"\n{name}\n" in page)
-        before, behind = page[:at], page[at + 1:]
-    return f"{before}\n{section}\n{behind}"
+    answers = [each for times in figures["answers_ms"].values() for each in times]
+    growth = [f"{name} {shown(times[SIZES[0]] / 1e3)} to {shown(times[SIZES[1]] / 1e3)}" for name, times in figures["growth"].items()
+              if all(size in times for size in SIZES)]
+    text = (f"{figures['date']}, {machine['processor']}, {machine['cpus_allowed']} processors, GIMnet {figures['version']}. After `kill -9` of the hub "
+            f"all {rejoin[0]['nodes']:,} nodes are back in {shown(statistics.median(seconds))} s ({shown(min(seconds))} to {shown(max(seconds))}; goal "
+            f"{REJOIN_GOAL_SECONDS} s). A command of `gimnet` takes {shown(statistics.median(answers))} ms from start to end, at most "
+            f"{shown(max(answers))} (goal {ANSWER_GOAL_MS} ms). CPU time of one operation in us, with 1,000 and with 100,000 names on the hub: "
+            f"{', '.join(growth)}.")
+    return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)

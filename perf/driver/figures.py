@@ -57,26 +57,3 @@ def shown(value: float | None) -> str:
     if abs(value) >= 100:
         return f"{value:,.0f}"
     return f"{value:.3g}"
-
-
-def shown_spread(row: dict, name: str) -> str:
-    """Smallest and largest; nothing of a single run."""
-    low, high = row.get("spread", {}).get(name, (None, None))
-    return f"{shown(low)} to {shown(high)}" if low is not None and len(values_of(row, name)) > 1 else ""
-
-
-def shown_with_spread(row: dict, name: str) -> str:
-    spread = shown_spread(row, name)
-    return shown(row.get(name)) + (f" ({spread})" if spread else "")
-
-
-def ratios(row: dict, other: dict, name: str) -> list[float]:
-    """`other` in terms of `row`, for each round that both have."""
-    theirs = {found["round"]: found for found in other["rounds"]}
-    return [theirs[found["round"]][name] / found[name] for found in row["rounds"] if found["round"] in theirs and found[name]]
-
-
-def times(values: list[float]) -> str:
-    """'1.2 times (1.1 to 1.3)'"""
-    spread = f" ({shown(min(values))} to {shown(max(values))})" if len(values) > 1 else ""
-    return f"{shown(statistics.median(values))} times{spread}"

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from driver.figures import decisive
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -18,6 +20,23 @@ class Goal:
 
     def holds(self, value: float, limit: float) -> bool:
         return value >= limit if self.at_least else value <= limit
+
+
+def standing(goal: Goal, values: list[float], limit: float) -> bool | None:
+    """Does it hold? None: its runs do not agree."""
+    held = {goal.holds(value, limit) for value in decisive(values)}
+    return held.pop() if len(held) == 1 else None
+
+
+def verdict(goal: Goal, values: list[float]) -> str:
+    reached = standing(goal, values, goal.goal)
+    if reached:
+        return "goal met"
+    of_goal = "goal undecided" if reached is None else "goal missed"
+    if goal.bound is None:
+        return of_goal
+    kept = standing(goal, values, goal.bound)
+    return f"bound met, {of_goal}" if kept else "bound undecided" if kept is None else "bound missed"
 
 
 NULL = "ratio_to_null"

@@ -1,10 +1,9 @@
 """Which runs of a group are made again because those that there are say too little."""
 
 from driver.figures import values_of
-from driver.goals import GOALS, Goal, rivals_in_goals
+from driver.goals import GOALS, Goal, rivals_in_goals, standing
 from driver.outcome import Outcome
 from driver.summary import make_rows
-from driver.verdicts import standing
 
 # Runs that lie further apart come from more than one state of the machine or of the subject: three may all have met one.
 APART_MAX = 1.5

@@ -1,7 +1,7 @@
 """From outcomes to the rows of the JSON document and of the table."""
 
 from driver.derived import add_derived
-from driver.figures import shown, shown_with_spread, summarise
+from driver.figures import shown, summarise
 from driver.outcome import Outcome
 
 
@@ -34,16 +34,10 @@ COLUMNS = (("subject", "subject"), ("transport", "transport"), ("scenario", "sce
            ("cpu_ns_per_message", "CPU ns/message"), ("ratio_to_null", "x null"), ("min", "min"), ("max", "max"),
            ("messages_per_second", "messages/s"), ("p50_us", "p50 us"), ("p99_us", "p99 us"),
            ("p999_us", "p99.9 us"), ("rss_peak_bytes", "peak bytes"), ("lost", "lost"), ("runs", "runs"))
-# With the spread beside each figure, that of one needs no columns.
-DOCUMENT_COLUMNS = tuple(column for column in COLUMNS if column[0] not in ("min", "max"))
 
 
 def cells(row: dict) -> list[str]:
     return [row[key] if isinstance(row.get(key), str) else shown(row.get(key)) for key, _ in COLUMNS]
-
-
-def document_cells(row: dict) -> list[str]:
-    return [row[key] if isinstance(row.get(key), str) else shown_with_spread(row, key) for key, _ in DOCUMENT_COLUMNS]
 
 
 def absence_lines(absences: list[dict]) -> list[str]:

@@ -81,7 +81,7 @@ def find_partial(given: list[str]) -> str | None:
     parts = [flag(name) for name in given if name in PARTS]
     if not parts:
         return None
-    return (f"--report replaces all of docs/performance.md, and {' and '.join(parts)} would leave most of it out: keep the result with --json >RESULT.json, "
+    return (f"--report replaces the figures of docs/performance.md, and {' and '.join(parts)} would leave most of it out: keep the result with --json >RESULT.json, "
             "and make a page of its own with perf/report.py RESULT.json OTHER.md")
 
 

@@ -11,10 +11,9 @@ import tempfile
 import unittest
 from unittest import mock
 
-from support import ROOT, outcome, result_of
+from support import ROOT, outcome
 import run
-from driver import catalogue, library, plots, subjects, suite
-from driver.document import make_document
+from driver import catalogue, library, subjects, suite
 from driver.goals import GOALS, RIVAL_FIELDS
 from driver.measure import Outcome, make_group
 from driver.summary import absence_lines, make_absences
@@ -244,37 +243,6 @@ class Absences(unittest.TestCase):
         self.assertEqual([each["size"] for each in absences], [16, 256])
         self.assertEqual(absence_lines(absences),
                          ["nats: one_to_one 16 B unix, one_to_one 256 B unix: it has no Unix socket"])
-
-
-class Pictures(unittest.TestCase):
-    ROWS = [{"subject": "tcphub", "scenario": scenario, "transport": transport, "size": size, "cpu_ns_per_message": cost}
-            for scenario, transport, size, cost in (("one_to_one", "tcp", 256, 80), ("one_to_one", "tcp", 16, 12),
-                                                    ("one_to_one", "unix", 16, 9), ("fan_out_10", "tcp", 16, 7))]
-
-    def test_lines_are_of_one_scenario_over_tcp_in_order(self):
-        self.assertEqual(plots.series_by_size(self.ROWS, "one_to_one"), {"tcphub": [(16, 12), (256, 80)]})
-        self.assertEqual(plots.series_by_subscribers(self.ROWS, 16), {"tcphub": [(1, 12), (10, 7)]})
-
-    def test_latency_is_the_share_that_takes_longer(self):
-        rows = [{"subject": "null", "scenario": "ping_paced", "transport": "tcp", "p50_us": 30, "p99_us": 90}]
-        (points,) = plots.series_of_latency(rows, "ping_paced").values()
-        self.assertEqual([(x, round(y, 9)) for x, y in points], [(30, 0.5), (90, 0.01)])
-
-    def test_draws_what_there_are_rows_for(self):
-        try:
-            import matplotlib  # noqa: F401
-        except ImportError:
-            self.skipTest("matplotlib is not installed")
-        with tempfile.TemporaryDirectory() as folder:
-            drawn = plots.draw_all(self.ROWS, pathlib.Path(folder))
-            self.assertEqual([name for name, _ in drawn], ["cost_by_size.png", "cost_by_subscribers.png"])
-            for name, _ in drawn:
-                self.assertTrue(pathlib.Path(folder, name).read_bytes().startswith(b"\x89PNG"))
-
-
-class Document(unittest.TestCase):
-    def test_pictures_are_linked(self):
-        self.assertIn("![a](performance/a.png)", make_document(result_of([]), ["![a](performance/a.png)"]))
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ class Arguments(unittest.TestCase):
 
     def test_a_part_of_the_suite_does_not_replace_the_whole_page(self):
         for words in ("--quick", "--scenario one_to_one", "--size 16", "--transport unix", "--only nats"):
-            self.assert_refused(f"{words} --report", "--report replaces all of docs/performance.md, and --")
+            self.assert_refused(f"{words} --report", "--report replaces the figures of docs/performance.md, and --")
         self.assert_refused("--scenario in_turns --size 16 --report",
                             "keep the result with --json >RESULT.json, and make a page of its own with perf/report.py RESULT.json OTHER.md")
 

@@ -20,7 +20,7 @@ inline constexpr int kReadsMore = 4;
 
 /// What is there, and behind a small read what came meanwhile, where that is often the case: who
 /// writes message by message has written the next one while the first was read, and both then leave
-/// in one write, which is what a message costs (docs/performance.md, "Findings"). REQUIRES: `room`
+/// in one write, which is what a message costs (docs/why-these-figures.md). REQUIRES: `room`
 /// is not empty. Thread safety: one shard.
 [[nodiscard]] inline IoResult receive_repeatedly(Connection& connection, std::span<std::byte> room,
                                                  Tally& tally) {

@@ -45,7 +45,7 @@ class Outbox {
     return true;
   }
   /// Runs below this are cheaper to copy than to reference: up to a fifth of in_turns at 1 to 2
-  /// KiB, and the same from there to 4 KiB (docs/performance.md, "Findings";
+  /// KiB, and the same from there to 4 KiB (docs/why-these-figures.md;
   /// bench/hub/data/egress/outbox_bench.cpp).
   static constexpr std::uint32_t kAppendBytesMax = 4096;
   /// Data frames for this connection. Every frame ends in a lane or in the drop book.
