@@ -15,9 +15,8 @@ import textwrap
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from driver.figures import shown, values_of  # noqa: E402
-from driver.goals import FIELD_TITLES, GOALS, verdict  # noqa: E402
-from driver.suite import CPU, SCENARIOS, Case  # noqa: E402
+from driver.rows import shown, values_of  # noqa: E402
+from driver.suite import CPU, FIELD_TITLES, GOALS, SCENARIOS, Case, verdict  # noqa: E402
 
 PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "performance.md"
 # Without these there is no page; what else there may be, it can do without.
@@ -48,7 +47,7 @@ def judge_goals(rows: list[dict]) -> list[dict]:
         row = measured.get((goal.subject, goal.scenario, goal.size, goal.transport), {"rounds": []})
         if values := values_of(row, goal.field):
             judged.append({"subject": goal.subject, "scenario": goal.scenario, "size": goal.size, "transport": goal.transport,
-                           "figure": goal.field, "bound": goal.bound, "goal": goal.goal, "at_least": goal.at_least,
+                           "figure": goal.field, "title": FIELD_TITLES[goal.field], "bound": goal.bound, "goal": goal.goal, "at_least": goal.at_least,
                            "runs": len(values), "measured": figure(row, goal.field), "verdict": verdict(goal, values)})
     return judged
 
@@ -81,9 +80,8 @@ def where_and_when(record: dict) -> str:
 
 
 def goal_text(goal: dict) -> str:
-    title = FIELD_TITLES[goal["figure"]]
     of = "" if goal["subject"] == "tcphub" else goal["subject"].removeprefix("tcphub_") + ": "
-    return f"{of}{title}: {shown(goal['measured'][0])} ({'>=' if goal['at_least'] else '<='} {shown(goal['goal'])}), {goal['verdict']}"
+    return f"{of}{goal['title']}: {shown(goal['measured'][0])} ({'>=' if goal['at_least'] else '<='} {shown(goal['goal'])}), {goal['verdict']}"
 
 
 def make_table(record: dict) -> str:

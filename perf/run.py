@@ -20,11 +20,10 @@ from collections.abc import Callable
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import report  # noqa: E402
-from driver import against, catalogue, control, instructions, suite, usage  # noqa: E402
-from driver.judgement import faults_of  # noqa: E402
+from driver import against, control, instructions, subjects, suite, usage  # noqa: E402
 from driver.measure import Outcome, Settings, run_cases, say  # noqa: E402
+from driver.rows import absence_lines, faults_of, make_absences, make_rows, text_table  # noqa: E402
 from driver.subjects import SubjectError, allowed_cpus, remove_left_folders  # noqa: E402
-from driver.summary import absence_lines, make_absences, make_rows, text_table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK_SECONDS = 0.4
@@ -45,8 +44,8 @@ def parse_arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--smoke", action="store_true", help="every scenario for a second, with 200 clients for 10,000: is anything lost? times mean nothing")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
     parser.add_argument("--report", action="store_true", help="fill docs/performance.md, its plots and full tables, of the whole suite")
-    parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=catalogue.SUBJECTS, default=[],
-                        metavar="NAME", help=", ".join(catalogue.SUBJECTS) + "; default: all; the null relay is always among them")
+    parser.add_argument("--subjects", "--only", nargs="+", action="extend", choices=subjects.SUBJECTS, default=[],
+                        metavar="NAME", help=", ".join(subjects.SUBJECTS) + "; default: all; the null relay is always among them")
     parser.add_argument("--against", metavar="REV", help="build that version too, and say which is faster; --runs are pairs")
     parser.add_argument("--instructions", nargs="?", const="", metavar="SCRIPT",
                         help="instructions per frame against the budget; of one script: where they go")
@@ -81,7 +80,7 @@ def find_impossible(arguments: argparse.Namespace) -> str | None:
             return None
         plan = choose_plan(arguments)
         # The null relay is always there, but is only something to measure where it was asked for.
-        if (why := catalogue.why_nothing(plan, arguments.subjects or list(catalogue.SUBJECTS))) is not None:
+        if (why := subjects.why_nothing(plan, arguments.subjects or list(subjects.SUBJECTS))) is not None:
             return f"there is nothing to measure: {why}"
         if mode == "--against":
             cases = cases_against(arguments)
@@ -102,7 +101,7 @@ def choose_plan(arguments: argparse.Namespace) -> suite.Plan:
 
 def chosen_subjects(arguments: argparse.Namespace) -> tuple[str, ...]:
     """In the order of the catalogue, the null relay always first: everything is compared with it."""
-    return tuple(name for name in catalogue.SUBJECTS if not arguments.subjects or name in ("null", *arguments.subjects))
+    return tuple(name for name in subjects.SUBJECTS if not arguments.subjects or name in ("null", *arguments.subjects))
 
 
 def needed_packages(arguments: argparse.Namespace) -> list[str]:
@@ -110,9 +109,10 @@ def needed_packages(arguments: argparse.Namespace) -> list[str]:
         return ["valgrind"]
     if arguments.against is not None or arguments.control:
         return []
-    packages = [catalogue.PACKAGES[name] for name in chosen_subjects(arguments) if name in catalogue.PACKAGES]
-    if any(case.spec.roles is not None for case in choose_plan(arguments)):
-        packages += [package for name, package in catalogue.LIBRARY_PACKAGES.items() if catalogue.PACKAGES[name] in packages]
+    packages = []
+    for name in chosen_subjects(arguments):
+        if name in suite.RIVALS and any(name in wanted for wanted in choose_plan(arguments).values()):
+            packages += [subjects.RIVAL_CLASSES[name].package, subjects.LIBRARY_PACKAGES[name]]
     return packages + (["python3-matplotlib"] if arguments.report else [])
 
 
@@ -165,11 +165,11 @@ def judge(outcomes: list[Outcome], rows: list[dict], is_smoke: bool) -> int:
     status = 0
     for outcome in outcomes:
         if outcome.error is not None and not outcome.is_absent:
-            is_ours = outcome.subject not in catalogue.RIVAL_CLASSES
+            is_ours = outcome.subject not in subjects.RIVAL_CLASSES
             say(f"{'error' if is_ours else 'warning'}: {outcome.subject}, {outcome.case}: {outcome.error}")
             status = 1 if is_ours else status
     for row in rows:
-        is_ours = row["subject"] not in catalogue.RIVAL_CLASSES
+        is_ours = row["subject"] not in subjects.RIVAL_CLASSES
         where = f"{row['subject']}, {row['scenario']} {row['size']} B {row['transport']}"
         for fault in faults_of(where, row, is_ours, is_smoke):
             say(str(fault))
@@ -191,7 +191,7 @@ def measure(arguments: argparse.Namespace) -> int:
     for line in absence_lines(absences):
         say(f"no row: {line}")
     document = {"results": rows, "absent": absences, "machine": describe_machine(), "version": program_version(),
-                "versions": catalogue.rival_versions(list(chosen_subjects(arguments))),
+                "versions": subjects.rival_versions(list(chosen_subjects(arguments))),
                 "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
                 "seconds": settings.seconds, "longer": [[*dataclasses.astuple(case), least, subjects] for case, (least, subjects) in
                                                                 suite.WHOLE_SECONDS.items() if settings.seconds_of is not None and not arguments.smoke],

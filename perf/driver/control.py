@@ -10,7 +10,7 @@ import subprocess
 import textwrap
 import time
 
-from driver.figures import shown
+from driver.rows import shown
 from driver.subjects import SubjectError, TcpHub, allowed_cpus
 
 FIGURES = pathlib.Path(__file__).resolve().parents[2] / "docs" / "performance" / "control.json"

@@ -1,24 +1,26 @@
 """Runs cases: each on a fresh subject, subjects in turns, so that a slow minute of the machine hits all of them."""
 
 import json
+import os
 import pathlib
+import select
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from driver.catalogue import make_subject, why_absent
-from driver.library import run_pair
-from driver.outcome import Outcome
-from driver.repetition import find_undecided, to_repeat
-from driver.subjects import Subject, SubjectError, allowed_cpus, child_setup
-from driver.suite import Case, Plan
+from driver.rows import Outcome, make_rows, values_of
+from driver.subjects import CLIENTS, READY_SECONDS, Subject, SubjectError, allowed_cpus, child_setup, make_subject, why_absent
+from driver.suite import GOALS, RIVALS, Case, Goal, Plan, standing
 
 # A generator that takes this much longer than its measurement hangs.
 EXTRA_SECONDS = 35
+LEDGER = ("ledger_gap", "dropped_frames", "queued_frames")
 # Of the time for runs that are made again, one group takes at most this much of what is left.
 GROUP_SHARE = 0.2
+# Runs that lie further apart come from more than one state of the machine or of the subject: three may all have met one.
+APART_MAX = 1.5
 
 
 @dataclass
@@ -45,21 +47,85 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+def await_ready(partner: subprocess.Popen) -> None:
+    """The partner says so when its messages would reach it."""
+    deadline = time.monotonic() + READY_SECONDS
+    line = b""
+    while not line.endswith(b"\n"):
+        ready, _, _ = select.select([partner.stdout], [], [], max(0.0, deadline - time.monotonic()))
+        piece = os.read(partner.stdout.fileno(), 100) if ready else b""
+        if not piece:
+            raise SubjectError("the answering program was not ready in time" if not ready else ended(partner))
+        line += piece
+
+
+def ended(partner: subprocess.Popen) -> str:
+    partner.wait(READY_SECONDS)
+    return f"the answering program ended with {partner.returncode}: {partner.stderr.read(2000).decode(errors='replace').strip()}"
+
+
+def run_pair(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
+    """What the asking program found. Raises SubjectError."""
+    answering, asking = case.spec.roles
+    cpus = allowed_cpus()[:1] if case.spec.one_cpu else allowed_cpus()
+    seconds = settings.length_of(subject.name, case)
+    command = [str(settings.build / "bin" / CLIENTS[subject.name]), "--connect", subject.urls[case.transport],
+               "--size", str(case.size), "--seconds", str(seconds),
+               "--patience", str(settings.patience_seconds), "--hub", str(subject.pid)]
+    partner = subprocess.Popen([*command, "--role", answering], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, preexec_fn=child_setup(cpus))
+    try:
+        await_ready(partner)
+        limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
+        try:
+            done = subprocess.run([*command, "--role", asking, "--partner", str(partner.pid)], capture_output=True,
+                                  text=True, timeout=limit, stdin=subprocess.DEVNULL, preexec_fn=child_setup(cpus))
+        except subprocess.TimeoutExpired:
+            raise SubjectError(f"{subject.name}: no result within {limit:.0f} s") from None
+        subject.check_alive()
+        if partner.poll() is not None:
+            raise SubjectError(f"{subject.name}: {ended(partner)}")
+        if done.returncode != 0:
+            raise SubjectError(f"{subject.name}: {done.stderr.strip() or f'the client ended with {done.returncode}'}")
+        findings = json.loads(done.stdout)
+    finally:
+        partner.kill()
+        partner.communicate()
+    return findings | ask_for_ledger(subject, case, settings)
+
+
+def ask_for_ledger(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
+    """What a hub of ours accounts for, now that both programs are gone; nothing of others, which keep no account."""
+    if subject.name in RIVALS:
+        return {}
+    # The scenario in which nobody is connected: it only asks at its end.
+    command = [str(settings.build / "bin" / "load_generator"), "--connect", subject.urls[case.transport],
+               "--process", str(subject.pid), "--scenario", "idle_alone", "--seconds", "0.01"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=EXTRA_SECONDS, stdin=subprocess.DEVNULL,
+                              preexec_fn=child_setup(allowed_cpus()))
+    except subprocess.TimeoutExpired:
+        raise SubjectError(f"{subject.name}: did not tell its ledger within {EXTRA_SECONDS} s") from None
+    if done.returncode != 0:
+        raise SubjectError(f"{subject.name}: did not tell its ledger: {done.stderr.strip()}")
+    return {name: value for name, value in json.loads(done.stdout).items() if name in LEDGER}
+
+
 def run_once(subject: Subject, case: Case, settings: Settings) -> dict[str, float]:
     if case.spec.roles is not None:
         with subject:
             return run_pair(subject, case, settings)
     cpus = allowed_cpus()
     seconds = settings.length_of(subject.name, case)
-    command = [str(settings.build / "bin" / "load_generator"), "--wire", subject.wire, "--scenario", case.scenario,
+    command = [str(settings.build / "bin" / "load_generator"), "--scenario", case.scenario,
                "--size", str(case.size), "--seconds", str(seconds),
                "--patience", str(settings.patience_seconds)]
     if settings.clients is not None:
         command += ["--clients", str(settings.clients)]
+    if subject.name == "null":
+        command.append("--null")
     with subject:
         command += ["--connect", subject.urls[case.transport], "--process", str(subject.pid)]
-        if case.transport in subject.publish_urls:
-            command += ["--publish-to", subject.publish_urls[case.transport]]
         limit = 3 * seconds + 5 * settings.patience_seconds + EXTRA_SECONDS
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=limit, stdin=subprocess.DEVNULL,
@@ -99,6 +165,46 @@ def run_round(members: list[Outcome], number: int, settings: Settings) -> None:
         except SubjectError as error:
             outcome.error = str(error)
             say(f"error: {outcome.case}: {outcome.error}")
+
+
+def times_apart(values: list[float]) -> float:
+    return max(values) / min(values) if values and min(values) > 0 else 1.0
+
+
+def is_wild(outcome: Outcome) -> bool:
+    metric = outcome.case.spec.metric
+    return times_apart([found[metric] for found in outcome.findings if metric in found]) > APART_MAX
+
+
+def decides_nothing(goal: Goal, row: dict) -> bool:
+    values = values_of(row, goal.field)
+    return bool(values) and None in (standing(goal, values, limit) for limit in (goal.goal, goal.bound) if limit is not None)
+
+
+def find_undecided(group: list[Outcome]) -> list[Outcome]:
+    """Those of a group with a bound or a goal that some of their runs meet and others do not."""
+    doubtful = {(row["subject"], row["scenario"], row["size"], row["transport"]) for row in make_rows(group) for goal in GOALS
+                if (goal.subject, goal.scenario, goal.size, goal.transport)
+                == (row["subject"], row["scenario"], row["size"], row["transport"]) and decides_nothing(goal, row)}
+    return [each for each in group if (each.subject, each.case.scenario, each.case.size, each.case.transport) in doubtful]
+
+
+def to_repeat(group: list[Outcome], undecided: list[Outcome]) -> list[Outcome]:
+    """The wild and the undecided ones of a group, in its order, with those that a verdict compares them with: the null relay, the
+    hub where another one is wild, and the others that goals name where the hub is; of libraries, all."""
+    doubtful = [outcome for outcome in group if outcome.error is None
+                and (is_wild(outcome) or any(outcome is each for each in undecided))]
+    return [outcome for outcome in group if outcome.error is None
+            and any(outcome is each or is_partner(outcome, each) for each in doubtful)]
+
+
+def is_partner(other: Outcome, doubtful: Outcome) -> bool:
+    case = doubtful.case
+    if case.spec.roles is not None or other.subject == "null":
+        return True
+    if other.subject == doubtful.subject and other.case.scenario == case.spec.beside:
+        return True
+    return other.case == case and other.subject == "tcphub"
 
 
 def run_group(outcomes: list[Outcome], settings: Settings) -> None:

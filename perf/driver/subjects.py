@@ -1,4 +1,7 @@
-"""The programs that are measured: how each is started, pinned to its processor, found ready, and ended."""
+"""The programs that are measured: which there are, and how each is started, pinned to its processor, found ready, and ended.
+
+Other hubs are Debian's packages, each as its documentation would have it for messages that need not be kept, and in its favour: nothing
+on disk, no passwords, TCP_NODELAY, limits that do not stand in the way. They are measured with their own libraries."""
 
 import ctypes
 import fcntl
@@ -6,13 +9,17 @@ import glob
 import io
 import os
 import pathlib
+import re
 import resource
 import select
 import shutil
 import signal
+import socket
 import subprocess
 import tempfile
 import time
+
+from driver.suite import WITH_LIBRARY, Case, Plan
 
 READY_SECONDS = 15
 PR_SET_PDEATHSIG = 1
@@ -22,6 +29,8 @@ FOLDER_PREFIX = "gimnet-perf-"
 LOCK = "in-use"
 # The hub sets this on every connection (`socket_send_bytes`); the null relay gets the same.
 SEND_BUFFER_BYTES = 256 * 1024
+# Debian keeps servers where a user's PATH does not look.
+SERVER_FOLDERS = ("/usr/sbin", "/usr/local/sbin", "/sbin")
 
 
 class SubjectError(Exception):
@@ -75,7 +84,6 @@ class Subject:
     """A running hub or relay, for `with`. Listens on TCP and, unless `transports` says otherwise, on a Unix socket."""
 
     name = ""
-    wire = ""
     transports = ("tcp", "unix")
     prints_ready = True  # `ready URL...` on standard output; otherwise that belongs to its log
 
@@ -84,7 +92,6 @@ class Subject:
         self._cpus = cpus
         self._process: subprocess.Popen | None = None
         self.urls: dict[str, str] = {}
-        self.publish_urls: dict[str, str] = {}  # where it takes messages, if at other addresses
 
     def command(self, folder: str) -> list[str]:
         raise NotImplementedError
@@ -137,10 +144,7 @@ class Subject:
         words = line.decode().split()
         if len(words) < 3 or words[0] != "ready":
             raise SubjectError(f"{self.name} did not print its addresses, but: {line.decode().strip()}")
-        self.take_ready(words[1:])
-
-    def take_ready(self, urls: list[str]) -> None:
-        self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in urls}
+        self.urls = {"unix" if url.startswith("unix:") else "tcp": url for url in words[1:]}
 
     def _log_end(self) -> str:
         self._log.seek(0)
@@ -166,7 +170,6 @@ class NullRelay(Subject):
     """The yardstick."""
 
     name = "null"
-    wire = "null"
 
     def __init__(self, build: pathlib.Path, cpu: int, mode: str):
         super().__init__(build, [cpu])
@@ -181,7 +184,6 @@ class TcpHub(Subject):
     """The shipped hub as it starts by default, apart from where it listens."""
 
     name = "tcphub"
-    wire = "gimnet"
 
     def __init__(self, build: pathlib.Path, cpus: list[int], arguments: list[str], name: str = "tcphub"):
         super().__init__(build, cpus)
@@ -191,3 +193,167 @@ class TcpHub(Subject):
     def command(self, folder: str) -> list[str]:
         return [str(self._build / "bin" / "tcphub"), "--listen", "tcp://127.0.0.1:0", "--listen",
                 f"unix:{folder}/socket", "--hub-id", "7", "--state-dir", f"{folder}/state", *self._arguments]
+
+
+def find_program(name: str) -> str | None:
+    return shutil.which(name, path=os.pathsep.join([os.environ.get("PATH", os.defpath), *SERVER_FOLDERS]))
+
+
+def free_port() -> int:
+    """Free when this returns; a start that finds it taken is tried again with another."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Rival(Subject):
+    """A server that does not tell when it is ready: it is when it takes a connection."""
+
+    program = ""
+    package = ""
+    prints_ready = False
+    starts_max = 3
+
+    def __init__(self, build: pathlib.Path, cpus: list[int]):
+        super().__init__(build, cpus)
+        self._port = 0
+
+    @classmethod
+    def why_absent(cls, build: pathlib.Path) -> str | None:
+        return None if find_program(cls.program) else f"{cls.program} is not installed (package {cls.package})"
+
+    def __enter__(self) -> "Rival":
+        for attempt in range(self.starts_max):
+            self._port = free_port()
+            try:
+                return super().__enter__()
+            except SubjectError:
+                if attempt == self.starts_max - 1:
+                    raise
+        raise AssertionError("not reached")
+
+    def _await_ready(self) -> None:
+        deadline = time.monotonic() + READY_SECONDS
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", self._port), timeout=1).close()
+                self.check_alive()  # or somebody else has the port
+                break
+            except OSError:
+                self.check_alive()
+                if time.monotonic() > deadline:
+                    raise SubjectError(f"{self.name} was not ready within {READY_SECONDS} s: {self._log_end()}") from None
+                time.sleep(0.01)
+        self.urls = {"tcp": f"tcp://127.0.0.1:{self._port}"}
+        path = self.unix_path(self._folder.name)
+        if path is not None:
+            self.urls["unix"] = f"unix:{path}"
+
+    def unix_path(self, folder: str) -> str | None:
+        return None
+
+
+class Nats(Rival):
+    name = "nats"
+    program = "nats-server"
+    package = "nats-server"
+    transports = ("tcp",)
+
+    def command(self, folder: str) -> list[str]:
+        pathlib.Path(folder, "nats.conf").write_text(f"listen: 127.0.0.1:{self._port}\nmax_connections: 100000\n")
+        return [find_program(self.program), "-c", f"{folder}/nats.conf"]
+
+
+class Mosquitto(Rival):
+    name = "mosquitto"
+    program = "mosquitto"
+    package = "mosquitto"
+
+    def command(self, folder: str) -> list[str]:
+        lines = ["per_listener_settings false", f"listener {self._port} 127.0.0.1", f"listener 0 {folder}/socket",
+                 "allow_anonymous true", "persistence false", "set_tcp_nodelay true", "sys_interval 0",
+                 "connection_messages false", "log_type error", "log_dest stderr", "max_queued_messages 0"]
+        if os.geteuid() == 0:
+            lines.append("user root")  # or it gives its rights up, and cannot make its socket in the folder
+        pathlib.Path(folder, "mosquitto.conf").write_text("\n".join(lines) + "\n")
+        return [find_program(self.program), "-c", f"{folder}/mosquitto.conf"]
+
+    def unix_path(self, folder: str) -> str:
+        return f"{folder}/socket"
+
+
+HUBS = {"tcphub": [], "tcphub_2_shards": ["--shards", "2"], "tcphub_spinning": ["--spin"]}
+RIVAL_CLASSES = {rival.name: rival for rival in (Nats, Mosquitto)}
+CLIENTS = {"tcphub": "library_client_nif", "nats": "library_client_nats", "mosquitto": "library_client_mosquitto"}
+SUBJECTS = ("null", *HUBS, *RIVAL_CLASSES)
+OF_LIBRARIES = "other hubs are measured by their libraries only"
+LIBRARY_PACKAGES = {"nats": "libnats-dev", "mosquitto": "libmosquitto-dev"}
+
+
+def why_never(name: str, case: Case) -> str | None:
+    """Why there can be no row of this subject for this case, whatever is built or installed."""
+    if name in RIVAL_CLASSES and case.spec.roles is None:
+        return OF_LIBRARIES
+    if name == "null" and case.baseline is None:
+        return "a relay without queues says nothing here"
+    if name not in RIVAL_CLASSES:
+        return None
+    return None if case.transport in RIVAL_CLASSES[name].transports else "it has no Unix socket"
+
+
+def why_absent(name: str, case: Case, build: pathlib.Path) -> str | None:
+    """Why there will be no row of this subject for this case; None: there will be one."""
+    if (never := why_never(name, case)) is not None or name not in RIVAL_CLASSES:
+        return never
+    if not (build / "bin" / CLIENTS[name]).exists():
+        return f"{CLIENTS[name]} was not built: no library (package {LIBRARY_PACKAGES[name]})"
+    return RIVAL_CLASSES[name].why_absent(build)
+
+
+def why_nothing(plan: Plan, wanted: list[str]) -> str | None:
+    """Why none of the wanted subjects has a row, whatever is built or installed; None: one has."""
+    if not plan:
+        return "these scenarios are not measured over that transport"
+    reasons = {}
+    for name in wanted:
+        cases = [case for case, subjects in plan.items() if name in subjects]
+        found = {why_never(name, case) for case in cases}
+        if not cases:
+            found = {OF_LIBRARIES if name in RIVAL_CLASSES else f"libraries are measured with {', '.join(WITH_LIBRARY)} only"}
+        if None in found:
+            return None
+        reasons[name] = " and ".join(sorted(found))
+    return "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+
+
+def make_subject(name: str, case: Case, build: pathlib.Path, hub_arguments: list[str]) -> Subject:
+    cpus = allowed_cpus()
+    if case.spec.roles is not None and not case.spec.one_cpu:
+        # Programs and hub run where the system puts them.
+        return RIVAL_CLASSES[name](build, cpus) if name in RIVAL_CLASSES else TcpHub(build, cpus, hub_arguments, name)
+    if name == "null":
+        return NullRelay(build, cpus[0], case.spec.relay_mode)
+    if name in RIVAL_CLASSES:
+        return RIVAL_CLASSES[name](build, cpus[:1])
+    # A second shard gets a processor of its own where the generator leaves one.
+    own = cpus[: max(1, min(2, len(cpus) - 1))] if name == "tcphub_2_shards" else cpus[:1]
+    return TcpHub(build, own, [*HUBS[name], *hub_arguments], name)
+
+
+def _version_of(command: list[str]) -> str | None:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, stdin=subprocess.DEVNULL)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    found = re.search(r"\d+\.\d+(\.\d+)*", done.stdout + done.stderr)
+    return found.group(0) if found else None
+
+
+def rival_versions(names: list[str]) -> dict[str, str]:
+    """What of the other hubs is installed, and its version."""
+    versions = {}
+    for name in (name for name in names if name in RIVAL_CLASSES):
+        library, program = LIBRARY_PACKAGES[name], find_program(RIVAL_CLASSES[name].program)
+        versions[library.removesuffix("-dev")] = _version_of(["dpkg-query", "-W", "-f=${Version}", library])
+        versions[name] = _version_of([program, "-h" if name == "mosquitto" else "--version"]) if program else None
+    return {name: version for name, version in versions.items() if version is not None}

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "generator/inbox.hpp"
+#include "generator/messages.hpp"
 #include "proto/frame/flow.hpp"
 
 namespace gimnet::perf {
@@ -22,13 +22,6 @@ class Client {
 
   [[nodiscard]] std::size_t index() const { return index_; }
   [[nodiscard]] int socket() const { return socket_; }
-  /// Where its messages are written: the client itself, or its second connection to a subject that
-  /// takes messages at another address than it gives them out.
-  [[nodiscard]] Client& publishing_side() {
-    return publishing_side_ != nullptr ? *publishing_side_ : *this;
-  }
-  /// REQUIRES: `side` lives as long as this client.
-  void set_publishing_side(Client& side) { publishing_side_ = &side; }
   /// The bytes after the last message end; the next recv continues them.
   [[nodiscard]] std::vector<std::byte>& carry() { return carry_; }
 
@@ -45,7 +38,6 @@ class Client {
   Inbox inbox;
   bool is_joined = false;    ///< the subject has admitted it
   bool is_in_group = false;  ///< provides or subscribes, as asked
-  bool is_side = false;      ///< another client's publishing side
   bool is_reading = true;    ///< a stalled client is not read
   bool is_closed = false;    ///< by the subject, or by close()
   /// PAUSEs that were not lifted yet (one RESUME lifts any number for its target): nothing is
@@ -57,7 +49,6 @@ class Client {
 
   const std::size_t index_;
   int socket_;
-  Client* publishing_side_ = nullptr;
   std::vector<std::byte> carry_;
   std::span<const std::byte> begun_;
   std::vector<std::byte> control_;

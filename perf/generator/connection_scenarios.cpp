@@ -3,14 +3,12 @@
 
 #include "generator/flood.hpp"
 #include "generator/process.hpp"
-#include "generator/publisher.hpp"
 #include "generator/scenario.hpp"
 
 namespace gimnet::perf {
 namespace {
 
 constexpr std::size_t kClients = 10'000;
-constexpr std::size_t kClientsUnderLoad = 1'000;
 /// Long enough for every client's first keep-alive.
 constexpr std::chrono::seconds kSettling{2};
 /// Of all clients, one after the other, to learn what a keep-alive costs a subject that is busy
@@ -19,8 +17,8 @@ constexpr int kBusyRounds = 5;
 /// A subject that has just started still does what belongs to that.
 constexpr std::chrono::milliseconds kStarting{500};
 
-std::size_t count_of(const RunOptions& options, std::size_t usual = kClients) {
-  return options.client_count == 0 ? usual : options.client_count;
+std::size_t count_of(const RunOptions& options) {
+  return options.client_count == 0 ? kClients : options.client_count;
 }
 
 double seconds_since(Clock::time_point begin) {
@@ -122,7 +120,6 @@ Findings connect_many(Engine& engine, const RunOptions& options) {
   engine.connect(count);
   Client& last = engine.client(count - 1);
   last.inbox.expect(0, options.payload_bytes);
-  engine.open_publisher(engine.client(count - 2));
   Publisher publisher(engine.wire(), engine.client(count - 2), {Target{.recipients = {&last}}},
                       MessageShape{.payload_bytes = options.payload_bytes}, Writing::unbatched);
   publisher.publish(1);
@@ -137,50 +134,6 @@ Findings connect_many(Engine& engine, const RunOptions& options) {
   findings.add("connections", static_cast<double>(count));
   findings.add("lost", arrived ? 0 : 1);
   findings.add("wrong", static_cast<double>(last.inbox.wrong()));
-  return findings;
-}
-
-/// Clients 0 and 1 go on as in one_to_one while others connect and join.
-Findings join_under_load(Engine& engine, const RunOptions& options) {
-  const std::size_t count = 2 + count_of(options, kClientsUnderLoad);
-  engine.connect(2);
-  engine.open_publisher(engine.client(0));
-  const Inbox& inbox = engine.client(1).inbox;
-  engine.client(1).inbox.expect(0, options.payload_bytes);
-  std::vector<Publisher> publishers;
-  publishers.emplace_back(engine.wire(), engine.client(0),
-                          std::vector{Target{.recipients = {&engine.client(1)}}},
-                          MessageShape{.payload_bytes = options.payload_bytes}, Writing::batched);
-  Flood flood(engine, std::move(publishers), 1);
-  flood.run_for(options.duration / 2);
-  const std::uint64_t before = inbox.delivered();
-  const auto begin_alone = Clock::now();
-  flood.run_for(options.duration);
-  const double alone = static_cast<double>(inbox.delivered() - before) / seconds_since(begin_alone);
-
-  const std::uint64_t before_joining = inbox.delivered();
-  const auto begin = Clock::now();
-  while (engine.wire().joined_count() < count) {
-    if (Clock::now() - begin > 3 * engine.answer_limit())
-      fail("the subject did not admit all clients under load in time");
-    if (engine.client_count() < count &&
-        engine.client_count() - engine.wire().joined_count() < Engine::kJoiningMax) {
-      engine.begin_connect();
-    }
-    flood.turn(std::chrono::nanoseconds(0));
-  }
-  const double seconds = seconds_since(begin);
-  const double beside = static_cast<double>(inbox.delivered() - before_joining) / seconds;
-  flood.drain();
-
-  Findings findings;
-  findings.add("seconds", seconds);
-  findings.add("messages_per_second", beside);
-  findings.add("messages_per_second_alone", alone);
-  findings.add("rate_kept", beside / alone);
-  findings.add("connections", static_cast<double>(count - 2));
-  findings.add("lost", static_cast<double>(inbox.lost() + flood.missing()));
-  findings.add("wrong", static_cast<double>(inbox.wrong()));
   return findings;
 }
 

@@ -16,27 +16,29 @@ constexpr std::size_t kReadBytes = 256 * 1024;
 /// The longest incomplete message that is carried over to the next read.
 constexpr std::size_t kCarryBytesMax = 2 * 1024 * 1024;
 constexpr std::size_t kEventsMax = 512;
+/// Clients that may wait for their admission at a time.
+constexpr std::size_t kJoiningMax = 64;
 constexpr std::chrono::milliseconds kKeepAlive{900};
 
 }  // namespace
 
-Engine::Engine(Wire& wire, Endpoint endpoint, std::optional<Endpoint> publish_endpoint)
+Engine::Engine(Wire& wire, Endpoint endpoint)
     : wire_(wire),
       endpoint_(std::move(endpoint)),
-      publish_endpoint_(std::move(publish_endpoint)),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       buffer_(std::make_unique<std::byte[]>(kCarryBytesMax + kReadBytes)),
       next_keep_alive_(Clock::now() + kKeepAlive) {}
 
 Engine::~Engine() {
   clients_.clear();
-  sides_.clear();
   ::close(epoll_);
 }
 
 void Engine::connect(std::size_t count) {
   for (std::size_t begun = 0; begun < count; ++begun) {
-    begin_connect();
+    clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(endpoint_)));
+    watch(*clients_.back());
+    wire_.open(*clients_.back());
     const bool room = poll_until(
         [this] { return clients_.size() - wire_.joined_count() < kJoiningMax; }, answer_limit());
     if (!room) fail("the subject admits nobody any more");
@@ -44,27 +46,6 @@ void Engine::connect(std::size_t count) {
   const bool all =
       poll_until([this] { return wire_.joined_count() == clients_.size(); }, answer_limit());
   if (!all) fail("the subject did not admit all clients in time");
-}
-
-void Engine::begin_connect() {
-  clients_.push_back(std::make_unique<Client>(clients_.size(), connect_to(endpoint_)));
-  Client& added = *clients_.back();
-  watch(added);
-  // A subject with publishing sides may tell only there that it has admitted a client.
-  if (added.index() == 0) open_publisher(added);
-  wire_.open(added);
-}
-
-void Engine::open_publisher(Client& client) {
-  if (!publish_endpoint_ || &client.publishing_side() != &client) return;
-  sides_.push_back(std::make_unique<Client>(client.index(), connect_to(*publish_endpoint_)));
-  Client& side = *sides_.back();
-  side.is_side = true;
-  client.set_publishing_side(side);
-  watch(side);
-  wire_.open_side(side);
-  if (!poll_until([&side] { return side.is_joined; }, answer_limit()))
-    fail("no answer to a publisher in time");
 }
 
 void Engine::watch(Client& client) const {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,22 +20,13 @@ using Clock = std::chrono::steady_clock;
 /// A subject that refuses, closes or does not answer ends the program with a sentence.
 class Engine {
  public:
-  /// `publish_endpoint`: where the subject takes messages, if it does so at another address than
-  /// `endpoint`.
-  Engine(Wire& wire, Endpoint endpoint, std::optional<Endpoint> publish_endpoint = {});
+  Engine(Wire& wire, Endpoint endpoint);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
   /// Connects `count` more clients, at most 64 of them waiting for their admission at a time.
   void connect(std::size_t count);
-  /// Connects one more client and does not wait for its admission.
-  void begin_connect();
-  /// How many may wait for their admission at a time.
-  static constexpr std::size_t kJoiningMax = 64;
-  /// Makes `client` ready to publish: opens its publishing side where it needs one. Before its
-  /// Publisher is made.
-  void open_publisher(Client& client);
   /// Client 0 provides the group, clients 1..count subscribe to it.
   void join_group(std::size_t first_subscriber, std::size_t count);
 
@@ -72,11 +62,9 @@ class Engine {
 
   Wire& wire_;
   const Endpoint endpoint_;
-  const std::optional<Endpoint> publish_endpoint_;
   const int epoll_;
   std::unique_ptr<std::byte[]> buffer_;
   std::vector<std::unique_ptr<Client>> clients_;
-  std::vector<std::unique_ptr<Client>> sides_;
   Clock::time_point next_keep_alive_;
   std::size_t closed_count_ = 0;
   bool is_closing_tolerated_ = false;

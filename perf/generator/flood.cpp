@@ -6,6 +6,7 @@
 namespace gimnet::perf {
 namespace {
 
+constexpr std::size_t kWriteBytes = 64 * 1024;
 constexpr std::size_t kWindowBytes = 2 * 1024 * 1024;
 constexpr std::size_t kWindowBytesARecipient = 128 * 1024;
 constexpr std::size_t kUnbatchedMessages = 64;
@@ -20,16 +21,45 @@ constexpr std::chrono::milliseconds kPatience{1};
 
 }  // namespace
 
-Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message,
-             double bytes_a_second)
+Publisher::Publisher(Wire& wire, Client& from, const std::vector<Target>& targets,
+                     MessageShape shape, Writing writing)
+    : from_(from), writing_(writing), messages_a_write_(1) {
+  const auto payload = pattern_payload(shape.payload_bytes);
+  // Whole rounds through the targets, so that each gets the same share.
+  do {
+    for (const Target& target : targets)
+      wire.append_message(from, target, shape.lane, payload, block_);
+  } while (block_.bytes.size() + targets.size() * block_.message_bytes() <= kWriteBytes);
+  if (writing == Writing::batched) {
+    messages_a_write_ =
+        std::clamp<std::size_t>(kWriteBytes / block_.message_bytes(), 1, block_.message_count());
+  }
+  next_message_ = block_.message_count();
+}
+
+std::size_t Publisher::publish(std::uint64_t messages_max, std::uint64_t cut_to) {
+  if (!from_.flush() || !from_.paused.empty()) return 0;
+  if (next_message_ == block_.message_count()) {
+    block_.renew();
+    next_message_ = 0;
+  }
+  const auto whole = std::min(messages_a_write_, block_.message_count() - next_message_);
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(whole, cut_to));
+  if (count > messages_max || count == 0) return 0;
+  const std::size_t begin = next_message_ == 0 ? 0 : block_.message_end(next_message_ - 1);
+  const std::size_t end = block_.message_end(next_message_ + count - 1);
+  from_.write(std::span<const std::byte>(block_.bytes).subspan(begin, end - begin));
+  next_message_ += count;
+  return count;
+}
+
+Flood::Flood(Engine& engine, std::vector<Publisher> publishers, std::size_t recipients_a_message)
     : engine_(engine),
       publishers_(std::move(publishers)),
       recipients_a_message_(recipients_a_message),
-      bytes_a_second_(bytes_a_second),
       message_bytes_(publishers_.front().message_bytes()),
       window_bytes_(std::max(kWindowBytes, kWindowBytesARecipient * recipients_a_message)),
-      is_unbatched_(publishers_.front().is_unbatched()),
-      begin_(Clock::now()) {}
+      is_unbatched_(publishers_.front().is_unbatched()) {}
 
 std::uint64_t Flood::window() const {
   std::uint64_t deliveries = window_bytes_ / message_bytes_;
@@ -65,13 +95,8 @@ bool Flood::publish() {
   for (auto& publisher : publishers_) {
     const std::size_t writes = is_unbatched_ ? kUnbatchedWrites : 1;
     for (std::size_t write = 0; write < writes; ++write) {
-      if (bytes_a_second_ > 0) {
-        const std::chrono::duration<double> elapsed = Clock::now() - begin_;
-        if (static_cast<double>(begun_bytes_) > elapsed.count() * bytes_a_second_) break;
-      }
       const std::size_t count = publisher.publish(messages_allowed(), messages_max_);
       if (count == 0) break;
-      begun_bytes_ += count * message_bytes_;
       expected_ += count * recipients_a_message_;
       any = true;
     }

@@ -72,7 +72,7 @@ void GimnetWire::subscribe(Client& client) {
 
 std::size_t GimnetWire::take(Client& client, std::span<const std::byte> bytes) {
   Session& session = sessions_[client.index()];
-  if (session.is_opened) return FrameWire::take(client, bytes);
+  if (session.is_opened) return Wire::take(client, bytes);
   switch (proto::check_opening(bytes)) {
     case proto::Opening::need_more:
       return 0;
@@ -82,7 +82,7 @@ std::size_t GimnetWire::take(Client& client, std::span<const std::byte> bytes) {
       fail("the subject is not a GIMnet hub of this version");
   }
   session.is_opened = true;
-  return proto::kOpeningSize + FrameWire::take(client, bytes.subspan(proto::kOpeningSize));
+  return proto::kOpeningSize + Wire::take(client, bytes.subspan(proto::kOpeningSize));
 }
 
 void GimnetWire::take_other(Client& client, const proto::FrameHeader& header,

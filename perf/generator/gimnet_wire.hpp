@@ -4,14 +4,14 @@
 #include <span>
 #include <vector>
 
-#include "generator/frame_wire.hpp"
+#include "generator/wire.hpp"
 
 namespace gimnet::perf {
 
 /// A raw node of docs/protocol.md: opening, HELLO and WELCOME, frames, one service as the group,
 /// keep-alive, and PAUSE and RESUME honoured. It asks for no resume. What the hub refuses ends the
 /// program with the hub's own sentence.
-class GimnetWire final : public FrameWire {
+class GimnetWire final : public Wire {
  public:
   void open(Client& client) override;
   void provide(Client& client) override;

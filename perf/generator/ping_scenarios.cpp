@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::size_t kWarmUpCount = 100;
-constexpr std::size_t kJoining = 1'000;
 constexpr std::size_t kBulkBytes = 64 * 1024;
 constexpr std::uint8_t kRealTimeLane = 0;
 constexpr std::uint8_t kBulkLane = 2;
@@ -35,14 +34,14 @@ class PingPair {
     near_.inbox.expect(kBack, payload_bytes);
   }
 
-  void add_bulk(double bytes_a_second) {
+  void add_bulk() {
     engine_.client(3).inbox.expect(kBulk, kBulkBytes);
     std::vector<Publisher> publishers;
     publishers.emplace_back(
         engine_.wire(), engine_.client(2),
         std::vector{Target{.recipients = {&engine_.client(3)}, .stream = kBulk}},
         MessageShape{.payload_bytes = kBulkBytes, .lane = kBulkLane}, Writing::batched);
-    bulk_.emplace(engine_, std::move(publishers), 1, bytes_a_second);
+    bulk_.emplace(engine_, std::move(publishers), 1);
   }
 
   /// Nothing when the message or the answer was lost.
@@ -103,14 +102,6 @@ class PingPair {
   std::optional<Flood> bulk_;
 };
 
-/// 2 clients for a pair, 4 with bulk beside it, all but the last of which publish.
-void connect(Engine& engine, std::size_t count) {
-  engine.connect(count);
-  for (std::size_t index = 0; index < std::max<std::size_t>(2, count - 1); ++index) {
-    engine.open_publisher(engine.client(index));
-  }
-}
-
 /// Round trips one after the other, at least `interval` from one beginning to the next.
 Findings measure(Engine& engine, const RunOptions& options, PingPair& pair,
                  std::chrono::nanoseconds interval) {
@@ -155,61 +146,22 @@ Findings measure(Engine& engine, const RunOptions& options, PingPair& pair,
 }  // namespace
 
 Findings ping(Engine& engine, const RunOptions& options) {
-  connect(engine, 2);
+  engine.connect(2);
   PingPair pair(engine, options.payload_bytes);
   return measure(engine, options, pair, std::chrono::nanoseconds(0));
 }
 
 Findings ping_paced(Engine& engine, const RunOptions& options) {
-  connect(engine, 2);
+  engine.connect(2);
   PingPair pair(engine, options.payload_bytes);
   return measure(engine, options, pair, std::chrono::milliseconds(1));
 }
 
 Findings ping_under_bulk(Engine& engine, const RunOptions& options) {
-  connect(engine, 4);
+  engine.connect(4);
   PingPair pair(engine, options.payload_bytes);
-  pair.add_bulk(options.bulk_bytes_a_second);
+  pair.add_bulk();
   return measure(engine, options, pair, std::chrono::nanoseconds(0));
-}
-
-/// What bystanders notice of it: round trips alone, and then while others connect and join.
-Findings ping_beside_joins(Engine& engine, const RunOptions& options) {
-  const std::size_t count = 2 + (options.client_count == 0 ? kJoining : options.client_count);
-  connect(engine, 2);
-  PingPair pair(engine, options.payload_bytes);
-  std::vector<std::int64_t> alone_ns;
-  std::vector<std::int64_t> beside_ns;
-  std::uint64_t lost = 0;
-  const auto measure_into = [&](std::vector<std::int64_t>& round_trips_ns) {
-    const auto time = pair.round_trip();
-    lost += time ? 0 : 1;
-    if (time) round_trips_ns.push_back(time->count());
-  };
-  for (std::size_t i = 0; i < kWarmUpCount; ++i) measure_into(alone_ns);
-  alone_ns.clear();
-  for (const auto end = Clock::now() + options.duration; Clock::now() < end;)
-    measure_into(alone_ns);
-  const auto begin = Clock::now();
-  while (engine.wire().joined_count() < count) {
-    if (Clock::now() - begin > 3 * engine.answer_limit())
-      fail("the subject did not admit all clients in time");
-    const std::size_t joining = engine.client_count() - engine.wire().joined_count();
-    if (engine.client_count() < count && joining < Engine::kJoiningMax) engine.begin_connect();
-    measure_into(beside_ns);
-  }
-  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  const auto wrong = engine.client(0).inbox.wrong() + engine.client(1).inbox.wrong();
-  lost += engine.client(0).inbox.lost() + engine.client(1).inbox.lost();
-
-  Findings findings;
-  add_percentiles(findings, beside_ns);
-  add_percentiles(findings, alone_ns, "_alone");
-  findings.add("seconds", seconds);
-  findings.add("connections", static_cast<double>(count - 2));
-  findings.add("lost", static_cast<double>(lost));
-  findings.add("wrong", static_cast<double>(wrong));
-  return findings;
 }
 
 }  // namespace gimnet::perf

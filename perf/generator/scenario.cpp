@@ -17,12 +17,6 @@ Findings fan_out_to(Engine& engine, const RunOptions& options) {
   return fan_out(engine, options, count);
 }
 
-Findings ping_under_300MBps(Engine& engine, const RunOptions& options) {
-  RunOptions paced = options;
-  paced.bulk_bytes_a_second = 300e6;
-  return ping_under_bulk(engine, paced);
-}
-
 // ping_one_cpu and ping_two_cpus are one scenario here: where the processes run is the driver's
 // affair.
 constexpr Named kScenarios[] = {
@@ -34,18 +28,14 @@ constexpr Named kScenarios[] = {
     {"fan_out_100", fan_out_to<100>},
     {"fan_out_1000", fan_out_to<1000>},
     {"list_100", list_100},
-    {"broadcast_100", broadcast_100},
     {"ping_one_cpu", ping},
     {"ping_two_cpus", ping},
     {"ping_paced", ping_paced},
     {"ping_under_bulk", ping_under_bulk},
-    {"ping_under_300MBps", ping_under_300MBps},
     {"stalled_subscriber", stalled_subscriber},
     {"idle_10000", idle},
     {"idle_alone", idle_alone},
     {"connect_10000", connect_many},
-    {"join_under_load", join_under_load},
-    {"ping_beside_joins", ping_beside_joins},
 };
 
 double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
@@ -56,14 +46,13 @@ double percentile_us(const std::vector<std::int64_t>& sorted_ns, double share) {
 
 }  // namespace
 
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns,
-                     const std::string& suffix) {
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns) {
   constexpr std::pair<const char*, double> kShares[] = {
       {"p10_us", 0.1}, {"p25_us", 0.25}, {"p50_us", 0.5},    {"p75_us", 0.75},
       {"p90_us", 0.9}, {"p99_us", 0.99}, {"p999_us", 0.999}, {"max_us", 1}};
   std::sort(round_trips_ns.begin(), round_trips_ns.end());
   for (const auto& [name, share] : kShares)
-    findings.add(name + suffix, percentile_us(round_trips_ns, share));
+    findings.add(name, percentile_us(round_trips_ns, share));
 }
 
 std::string Findings::json() const {

@@ -17,10 +17,8 @@ namespace gimnet::perf {
 struct RunOptions {
   std::size_t payload_bytes = 16;
   std::chrono::nanoseconds duration{1'000'000'000};
-  pid_t process = 0;  ///< the measured hub or relay
-  std::size_t client_count =
-      0;  ///< of idle, connect, join_under_load and ping_beside_joins; 0: the scenario's own
-  double bulk_bytes_a_second = 0;  ///< of ping_under_bulk; 0: as fast as it goes
+  pid_t process = 0;             ///< the measured hub or relay
+  std::size_t client_count = 0;  ///< of idle and connect_many; 0: the scenario's own
 };
 
 /// What a run found: names and numbers, printed as one JSON object.
@@ -33,10 +31,8 @@ class Findings {
   std::vector<std::pair<std::string, double>> values_;
 };
 
-/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`, each with `suffix`
-/// behind. Sorts them.
-void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns,
-                     const std::string& suffix = {});
+/// Adds the distribution of round trips, `p10_us` to `p999_us` and `max_us`. Sorts them.
+void add_percentiles(Findings& findings, std::vector<std::int64_t>& round_trips_ns);
 
 /// Adds what the subject itself says that it dropped and kept, and `ledger_gap`: what its account
 /// does not explain.
@@ -50,28 +46,24 @@ using Scenario = Findings (*)(Engine& engine, const RunOptions& options);
 
 // The scenarios, by the file that they are in.
 
-// throughput_scenarios.cpp: hub CPU per delivered message.
+// throughput_scenarios.cpp: hub CPU per delivered message; the last one has a subscriber that does
+// not read beside one that does.
 Findings one_to_one(Engine& engine, const RunOptions& options);
 Findings one_to_one_unbatched(Engine& engine, const RunOptions& options);
 Findings four_to_four(Engine& engine, const RunOptions& options);
 Findings in_turns(Engine& engine, const RunOptions& options);
 Findings list_100(Engine& engine, const RunOptions& options);
-Findings broadcast_100(Engine& engine, const RunOptions& options);
 Findings fan_out(Engine& engine, const RunOptions& options, std::size_t subscriber_count);
+Findings stalled_subscriber(Engine& engine, const RunOptions& options);
 
 // ping_scenarios.cpp: round trips.
 Findings ping(Engine& engine, const RunOptions& options);
 Findings ping_paced(Engine& engine, const RunOptions& options);
 Findings ping_under_bulk(Engine& engine, const RunOptions& options);
-Findings ping_beside_joins(Engine& engine, const RunOptions& options);
-
-// stalled_scenario.cpp: one subscriber that does not read beside one that does.
-Findings stalled_subscriber(Engine& engine, const RunOptions& options);
 
 // connection_scenarios.cpp: what many connections cost.
 Findings idle(Engine& engine, const RunOptions& options);
 Findings idle_alone(Engine& engine, const RunOptions& options);
 Findings connect_many(Engine& engine, const RunOptions& options);
-Findings join_under_load(Engine& engine, const RunOptions& options);
 
 }  // namespace gimnet::perf

@@ -2,22 +2,20 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "generator/client.hpp"
-#include "generator/message_block.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::perf {
 
 /// To whom a message goes.
 struct Target {
-  enum class Kind { unicast, group, list, broadcast };
+  enum class Kind { unicast, group, list };
   Kind kind = Kind::unicast;
-  std::vector<const Client*> recipients;  ///< one for unicast; unused for group and broadcast
+  std::vector<const Client*> recipients;  ///< one for unicast; unused for group
   StreamId stream = 0;
 };
 
@@ -38,38 +36,37 @@ struct KeepAlives {
   std::uint64_t asked = 0;     ///< by the subject of its own accord; each is answered
 };
 
-/// How one subject is spoken to: the seam behind which each wire protocol is. Scenarios know
-/// clients, targets and messages; a wire knows bytes. Virtual calls are per read buffer and per
-/// block, never per message.
+/// How a subject is spoken to: scenarios know clients, targets and messages, a wire knows bytes.
+/// Messages are frames of docs/protocol.md, section 2: what the hub carries, and, byte for byte the
+/// same, what goes through the null relay. By itself this is the null relay's wire: no handshake,
+/// ids given by the order of connecting. Virtual calls are per read buffer, never per message.
+///
+/// A payload over 4 KiB travels in fragments of 32 KiB: the fewest equal pieces of a 64 KiB message
+/// that are legal, since a frame's length, at most 65,536, counts the fragment header too. Such a
+/// message is below the first window (1 MiB), so that no TAKEN is needed.
 class Wire {
  public:
   virtual ~Wire() = default;
 
-  /// Sends what `client` has to say first. take() admits it (client.is_joined) once the subject
-  /// has.
-  virtual void open(Client& client) = 0;
-  /// Sends what a publishing side has to say first, where the subject has such; take() admits it.
-  virtual void open_side(Client& side) { side.is_joined = true; }
+  /// Sends what `client` has to say first. It is admitted (client.is_joined) once the subject has.
+  virtual void open(Client& client) { admit(client); }
   /// Makes `client` the publisher of the one group of a run; take() sets client.is_in_group.
-  virtual void provide(Client& client) = 0;
+  virtual void provide(Client& client) { client.is_in_group = true; }
   /// Makes `client` a subscriber of that group. REQUIRES: the publisher is in the group.
-  virtual void subscribe(Client& client) = 0;
-  /// Appends one message of `from` with `payload` to `block`, in lane `lane` where the subject has
-  /// lanes.
-  virtual void append_message(const Client& from, const Target& target, std::uint8_t lane,
-                              std::span<const std::byte> payload, MessageBlock& block) = 0;
+  virtual void subscribe(Client& client) { client.is_in_group = true; }
+  /// Appends one message of `from` with `payload` to `block`, in lane `lane`.
+  void append_message(const Client& from, const Target& target, std::uint8_t lane,
+                      std::span<const std::byte> payload, MessageBlock& block);
   /// Hands the messages in `bytes` to client.inbox and answers what asks for an answer. Returns the
   /// bytes done; the rest is an incomplete message.
-  [[nodiscard]] virtual std::size_t take(Client& client, std::span<const std::byte> bytes) = 0;
+  [[nodiscard]] virtual std::size_t take(Client& client, std::span<const std::byte> bytes);
   /// Called once a second for every client.
-  virtual void keep_alive(Client& client) = 0;
+  virtual void keep_alive(Client&) {}
 
-  /// Clients that were admitted so far, publishing sides not among them.
+  /// Clients that were admitted so far.
   [[nodiscard]] std::size_t joined_count() const { return joined_count_; }
-
   /// All so far; none where clients of this protocol need not say anything.
   [[nodiscard]] const KeepAlives& keep_alives() const { return keep_alives_; }
-
   /// Asks for the ledger; false: this subject keeps none. take() sets ledger().
   virtual bool ask_for_ledger(Client&) { return false; }
   [[nodiscard]] const std::optional<Ledger>& ledger() const { return ledger_; }
@@ -77,19 +74,27 @@ class Wire {
  protected:
   /// Marks `client` as joined; once.
   void admit(Client& client) {
-    if (client.is_joined) return;
+    if (!client.is_joined) ++joined_count_;
     client.is_joined = true;
-    if (!client.is_side) ++joined_count_;
   }
+  [[nodiscard]] virtual std::uint32_t node_id(const Client& client) const;
+  [[nodiscard]] virtual std::uint32_t group_id() const;
+  /// A frame that is not a message for the application.
+  virtual void take_other(Client& client, const proto::FrameHeader& header,
+                          std::span<const std::byte> body);
+  /// Appends a frame.
+  static void append_frame(const proto::FrameHeader& header, std::span<const std::byte> body,
+                           std::vector<std::byte>& to);
 
   std::optional<Ledger> ledger_;
   KeepAlives keep_alives_;
 
  private:
+  void take_data(Client& client, const proto::FrameHeader& header, std::span<const std::byte> body);
+  [[nodiscard]] proto::FrameHeader make_header(const Client& from, const Target& target,
+                                               std::uint8_t lane) const;
+
   std::size_t joined_count_ = 0;
 };
-
-/// "null", "gimnet", "nats", "mqtt", "resp" or "zmtp"; nullptr for an unknown name.
-[[nodiscard]] std::unique_ptr<Wire> make_wire(std::string_view name);
 
 }  // namespace gimnet::perf

@@ -3,10 +3,8 @@
 #include <atomic>
 #include <vector>
 
-#include "generator/inbox.hpp"
-#include "generator/pattern.hpp"
+#include "generator/messages.hpp"
 #include "library/pair.hpp"
-#include "library/three_processes.hpp"
 #include "net/socket.hpp"
 
 namespace gimnet::perf {

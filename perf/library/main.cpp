@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <string>
 
-#include "generator/pattern.hpp"
+#include "generator/messages.hpp"
 #include "generator/process.hpp"
 #include "library/library_client.hpp"
 #include "library/pair.hpp"

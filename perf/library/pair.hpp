@@ -2,9 +2,12 @@
 
 #include <sys/types.h>
 
+#include <array>
 #include <chrono>
 #include <cstddef>
+#include <string>
 
+#include "generator/process.hpp"
 #include "generator/scenario.hpp"
 #include "library/library_client.hpp"
 
@@ -19,6 +22,36 @@ struct PairOptions {
   std::chrono::nanoseconds patience{2'000'000'000};  ///< a message that takes longer is lost
   pid_t hub = 0;
   pid_t partner = 0;
+};
+
+/// What hub and both clients used since this was made.
+class ThreeProcesses {
+ public:
+  ThreeProcesses(pid_t sender, pid_t receiver, pid_t hub)
+      : meters_{{{"sender", CpuMeter(sender)},
+                 {"receiver", CpuMeter(receiver)},
+                 {"hub", CpuMeter(hub)}}} {}
+
+  /// Adds user and system time of each, and those of all together, a message.
+  void add_to(Findings& findings, double messages) const {
+    CpuMeter::Used all;
+    for (const auto& [name, meter] : meters_) {
+      const CpuMeter::Used used = meter.used();
+      findings.add(std::string(name) + "_user_ns_per_message", used.user_ns / messages);
+      findings.add(std::string(name) + "_system_ns_per_message", used.system_ns / messages);
+      all.user_ns += used.user_ns;
+      all.system_ns += used.system_ns;
+    }
+    findings.add("cpu_ns_per_message", (all.user_ns + all.system_ns) / messages);
+    findings.add("system_ns_per_message", all.system_ns / messages);
+  }
+
+ private:
+  struct Named {
+    const char* name;
+    CpuMeter meter;
+  };
+  std::array<Named, 3> meters_;
 };
 
 /// Sends, with a bounded number of messages under way, for as long as asked, and says what it cost

@@ -10,7 +10,7 @@ from unittest import mock
 from support import ROOT
 import run
 from driver import against, measure, suite
-from driver.statistics_of_pairs import CONFIDENCE, RATIO_MAX, compare, compare_all, interval, pairs_min, signed_rank_p
+from driver.against import CONFIDENCE, RATIO_MAX, compare, compare_all, interval, pairs_min, signed_rank_p
 from driver.subjects import SubjectError
 
 OLD = [100.0, 104.0, 98.0, 101.0, 99.0, 130.0, 100.5, 102.0, 97.0, 100.0, 103.0, 99.5]

@@ -13,9 +13,8 @@ from unittest import mock
 from support import ROOT, outcome, result_of
 import report
 from driver import control, suite
-from driver.goals import FIELD_TITLES, GOALS
-from driver.measure import Outcome
-from driver.summary import make_rows
+from driver.rows import Outcome, make_rows
+from driver.suite import FIELD_TITLES, GOALS
 
 
 def standing_text(rows: list[dict], scenario: str) -> list[str]:

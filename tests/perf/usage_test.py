@@ -9,7 +9,7 @@ from unittest import mock
 
 import support  # noqa: F401
 import run
-from driver import against, catalogue, instructions, usage
+from driver import against, instructions, subjects, usage
 
 
 class Arguments(unittest.TestCase):
@@ -47,7 +47,7 @@ class Arguments(unittest.TestCase):
             self.assertEqual(run.parse_arguments(["--scenario", "one_to_one", "--seconds", str(number)]).seconds, number)
 
     def test_the_generator_has_the_same_bounds(self):
-        pattern = (support.ROOT / "perf" / "generator" / "pattern.hpp").read_text()
+        pattern = (support.ROOT / "perf" / "generator" / "messages.hpp").read_text()
         self.assertIn(f"kPayloadBytesMin = {usage.SIZE_MIN};", pattern)
         self.assertIn("kPayloadBytesMax = 1024 * 1024;", pattern)
         self.assertEqual(usage.SIZE_MAX, 1024 * 1024)
@@ -90,16 +90,14 @@ class Arguments(unittest.TestCase):
     def test_nothing_to_measure_is_refused_with_the_reason(self):
         for words, reason in (("--scenario idle_10000 --transport unix", "these scenarios are not measured over that transport"),
                               ("--against HEAD --scenario idle_10000 --transport unix", "these scenarios are not measured over that transport"),
-                              ("--only nats --transport unix --scenario one_to_one", "nats: it has no Unix socket"),
-                              ("--only null --scenario idle_alone", "null: a relay without queues says nothing here"),
-                              ("--only null --scenario library_burst", "null: libraries are measured with tcphub, nats, mosquitto only"),
-                              ("--only redis nats --scenario list_100 --transport unix",
-                               "redis: it has no lists of recipients; nats: it has no Unix socket"),
-                              ("--only nats --scenario list_100", "nats: it has no Unix socket and it has no lists of recipients")):
-            self.assert_refused(words, f"there is nothing to measure: {reason}\n")
+                              ("--only nats --transport unix --scenario library_burst", "nats: it has no Unix socket"),
+                              ("--only nats mosquitto --scenario one_to_one", "nats: other hubs are measured by their libraries only; mosquitto: other"),
+                              ("--only null --scenario idle_alone", "null: a relay without queues says nothing here\n"),
+                              ("--only null --scenario library_burst", "null: libraries are measured with tcphub, nats, mosquitto only\n")):
+            self.assert_refused(words, f"there is nothing to measure: {reason}")
 
     def test_what_has_a_row_is_measured_though_others_have_none(self):
-        for words in ("--only nats redis --transport unix --scenario one_to_one", "--only nats --scenario one_to_one list_100",
+        for words in ("--only nats mosquitto --transport unix --scenario library_burst", "--only nats --scenario one_to_one library_burst",
                       "--only null --scenario one_to_one idle_alone", "--scenario idle_alone", "--only tcphub_spinning --quick"):
             run.parse_arguments(words.split())
 
@@ -118,8 +116,8 @@ class Arguments(unittest.TestCase):
         self.assertEqual(settings.hub_arguments, ["--shards", "2"])
 
     def test_the_null_relay_is_always_among_the_subjects_as_the_help_says(self):
-        self.assertEqual(run.chosen_subjects(run.parse_arguments(["--only", "redis"])), ("null", "redis"))
-        self.assertEqual(run.chosen_subjects(run.parse_arguments([])), catalogue.SUBJECTS)
+        self.assertEqual(run.chosen_subjects(run.parse_arguments(["--only", "nats", "--scenario", "library_burst"])), ("null", "nats"))
+        self.assertEqual(run.chosen_subjects(run.parse_arguments([])), subjects.SUBJECTS)
 
     def test_what_goes_together_is_taken(self):
         for words in ("--instructions --update", "--instructions parser_run", "--control --report --packages", "--quick --json", "--json --report --runs 5",

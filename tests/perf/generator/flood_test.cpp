@@ -8,7 +8,7 @@
 #include <optional>
 #include <thread>
 
-#include "generator/frame_wire.hpp"
+#include "generator/wire.hpp"
 
 namespace gimnet::perf {
 namespace {
@@ -68,7 +68,7 @@ class FloodTest : public testing::Test {
 
   const Endpoint asked_ = parse_endpoint("tcp://127.0.0.1:0");
   const int listener_ = listen_on(asked_);
-  FrameWire wire_;
+  Wire wire_;
   Engine engine_{wire_, parse_endpoint(local_url(listener_, asked_))};
   std::optional<Flood> flood_;
   int from_ = -1;

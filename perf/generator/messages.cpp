@@ -1,4 +1,4 @@
-#include "generator/pattern.hpp"
+#include "generator/messages.hpp"
 
 #include <vector>
 

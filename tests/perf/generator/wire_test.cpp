@@ -1,15 +1,15 @@
-#include "generator/frame_wire.hpp"
+#include "generator/wire.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
-#include "generator/publisher.hpp"
+#include "generator/flood.hpp"
 
 namespace gimnet::perf {
 namespace {
 
 /// Two clients whose sockets are never used.
-class FrameWireTest : public testing::Test {
+class WireTest : public testing::Test {
  protected:
   MessageBlock block_of(std::size_t payload_bytes, std::size_t messages, Target target) {
     MessageBlock block;
@@ -21,13 +21,13 @@ class FrameWireTest : public testing::Test {
     return block;
   }
 
-  FrameWire wire_;
+  Wire wire_;
   Client from_{0, ::socket(AF_UNIX, SOCK_STREAM, 0)};
   Client to_{1, ::socket(AF_UNIX, SOCK_STREAM, 0)};
   const Target unicast_{.kind = Target::Kind::unicast, .recipients = {&to_}, .stream = 5};
 };
 
-TEST_F(FrameWireTest, ReadsWhatItWritesHoweverItIsSplit) {
+TEST_F(WireTest, ReadsWhatItWritesHoweverItIsSplit) {
   for (const std::size_t size : {16u, 4096u, 4097u, 65536u}) {
     const MessageBlock block = block_of(size, 3, unicast_);
     for (std::size_t split = 0; split <= block.bytes.size(); split += 1 + block.bytes.size() / 97) {
@@ -43,13 +43,13 @@ TEST_F(FrameWireTest, ReadsWhatItWritesHoweverItIsSplit) {
   }
 }
 
-TEST_F(FrameWireTest, SendsSmallMessagesAsOneFrameAndLargeOnesInPieces) {
+TEST_F(WireTest, SendsSmallMessagesAsOneFrameAndLargeOnesInPieces) {
   EXPECT_EQ(block_of(16, 1, unicast_).bytes.size(), 32u);
   EXPECT_EQ(block_of(4096, 1, unicast_).bytes.size(), 4096u + 16u);
   EXPECT_EQ(block_of(65536, 1, unicast_).bytes.size(), 65536u + 2 * (16u + 12u));
 }
 
-TEST_F(FrameWireTest, SeesAMessageForSomebodyElse) {
+TEST_F(WireTest, SeesAMessageForSomebodyElse) {
   const Target wrong{.kind = Target::Kind::unicast, .recipients = {&from_}, .stream = 5};
   const MessageBlock block = block_of(16, 1, wrong);
   EXPECT_EQ(wire_.take(to_, block.bytes), block.bytes.size());
@@ -57,7 +57,7 @@ TEST_F(FrameWireTest, SeesAMessageForSomebodyElse) {
   EXPECT_EQ(to_.inbox.wrong(), 1u);
 }
 
-TEST_F(FrameWireTest, ListsItsRecipientsInOrder) {
+TEST_F(WireTest, ListsItsRecipientsInOrder) {
   const Target list{.kind = Target::Kind::list, .recipients = {&to_, &from_}};
   const MessageBlock block = block_of(16, 1, list);
   const auto header = proto::load_header(block.bytes.data());
@@ -67,7 +67,7 @@ TEST_F(FrameWireTest, ListsItsRecipientsInOrder) {
   EXPECT_LT(load_u32(block.bytes.data() + 16), load_u32(block.bytes.data() + 20));
 }
 
-TEST_F(FrameWireTest, PublishesWholeMessagesOnly) {
+TEST_F(WireTest, PublishesWholeMessagesOnly) {
   int sockets[2];
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, sockets), 0);
   Client sender(0, sockets[0]);
