@@ -54,7 +54,8 @@ MAY_INCLUDE = {
     "hub": _PROTO + ("hub",),
     "client/nif": _NIF,
     "client/gimi": _GIMI,
-    "tools": _GIMI + ("tools",),
+    "impair": _BASE + ("impair",),
+    "tools": _GIMI + ("impair", "tools"),
     "examples": _GIMI + ("examples",),
 }
 # Public headers belong to the part that implements them.

@@ -87,7 +87,8 @@ class WrongForGimnet(unittest.TestCase):
         self.refused(2, ["the command is missing", "\n  recv "])
 
     def test_help_begins_with_examples(self):
-        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["hz"], ["bw"], ["ping"], ["nodes"], ["services"], ["watch"], ["status"]):
+        for command in ([], ["send"], ["recv"], ["pub"], ["echo"], ["hz"], ["bw"], ["ping"], ["nodes"], ["services"], ["watch"], ["status"],
+                        ["impair"]):
             tool = run(GIMNET, *command, "--help")
             self.assertEqual((tool.code, tool.err), (0, ""), command)
             text = tool.out.decode()

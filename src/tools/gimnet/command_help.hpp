@@ -15,6 +15,7 @@ Examples:
   gimnet ping B                             how far away is B?
   gimnet watch                              who comes and goes?
   gimnet nodes; gimnet services; gimnet status --json
+  gimnet impair LISTEN TARGET --delay 80ms  relay as a bad network does
   gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
 
 Data goes to standard output, words to standard error. Ends with 0 done, 1 failed, 2 wrong arguments, 3 cannot connect,

@@ -236,6 +236,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_meter(app, "bw", help::kBwAbout, options);
   add_ping(app, options);
   add_lists(app, options);
+  add_impair(app, options.impair);
   add_ctl(app, options.ctl);
   app.require_subcommand(
       0, 1);  // the name of a second one is an argument: nodes may be called as commands are

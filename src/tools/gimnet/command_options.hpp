@@ -14,7 +14,7 @@ class Validator;
 namespace gimnet::tool {
 
 /// All commands, by the words that name them.
-inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{
+inline constexpr std::array<std::pair<std::string_view, Command>, 13> kCommands{
     {{"send", Command::send},
      {"recv", Command::recv},
      {"pub", Command::pub},
@@ -26,6 +26,7 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 12> kCommands{
      {"services", Command::services},
      {"watch", Command::watch},
      {"status", Command::status},
+     {"impair", Command::impair},
      {"ctl", Command::ctl}}};
 
 /// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each

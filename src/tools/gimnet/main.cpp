@@ -12,6 +12,7 @@ using namespace gimnet::tool;
 
 ExitCode run(const Options& options) {
   StopSignal stop;
+  if (options.command == Command::impair) return run_impair(options.impair, stop);
   Session session(options, stop);
   switch (options.command) {
     case Command::send:
@@ -38,6 +39,8 @@ ExitCode run(const Options& options) {
       return run_status(session);
     case Command::ctl:
       return run_ctl(session);
+    case Command::impair:
+      break;
   }
   return ExitCode::usage;
 }

@@ -8,6 +8,7 @@
 
 #include "gimnet/gimi.hpp"
 #include "tools/gimnet/ctl_options.hpp"
+#include "tools/gimnet/impair.hpp"
 
 namespace gimnet::tool {
 
@@ -23,6 +24,7 @@ enum class Command : std::uint8_t {
   services,
   watch,
   status,
+  impair,
   ctl
 };
 
@@ -65,6 +67,7 @@ struct Options {
   Lane lane = Lane::normal;
   MessageKey key;
   CtlOptions ctl;
+  ImpairOptions impair;
 };
 
 }  // namespace gimnet::tool

@@ -1,0 +1,391 @@
+#include "impair/fault_proxy.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <list>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "base/descriptor.hpp"
+#include "base/mutex.hpp"
+#include "impair/address.hpp"
+#include "impair/delayed_channel.hpp"
+
+namespace gimnet::impair {
+namespace {
+
+constexpr std::int64_t kNever = DelayedChannel::kNever;
+constexpr int kBacklog = 128;
+constexpr std::string_view kUnix = "unix:";
+
+int open_socket(const Address& address) {
+  const int made = ::socket(address.bytes.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const int on = 1;
+  // Pieces leave as they are due. Fails on Unix sockets, which do not join them.
+  static_cast<void>(::setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
+  return made;
+}
+
+/// The URL of a listening socket: the one that was asked for, with the port that the system chose.
+std::string bound_url(std::string_view url, int descriptor) {
+  if (!url.starts_with("tcp://")) return std::string(url);
+  sockaddr_storage bytes{};
+  socklen_t size = sizeof bytes;
+  static_cast<void>(::getsockname(descriptor, reinterpret_cast<sockaddr*>(&bytes), &size));
+  const std::uint16_t port = bytes.ss_family == AF_INET6
+                                 ? reinterpret_cast<const sockaddr_in6&>(bytes).sin6_port
+                                 : reinterpret_cast<const sockaddr_in&>(bytes).sin_port;
+  return std::string(url.substr(0, url.rfind(':') + 1)) + std::to_string(ntohs(port));
+}
+
+bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
+
+/// One end of a connection.
+struct End {
+  explicit End(int descriptor) : socket(descriptor) {}
+  Descriptor socket;
+  short ready = 0;  ///< what poll(2) said
+};
+
+/// One way: what is read at one end and written at the other.
+struct Flow {
+  explicit Flow(std::uint64_t seed) : channel(seed) {}
+  DelayedChannel channel;
+  bool ended = false;       ///< its sender has ended, or was reset
+  bool reset = false;       ///< it was reset: so is the reader, once it has what came before
+  bool told = false;        ///< the reader was told of the end
+  bool is_blocked = false;  ///< the reader's kernel takes nothing now
+};
+
+struct Connection {
+  Connection(int accepted, int dialled, std::uint64_t seed)
+      : client(accepted), target(dialled), up(seed), down(~seed) {}
+  End client;
+  End target;
+  bool is_connecting = true;
+  bool is_over = false;
+  Flow up;
+  Flow down;
+};
+
+void end_by_reset(Connection& connection) {
+  const linger at_once{1, 0};
+  for (const End* end : {&connection.client, &connection.target}) {
+    static_cast<void>(
+        ::setsockopt(end->socket.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once));
+  }
+  connection.is_over = true;
+}
+
+}  // namespace
+
+/// The thread and what it owns. Everything below "loop" belongs to that thread; what others change
+/// is behind the mutex, and the event wakes the thread.
+class FaultProxy::Relay {
+ public:
+  Relay(int listener, std::string url, const Address& target, const Impairment& how,
+        std::uint64_t seed)
+      : listener_(listener),
+        url_(std::move(url)),
+        target_(target),
+        event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        orders_{.how = how},
+        random_(seed) {
+    thread_ = std::thread([this] { loop(); });
+  }
+
+  ~Relay() {
+    order([](Orders& orders) { orders.ends = true; });
+    thread_.join();
+    if (url_.starts_with(kUnix)) ::unlink(url_.c_str() + kUnix.size());
+  }
+
+  struct Orders {
+    std::uint64_t number = 0;
+    Impairment how;
+    bool ends = false;
+    bool refuses = false;
+    std::uint64_t cuts = 0;
+    std::array<std::int64_t, 2> stalled_until_ns{INT64_MIN, INT64_MIN};
+  };
+
+  /// Changes the orders, and waits until the thread has obeyed them.
+  template <class Change>
+  void order(Change change) GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    change(orders_);
+    const std::uint64_t number = ++orders_.number;
+    static_cast<void>(::eventfd_write(event_.get(), 1));
+    while (obeyed_ < number) obeyed_changed_.wait(mutex_);
+  }
+  [[nodiscard]] Orders orders() const GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return orders_;
+  }
+  [[nodiscard]] Relayed relayed() const GIMNET_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return relayed_;
+  }
+  [[nodiscard]] const std::string& url() const { return url_; }
+
+ private:
+  void loop();
+  void take_orders(std::int64_t now_ns);
+  void wait();
+  void accept_all();
+  void serve(Connection& connection, std::int64_t now_ns);
+  void read(Flow& flow, const End& from, std::int64_t now_ns);
+  void write(Connection& connection, Flow& flow, const End& to, Way way, std::int64_t now_ns);
+  /// Nothing of this way is written before.
+  [[nodiscard]] std::int64_t stalled_until_ns(Way way) const;
+  [[nodiscard]] std::int64_t drawn(std::int64_t now_ns, std::int64_t mean_ns);
+
+  const Descriptor listener_;
+  const std::string url_;
+  const Address target_;
+  const Descriptor event_;
+  mutable Mutex mutex_;
+  Orders orders_ GIMNET_GUARDED_BY(mutex_);
+  Relayed relayed_ GIMNET_GUARDED_BY(mutex_);
+  std::uint64_t obeyed_ GIMNET_GUARDED_BY(mutex_) = 0;  ///< number of the last orders
+  Condition obeyed_changed_;
+  std::thread thread_;
+
+  // loop
+  std::mt19937_64 random_;
+  Orders now_;  ///< of this turn
+  Relayed done_;
+  std::uint64_t cuts_done_ = 0;
+  std::int64_t next_stall_ns_ = kNever;
+  std::int64_t next_cut_ns_ = kNever;
+  std::int64_t drawn_stall_end_ns_ = INT64_MIN;
+  std::list<Connection> connections_;  ///< Limit: kConnections.
+  std::vector<pollfd> polled_;
+  std::array<std::byte, std::size_t{64} << 10> buffer_{};
+};
+
+std::int64_t FaultProxy::Relay::drawn(std::int64_t now_ns, std::int64_t mean_ns) {
+  if (mean_ns == 0) return kNever;
+  std::exponential_distribution<double> wait(1.0 / static_cast<double>(mean_ns));
+  return now_ns + static_cast<std::int64_t>(wait(random_));
+}
+
+std::int64_t FaultProxy::Relay::stalled_until_ns(Way way) const {
+  return std::max(drawn_stall_end_ns_, now_.stalled_until_ns[way == Way::up ? 0 : 1]);
+}
+
+void FaultProxy::Relay::loop() {
+  for (;;) {
+    const std::int64_t now_ns = steady_now_ns();
+    take_orders(now_ns);
+    if (!now_.ends) {
+      for (Connection& connection : connections_) serve(connection, now_ns);
+      accept_all();
+    }
+    std::erase_if(connections_, [](const Connection& connection) { return connection.is_over; });
+    done_.connections = connections_.size();
+    {
+      const MutexLock lock(mutex_);
+      relayed_ = done_;
+      obeyed_ = now_.number;
+      obeyed_changed_.notify_all();
+    }
+    if (now_.ends) return;
+    wait();
+  }
+}
+
+void FaultProxy::Relay::take_orders(std::int64_t now_ns) {
+  const Impairment before = now_.how;
+  now_ = orders();
+  if (now_.how.stall_every_ns != before.stall_every_ns)
+    next_stall_ns_ = drawn(now_ns, now_.how.stall_every_ns);
+  if (now_.how.cut_every_ns != before.cut_every_ns)
+    next_cut_ns_ = drawn(now_ns, now_.how.cut_every_ns);
+  if (now_ns >= next_stall_ns_) {
+    ++done_.stalls;
+    drawn_stall_end_ns_ = now_ns + now_.how.stall_for_ns;
+    next_stall_ns_ = drawn(drawn_stall_end_ns_, now_.how.stall_every_ns);
+  }
+  const bool cut_now = now_ns >= next_cut_ns_;
+  if (cut_now) next_cut_ns_ = drawn(now_ns, now_.how.cut_every_ns);
+  if (!cut_now && cuts_done_ == now_.cuts) return;
+  cuts_done_ = now_.cuts;
+  done_.cut += connections_.size();
+  for (Connection& connection : connections_) end_by_reset(connection);
+}
+
+void FaultProxy::Relay::accept_all() {
+  while (connections_.size() < kConnections) {
+    const int accepted = ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (accepted < 0) return;
+    const int on = 1;
+    static_cast<void>(::setsockopt(accepted, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
+    ++done_.accepted;
+    Connection& connection = connections_.emplace_back(accepted, open_socket(target_), random_());
+    if (now_.refuses ||
+        (::connect(connection.target.socket.get(), target_.get(), target_.size) != 0 &&
+         errno != EINPROGRESS)) {
+      ++done_.refused;
+      end_by_reset(connection);
+    }
+  }
+}
+
+void FaultProxy::Relay::serve(Connection& connection, std::int64_t now_ns) {
+  if (connection.is_over) return;
+  if (connection.is_connecting && connection.target.ready != 0) {
+    int error = 0;
+    socklen_t size = sizeof error;
+    ::getsockopt(connection.target.socket.get(), SOL_SOCKET, SO_ERROR, &error, &size);
+    if (error != 0) {
+      ++done_.refused;
+      return end_by_reset(connection);
+    }
+    connection.is_connecting = false;
+    connection.target.ready = 0;
+  }
+  if (connection.client.ready != 0) read(connection.up, connection.client, now_ns);
+  if (connection.target.ready != 0) read(connection.down, connection.target, now_ns);
+  if (!connection.is_connecting)
+    write(connection, connection.up, connection.target, Way::up, now_ns);
+  write(connection, connection.down, connection.client, Way::down, now_ns);
+  if (connection.up.told && connection.down.told) connection.is_over = true;
+}
+
+void FaultProxy::Relay::read(Flow& flow, const End& from, std::int64_t now_ns) {
+  for (;;) {
+    const std::size_t room = std::min(flow.channel.room(now_.how), buffer_.size());
+    if (flow.ended || room == 0) return;
+    const ssize_t got = ::recv(from.socket.get(), buffer_.data(), room, 0);
+    if (got < 0 && would_block(errno)) return;
+    if (got <= 0) {
+      flow.ended = true;
+      flow.reset = got < 0;
+      return;
+    }
+    flow.channel.put(now_ns, now_.how, std::span(buffer_).first(static_cast<std::size_t>(got)));
+  }
+}
+
+void FaultProxy::Relay::write(Connection& connection, Flow& flow, const End& to, Way way,
+                              std::int64_t now_ns) {
+  if (connection.is_over || now_ns < stalled_until_ns(way)) return;
+  flow.is_blocked = false;
+  for (auto piece = flow.channel.due(now_ns); !piece.empty(); piece = flow.channel.due(now_ns)) {
+    const ssize_t took = ::send(to.socket.get(), piece.data(), piece.size(), MSG_NOSIGNAL);
+    if (took < 0 && !would_block(errno)) return end_by_reset(connection);
+    if (took < 0) {
+      flow.is_blocked = true;
+      return;
+    }
+    (way == Way::up ? done_.up_bytes : done_.down_bytes) += static_cast<std::uint64_t>(took);
+    flow.channel.took(static_cast<std::size_t>(took));
+  }
+  if (!flow.ended || flow.told || flow.channel.held() != 0) return;
+  flow.told = true;
+  if (flow.reset) return end_by_reset(connection);
+  static_cast<void>(::shutdown(to.socket.get(), SHUT_WR));
+}
+
+void FaultProxy::Relay::wait() {
+  std::int64_t wake_ns = std::min(next_stall_ns_, next_cut_ns_);
+  polled_.assign({{event_.get(), POLLIN, 0},
+                  {connections_.size() < kConnections ? listener_.get() : -1, POLLIN, 0}});
+  const auto interest = [&](const End& end, const Flow& from, const Flow& to, Way way) {
+    short events = 0;
+    if (!from.ended && from.channel.room(now_.how) != 0) events |= POLLIN;
+    if (to.is_blocked) {
+      events |= POLLOUT;
+    } else {
+      const bool must_tell = to.ended && !to.told && to.channel.held() == 0;
+      const std::int64_t due_ns = must_tell ? INT64_MIN : to.channel.due_ns();
+      wake_ns = std::min(wake_ns, std::max(due_ns, stalled_until_ns(way)));
+    }
+    // Without an interest the system would still tell of the end of the connection, again and
+    // again.
+    polled_.push_back({events == 0 ? -1 : end.socket.get(), events, 0});
+  };
+  for (const Connection& connection : connections_) {
+    interest(connection.client, connection.up, connection.down, Way::down);
+    if (connection.is_connecting) {
+      polled_.push_back({connection.target.socket.get(), POLLOUT, 0});
+    } else {
+      interest(connection.target, connection.down, connection.up, Way::up);
+    }
+  }
+  const std::int64_t left_ns = std::max<std::int64_t>(0, wake_ns - steady_now_ns());
+  const timespec timeout{static_cast<time_t>(left_ns / 1'000'000'000), left_ns % 1'000'000'000};
+  ::ppoll(polled_.data(), polled_.size(), wake_ns == kNever ? nullptr : &timeout, nullptr);
+  eventfd_t ignored = 0;
+  static_cast<void>(::eventfd_read(event_.get(), &ignored));
+  std::size_t next = 2;
+  for (Connection& connection : connections_) {
+    connection.client.ready = polled_[next++].revents;
+    connection.target.ready = polled_[next++].revents;
+  }
+}
+
+Result<std::unique_ptr<FaultProxy>> FaultProxy::open(std::string_view listen,
+                                                     std::string_view target, const Impairment& how,
+                                                     std::uint64_t seed) {
+  const auto at = find_address(listen);
+  if (!at) return at.error();
+  const auto to = find_address(target);
+  if (!to) return to.error();
+  Descriptor listener(open_socket(*at));
+  const int on = 1;
+  static_cast<void>(::setsockopt(listener.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on));
+  if (::bind(listener.get(), at->get(), at->size) != 0 || ::listen(listener.get(), kBacklog) != 0) {
+    return Error{"cannot listen on '" + std::string(listen) + "': " + system_text(errno)};
+  }
+  std::string url = bound_url(listen, listener.get());
+  auto relay = std::make_unique<Relay>(listener.release(), std::move(url), *to, how, seed);
+  return std::unique_ptr<FaultProxy>(new FaultProxy(std::move(relay)));
+}
+
+FaultProxy::FaultProxy(std::unique_ptr<Relay> relay) : relay_(std::move(relay)) {}
+FaultProxy::~FaultProxy() = default;
+
+const std::string& FaultProxy::url() const { return relay_->url(); }
+Impairment FaultProxy::impairment() const { return relay_->orders().how; }
+Relayed FaultProxy::relayed() const { return relay_->relayed(); }
+
+void FaultProxy::change(const Impairment& how) {
+  relay_->order([&](Relay::Orders& orders) { orders.how = how; });
+}
+
+void FaultProxy::stall(Way way, std::int64_t duration_ns) {
+  const std::int64_t now_ns = steady_now_ns();
+  const std::int64_t end_ns = duration_ns > kNever - now_ns ? kNever : now_ns + duration_ns;
+  relay_->order([&](Relay::Orders& orders) {
+    if (way != Way::down) orders.stalled_until_ns[0] = end_ns;
+    if (way != Way::up) orders.stalled_until_ns[1] = end_ns;
+  });
+}
+
+void FaultProxy::go() {
+  relay_->order([](Relay::Orders& orders) { orders.stalled_until_ns.fill(INT64_MIN); });
+}
+
+void FaultProxy::cut() {
+  relay_->order([](Relay::Orders& orders) { ++orders.cuts; });
+}
+
+void FaultProxy::refuse(bool all) {
+  relay_->order([&](Relay::Orders& orders) { orders.refuses = all; });
+}
+
+}  // namespace gimnet::impair

@@ -1,0 +1,95 @@
+#include "tools/gimnet/impair.hpp"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdint>
+
+#include "impair/address.hpp"
+#include "impair/control_line.hpp"
+#include "impair/fault_proxy.hpp"
+#include "tools/gimnet/command_options.hpp"
+#include "tools/gimnet/line_input.hpp"
+#include "tools/gimnet/output.hpp"
+#include "tools/gimnet/session.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+constexpr const char* kImpairAbout =
+    R"(Relay connections, and do to them what a bad network does: to try programs under it.
+
+Examples:
+  gimnet impair tcp://127.0.0.1:7460 tcp://127.0.0.1:7450 --delay 80ms --jitter 5ms --rate 1MB
+  gimnet --hub tcp://127.0.0.1:7460 ping B  B behind 80 ms, each way
+
+Prints `ready tcp://127.0.0.1:7460` and relays until Ctrl-C. Lines of standard input change it while it runs, and each is
+answered with a line: `rate 100kB` or another setting; `stall`, `stall up 500ms`, `go`; `cut`; `refuse`, `accept`; `status`.
+TCP carries the faults: what a network loses comes late, never wrong or in another order.
+)";
+
+void add_setting(CLI::App& command, ImpairOptions& options, const std::string& name,
+                 const std::string& about) {
+  command.add_option_function<std::string>(
+      "--" + name,
+      [&options, name](const std::string& word) {
+        const auto changed = impair::change_setting(options.how, name, word);
+        if (!changed) throw CLI::ValidationError("--" + name, changed.error().sentence);
+        options.how = *changed;
+      },
+      about);
+}
+
+}  // namespace
+
+void add_impair(CLI::App& app, ImpairOptions& options) {
+  CLI::App& command = *app.add_subcommand("impair", kImpairAbout);
+  command.add_option("listen", options.listen, "where to listen: tcp://host:port or unix:/path")
+      ->required()
+      ->check(not_empty());
+  command.add_option("target", options.target, "where to relay to: tcp://host:port or unix:/path")
+      ->required()
+      ->check(not_empty());
+  add_setting(command, options, "delay", "of each byte, one way, such as 80ms, up to 60min");
+  add_setting(command, options, "jitter",
+              "by which the delay varies, such as 5ms; nothing overtakes");
+  add_setting(command, options, "rate", "bytes a second, each way, such as 1MB");
+  add_setting(command, options, "queue",
+              "bytes held each way, such as 64KiB, default what passes in the delay and 100 ms");
+  add_setting(command, options, "split", "write pieces of 1 to this many bytes, such as 7");
+  add_setting(command, options, "stall-every",
+              "mean time between stalls, such as 2s, default none");
+  add_setting(command, options, "stall-for", "length of each, such as 300ms, default 200ms");
+  add_setting(command, options, "cut-every",
+              "mean time between cuts of all connections, such as 10s, default none");
+  command.add_option("--seed", options.seed, "of what is drawn, a whole number, default 1");
+}
+
+ExitCode run_impair(const ImpairOptions& options, StopSignal& stop) {
+  for (const std::string& url : {options.listen, options.target}) {
+    if (const std::string wrong = impair::wrong_form_of(url); !wrong.empty()) {
+      say(wrong);
+      return ExitCode::usage;
+    }
+  }
+  auto opened = impair::FaultProxy::open(options.listen, options.target, options.how, options.seed);
+  if (!opened) {
+    say(opened.error().sentence);
+    return ExitCode::failed;
+  }
+  impair::FaultProxy& proxy = **opened;
+  Output output;
+  output.write("ready " + proxy.url() + "\n");
+  output.flush();
+  LineInput input(0, stop.descriptor());
+  std::string_view line;
+  while (output.ok() && input.next(line) == LineInput::State::line) {
+    output.write(impair::obey(proxy, line) + "\n");
+    output.flush();
+  }
+  // Without orders it goes on: the input of a program in the background ends at once.
+  while (stop.wait_until(INT64_MAX)) {
+  }
+  return exit_code_of_signal(stop.signal());
+}
+
+}  // namespace gimnet::tool
