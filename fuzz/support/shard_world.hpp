@@ -10,7 +10,7 @@
 #include "hub/shard/io_shard.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_parser.hpp"
-#include "tests/support/memory_transport.hpp"
+#include "tests/support/memory_stream.hpp"
 
 namespace gimnet::hub::fuzzing {
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "base/endian.hpp"
-#include "bench/hub/data/support/null_transport.hpp"
+#include "bench/hub/data/support/null_stream.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "tests/hub/data/support/route_rig.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
@@ -82,7 +82,7 @@ Work parser(std::uint32_t destinations) {
 /// A shard's routing side with recipients that take everything at once.
 struct Routing {
   testing::RouteRig rig;
-  benchmarks::NullTransport transport;
+  benchmarks::NullStream transport;
   std::vector<GatherWriter> writers;
   std::vector<hub::Run> runs;
 

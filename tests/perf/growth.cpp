@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bench/hub/data/support/null_transport.hpp"
+#include "bench/hub/data/support/null_stream.hpp"
 #include "client/gimi/ack_book.hpp"
 #include "client/nif/name_cache.hpp"
 #include "client/nif/pause_table.hpp"
@@ -331,7 +331,7 @@ Work forwarding(std::size_t count) {
   constexpr std::uint32_t kDestinations = 8;
   struct World {
     hub::testing::RouteRig rig;
-    benchmarks::NullTransport transport;
+    benchmarks::NullStream transport;
     std::vector<GatherWriter> writers;
     std::vector<hub::Run> runs;
   };

@@ -132,7 +132,7 @@ hub::PeerInfo HubLife::peer_of(const hub::Identity& identity, std::uint32_t node
 
 std::optional<proto::Goodbye> HubLife::admit(const Newcomer& newcomer, std::uint64_t number) {
   hub::Stranger stranger;
-  stranger.transport = std::make_unique<WireTransport>(newcomer.wire);
+  stranger.transport = std::make_unique<WireStream>(newcomer.wire);
   stranger.peer = peer_of(newcomer.identity, newcomer.wire->node, newcomer.wire->number);
   const milliseconds now = setting_.agenda.now_ms();
   shards_.forget_sent();

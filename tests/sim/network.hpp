@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hub/control/state/identity.hpp"
-#include "hub/transport/transport.hpp"
+#include "net/stream.hpp"
 #include "tests/sim/setting.hpp"
 
 namespace gimnet::sim {
@@ -41,11 +41,12 @@ struct Wire {
 using WirePointer = std::shared_ptr<Wire>;
 
 /// What the conductor and a shard hold of a wire.
-class WireTransport final : public hub::Transport {
+class WireStream final : public net::Stream {
  public:
-  explicit WireTransport(WirePointer wire) : wire_(std::move(wire)) {}
-  hub::IoResult receive(std::span<std::byte>) override { return {}; }
-  hub::IoResult send(std::span<const iovec>) override { return {}; }
+  explicit WireStream(WirePointer wire) : wire_(std::move(wire)) {}
+  net::IoResult receive(std::span<std::byte>) override { return {}; }
+  net::IoResult send(std::span<const iovec>) override { return {}; }
+  void shut_down() override {}
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
   void limit_unacknowledged(std::uint32_t) override {}

@@ -184,7 +184,7 @@ SimShards::Seat& SimShards::seat_for(std::size_t index, const AttachCommand& com
 }
 
 void SimShards::attach(std::size_t index, AttachCommand& command) {
-  const WirePointer wire = static_cast<const WireTransport&>(*command.transport).wire();
+  const WirePointer wire = static_cast<const WireStream&>(*command.transport).wire();
   Seat& seat = seat_for(index, command);
   setting_.trace.note("shard {a} attaches wire {b} as node {c}", index, wire->number,
                       index_of(command.node));
@@ -330,7 +330,7 @@ void SimShards::die() {
     for (const ShardCommand& command : shard.commands) {
       const auto* attached = std::get_if<AttachCommand>(&command);
       if (attached == nullptr) continue;
-      parts_.network.close_by_hub(static_cast<const WireTransport&>(*attached->transport).wire());
+      parts_.network.close_by_hub(static_cast<const WireStream&>(*attached->transport).wire());
     }
   }
 }

@@ -27,16 +27,18 @@ REQUIREMENTS = "docs/requirements.md"
 # Who may include whom: the table of docs/architecture.md, "Include rules". Longest prefix wins.
 _BASE = ("base",)
 _PROTO = _BASE + ("proto",)
+_NET = _PROTO + ("net",)
 _HUB_PARTS = ("hub/limits.hpp", "hub/observe/counters.hpp", "hub/observe/session_gauges.hpp")
 _CONCURRENT = _PROTO + _HUB_PARTS + ("hub/concurrent",)
-_DATA = _CONCURRENT + ("hub/transport/transport.hpp", "hub/data")
-_SHARD = _DATA + ("hub/transport", "hub/shard")
+_DATA = _CONCURRENT + ("net/stream.hpp", "hub/data")
+_SHARD = _DATA + ("net", "hub/shard")
 _CONTROL = _SHARD + ("hub/version.hpp", "hub/observe", "hub/crypto", "hub/control")
-_NIF = _PROTO + ("client/nif",)
+_NIF = _NET + ("client/nif",)
 _GIMI = _NIF + ("client/gimi",)
 MAY_INCLUDE = {
     "base": _BASE,
     "proto": _PROTO,
+    "net": _NET,
     "hub/limits.hpp": _BASE,
     "hub/limits.cpp": _PROTO + ("hub/limits.hpp",),
     "hub/observe/counters.hpp": _PROTO,
@@ -44,14 +46,13 @@ MAY_INCLUDE = {
     "hub/observe/counters.cpp": _PROTO + ("hub/observe/counters.hpp",),
     "hub/concurrent": _CONCURRENT,
     "hub/data": _DATA,
-    "hub/transport": _CONCURRENT + ("hub/transport",),
     "hub/shard": _SHARD,
     "hub/crypto": _BASE + ("hub/crypto",),
     "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/control/state"),
     "hub/control": _CONTROL,
     "hub/config": _CONTROL + ("hub/config",),
     "hub/observe": _CONCURRENT + ("hub/observe",),
-    "hub": _PROTO + ("hub",),
+    "hub": _NET + ("hub",),
     "client/nif": _NIF,
     "client/gimi": _GIMI,
     "impair": _BASE + ("impair",),
@@ -67,6 +68,7 @@ _THREADS = ("thread", "mutex", "shared_mutex", "atomic", "condition_variable", "
 _LIBRARIES = ("boost/", "concurrentqueue/", "readerwriterqueue/", "fmt/", "spdlog/", "CLI/", "toml++/", "jemalloc/")
 FORBIDDEN_INCLUDES = {
     "base": _LIBRARIES,
+    "net": _LIBRARIES,
     "proto": _LIBRARIES + _SOCKETS + _THREADS,
     "client": _LIBRARIES,
     "hub/data": ("mutex", "shared_mutex", "condition_variable", "functional", "boost/asio"),

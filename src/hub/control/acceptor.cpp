@@ -11,7 +11,6 @@
 #include "base/log.hpp"
 #include "hub/control/goodbye.hpp"
 #include "hub/control/log_peer.hpp"
-#include "hub/transport/socket_transport.hpp"
 
 namespace gimnet::hub {
 namespace {
@@ -77,13 +76,19 @@ Acceptor::After Acceptor::accept_some(const std::function<void(Stranger)>& take)
   return After::wait;
 }
 
+std::unique_ptr<net::Stream> Acceptor::stream_of(int descriptor,
+                                                 net::SocketStream::Family family) const {
+  const auto send_bytes = static_cast<std::uint32_t>(limits_.socket_send_bytes);
+  return std::make_unique<net::SocketStream>(descriptor, family,
+                                             net::SocketOptions{.send_bytes = send_bytes});
+}
+
 Stranger Acceptor::stranger(int descriptor) const {
   Stranger result;
   if (listener_->url().scheme == ListenUrl::Scheme::tcp) {
     result.peer = PeerInfo{"tcp", tcp_peer(descriptor)};
     result.identity = Identity::open();
-    result.transport =
-        std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::tcp, limits_);
+    result.transport = stream_of(descriptor, net::SocketStream::Family::tcp);
     return result;
   }
   ucred credentials{};
@@ -95,8 +100,7 @@ Stranger Acceptor::stranger(int descriptor) const {
     result.identity = Identity::of_user(credentials.uid);
     result.rights.administer = credentials.uid == 0 || credentials.uid == ::geteuid();
   }
-  result.transport =
-      std::make_unique<SocketTransport>(descriptor, SocketTransport::Family::unix_socket, limits_);
+  result.transport = stream_of(descriptor, net::SocketStream::Family::unix_socket);
   return result;
 }
 

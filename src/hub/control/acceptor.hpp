@@ -3,19 +3,26 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "hub/control/descriptor_reserve.hpp"
 #include "hub/control/listener.hpp"
 #include "hub/control/state/identity.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
-#include "hub/transport/transport.hpp"
+#include "net/socket_stream.hpp"
 
 namespace gimnet::hub {
 
+/// The origin of a connection, as people read it.
+struct PeerInfo {
+  std::string transport;  ///< "tcp" or "unix"
+  std::string address;    ///< "127.0.0.1:41234", or "pid 77 uid 1000"
+};
+
 /// A connection that was accepted and has said nothing yet.
 struct Stranger {
-  std::unique_ptr<Transport> transport;
+  std::unique_ptr<net::Stream> transport;
   PeerInfo peer;
   Identity identity;
   Rights rights;
@@ -53,6 +60,8 @@ class Acceptor {
   [[nodiscard]] const Listener& listener() const { return *listener_; }
 
  private:
+  [[nodiscard]] std::unique_ptr<net::Stream> stream_of(int descriptor,
+                                                       net::SocketStream::Family family) const;
   [[nodiscard]] Stranger stranger(int descriptor) const;
   enum class Shortage : std::uint8_t { served_one, nobody_waits, nothing_helps };
   /// Descriptors are short: takes one peer, or turns it away, with the spare one's help.

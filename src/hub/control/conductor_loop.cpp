@@ -285,7 +285,7 @@ struct ConductorLoop::Impl {
   asio::io_context context{1};
   DescriptorReserve reserve;
   WaitingRoom strangers;
-  std::vector<std::unique_ptr<Transport>> leaving;  ///< to be seen off by `strangers`
+  std::vector<std::unique_ptr<net::Stream>> leaving;  ///< to be seen off by `strangers`
   Watch strangers_watch;
   Watch inbox_watch;
   asio::steady_timer timer;

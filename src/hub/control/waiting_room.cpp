@@ -1,7 +1,6 @@
 #include "hub/control/waiting_room.hpp"
 
 #include <sys/epoll.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -150,9 +149,9 @@ std::optional<milliseconds> WaitingRoom::next_deadline() const {
 }
 
 void WaitingRoom::read(Peer& peer, milliseconds now) {
-  const IoResult result = peer.stranger.transport->receive(peer.handshake->room());
-  if (result.status == IoStatus::would_block) return;
-  if (result.status != IoStatus::ok) {
+  const net::IoResult result = peer.stranger.transport->receive(peer.handshake->room());
+  if (result.status == net::IoStatus::would_block) return;
+  if (result.status != net::IoStatus::ok) {
     if (peer.handshake->begun()) refusals_.unfinished.add(1);
     return remove(peer);
   }
@@ -224,10 +223,10 @@ Acceptor::Room WaitingRoom::give_way_to(const Stranger& newcomer) {
 
 void WaitingRoom::discard(Peer& peer) {
   std::array<std::byte, 4'096> nobody_looks{};
-  const IoResult result = peer.stranger.transport->receive(nobody_looks);
-  if (result.status == IoStatus::would_block) return;
+  const net::IoResult result = peer.stranger.transport->receive(nobody_looks);
+  if (result.status == net::IoStatus::would_block) return;
   peer.discarded += result.bytes;
-  if (result.status != IoStatus::ok || peer.discarded > kDiscardedMax) remove(peer);
+  if (result.status != net::IoStatus::ok || peer.discarded > kDiscardedMax) remove(peer);
 }
 
 void WaitingRoom::turn_away(Peer& peer, const Goodbye& goodbye, milliseconds now) {
@@ -250,7 +249,7 @@ void WaitingRoom::keep_leaving_few() {
   while (leaving_.size() > limits_.handshakes) remove(leaving_.front());
 }
 
-void WaitingRoom::see_off(std::unique_ptr<Transport> transport, milliseconds now) {
+void WaitingRoom::see_off(std::unique_ptr<net::Stream> transport, milliseconds now) {
   Peer& peer = leaving_.emplace_back();
   peer.self = std::prev(leaving_.end());
   peer.stranger.transport = std::move(transport);
@@ -264,7 +263,7 @@ void WaitingRoom::see_off(std::unique_ptr<Transport> transport, milliseconds now
 }
 
 void WaitingRoom::begin_leaving(Peer& peer, milliseconds now) {
-  ::shutdown(peer.stranger.transport->descriptor(), SHUT_WR);
+  peer.stranger.transport->shut_down();
   peer.deadline = now + milliseconds{limits_.farewell_ms};
 }
 

@@ -37,7 +37,7 @@ class WaitingRoom {
   void enter(Stranger stranger, std::chrono::milliseconds now);
   /// A peer to which GOODBYE was written elsewhere: it gets the same moment. REQUIRES: a transport
   /// with a descriptor.
-  void see_off(std::unique_ptr<Transport> transport, std::chrono::milliseconds now);
+  void see_off(std::unique_ptr<net::Stream> transport, std::chrono::milliseconds now);
   /// There are no descriptors: ends the one who is leaving longest, else the one who waits longest
   /// without HELLO. Who may administer the hub makes way only for its like.
   [[nodiscard]] Acceptor::Room give_way_to(const Stranger& newcomer);

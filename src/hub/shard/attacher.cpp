@@ -171,8 +171,8 @@ void Attacher::welcome(Connection& connection, const proto::Welcome& welcome, st
   // The opening is no frame: it goes past the outbox. A fresh connection takes this much at once,
   // or it is of no use.
   const iovec piece{bytes.data(), bytes.size()};
-  const IoResult sent = connection.transport->send({&piece, 1});
-  if (sent.status != IoStatus::ok || sent.bytes != bytes.size())
+  const net::IoResult sent = connection.transport->send({&piece, 1});
+  if (sent.status != net::IoStatus::ok || sent.bytes != bytes.size())
     return closer_.on_broken(connection);
   if (gap != 0) {
     send_flow(state_, connection, proto::flow::Skip{proto::DropReason::link_lost, gap});

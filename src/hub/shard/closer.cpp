@@ -51,8 +51,8 @@ bool Closer::say_goodbye(Connection& connection, proto::GoodbyeCode code,
                     proto::encode(proto::Goodbye{code, sentence}));
   // Past the outbox: nothing follows a GOODBYE. A peer that takes nothing any more does not get it.
   const iovec piece{const_cast<std::byte*>(frame.data()), frame.size()};
-  const IoResult sent = connection.transport->send({&piece, 1});
-  return sent.status == IoStatus::ok && sent.bytes == frame.size();
+  const net::IoResult sent = connection.transport->send({&piece, 1});
+  return sent.status == net::IoStatus::ok && sent.bytes == frame.size();
 }
 
 void Closer::give_up_rest(Connection& connection) {
@@ -80,7 +80,7 @@ void Closer::give_up_rest(Connection& connection) {
 
 void Closer::detach(Connection& connection, bool said_goodbye) {
   if (connection.tail.rest) give_up_rest(connection);
-  std::unique_ptr<Transport> transport = std::move(connection.transport);
+  std::unique_ptr<net::Stream> transport = std::move(connection.transport);
   if (transport->descriptor() >= 0) {
     state_.poller.remove(transport->descriptor());
     if (said_goodbye) state_.tell_conductor({state_.self, FarewellEvent{std::move(transport)}});

@@ -11,7 +11,7 @@
 #include "hub/data/fanout/mailbox.hpp"
 #include "hub/data/fanout/paced_subscription.hpp"
 #include "hub/limits.hpp"
-#include "hub/transport/transport.hpp"
+#include "net/stream.hpp"
 #include "proto/control/link.hpp"
 
 // All that the conductor tells a shard, one type each, and all that a shard tells the conductor.
@@ -52,7 +52,7 @@ struct AttachCommand {
   NodeId node;
   /// The shard finds out by itself: by this the simulations judge what the conductor decided.
   bool new_session = true;
-  std::unique_ptr<Transport> transport;
+  std::unique_ptr<net::Stream> transport;
   /// All of WELCOME but what the shard puts in: resumed, and for a session that can resume taken,
   /// epoch and resume_buffer_bytes.
   proto::Welcome welcome;
@@ -213,7 +213,7 @@ struct DetachedEvent {
 /// moment, since closing with unread bytes would reset the connection and could take the GOODBYE
 /// with it.
 struct FarewellEvent {
-  std::unique_ptr<Transport> transport;
+  std::unique_ptr<net::Stream> transport;
 };
 
 /// The shard has nothing left to write, nor any other for it (answer to DrainCommand).

@@ -13,7 +13,7 @@
 #include "hub/shard/backoff.hpp"
 #include "hub/shard/commands.hpp"
 #include "hub/shard/poller.hpp"
-#include "hub/transport/transport.hpp"
+#include "net/stream.hpp"
 
 namespace gimnet::hub {
 
@@ -72,7 +72,7 @@ struct Connection : Recipient {
   std::uint32_t requests = 0;  ///< that are unanswered
   std::uint32_t ping_sequence = 0;
   std::uint32_t unsent_limit = 0;            ///< of the transport; 0: not limited
-  std::unique_ptr<Transport> transport;      ///< nullptr: away
+  std::unique_ptr<net::Stream> transport;    ///< nullptr: away
   std::vector<NodeId> former_nodes;          ///< under which it may still send, the latest last
   TokenBucket oddities;                      ///< CREDITs of no use
   std::uint64_t posted_shards = kAllShards;  ///< that its last read sent to; all, before the first

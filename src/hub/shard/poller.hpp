@@ -6,14 +6,11 @@
 #include <cstdint>
 #include <span>
 
+#include "net/stream.hpp"
+
 namespace gimnet::hub {
 
-/// What a descriptor is waited for.
-struct Interest {
-  bool read = false;
-  bool write = false;
-  friend bool operator==(const Interest&, const Interest&) = default;
-};
+using net::Interest;
 
 /// A descriptor that is ready. Errors show as readable: the next receive() tells.
 struct Ready {

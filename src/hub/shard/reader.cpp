@@ -57,9 +57,9 @@ void Reader::read(Connection& connection) {
   }
   const std::span<std::byte> room = state_.receive_buffer.prepare(connection.tail);
   const std::span<std::byte> share = room.first(std::min<std::size_t>(room.size(), most));
-  const IoResult result = receive_repeatedly(connection, share, state_.tally);
-  if (result.status == IoStatus::would_block) return;
-  if (result.status != IoStatus::ok) return closer_.on_end(connection);
+  const net::IoResult result = receive_repeatedly(connection, share, state_.tally);
+  if (result.status == net::IoStatus::would_block) return;
+  if (result.status != net::IoStatus::ok) return closer_.on_end(connection);
   state_.tally.received_bytes += result.bytes;
   connection.outbox.counters()->received_bytes.add(result.bytes);
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.

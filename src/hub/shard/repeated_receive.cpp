@@ -6,9 +6,9 @@ std::size_t receive_more(Connection& connection, std::span<std::byte> room, Tall
   std::size_t bytes = 0;
   for (int reads = 0; reads < kReadsMore && bytes < std::min(kSmallReadBytes, room.size());
        ++reads) {
-    const IoResult more = connection.transport->receive(room.subspan(bytes));
+    const net::IoResult more = connection.transport->receive(room.subspan(bytes));
     ++tally.receive_calls;
-    if (more.status != IoStatus::ok) break;
+    if (more.status != net::IoStatus::ok) break;
     bytes += more.bytes;
   }
   if (bytes != 0) {

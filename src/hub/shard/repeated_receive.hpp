@@ -22,11 +22,11 @@ inline constexpr int kReadsMore = 4;
 /// writes message by message has written the next one while the first was read, and both then leave
 /// in one write, which is what a message costs (docs/why-these-figures.md). REQUIRES: `room`
 /// is not empty. Thread safety: one shard.
-[[nodiscard]] inline IoResult receive_repeatedly(Connection& connection, std::span<std::byte> room,
-                                                 Tally& tally) {
-  IoResult result = connection.transport->receive(room);
+[[nodiscard]] inline net::IoResult receive_repeatedly(Connection& connection,
+                                                      std::span<std::byte> room, Tally& tally) {
+  net::IoResult result = connection.transport->receive(room);
   ++tally.receive_calls;
-  if (result.status == IoStatus::ok && result.bytes < std::min(kSmallReadBytes, room.size()) &&
+  if (result.status == net::IoStatus::ok && result.bytes < std::min(kSmallReadBytes, room.size()) &&
       connection.read_again.is_due()) {
     result.bytes += receive_more(connection, room.subspan(result.bytes), tally);
   }

@@ -108,8 +108,9 @@ void Signals::arm(Connection& connection) {
   // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would
   // wait for ever. And what waits for that could not be written before the hub ends.
   const bool may_read = (connection.holds == 0 && !connection.draining) || connection.must_confirm;
-  const Interest wanted{.read = may_read && !connection.waits_for_room,
-                        .write = connection.blocked && !connection.write_failed};
+  const Interest wanted = net::interest_of(may_read && !connection.waits_for_room,
+                                           connection.blocked && !connection.write_failed,
+                                           connection.transport->pending_out());
   if (wanted == connection.armed) return;
   connection.armed = wanted;
   const int descriptor = connection.transport->descriptor();

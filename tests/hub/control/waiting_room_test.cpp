@@ -200,9 +200,9 @@ TEST_F(WaitingRoomTest, WhoHangsUpIsForgotten) {
 // Many robots behind one address translator come back at once: none is sent away whose HELLO is
 // there.
 TEST_F(WaitingRoomTest, WhoIsSeenOffIsReadUntilItLeavesOrItsTimeIsOver) {
-  peers_.push_back(std::make_unique<Peer>(limits_));
+  peers_.push_back(std::make_unique<Peer>());
   Peer& patient = *peers_.back();
-  peers_.push_back(std::make_unique<Peer>(limits_));
+  peers_.push_back(std::make_unique<Peer>());
   Peer& hasty = *peers_.back();
   room_.see_off(patient.take_stranger().transport, 0ms);
   room_.see_off(hasty.take_stranger().transport, 0ms);
@@ -229,7 +229,7 @@ TEST_F(WaitingRoomTest, AtTheEndEverybodyIsDismissed) {
 TEST_F(WaitingRoomTest, AtTheEndAllWhoLeaveHaveTheirTime) {
   limits_.handshakes = 1;
   const auto see_off = [this] {
-    peers_.push_back(std::make_unique<Peer>(limits_));
+    peers_.push_back(std::make_unique<Peer>());
     room_.see_off(peers_.back()->take_stranger().transport, 0ms);
   };
   see_off();

@@ -319,22 +319,23 @@ TEST(Attacher, ABrokenTransportIsToldToTheConductor) {
 }
 
 /// A pipe whose descriptor no poller takes: epoll refuses regular files.
-class UnpollableTransport final : public Transport {
+class UnpollableStream final : public net::Stream {
  public:
-  explicit UnpollableTransport(std::unique_ptr<Transport> pipe)
+  explicit UnpollableStream(std::unique_ptr<net::Stream> pipe)
       : pipe_(std::move(pipe)), file_(std::tmpfile()) {}
-  ~UnpollableTransport() override { std::fclose(file_); }
-  UnpollableTransport(const UnpollableTransport&) = delete;
-  UnpollableTransport& operator=(const UnpollableTransport&) = delete;
-  IoResult receive(std::span<std::byte> into) override { return pipe_->receive(into); }
-  IoResult send(std::span<const iovec> pieces) override { return pipe_->send(pieces); }
+  ~UnpollableStream() override { std::fclose(file_); }
+  UnpollableStream(const UnpollableStream&) = delete;
+  UnpollableStream& operator=(const UnpollableStream&) = delete;
+  net::IoResult receive(std::span<std::byte> into) override { return pipe_->receive(into); }
+  net::IoResult send(std::span<const iovec> pieces) override { return pipe_->send(pieces); }
+  void shut_down() override {}
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
   void limit_unacknowledged(std::uint32_t) override {}
   [[nodiscard]] int descriptor() const override { return ::fileno(file_); }
 
  private:
-  std::unique_ptr<Transport> pipe_;
+  std::unique_ptr<net::Stream> pipe_;
   std::FILE* file_;
 };
 
@@ -345,7 +346,7 @@ TEST(Attacher, WhoCannotBePolledHearsWhyBehindTheOpening) {
   command.session = {ConnectionSlot{3}, 9};
   command.attachment = 1;
   command.node = make_id<NodeId>(rig.hub(), 3);
-  command.transport = std::make_unique<UnpollableTransport>(std::move(transport));
+  command.transport = std::make_unique<UnpollableStream>(std::move(transport));
   rig.command(0, std::move(command));
   rig.turn();
   FakeNode node;

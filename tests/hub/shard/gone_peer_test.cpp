@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "hub/transport/socket_transport.hpp"
+#include "net/socket_stream.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
-#include "tests/hub/transport/support/connected_sockets.hpp"
+#include "tests/net/support/connected_sockets.hpp"
 
 // A peer that is gone, behind a real socket: what it had sent is with the kernel, writing to it
 // fails, and the kernel tells of its end whether it is asked or not. Time is the rig's.
@@ -23,7 +23,9 @@
 namespace gimnet::hub {
 namespace {
 
-using Family = SocketTransport::Family;
+using Family = net::SocketStream::Family;
+
+constexpr net::SocketOptions kSizes{.send_bytes = 256 * 1'024};
 using testing::FakeNode;
 using testing::HubRig;
 using ::testing::SizeIs;
@@ -51,7 +53,7 @@ class GonePeer : public ::testing::TestWithParam<Family> {
     command.session = {ConnectionSlot{500}, 77};
     command.attachment = 1;
     command.node = sender_.id = make_id<NodeId>(rig_.hub(), 500);
-    command.transport = std::make_unique<SocketTransport>(near, GetParam(), limits_);
+    command.transport = std::make_unique<net::SocketStream>(near, GetParam(), kSizes);
     command.welcome.node = sender_.id;
     command.resume_wanted = resume;
     command.peer_epoch = 5;

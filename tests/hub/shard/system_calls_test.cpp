@@ -17,9 +17,9 @@
 #include <utility>
 #include <vector>
 
-#include "hub/transport/socket_transport.hpp"
+#include "net/socket_stream.hpp"
 #include "tests/hub/shard/support/hub_rig.hpp"
-#include "tests/hub/transport/support/connected_sockets.hpp"
+#include "tests/net/support/connected_sockets.hpp"
 
 // What a shard's turn costs in system calls, as the kernel counts them: one wait, one read of each
 // connection that has something, one write of each that gets something, whatever the number of
@@ -30,7 +30,9 @@ namespace gimnet::hub {
 namespace {
 
 using Calls = std::vector<int>;
-using Family = SocketTransport::Family;
+using Family = net::SocketStream::Family;
+
+constexpr net::SocketOptions kSizes{.send_bytes = 256 * 1'024};
 using ::testing::ElementsAre;
 using testing::FakeNode;
 using testing::HubRig;
@@ -56,7 +58,7 @@ class TurnSystemCalls : public ::testing::TestWithParam<Family> {
       command.session = node.session;
       command.attachment = 1;
       command.node = node.id = command.welcome.node = make_id<NodeId>(rig_.hub(), index);
-      command.transport = std::make_unique<SocketTransport>(near, GetParam(), Limits{});
+      command.transport = std::make_unique<net::SocketStream>(near, GetParam(), kSizes);
       command.peer_epoch = 5;
       command.peer_frame_bytes = proto::kFrameLengthDefault;
       rig_.command(0, std::move(command));

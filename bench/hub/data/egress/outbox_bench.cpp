@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/hub/data/support/null_transport.hpp"
+#include "bench/hub/data/support/null_stream.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
 
 namespace gimnet::hub {
@@ -20,7 +20,7 @@ void in_and_out(benchmark::State& state) {
   EgressRig rig;
   Outbox outbox;
   GatherWriter writer;
-  benchmarks::NullTransport transport;
+  benchmarks::NullStream transport;
   const hub::Run run = rig.run({std::string(static_cast<std::size_t>(state.range(0)), 'x')});
   const proto::FrameHeader header = run.header();
   for (auto _ : state) {
@@ -56,7 +56,7 @@ void bursts_of_streams(benchmark::State& state) {
   EgressRig rig;
   Outbox outbox;
   GatherWriter writer;
-  benchmarks::NullTransport transport;
+  benchmarks::NullStream transport;
   std::vector<hub::Run> runs;
   for (std::int64_t key = 0; key < state.range(0); ++key) {
     std::string payload(200, 'k');
@@ -81,7 +81,7 @@ void fragments(benchmark::State& state) {
   EgressRig rig;
   Outbox outbox;
   GatherWriter writer;
-  benchmarks::NullTransport transport;
+  benchmarks::NullStream transport;
   constexpr std::uint32_t kPiece = 8 * 1024;
   constexpr std::uint32_t kTotal = 1 << 20;
   constexpr std::uint32_t kPerTurn = 16;

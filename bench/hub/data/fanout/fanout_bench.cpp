@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "bench/hub/data/support/null_transport.hpp"
+#include "bench/hub/data/support/null_stream.hpp"
 #include "tests/hub/data/support/route_rig.hpp"
 
 namespace gimnet::hub {
@@ -13,7 +13,7 @@ void fan_out(benchmark::State& state, bool by_reference) {
   const auto recipients = static_cast<std::uint32_t>(state.range(0));
   const auto bytes = static_cast<std::size_t>(state.range(1));
   for (std::uint32_t i = 0; i < recipients; ++i) rig.add_here(2 + i);
-  benchmarks::NullTransport transport;
+  benchmarks::NullStream transport;
   GatherWriter writer;
   const hub::Run run =
       rig.make_run(7u << 20 | 1, {std::string(bytes, 'x')}, {.kind = proto::Kind::group});

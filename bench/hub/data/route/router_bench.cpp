@@ -11,7 +11,7 @@
 
 #include <random>
 
-#include "bench/hub/data/support/null_transport.hpp"
+#include "bench/hub/data/support/null_stream.hpp"
 #include "proto/frame/frame_parser.hpp"
 #include "tests/hub/data/support/route_rig.hpp"
 
@@ -69,7 +69,7 @@ class Forwarding {
 
  private:
   testing::RouteRig rig_;
-  benchmarks::NullTransport transport_;
+  benchmarks::NullStream transport_;
   std::vector<GatherWriter> writers_;
   std::vector<BufferRef> slabs_;
   std::vector<const std::byte*> ends_;

@@ -45,7 +45,7 @@ void GatherWriter::Batch::add(Source source, const std::byte* begin, std::uint32
   pieces[piece_count++] = {const_cast<std::byte*>(begin), size};
 }
 
-Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport,
+Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, net::Stream& transport,
                           EgressContext& context) {
   context.owner.check_here();
   Job job{outbox, resume, context};
@@ -53,10 +53,10 @@ Flush GatherWriter::flush(Outbox& outbox, ResumeBuffer* resume, Transport& trans
     Batch batch;
     gather(batch, job);
     if (batch.bytes == 0) return outbox.empty() ? Flush::emptied : Flush::waits;
-    const IoResult result = transport.send({batch.pieces.data(), batch.piece_count});
+    const net::IoResult result = transport.send({batch.pieces.data(), batch.piece_count});
     ++context.tally.send_calls;
-    if (result.status == IoStatus::would_block) return Flush::blocked;
-    if (result.status != IoStatus::ok) return Flush::failed;
+    if (result.status == net::IoStatus::would_block) return Flush::blocked;
+    if (result.status != net::IoStatus::ok) return Flush::failed;
     context.tally.sent_bytes += result.bytes;
     consume(batch, result.bytes, job);
     if (result.bytes < batch.bytes) return Flush::blocked;

@@ -6,7 +6,7 @@
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/egress/outbox.hpp"
 #include "hub/data/egress/resume_buffer.hpp"
-#include "hub/transport/transport.hpp"
+#include "net/stream.hpp"
 
 namespace gimnet::hub {
 
@@ -27,7 +27,7 @@ class GatherWriter {
  public:
   /// `resume` is nullptr where the connection has no resume. Frames that were taken count as
   /// delivered, or go to `resume`.
-  [[nodiscard]] Flush flush(Outbox& outbox, ResumeBuffer* resume, Transport& transport,
+  [[nodiscard]] Flush flush(Outbox& outbox, ResumeBuffer* resume, net::Stream& transport,
                             EgressContext& context);
 
   [[nodiscard]] bool in_frame() const { return partial_.run.frames != 0; }

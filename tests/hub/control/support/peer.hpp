@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hub/control/acceptor.hpp"
-#include "hub/transport/socket_transport.hpp"
+#include "net/socket_stream.hpp"
 #include "proto/control/link.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -38,12 +38,12 @@ inline std::vector<std::byte> opening_and(const proto::Hello& hello) {
 /// The far end of a connection, as a test holds it.
 class Peer {
  public:
-  explicit Peer(const Limits& limits) {
+  Peer() {
     int ends[2] = {-1, -1};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends), 0);
     descriptor_ = ends[0];
     near_.transport =
-        std::make_unique<SocketTransport>(ends[1], SocketTransport::Family::unix_socket, limits);
+        std::make_unique<net::SocketStream>(ends[1], net::SocketStream::Family::unix_socket);
     near_.peer = PeerInfo{"unix", "pid 1 uid 2"};
   }
   ~Peer() { close(); }

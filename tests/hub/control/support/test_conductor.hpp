@@ -19,10 +19,11 @@
 namespace gimnet::hub {
 
 /// A transport that leads nowhere.
-class NoTransport final : public Transport {
+class NoStream final : public net::Stream {
  public:
-  IoResult receive(std::span<std::byte>) override { return {}; }
-  IoResult send(std::span<const iovec>) override { return {}; }
+  net::IoResult receive(std::span<std::byte>) override { return {}; }
+  net::IoResult send(std::span<const iovec>) override { return {}; }
+  void shut_down() override {}
   [[nodiscard]] std::uint64_t unsent_bytes() const override { return 0; }
   void limit_unsent(std::uint32_t) override {}
   void limit_unacknowledged(std::uint32_t) override {}
@@ -61,7 +62,7 @@ class TestConductor {
   std::optional<proto::Goodbye> try_join(const proto::Hello& hello) {
     Stranger stranger;
     stranger.rights.administer = may_administer;
-    stranger.transport = std::make_unique<NoTransport>();
+    stranger.transport = std::make_unique<NoStream>();
     stranger.peer = PeerInfo{"tcp", "127.0.0.1:5000"};
     stranger.identity = identity;
     return conductor.admit(stranger, hello, {now, 1'000'000'000});

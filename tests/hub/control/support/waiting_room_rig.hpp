@@ -31,13 +31,13 @@ class WaitingRoomTest : public ::testing::Test {
     return std::nullopt;
   }
   Peer& enter(std::chrono::milliseconds now = std::chrono::milliseconds{0}) {
-    peers_.push_back(std::make_unique<Peer>(limits_));
+    peers_.push_back(std::make_unique<Peer>());
     room_.enter(peers_.back()->take_stranger(), now);
     return *peers_.back();
   }
   Peer& enter_from(const std::string& address,
                    std::chrono::milliseconds now = std::chrono::milliseconds{0}) {
-    peers_.push_back(std::make_unique<Peer>(limits_));
+    peers_.push_back(std::make_unique<Peer>());
     Stranger stranger = peers_.back()->take_stranger();
     stranger.peer = PeerInfo{"tcp", address + ":" + std::to_string(40'000 + peers_.size())};
     room_.enter(std::move(stranger), now);
@@ -52,7 +52,7 @@ class WaitingRoomTest : public ::testing::Test {
     bool on_reserve = false;
   };
   Peer& enter_as(const Standing& standing) {
-    peers_.push_back(std::make_unique<Peer>(limits_));
+    peers_.push_back(std::make_unique<Peer>());
     Stranger stranger = peers_.back()->take_stranger();
     stranger.rights.administer = standing.may_administer;
     stranger.on_reserve = standing.on_reserve;
@@ -72,7 +72,7 @@ class WaitingRoomTest : public ::testing::Test {
   Limits limits_;
   RefusalCounters refusals_;
   std::vector<proto::Hello> hellos_;
-  std::vector<std::unique_ptr<Transport>> admitted_;
+  std::vector<std::unique_ptr<net::Stream>> admitted_;
   std::vector<std::unique_ptr<Peer>> peers_;
   WaitingRoom room_;
 };

@@ -8,7 +8,7 @@
 #include "hub/data/egress/gather_writer.hpp"
 #include "hub/data/egress/outbox.hpp"
 #include "proto/frame/fragment_header.hpp"
-#include "tests/support/memory_transport.hpp"
+#include "tests/support/memory_stream.hpp"
 
 namespace gimnet::hub::testing {
 
@@ -161,7 +161,7 @@ struct TestConnection {
   }
 
   EgressRig& rig;
-  std::unique_ptr<MemoryTransport> transport;
+  std::unique_ptr<MemoryStream> transport;
   MemoryPeer peer;
   Outbox outbox;
   GatherWriter writer;

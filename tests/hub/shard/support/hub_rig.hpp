@@ -14,7 +14,7 @@
 #include "proto/frame/flow.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "proto/frame/report.hpp"
-#include "tests/support/memory_transport.hpp"
+#include "tests/support/memory_stream.hpp"
 
 namespace gimnet::hub::testing {
 

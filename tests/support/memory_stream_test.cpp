@@ -1,4 +1,4 @@
-#include "tests/support/memory_transport.hpp"
+#include "tests/support/memory_stream.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,18 +18,18 @@ std::string read_all(MemoryPeer& peer) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-IoResult send(MemoryTransport& transport, std::string text) {
+net::IoResult send(MemoryStream& transport, std::string text) {
   const iovec piece{text.data(), text.size()};
   return transport.send({&piece, 1});
 }
 
-std::string receive(MemoryTransport& transport, std::size_t most = 64) {
+std::string receive(MemoryStream& transport, std::size_t most = 64) {
   std::vector<std::byte> bytes(most);
-  const IoResult result = transport.receive(bytes);
+  const net::IoResult result = transport.receive(bytes);
   return {reinterpret_cast<const char*>(bytes.data()), result.bytes};
 }
 
-TEST(MemoryTransport, CarriesBytesBothWaysInOrder) {
+TEST(MemoryStream, CarriesBytesBothWaysInOrder) {
   auto [transport, peer] = make_memory_pipe();
   EXPECT_EQ(receive(*transport), "");
   peer.write(bytes_of("abc"));
@@ -43,26 +43,26 @@ TEST(MemoryTransport, CarriesBytesBothWaysInOrder) {
   EXPECT_EQ(transport->unsent_bytes(), 0u);
 }
 
-TEST(MemoryTransport, GathersPiecesAndCutsThemAtAnyByte) {
+TEST(MemoryStream, GathersPiecesAndCutsThemAtAnyByte) {
   for (std::size_t cut = 1; cut <= 6; ++cut) {
     auto [transport, peer] = make_memory_pipe();
     peer.plan_sends({cut});
     std::string first = "abc";
     std::string second = "def";
     const std::array pieces{iovec{first.data(), 3}, iovec{second.data(), 3}};
-    const IoResult result = transport->send(pieces);
-    EXPECT_EQ(result.status, IoStatus::ok);
+    const net::IoResult result = transport->send(pieces);
+    EXPECT_EQ(result.status, net::IoStatus::ok);
     EXPECT_EQ(result.bytes, cut);
     EXPECT_EQ(read_all(peer), std::string("abcdef").substr(0, cut));
   }
 }
 
-TEST(MemoryTransport, BlocksWhereItIsTold) {
+TEST(MemoryStream, BlocksWhereItIsTold) {
   auto [transport, peer] = make_memory_pipe();
   peer.plan_sends({0, 2, 0});
-  EXPECT_EQ(send(*transport, "abc").status, IoStatus::would_block);
+  EXPECT_EQ(send(*transport, "abc").status, net::IoStatus::would_block);
   EXPECT_EQ(send(*transport, "abc").bytes, 2u);
-  EXPECT_EQ(send(*transport, "c").status, IoStatus::would_block);
+  EXPECT_EQ(send(*transport, "c").status, net::IoStatus::would_block);
   EXPECT_EQ(send(*transport, "c").bytes, 1u);
   EXPECT_EQ(read_all(peer), "abc");
   peer.plan_receives({0, 1});
@@ -72,49 +72,49 @@ TEST(MemoryTransport, BlocksWhereItIsTold) {
   EXPECT_EQ(receive(*transport), "yz");
 }
 
-TEST(MemoryTransport, TakesAsMuchAsThereIsRoomAndOneMoreBlocks) {
+TEST(MemoryStream, TakesAsMuchAsThereIsRoomAndOneMoreBlocks) {
   auto [transport, peer] = make_memory_pipe();
   peer.set_room(4);
   EXPECT_EQ(send(*transport, "abcd").bytes, 4u);
   EXPECT_FALSE(peer.transport_writable());
-  EXPECT_EQ(send(*transport, "e").status, IoStatus::would_block);
+  EXPECT_EQ(send(*transport, "e").status, net::IoStatus::would_block);
   std::vector<std::byte> some;
   EXPECT_EQ(peer.read(some, 1), 1u);
   EXPECT_TRUE(peer.transport_writable());
   EXPECT_EQ(send(*transport, "ef").bytes, 1u);
 }
 
-TEST(MemoryTransport, EndsInOrderAfterEverythingWasRead) {
+TEST(MemoryStream, EndsInOrderAfterEverythingWasRead) {
   auto [transport, peer] = make_memory_pipe();
   peer.write(bytes_of("ab"));
   peer.close();
   std::array<std::byte, 8> into{};
   EXPECT_TRUE(peer.transport_readable());
   EXPECT_EQ(transport->receive(into).bytes, 2u);
-  EXPECT_EQ(transport->receive(into).status, IoStatus::closed);
+  EXPECT_EQ(transport->receive(into).status, net::IoStatus::closed);
   transport.reset();
   EXPECT_TRUE(peer.transport_gone());
 }
 
-TEST(MemoryTransport, FailsAfterAReset) {
+TEST(MemoryStream, FailsAfterAReset) {
   auto [transport, peer] = make_memory_pipe();
   peer.write(bytes_of("ab"));
   peer.reset();
   std::array<std::byte, 8> into{};
-  EXPECT_EQ(transport->receive(into).status, IoStatus::failed);
-  EXPECT_EQ(send(*transport, "x").status, IoStatus::failed);
+  EXPECT_EQ(transport->receive(into).status, net::IoStatus::failed);
+  EXPECT_EQ(send(*transport, "x").status, net::IoStatus::failed);
 }
 
-TEST(MemoryTransport, FailsAfterSoManyBytes) {
+TEST(MemoryStream, FailsAfterSoManyBytes) {
   auto [transport, peer] = make_memory_pipe();
   peer.reset_after(4);
   EXPECT_EQ(send(*transport, "abc").bytes, 3u);
   EXPECT_EQ(send(*transport, "def").bytes, 1u);
-  EXPECT_EQ(send(*transport, "ef").status, IoStatus::failed);
+  EXPECT_EQ(send(*transport, "ef").status, net::IoStatus::failed);
   EXPECT_EQ(read_all(peer), "abcd");
 }
 
-TEST(MemoryTransport, RemembersTheBoundOfWhatIsUnsent) {
+TEST(MemoryStream, RemembersTheBoundOfWhatIsUnsent) {
   auto [transport, peer] = make_memory_pipe();
   transport->limit_unsent(4096);
   EXPECT_EQ(peer.unsent_limit(), 4096u);

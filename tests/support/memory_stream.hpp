@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "hub/transport/transport.hpp"
+#include "net/stream.hpp"
 
 namespace gimnet::hub {
 
@@ -15,15 +15,16 @@ struct MemoryPipe;
 
 /// The hub's end of a pipe in memory, which does what its peer says: short reads and writes, no
 /// room, faults. Thread safety: none; both ends belong to one thread.
-class MemoryTransport final : public Transport {
+class MemoryStream final : public net::Stream {
  public:
-  explicit MemoryTransport(std::shared_ptr<MemoryPipe> pipe);
-  ~MemoryTransport() override;
-  MemoryTransport(const MemoryTransport&) = delete;
-  MemoryTransport& operator=(const MemoryTransport&) = delete;
+  explicit MemoryStream(std::shared_ptr<MemoryPipe> pipe);
+  ~MemoryStream() override;
+  MemoryStream(const MemoryStream&) = delete;
+  MemoryStream& operator=(const MemoryStream&) = delete;
 
-  [[nodiscard]] IoResult receive(std::span<std::byte> into) override;
-  [[nodiscard]] IoResult send(std::span<const iovec> pieces) override;
+  [[nodiscard]] net::IoResult receive(std::span<std::byte> into) override;
+  [[nodiscard]] net::IoResult send(std::span<const iovec> pieces) override;
+  void shut_down() override;
   /// What the peer has not read yet.
   [[nodiscard]] std::uint64_t unsent_bytes() const override;
   void limit_unsent(std::uint32_t bytes) override;
@@ -35,7 +36,7 @@ class MemoryTransport final : public Transport {
 };
 
 /// The other end, from which a test or a fuzzer plays a node. Outlives the transport: what that had
-/// sent can still be read. Thread safety: as MemoryTransport.
+/// sent can still be read. Thread safety: as MemoryStream.
 class MemoryPeer {
  public:
   static constexpr std::size_t kAll = ~std::size_t{0};
@@ -67,6 +68,8 @@ class MemoryPeer {
   /// Would a poller call the transport readable, or writable?
   [[nodiscard]] bool transport_readable() const;
   [[nodiscard]] bool transport_writable() const;
+  /// The hub sends nothing any more.
+  [[nodiscard]] bool shut_down() const;
   /// The hub has let its end go.
   [[nodiscard]] bool transport_gone() const;
   /// The last bound that limit_unsent() set.
@@ -80,6 +83,6 @@ class MemoryPeer {
 };
 
 /// Both ends of a new pipe.
-[[nodiscard]] std::pair<std::unique_ptr<MemoryTransport>, MemoryPeer> make_memory_pipe();
+[[nodiscard]] std::pair<std::unique_ptr<MemoryStream>, MemoryPeer> make_memory_pipe();
 
 }  // namespace gimnet::hub

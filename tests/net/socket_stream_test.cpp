@@ -1,4 +1,4 @@
-#include "hub/transport/socket_transport.hpp"
+#include "net/socket_stream.hpp"
 
 #include <gtest/gtest.h>
 #include <netinet/tcp.h>
@@ -11,33 +11,37 @@
 #include <utility>
 #include <vector>
 
-#include "tests/hub/transport/support/connected_sockets.hpp"
+#include "tests/net/support/connected_sockets.hpp"
 
-namespace gimnet::hub {
+namespace gimnet::net {
 namespace {
 
-using Family = SocketTransport::Family;
+using Family = SocketStream::Family;
+
+constexpr SocketOptions kSizes{.send_bytes = 256 * 1'024};
 
 /// The hub's end as a transport, and the far end's descriptor.
 struct Ends {
-  std::unique_ptr<SocketTransport> near;
+  std::unique_ptr<SocketStream> near;
   int far = -1;
   ~Ends() {
     if (far >= 0) ::close(far);
   }
 };
 
-std::unique_ptr<Ends> connect(Family family, const Limits& limits) {
+std::unique_ptr<Ends> connect(Family family, const SocketOptions& options) {
   const ConnectedSockets sockets = connect_by(family);
   auto ends = std::make_unique<Ends>();
-  ends->near = std::make_unique<SocketTransport>(sockets.near, family, limits);
+  ends->near = std::make_unique<SocketStream>(sockets.near, family, options);
   ends->far = sockets.far;
   return ends;
 }
-std::unique_ptr<Ends> unix_ends(const Limits& limits = {}) {
-  return connect(Family::unix_socket, limits);
+std::unique_ptr<Ends> unix_ends(const SocketOptions& options = kSizes) {
+  return connect(Family::unix_socket, options);
 }
-std::unique_ptr<Ends> tcp_ends(const Limits& limits = {}) { return connect(Family::tcp, limits); }
+std::unique_ptr<Ends> tcp_ends(const SocketOptions& options = kSizes) {
+  return connect(Family::tcp, options);
+}
 
 iovec piece(std::string_view text) { return {const_cast<char*>(text.data()), text.size()}; }
 
@@ -49,7 +53,7 @@ int option(int descriptor, int level, int name) {
 }
 
 /// Sends until nothing is taken any more; returns how many bytes were.
-std::size_t fill(SocketTransport& transport) {
+std::size_t fill(SocketStream& transport) {
   const std::vector<std::byte> block(64 * 1'024);
   std::size_t total = 0;
   for (;;) {
@@ -60,7 +64,7 @@ std::size_t fill(SocketTransport& transport) {
   }
 }
 
-TEST(SocketTransport, SendsGatheredPiecesInOrder) {
+TEST(SocketStream, SendsGatheredPiecesInOrder) {
   for (const auto& ends : {unix_ends(), tcp_ends()}) {
     const std::array<iovec, 3> pieces{piece("one "), piece("two "), piece("three")};
     const IoResult sent = ends->near->send(pieces);
@@ -72,7 +76,7 @@ TEST(SocketTransport, SendsGatheredPiecesInOrder) {
   }
 }
 
-TEST(SocketTransport, ReceivesWithoutWaiting) {
+TEST(SocketStream, ReceivesWithoutWaiting) {
   const auto ends = unix_ends();
   std::array<std::byte, 4> room{};
   EXPECT_EQ(ends->near->receive(room).status, IoStatus::would_block);
@@ -84,7 +88,7 @@ TEST(SocketTransport, ReceivesWithoutWaiting) {
   EXPECT_EQ(ends->near->receive(room).status, IoStatus::would_block);
 }
 
-TEST(SocketTransport, TellsAnOrderlyEndFromABrokenOne) {
+TEST(SocketStream, TellsAnOrderlyEndFromABrokenOne) {
   const auto orderly = tcp_ends();
   ::close(std::exchange(orderly->far, -1));
   std::array<std::byte, 4> room{};
@@ -100,14 +104,37 @@ TEST(SocketTransport, TellsAnOrderlyEndFromABrokenOne) {
   EXPECT_NE(broken->near->receive(room).status, IoStatus::would_block);
 }
 
-TEST(SocketTransport, SendingToNobodyFailsWithoutASignal) {
+TEST(SocketStream, ThePeerSeesTheEndBehindWhatWasSent) {
+  for (const auto& ends : {unix_ends(), tcp_ends()}) {
+    const iovec one = piece("last");
+    EXPECT_EQ(ends->near->send({&one, 1}).bytes, 4u);
+    ends->near->shut_down();
+    std::array<char, 8> text{};
+    EXPECT_EQ(::recv(ends->far, text.data(), text.size(), 0), 4);
+    EXPECT_EQ(::recv(ends->far, text.data(), text.size(), 0), 0);
+    EXPECT_EQ(ends->near->send({&one, 1}).status, IoStatus::failed);
+    ASSERT_EQ(::send(ends->far, "still read", 10, 0), 10);
+    std::array<std::byte, 16> room{};
+    EXPECT_EQ(ends->near->receive(room).bytes, 10u);
+  }
+}
+
+TEST(SocketStream, KeepsNothingOfItsOwn) {
+  const auto ends = unix_ends();
+  EXPECT_GT(fill(*ends->near), 0u);
+  EXPECT_EQ(ends->near->pending_out(), 0u);
+  EXPECT_EQ(ends->near->pending_in(), 0u);
+  EXPECT_EQ(ends->near->send({}).status, IoStatus::ok);
+}
+
+TEST(SocketStream, SendingToNobodyFailsWithoutASignal) {
   const auto ends = unix_ends();
   ::close(std::exchange(ends->far, -1));
   const iovec one = piece("x");
   EXPECT_EQ(ends->near->send({&one, 1}).status, IoStatus::failed);
 }
 
-TEST(SocketTransport, AFullSocketTakesNoMoreAndSaysHowMuchWaits) {
+TEST(SocketStream, AFullSocketTakesNoMoreAndSaysHowMuchWaits) {
   for (const auto& ends : {unix_ends(), tcp_ends()}) {
     EXPECT_EQ(ends->near->unsent_bytes(), 0u);
     EXPECT_GT(fill(*ends->near), 0u);
@@ -115,16 +142,15 @@ TEST(SocketTransport, AFullSocketTakesNoMoreAndSaysHowMuchWaits) {
   }
 }
 
-TEST(SocketTransport, SetsItsOptions) {
-  Limits limits;
-  limits.socket_send_bytes = 128 * 1'024;
-  const auto ends = tcp_ends(limits);
-  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF),
-            2 * 128 * 1'024);  // as kernels report it
+TEST(SocketStream, SetsItsOptions) {
+  const auto ends = tcp_ends({.receive_bytes = 64 * 1'024, .send_bytes = 128 * 1'024});
+  // The kernel reports twice what was asked for.
+  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF), 2 * 128 * 1'024);
+  EXPECT_EQ(option(ends->near->descriptor(), SOL_SOCKET, SO_RCVBUF), 2 * 64 * 1'024);
   EXPECT_NE(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NODELAY), 0);
 }
 
-TEST(SocketTransport, LimitsWhatWaitsUnsentOnTcp) {
+TEST(SocketStream, LimitsWhatWaitsUnsentOnTcp) {
   const auto ends = tcp_ends();
   ends->near->limit_unsent(16'384);
   EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NOTSENT_LOWAT), 16'384);
@@ -132,7 +158,7 @@ TEST(SocketTransport, LimitsWhatWaitsUnsentOnTcp) {
   EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_NOTSENT_LOWAT), 4'096);
 }
 
-TEST(SocketTransport, LimitsHowLongWhatWasSentIsNotAcknowledged) {
+TEST(SocketStream, LimitsHowLongWhatWasSentIsNotAcknowledged) {
   const auto ends = tcp_ends();
   EXPECT_EQ(option(ends->near->descriptor(), IPPROTO_TCP, TCP_USER_TIMEOUT), 0)
       << "the system's own";
@@ -144,17 +170,15 @@ TEST(SocketTransport, LimitsHowLongWhatWasSentIsNotAcknowledged) {
   unix_ends()->near->limit_unacknowledged(1'000);
 }
 
-TEST(SocketTransport, LimitsWhatWaitsUnsentOnUnixSockets) {
+TEST(SocketStream, LimitsWhatWaitsUnsentOnUnixSockets) {
   const auto limited = unix_ends();
   limited->near->limit_unsent(16'384);
   const auto free = unix_ends();
   EXPECT_LT(fill(*limited->near), fill(*free->near));
 }
 
-TEST(SocketTransport, ABoundOfWhatWaitsUnsentDoesNotRaiseTheBufferOfAUnixSocket) {
-  Limits limits;
-  limits.socket_send_bytes = 16 * 1'024;
-  const auto ends = unix_ends(limits);
+TEST(SocketStream, ABoundOfWhatWaitsUnsentDoesNotRaiseTheBufferOfAUnixSocket) {
+  const auto ends = unix_ends({.send_bytes = 16 * 1'024});
   const int whole = option(ends->near->descriptor(), SOL_SOCKET, SO_SNDBUF);
   for (const std::uint32_t bytes : {16u * 1'024 + 1, 128u * 1'024, 1u << 30, 0u}) {
     ends->near->limit_unsent(bytes);
@@ -165,4 +189,4 @@ TEST(SocketTransport, ABoundOfWhatWaitsUnsentDoesNotRaiseTheBufferOfAUnixSocket)
 }
 
 }  // namespace
-}  // namespace gimnet::hub
+}  // namespace gimnet::net

@@ -1,4 +1,4 @@
-#include "tests/support/memory_transport.hpp"
+#include "tests/support/memory_stream.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -62,31 +62,34 @@ struct MemoryPipe {
   std::uint64_t send_calls = 0;
   bool closed = false;
   bool failed = false;
+  bool shut_down = false;
   bool gone = false;
 
   [[nodiscard]] std::size_t free_room() const { return room - std::min(room, to_peer.size()); }
 };
 
-MemoryTransport::MemoryTransport(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
+MemoryStream::MemoryStream(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
 
-MemoryTransport::~MemoryTransport() { pipe_->gone = true; }
+MemoryStream::~MemoryStream() { pipe_->gone = true; }
 
-IoResult MemoryTransport::receive(std::span<std::byte> into) {
+net::IoResult MemoryStream::receive(std::span<std::byte> into) {
   GIMNET_CHECK(!into.empty());
   MemoryPipe& pipe = *pipe_;
-  if (pipe.failed) return {IoStatus::failed, 0};
-  if (pipe.to_hub.size() == 0) return {pipe.closed ? IoStatus::closed : IoStatus::would_block, 0};
+  if (pipe.failed) return {net::IoStatus::failed, 0};
+  if (pipe.to_hub.size() == 0)
+    return {pipe.closed ? net::IoStatus::closed : net::IoStatus::would_block, 0};
   const std::size_t size = std::min({into.size(), pipe.to_hub.size(), pipe.receives.next()});
-  if (size == 0) return {IoStatus::would_block, 0};
+  if (size == 0) return {net::IoStatus::would_block, 0};
   std::memcpy(into.data(), pipe.to_hub.take(size), size);
-  return {IoStatus::ok, size};
+  return {net::IoStatus::ok, size};
 }
 
-IoResult MemoryTransport::send(std::span<const iovec> pieces) {
-  GIMNET_CHECK(!pieces.empty() && pieces.size() <= 64);
+net::IoResult MemoryStream::send(std::span<const iovec> pieces) {
+  GIMNET_CHECK(pieces.size() <= net::kPiecesMax);
   MemoryPipe& pipe = *pipe_;
   ++pipe.send_calls;
-  if (pipe.failed) return {IoStatus::failed, 0};
+  if (pipe.failed) return {net::IoStatus::failed, 0};
+  if (pieces.empty()) return {net::IoStatus::ok, 0};
   std::size_t allowed = std::min({pipe.free_room(), pipe.sends.next(), pipe.reset_after});
   std::size_t sent = 0;
   for (const iovec& piece : pieces) {
@@ -99,16 +102,19 @@ IoResult MemoryTransport::send(std::span<const iovec> pieces) {
   if (pipe.reset_after != ~std::size_t{0}) {
     pipe.reset_after -= sent;
     pipe.failed = pipe.reset_after == 0;
-    if (sent == 0 && pipe.failed) return {IoStatus::failed, 0};
+    if (sent == 0 && pipe.failed) return {net::IoStatus::failed, 0};
   }
-  return sent == 0 ? IoResult{IoStatus::would_block, 0} : IoResult{IoStatus::ok, sent};
+  return sent == 0 ? net::IoResult{net::IoStatus::would_block, 0}
+                   : net::IoResult{net::IoStatus::ok, sent};
 }
 
-std::uint64_t MemoryTransport::unsent_bytes() const { return pipe_->to_peer.size(); }
+void MemoryStream::shut_down() { pipe_->shut_down = true; }
 
-void MemoryTransport::limit_unsent(std::uint32_t bytes) { pipe_->unsent_limit = bytes; }
+std::uint64_t MemoryStream::unsent_bytes() const { return pipe_->to_peer.size(); }
 
-void MemoryTransport::limit_unacknowledged(std::uint32_t ms) { pipe_->unacknowledged_limit = ms; }
+void MemoryStream::limit_unsent(std::uint32_t bytes) { pipe_->unsent_limit = bytes; }
+
+void MemoryStream::limit_unacknowledged(std::uint32_t ms) { pipe_->unacknowledged_limit = ms; }
 
 MemoryPeer::MemoryPeer(std::shared_ptr<MemoryPipe> pipe) : pipe_(std::move(pipe)) {}
 
@@ -148,6 +154,8 @@ bool MemoryPeer::transport_readable() const {
 
 bool MemoryPeer::transport_writable() const { return pipe_->failed || pipe_->free_room() != 0; }
 
+bool MemoryPeer::shut_down() const { return pipe_->shut_down; }
+
 bool MemoryPeer::transport_gone() const { return pipe_->gone; }
 
 std::uint32_t MemoryPeer::unsent_limit() const { return pipe_->unsent_limit; }
@@ -156,9 +164,9 @@ std::uint32_t MemoryPeer::unacknowledged_limit() const { return pipe_->unacknowl
 
 std::uint64_t MemoryPeer::send_calls() const { return pipe_->send_calls; }
 
-std::pair<std::unique_ptr<MemoryTransport>, MemoryPeer> make_memory_pipe() {
+std::pair<std::unique_ptr<MemoryStream>, MemoryPeer> make_memory_pipe() {
   auto pipe = std::make_shared<MemoryPipe>();
-  return {std::make_unique<MemoryTransport>(pipe), MemoryPeer(pipe)};
+  return {std::make_unique<MemoryStream>(pipe), MemoryPeer(pipe)};
 }
 
 }  // namespace gimnet::hub

@@ -6,9 +6,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "hub/transport/socket_transport.hpp"
+#include "net/socket_stream.hpp"
 
-namespace gimnet::hub {
+namespace gimnet::net {
 
 /// Descriptors of the two ends of a connection, which are the caller's.
 struct ConnectedSockets {
@@ -40,8 +40,8 @@ struct ConnectedSockets {
 }
 
 /// Over loopback or a Unix socket.
-[[nodiscard]] inline ConnectedSockets connect_by(SocketTransport::Family family) {
-  return family == SocketTransport::Family::unix_socket ? connect_by_unix() : connect_by_tcp();
+[[nodiscard]] inline ConnectedSockets connect_by(SocketStream::Family family) {
+  return family == SocketStream::Family::unix_socket ? connect_by_unix() : connect_by_tcp();
 }
 
-}  // namespace gimnet::hub
+}  // namespace gimnet::net
