@@ -11,6 +11,7 @@
 #include "base/byte_buffer.hpp"
 #include "base/ids.hpp"
 #include "proto/frame/fragment_header.hpp"
+#include "proto/frame/fragment_stream.hpp"
 #include "proto/frame/fragmenter.hpp"
 #include "proto/frame/frame_header.hpp"
 
@@ -24,18 +25,6 @@ struct ReassemblyLimits {
   std::uint64_t waiting_bytes_max = 256ull
                                     << 20;  ///< received bytes of all unfinished messages together
   std::uint32_t streams_max = 256;  ///< streams that are remembered, each with at most one message
-};
-
-/// Within one of these, fragments come in order and one message after the other.
-struct FragmentStream {
-  std::uint32_t src = 0;
-  std::uint32_t dst = 0;
-  Kind kind = Kind::unicast;
-  std::uint8_t lane = 0;
-  [[nodiscard]] static FragmentStream of(const FrameHeader& header) {
-    return {header.src, header.dst, header.kind, header.lane};
-  }
-  friend constexpr bool operator==(const FragmentStream&, const FragmentStream&) = default;
 };
 
 /// What became of one fragment.

@@ -150,7 +150,7 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
   Entry entry = make_entry(run, header, handover, has_room && !by_share, context);
   if (by_share) make_share(entry, header, context);
   if (entry.fragmented) {
-    if (!follow_message(entry, header, context)) return;
+    if (!follow_message(entry, context)) return;
     if (entry.touched && join_message(entry, header, context)) return;
   }
   if (!backlog_ && has_room) {

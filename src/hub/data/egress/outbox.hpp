@@ -14,6 +14,7 @@
 #include "hub/data/egress/resume_buffer.hpp"
 #include "hub/data/egress/untold_losses.hpp"
 #include "hub/observe/session_gauges.hpp"
+#include "proto/frame/fragment_stream.hpp"
 
 namespace gimnet::hub {
 
@@ -162,11 +163,10 @@ class Outbox {
   void lose(Entry& entry, proto::DropReason reason, EgressContext& context);
 
  private:
-  /// A message in fragments.
+  /// A message in fragments, of which the beginning was taken and the end has not come.
   struct OpenMessage {
-    NodeId src;
+    proto::FragmentStream stream;
     std::uint32_t number = 0;
-    friend bool operator==(const OpenMessage&, const OpenMessage&) = default;
   };
   /// What data frames need.
   struct Lanes {
@@ -181,13 +181,13 @@ class Outbox {
     std::uint64_t charged_bytes = 0;  ///< of the queues' entries, counted against the budget
     PauseBook pauses;
     UntoldLosses losses;
-    std::vector<OpenMessage>
-        open_messages;  ///< of which the beginning was taken and the end has not come, by age
+    std::vector<OpenMessage> open_messages;  ///< one of a stream, the oldest first
     std::uint32_t first_control_bytes =
         0;  ///< of push_first_control() that have not left; here, since few ever have any
   };
-  /// Messages in fragments that may be under way to one connection at a time. Beyond it the rest of
-  /// the oldest is refused: a sender that never ends its messages takes the place of nothing else.
+  /// Messages in fragments that may be under way to one connection at a time. Beyond it the source
+  /// with most of them loses the oldest: a sender that never ends its messages takes no place of
+  /// others.
   static constexpr std::size_t kOpenMessagesMax = 256;
   /// A sender that is held may be read all the same (its own CONFIRM is waited for), and need not
   /// pause: beyond so many reserves its messages are dropped, BLOCK or not.
@@ -255,10 +255,9 @@ class Outbox {
                                   EgressContext& context);
   /// Takes note of where a fragment stands in its message. Returns whether it may go on: no rest of
   /// a message of which the beginning did not come or was dropped.
-  [[nodiscard]] bool follow_message(const Entry& entry, const proto::FrameHeader& header,
-                                    EgressContext& context);
-  /// Its rest is refused from now on. Returns whether there was such a message.
-  bool close_message(const OpenMessage& message);
+  [[nodiscard]] bool follow_message(const Entry& entry, EgressContext& context);
+  [[nodiscard]] std::vector<OpenMessage>::iterator find_open(const proto::FragmentStream& stream);
+  void open_message(const OpenMessage& message);
   void put_control(std::span<const std::byte> frame, EgressContext& context);
   [[nodiscard]] std::uint32_t first_control_bytes() const {
     return lanes_ ? lanes_->first_control_bytes : 0;

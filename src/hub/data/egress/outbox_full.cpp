@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "hub/data/egress/outbox.hpp"
@@ -32,26 +33,31 @@ bool Outbox::join_message(Entry& entry, const proto::FrameHeader& header, Egress
   return true;
 }
 
-bool Outbox::close_message(const OpenMessage& message) {
-  // The latest first: it is the one that goes on.
-  std::vector<OpenMessage>& open = lanes_->open_messages;
-  const auto found = std::find(open.rbegin(), open.rend(), message);
-  if (found == open.rend()) return false;
-  open.erase(std::next(found).base());
-  return true;
+std::vector<Outbox::OpenMessage>::iterator Outbox::find_open(const proto::FragmentStream& stream) {
+  return std::ranges::find(lanes_->open_messages, stream, &OpenMessage::stream);
 }
 
-bool Outbox::follow_message(const Entry& entry, const proto::FrameHeader& header,
-                            EgressContext& context) {
-  const OpenMessage message{NodeId{header.src}, entry.message_number};
+void Outbox::open_message(const OpenMessage& message) {
   std::vector<OpenMessage>& open = lanes_->open_messages;
-  if (entry.complete ? close_message(message)
-                     : std::find(open.rbegin(), open.rend(), message) != open.rend())
-    return true;
-  if (!entry.touched) {
-    if (entry.complete) return true;
-    if (open.size() == kOpenMessagesMax) open.erase(open.begin());
-    open.push_back(message);
+  if (open.size() == kOpenMessagesMax) {
+    std::array<proto::Holding, kOpenMessagesMax> holdings;
+    std::ranges::transform(open, holdings.begin(), [](const OpenMessage& each) -> proto::Holding {
+      return {.src = each.stream.src, .amount = 1};
+    });
+    open.erase(open.begin() +
+               static_cast<std::ptrdiff_t>(proto::first_of_fullest_source(holdings)));
+  }
+  open.push_back(message);
+}
+
+bool Outbox::follow_message(const Entry& entry, EgressContext& context) {
+  const proto::FragmentStream stream = proto::FragmentStream::of(entry.run.header());
+  const auto found = find_open(stream);
+  const bool known = found != lanes_->open_messages.end();
+  if (!entry.touched || (known && found->number == entry.message_number)) {
+    // A beginning ends the stream's message before it, whatever became of that one.
+    if (known && (entry.complete || !entry.touched)) lanes_->open_messages.erase(found);
+    if (!entry.complete && !entry.touched) open_message({stream, entry.message_number});
     return true;
   }
   tell_lost(entry);
@@ -287,8 +293,11 @@ void Outbox::lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReaso
 
 void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context) {
   if (entry.frames == 0) return;
-  if (entry.fragmented && !entry.complete)
-    close_message({NodeId{entry.run.header().src}, entry.message_number});
+  if (entry.fragmented && !entry.complete) {
+    const auto open = find_open(proto::FragmentStream::of(entry.run.header()));
+    if (open != lanes_->open_messages.end() && open->number == entry.message_number)
+      lanes_->open_messages.erase(open);
+  }
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;

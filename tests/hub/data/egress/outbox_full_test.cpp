@@ -343,21 +343,6 @@ TEST(FullOutbox, ARestWithoutABeginningIsRefused) {
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-TEST(FullOutbox, OfSoManyMessagesTheRestIsAwaited) {
-  for (const std::uint32_t begun : {256u, 257u}) {
-    EgressRig rig;
-    TestConnection connection(rig);
-    for (std::uint32_t number = 1; number <= begun; ++number) {
-      rig.push_fragment(connection.outbox, number, 0, 20, std::string(10, 'a'));
-    }
-    rig.push_fragment(connection.outbox, 2, 10, 20, std::string(10, 'a'));
-    EXPECT_FALSE(rig.tally.any_dropped);
-    rig.push_fragment(connection.outbox, 1, 10, 20, std::string(10, 'a'));
-    EXPECT_EQ(rig.dropped(DropReason::cut_message), begun == 256 ? 0u : 1u) << begun;
-    EXPECT_TRUE(rig.ledger_exact());
-  }
-}
-
 // The budget bounds everything, also the rest of messages whose beginning was written.
 TEST(FullOutbox, TheBudgetBoundsContinuedMessagesToo) {
   Limits limits;
@@ -365,13 +350,13 @@ TEST(FullOutbox, TheBudgetBoundsContinuedMessagesToo) {
   EgressRig rig(limits);
   TestConnection connection(rig);
   for (std::uint32_t number = 1; number <= 100; ++number) {
-    rig.push_fragment(connection.outbox, number, 0, 1 << 30, "a", {.flags = kDrop});
+    rig.push_fragment(connection.outbox, number, 0, 1 << 30, "a", {.flags = kDrop, .dst = number});
   }
   block(connection);
   for (std::uint32_t round = 0; round < 10; ++round) {
     for (std::uint32_t number = 1; number <= 100; ++number) {
       rig.push_fragment(connection.outbox, number, 60'000 + round, 1 << 30,
-                        std::string(30'000, 'a'), {.flags = kDrop});
+                        std::string(30'000, 'a'), {.flags = kDrop, .dst = number});
       connection.flush();
     }
   }

@@ -182,9 +182,9 @@ TEST(Outbox, LatestOfAMessageUnderWayIsNotReplaced) {
   connection.flush();
   connection.peer.set_room(proto::kHeaderSize);  // message 1 is begun
   connection.flush();
+  fragment(1, 8);
   fragment(2, 0);
   fragment(3, 0);  // replaces 2, of which the rest is refused
-  fragment(1, 8);
   fragment(2, 8);
   fragment(3, 8);
   EXPECT_EQ(rig.dropped(DropReason::replaced), 1u);
@@ -194,9 +194,9 @@ TEST(Outbox, LatestOfAMessageUnderWayIsNotReplaced) {
   const auto texts = connection.take();
   ASSERT_THAT(texts, SizeIs(4));
   EXPECT_EQ(texts[0].substr(0, 4), "1:0:");
-  EXPECT_EQ(texts[1].substr(0, 4), "3:0:");
-  EXPECT_EQ(texts[2].substr(0, 4), "3:8:");
-  EXPECT_EQ(texts[3].substr(0, 4), "1:8:");
+  EXPECT_EQ(texts[1].substr(0, 4), "1:8:");
+  EXPECT_EQ(texts[2].substr(0, 4), "3:0:");
+  EXPECT_EQ(texts[3].substr(0, 4), "3:8:");
   EXPECT_TRUE(rig.ledger_exact());
 }
 

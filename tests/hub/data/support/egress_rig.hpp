@@ -30,6 +30,7 @@ struct TestFrame {
   std::uint8_t flags = 0;
   std::uint8_t lane = 1;
   std::uint32_t src = 1;
+  std::uint32_t dst = 99;
 };
 
 /// What all outboxes of a shard share, and frames in a slab as a read leaves them there.
@@ -49,7 +50,7 @@ class EgressRig {
     header.length = static_cast<std::uint32_t>(payload.size());
     const bool for_this_connection =
         frame.kind == proto::Kind::flow || frame.kind == proto::Kind::link;
-    header.dst = for_this_connection ? 0 : 7u << 20 | 99;
+    header.dst = for_this_connection ? 0 : 7u << 20 | frame.dst;
     header.src = 7u << 20 | frame.src;
     header.kind = frame.kind;
     header.flags = frame.flags;
