@@ -15,12 +15,12 @@ VECTORS = ROOT / "tests" / "vectors"
 PROTOCOL = ROOT / "docs" / "protocol.md"
 BITESTREAM = ROOT / "docs" / "bitestream.md"
 HEADER = 16
-LINK, NS, CTRL, FLOW = 16, 17, 18, 6
+LINK, NS, CTRL, ROUTE, FLOW = 16, 17, 18, 19, 6
 
-# What section 10 of the protocol shows, in this order.
+# What section 11 of the protocol shows, in this order.
 FAMILIES = {"frame": "Data", "flow": "FLOW", "link": "LINK: connections", "gimi": "GIMI messages", "ns": "HubNS",
-            "ctrl": "HubCtrl"}
-SECTION = "## 10. Every frame in bytes\n"
+            "ctrl": "HubCtrl", "route": "ROUTE: records of hubs"}
+SECTION = "## 11. Every frame in bytes\n"
 # Long and deep ones stay in tests/vectors: nobody reads 300 times 78.
 OF_BITESTREAM = ("example", "every_type", "length_fields")
 
@@ -53,7 +53,7 @@ class Vector:
         if len(data) < HEADER:
             return (-1, 0, 0, self.name)
         kind, operation = data[12], 0
-        if kind in (LINK, NS, CTRL):
+        if kind in (LINK, NS, CTRL, ROUTE):
             operation = struct.unpack_from("<H", data, HEADER)[0]
         elif kind == FLOW or self.name.startswith("gimi/"):
             operation = data[HEADER] if kind == FLOW else data[HEADER + 16]

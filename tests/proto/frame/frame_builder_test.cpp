@@ -32,7 +32,7 @@ Bytes rebuilt(const Bytes& bytes, Origin origin) {
 }
 
 TEST(FrameBuilder, WritesEveryVector) {
-  for (const std::string folder : {"frame", "flow", "gimi", "ns", "ctrl"}) {
+  for (const std::string folder : {"frame", "flow", "gimi", "ns", "ctrl", "route"}) {
     for (const auto& name : test::vectors_in(folder)) {
       const auto bytes = load_vector(name);
       EXPECT_EQ(rebuilt(bytes, Origin::hub), bytes) << name;

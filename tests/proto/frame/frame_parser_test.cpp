@@ -322,7 +322,7 @@ TEST(ParseFrame, LetsAHubSendWhatANodeMayNot) {
 }
 
 TEST(ParseFrame, TakesEveryVectorAndRefusesEachThatIsCut) {
-  for (const std::string folder : {"frame", "flow", "gimi", "ns", "ctrl"}) {
+  for (const std::string folder : {"frame", "flow", "gimi", "ns", "ctrl", "route"}) {
     for (const auto& name : test::vectors_in(folder)) {
       const auto bytes = load_vector(name);
       EXPECT_EQ(error_of(bytes, Origin::hub), FrameError::none) << name;
