@@ -49,6 +49,7 @@ MAY_INCLUDE = {
     "hub/shard": _SHARD,
     "hub/crypto": _BASE + ("hub/crypto",),
     "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/control/state"),
+    "hub/network/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/network/state"),
     "hub/control": _CONTROL,
     "hub/config": _CONTROL + ("hub/config",),
     "hub/observe": _CONCURRENT + ("hub/observe",),
@@ -73,6 +74,7 @@ FORBIDDEN_INCLUDES = {
     "client": _LIBRARIES,
     "hub/data": ("mutex", "shared_mutex", "condition_variable", "functional", "boost/asio"),
     "hub/control/state": _SOCKETS + _THREADS,
+    "hub/network/state": _SOCKETS + _THREADS,
 }
 
 _SHARED_POINTER = re.compile(r"\b(shared_ptr|make_shared|weak_ptr|enable_shared_from_this|std::function)\b")

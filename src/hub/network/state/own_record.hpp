@@ -1,0 +1,87 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hub/network/state/change_pace.hpp"
+#include "hub/network/state/record_store.hpp"
+
+namespace gimnet::hub {
+
+/// A hub as HELLO, WELCOME and its record name it.
+struct HubIdentity {
+  proto::HubKey key;
+  proto::HubInstance instance;
+  bool configured = false;  ///< its hub id was configured, and not drawn
+};
+/// Of two hubs that have one hub id, the one that keeps it: a configured id before a drawn one,
+/// then the lower unique id. Every hub prefers the same.
+[[nodiscard]] bool is_preferred(const HubIdentity& hub, const HubIdentity& to);
+
+/// The words that a hub says of itself besides its neighbours.
+struct HubWords {
+  std::string name;
+  std::string version;
+  std::uint64_t features = 0;
+  std::uint64_t features_required = 0;
+};
+
+/// The record that this hub sends: which neighbours it has, in parts. A neighbour stays in its
+/// part, so that one change is one part. Thread safety: none. Time is an argument. Limits:
+/// kPartsMax parts of kNeighboursMax neighbours; changes go out at once, then with pauses of 50 ms
+/// that double to 1 s (a star of 4,000 robots that all start).
+class OwnRecord {
+ public:
+  static constexpr ChangePace::Pauses kChangePauses{std::chrono::milliseconds(50),
+                                                    std::chrono::seconds(1)};
+  /// Between two times that the hub goes on behind its own record. The first time is at once.
+  static constexpr std::chrono::milliseconds kGoOnPause = std::chrono::seconds(1);
+
+  OwnRecord(HubIdentity identity, HubWords words);
+
+  [[nodiscard]] const HubIdentity& identity() const { return identity_; }
+  /// REQUIRES: ascending, each once; at most kPartsMax times kNeighboursMax.
+  void set_neighbours(const std::vector<proto::route::Neighbour>& neighbours);
+  /// The hub has another id. Its sequence goes on, so that it may take a former id again.
+  void renumber(HubId hub);
+
+  /// A part of this hub's record came from a link: of a former life, of a copy of its state folder,
+  /// or invented. If it would be taken for newer than what the hub says or will say next, the hub
+  /// goes on behind it.
+  void hear(const proto::route::RecordPart& heard);
+  /// Another process with this unique id runs: it went on behind this instance. Nothing: none is
+  /// known.
+  [[nodiscard]] std::optional<proto::HubInstance> living_copy() const { return living_copy_; }
+  void forget_copy() { living_copy_.reset(); }
+
+  /// The parts that are to be sent now.
+  [[nodiscard]] std::vector<PartRef> take_due(std::chrono::milliseconds now);
+  /// When take_due() gives something. Nothing: not before something changes.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_due() const;
+
+ private:
+  struct Part {
+    std::vector<proto::route::Neighbour> neighbours;  ///< ascending
+    bool changed = true;
+    std::uint64_t sequence = 0;  ///< as it was sent last; 0: never
+  };
+  void add(const proto::route::Neighbour& neighbour);
+  [[nodiscard]] proto::route::RecordPart said(std::uint16_t number) const;
+
+  HubIdentity identity_;
+  const HubWords words_;
+  std::vector<Part> parts_{1};  ///< at least part 0; never fewer than were sent
+  std::uint64_t sequence_ = 0;  ///< the last that was used
+  bool changed_ = true;
+  ChangePace change_pace_{kChangePauses};
+  proto::HubInstance behind_;
+  /// The highest sequence heard of another instance that has to be passed. Nothing: none.
+  std::optional<std::uint64_t> pass_;
+  ChangePace go_on_pace_{{kGoOnPause, kGoOnPause}};
+  std::optional<proto::HubInstance> living_copy_;
+};
+
+}  // namespace gimnet::hub
