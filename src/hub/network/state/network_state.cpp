@@ -1,0 +1,241 @@
+#include "hub/network/state/network_state.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include "base/check.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+constexpr std::uint16_t kDrawnFrom = 1024;
+
+}  // namespace
+
+NetworkState::NetworkState(HubIdentity self, HubWords words)
+    : own_(self, std::move(words)), map_(self) {}
+
+AdmissionAnswer NetworkState::admit(const HubIdentity& newcomer) const {
+  const HubIdentity& self = own_.identity();
+  if (newcomer.instance == self.instance) return {Admission::is_self};
+  if (newcomer.key.unique == self.key.unique) return {Admission::is_copy, self.key};
+  for (const auto& [number, link] : links_) {
+    const HubIdentity& peer = link.facts.peer;
+    if (peer.key.unique == newcomer.key.unique && peer.instance != newcomer.instance)
+      return {Admission::ask_old_link, peer.key, number};
+  }
+  if (newcomer.key.hub == self.key.hub) {
+    if (!self.configured && is_preferred(newcomer, self)) return {Admission::draw_again};
+    return {Admission::id_taken, self.key};
+  }
+  for (const proto::HubKey& hub : map_.reachable()) {
+    if (hub == self.key) continue;
+    const auto known = identity_of(*store_.find(hub));
+    if (!known) continue;
+    if (hub.unique == newcomer.key.unique) {
+      if (known->instance != newcomer.instance) return {Admission::is_copy, hub};
+    } else if (hub.hub == newcomer.key.hub && is_preferred(*known, newcomer)) {
+      return {Admission::id_taken, hub};
+    }
+  }
+  return {};
+}
+
+NetworkState::Link* NetworkState::find(LinkNumber number) {
+  const auto found = links_.find(number);
+  return found == links_.end() ? nullptr : &found->second;
+}
+
+void NetworkState::begin_connection(LinkNumber number, LinkFacts facts,
+                                    std::chrono::milliseconds now) {
+  say_own(now);
+  Link& link = links_[number];
+  const HubIdentity& before = link.facts.peer;
+  const bool same = before.key == facts.peer.key && before.instance == facts.peer.instance;
+  if (!same) link = {};
+  link.facts = std::move(facts);
+  link.differs_since.reset();
+  links_changed_ = true;
+  for (const PartRef& part : store_.all()) send(number, part);
+  static const auto kMark =
+      std::make_shared<const proto::Payload>(proto::encode(proto::route::RecordsEnd{}));
+  sendings_.push_back({number, kMark});
+}
+
+void NetworkState::take_record(LinkNumber number, proto::Payload bytes,
+                               std::chrono::milliseconds now) {
+  Link* link = find(number);
+  if (link == nullptr) return;
+  const PartRef part = read_part(std::move(bytes));
+  if (part == nullptr) {
+    ++malformed_;
+    return;
+  }
+  const HubRecord* record = store_.find(part->said.hub);
+  const StoredPart* known = record == nullptr ? nullptr : record->part(part->said.part);
+  const bool is_own = part->said.hub == own_.identity().key;
+  if (!is_own && known != nullptr && !is_newer(part->said, known->said)) return;
+  if (link->pace.admit(part, now)) take(number, part, now);
+}
+
+void NetworkState::take(LinkNumber from, const PartRef& part, std::chrono::milliseconds now) {
+  if (part->said.hub == own_.identity().key) {
+    own_.hear(part->said);
+    // Of a hub and its copy the one with the lower instance stays.
+    if (own_.living_copy() > own_.identity().instance) own_.forget_copy();
+    return;
+  }
+  if (store_.take(part, now) != RecordStore::Taken::newer) return;
+  map_changed_ = true;
+  flood(part, from);
+}
+
+void NetworkState::take_mark(LinkNumber number) {
+  if (Link* link = find(number); link != nullptr && !link->has_mark)
+    link->has_mark = links_changed_ = true;
+}
+
+void NetworkState::take_digest(LinkNumber number, std::uint64_t digest,
+                               std::chrono::milliseconds now) {
+  Link* link = find(number);
+  if (link == nullptr || !link->has_mark) return;
+  if (digest == store_.digest()) {
+    link->differs_since.reset();
+  } else if (!link->differs_since) {
+    link->differs_since = now;
+  } else if (now - *link->differs_since >= kRepairAfter) {
+    link->differs_since = now;
+    for (const PartRef& part : store_.all()) send(number, part);
+  }
+}
+
+void NetworkState::set_cost(LinkNumber number, std::uint16_t cost) {
+  GIMNET_ASSERT(cost > 0);
+  Link* link = find(number);
+  if (link == nullptr || link->facts.cost == cost) return;
+  link->facts.cost = cost;
+  links_changed_ = true;
+}
+
+void NetworkState::set_damped(LinkNumber number, bool damped) {
+  Link* link = find(number);
+  if (link == nullptr || link->damped == damped) return;
+  link->damped = damped;
+  links_changed_ = true;
+}
+
+void NetworkState::end_link(LinkNumber number) {
+  if (links_.erase(number) != 0) links_changed_ = true;
+}
+
+void NetworkState::leave() {
+  links_.clear();
+  links_changed_ = true;
+  sendings_.clear();
+  own_.forget_copy();
+  map_ = NetworkMap(own_.identity());
+}
+
+void NetworkState::renumber(HubId hub) {
+  GIMNET_CHECK(links_.empty());
+  own_.renumber(hub);
+  map_ = NetworkMap(own_.identity());
+  map_changed_ = true;
+}
+
+HubId NetworkState::draw_hub_id(std::uint64_t random) const {
+  std::vector<std::uint16_t> free;
+  auto next = store_.records().lower_bound(proto::HubKey{HubId{kDrawnFrom}, {}});
+  for (std::uint16_t id = kDrawnFrom; id <= kHubIdMax; ++id) {
+    while (next != store_.records().end() && next->first.hub.value() < id) ++next;
+    if (next == store_.records().end() || next->first.hub.value() != id) free.push_back(id);
+  }
+  // All taken: some of those records are of hubs that are gone.
+  if (free.empty()) return HubId{kDrawnFrom};
+  return HubId{free[random % free.size()]};
+}
+
+void NetworkState::advance(std::chrono::milliseconds now) {
+  for (auto& [number, link] : links_) {
+    for (const PartRef& part : link.pace.take_due(now)) take(number, part, now);
+  }
+  if (links_changed_) {
+    links_changed_ = false;
+    map_changed_ = true;
+    std::vector<proto::route::Neighbour> neighbours;
+    for (const CarryingLink& each : carrying_links()) neighbours.push_back(each.neighbour);
+    own_.set_neighbours(neighbours);
+  }
+  say_own(now);
+  if (map_changed_ && now >= map_pace_.next()) compute_map(now);
+  if (now >= forget_pace_.next()) {
+    forget_pace_.note_done(now);
+    store_.forget(now);
+  }
+}
+
+void NetworkState::say_own(std::chrono::milliseconds now) {
+  for (const PartRef& part : own_.take_due(now)) {
+    store_.take(part, now);
+    flood(part, LinkNumber{});
+    map_changed_ = true;
+  }
+}
+
+void NetworkState::compute_map(std::chrono::milliseconds now) {
+  map_changed_ = false;
+  map_pace_.note_done(now);
+  map_ = NetworkMap(own_.identity(), store_, carrying_links());
+  store_.set_reachable(map_.reachable(), now);
+}
+
+std::optional<std::chrono::milliseconds> NetworkState::next_due() const {
+  auto due = own_.next_due();
+  const auto note = [&due](std::chrono::milliseconds time) {
+    due = std::min(due.value_or(time), time);
+  };
+  if (map_changed_) note(map_pace_.next());
+  if (links_changed_) note(std::chrono::milliseconds::min());
+  for (const auto& [number, link] : links_) {
+    if (const auto waits = link.pace.next_due()) note(*waits);
+  }
+  return due;
+}
+
+Verdict NetworkState::verdict() const {
+  if (own_.living_copy()) return Verdict::copied;
+  return map_.own_id_holder() ? Verdict::id_taken : Verdict::stay;
+}
+
+void NetworkState::send(LinkNumber link, const PartRef& part) {
+  sendings_.push_back({link, std::shared_ptr<const proto::Payload>(part, &part->bytes)});
+}
+
+void NetworkState::flood(const PartRef& part, LinkNumber except) {
+  for (const auto& [number, link] : links_) {
+    if (number != except) send(number, part);
+  }
+}
+
+bool NetworkState::carries_rather(const LinkFacts& link, const LinkFacts& than) const {
+  const auto rank = [this](const LinkFacts& facts) {
+    const auto& dialler = facts.dialled ? own_.identity().key : facts.peer.key;
+    return std::tie(facts.cost, dialler, facts.name);
+  };
+  return rank(link) < rank(than);
+}
+
+std::vector<CarryingLink> NetworkState::carrying_links() const {
+  std::map<proto::HubKey, std::pair<LinkNumber, const LinkFacts*>> best;
+  for (const auto& [number, link] : links_) {
+    if (!link.has_mark || link.damped) continue;
+    const auto [found, is_new] = best.try_emplace(link.facts.peer.key, number, &link.facts);
+    if (!is_new && carries_rather(link.facts, *found->second.second))
+      found->second = {number, &link.facts};
+  }
+  std::vector<CarryingLink> carrying;
+  for (const auto& [hub, link] : best) carrying.push_back({{hub, link.second->cost}, link.first});
+  return carrying;
+}
+
+}  // namespace gimnet::hub

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hub/network/state/network_map.hpp"
+#include "hub/network/state/own_record.hpp"
+#include "hub/network/state/part_pace.hpp"
+#include "hub/network/state/record_store.hpp"
+
+namespace gimnet::hub {
+
+/// The far end of a link, and how the link came about.
+struct LinkFacts {
+  HubIdentity peer;
+  std::string name;
+  bool dialled = false;  ///< by this hub
+  std::uint16_t cost = 1;
+};
+
+/// Whether a hub may become a neighbour, from the view of either end of a new link.
+enum class Admission : std::uint8_t {
+  accept,
+  is_self,       ///< this process dialled itself
+  is_copy,       ///< its state folder is a copy of one that another hub uses, perhaps this one
+  ask_old_link,  ///< as is_copy, if the hub behind the link `old_link` still answers
+  id_taken,      ///< another hub keeps its hub id
+  draw_again,    ///< it keeps this hub's id: this hub draws another one, then it may try again
+};
+struct AdmissionAnswer {
+  Admission admission = Admission::accept;
+  std::optional<proto::HubKey> holder{};  ///< id_taken, is_copy: the hub that is known
+  LinkNumber old_link{};                  ///< ask_old_link
+};
+
+/// Whether this hub has to leave the network: to end all its links, tell its log, and try again.
+enum class Verdict : std::uint8_t {
+  stay,
+  id_taken,  ///< another hub keeps this hub's id; a drawn id is drawn again
+  copied,    ///< another machine runs a copy of this state folder
+};
+
+/// A payload of kind ROUTE for a link.
+struct Sending {
+  LinkNumber link;
+  std::shared_ptr<const proto::Payload> bytes;
+};
+
+/// The routes of one hub: takes and floods the records of all hubs, says its own, and computes the
+/// next hop to each. Pure state: what comes over links, and the time, are arguments, and what is to
+/// be sent is taken out. After each call, or several at one time, advance() does what is due, and
+/// take_sendings() gives what is to be sent, in order. Thread safety: none. Errors: bytes that are
+/// no record are counted and otherwise ignored; calls for an unknown link are ignored, since a link
+/// may have ended while they were under way. Limits: those of its parts.
+class NetworkState {
+ public:
+  /// The next hops are computed at once, then at most so often.
+  static constexpr std::chrono::milliseconds kMapPause{50};
+  /// Neighbours whose records differ for so long send all of them again, each time.
+  static constexpr std::chrono::milliseconds kRepairAfter = std::chrono::seconds(1);
+
+  /// The pause between two looks for records that are too old.
+  static constexpr std::chrono::milliseconds kForgetPause = std::chrono::seconds(10);
+
+  NetworkState(HubIdentity self, HubWords words);
+
+  [[nodiscard]] AdmissionAnswer admit(const HubIdentity& newcomer) const;
+
+  /// A connection of a link begins: the first one, or the next one after a break. All records go
+  /// to it, then the mark that ends them. The link counts once the mark of the other side has come;
+  /// one that counted goes on to count if the same process is at the other end.
+  void begin_connection(LinkNumber number, LinkFacts facts, std::chrono::milliseconds now);
+  void take_record(LinkNumber number, proto::Payload bytes, std::chrono::milliseconds now);
+  /// RECORDS_END came.
+  void take_mark(LinkNumber number);
+  /// The digest in a keep-alive came.
+  void take_digest(LinkNumber number, std::uint64_t digest, std::chrono::milliseconds now);
+  void set_cost(LinkNumber number, std::uint16_t cost);
+  /// A damped link carries records and is not reported.
+  void set_damped(LinkNumber number, bool damped);
+  void end_link(LinkNumber number);
+  /// Ends all links: after a verdict.
+  void leave();
+  /// Takes another hub id. REQUIRES: no link.
+  void renumber(HubId hub);
+  /// An id of 1024..4094 that no known record has, chosen by `random`.
+  [[nodiscard]] HubId draw_hub_id(std::uint64_t random) const;
+
+  void advance(std::chrono::milliseconds now);
+  /// When advance() has something to do. Nothing: not before something comes.
+  [[nodiscard]] std::optional<std::chrono::milliseconds> next_due() const;
+  [[nodiscard]] std::vector<Sending> take_sendings() { return std::exchange(sendings_, {}); }
+
+  [[nodiscard]] const HubIdentity& self() const { return own_.identity(); }
+  [[nodiscard]] const NetworkMap& map() const { return map_; }
+  [[nodiscard]] const RecordStore& store() const { return store_; }
+  [[nodiscard]] std::uint64_t digest() const { return store_.digest(); }
+  [[nodiscard]] Verdict verdict() const;
+  /// Messages that were not what they should be.
+  [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
+
+ private:
+  struct Link {
+    LinkFacts facts;
+    bool has_mark = false;
+    bool damped = false;
+    std::optional<std::chrono::milliseconds> differs_since;
+    PartPace pace;
+  };
+  [[nodiscard]] Link* find(LinkNumber number);
+  void take(LinkNumber from, const PartRef& part, std::chrono::milliseconds now);
+  void say_own(std::chrono::milliseconds now);
+  void compute_map(std::chrono::milliseconds now);
+  void send(LinkNumber link, const PartRef& part);
+  void flood(const PartRef& part, LinkNumber except);
+  [[nodiscard]] bool carries_rather(const LinkFacts& link, const LinkFacts& than) const;
+  /// One link for each neighbour that counts; ascending by neighbour.
+  [[nodiscard]] std::vector<CarryingLink> carrying_links() const;
+
+  OwnRecord own_;
+  RecordStore store_;
+  NetworkMap map_;
+  std::map<LinkNumber, Link> links_;
+  bool links_changed_ = false;
+  bool map_changed_ = false;
+  ChangePace map_pace_{{kMapPause, kMapPause}};
+  ChangePace forget_pace_{{kForgetPause, kForgetPause}};
+  std::vector<Sending> sendings_;
+  std::uint64_t malformed_ = 0;
+};
+
+}  // namespace gimnet::hub

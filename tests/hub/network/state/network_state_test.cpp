@@ -1,0 +1,286 @@
+#include "hub/network/state/network_state.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/hub/network/state/support/hubs.hpp"
+
+namespace gimnet::hub {
+namespace {
+
+using namespace test;
+using std::chrono::seconds;
+
+constexpr milliseconds kNow{1'000};
+constexpr LinkNumber kFirst{1};
+constexpr LinkNumber kSecond{2};
+
+LinkFacts to(const HubIdentity& peer, std::uint16_t cost = 10) { return {peer, "url", true, cost}; }
+
+proto::Payload bytes(const HubIdentity& hub, std::uint64_t sequence,
+                     const std::vector<std::pair<proto::HubKey, std::uint16_t>>& neighbours = {}) {
+  return part(hub, sequence, neighbours)->bytes;
+}
+
+/// Everything that goes out: link and the hub of the record, "mark" as hub id 0.
+std::multiset<std::pair<std::uint32_t, std::uint16_t>> sent(NetworkState& hub) {
+  std::multiset<std::pair<std::uint32_t, std::uint16_t>> found;
+  for (const Sending& each : hub.take_sendings()) {
+    const PartRef record = read_part(*each.bytes);
+    found.emplace(each.link.value(), record == nullptr ? 0 : record->said.hub.hub.value());
+  }
+  return found;
+}
+using Sent = std::multiset<std::pair<std::uint32_t, std::uint16_t>>;
+
+/// Hub 5 with links to the hubs 2 and 3, which report it too.
+class HubWithTwoLinks : public testing::Test {
+ protected:
+  HubWithTwoLinks() {
+    hub_.begin_connection(kFirst, to(two_), kNow);
+    hub_.begin_connection(kSecond, to(three_), kNow);
+    hub_.take_record(kFirst, bytes(two_, 1, {{hub_key(5), 10}}), kNow);
+    hub_.take_record(kSecond, bytes(three_, 1, {{hub_key(5), 10}}), kNow);
+    hub_.take_mark(kFirst);
+    hub_.take_mark(kSecond);
+    hub_.advance(kNow);
+    hub_.advance(kNow + seconds(5));
+    (void)hub_.take_sendings();
+  }
+
+  const HubIdentity two_ = identity(2, 22);
+  const HubIdentity three_ = identity(3, 33);
+  NetworkState hub_{identity(5, 55), {"lab", "1.0"}};
+  milliseconds later_ = kNow + seconds(10);
+};
+
+TEST(NetworkStateExchange, SendsAllRecordsThenTheMark) {
+  NetworkState hub(identity(5, 55), {});
+  hub.begin_connection(kFirst, to(identity(2, 22)), kNow);
+  EXPECT_EQ(sent(hub), (Sent{{1, 5}, {1, 0}}));
+  hub.take_record(kFirst, bytes(identity(9, 99), 1), kNow);
+  EXPECT_EQ(sent(hub), Sent{}) << "never back to where it came from";
+  hub.begin_connection(kSecond, to(identity(3, 33)), kNow);
+  EXPECT_EQ(sent(hub), (Sent{{2, 5}, {2, 9}, {2, 0}}));
+}
+
+TEST(NetworkStateExchange, CountsALinkWhenTheMarkOfTheOtherSideHasCome) {
+  NetworkState hub(identity(5, 55), {});
+  hub.begin_connection(kFirst, to(identity(2, 22)), kNow);
+  hub.take_record(kFirst, bytes(identity(2, 22), 1, {{hub_key(5), 10}}), kNow);
+  hub.advance(kNow + seconds(1));
+  EXPECT_EQ(hub.map().reachable().size(), 1u);
+  hub.take_mark(kFirst);
+  hub.advance(kNow + seconds(2));
+  EXPECT_EQ(hub.map().reachable().size(), 2u);
+}
+
+TEST_F(HubWithTwoLinks, ReachesBoth) {
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst);
+  EXPECT_EQ(hub_.map().next_hops()[3], kSecond);
+  EXPECT_EQ(hub_.verdict(), Verdict::stay);
+}
+
+TEST_F(HubWithTwoLinks, FloodsWhatIsNewerToTheOtherLinks) {
+  hub_.take_record(kFirst, bytes(two_, 2, {{hub_key(5), 10}}), later_);
+  EXPECT_EQ(sent(hub_), (Sent{{2, 2}}));
+  hub_.take_record(kSecond, bytes(two_, 2, {{hub_key(5), 10}}), later_);
+  EXPECT_EQ(sent(hub_), Sent{}) << "known";
+}
+
+TEST_F(HubWithTwoLinks, SendsOnTheBytesThatCame) {
+  proto::bitestream::Writer body;
+  said(two_, 2).write(body);
+  body.put_text(20, "of a later version");
+  const auto bytes = proto::assemble_control({proto::route::RecordPart::kOperation, 0}, body);
+  hub_.take_record(kFirst, bytes, later_);
+  const auto sendings = hub_.take_sendings();
+  ASSERT_EQ(sendings.size(), 1u);
+  EXPECT_EQ(*sendings.front().bytes, bytes);
+}
+
+TEST_F(HubWithTwoLinks, WithdrawsALinkAtOnce) {
+  hub_.end_link(kFirst);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{});
+  EXPECT_EQ(sent(hub_), (Sent{{2, 5}})) << "its own record says so";
+  hub_.end_link(kFirst);
+  hub_.take_mark(kFirst);
+  hub_.take_digest(kFirst, 1, later_);
+  hub_.set_cost(kFirst, 3);
+  hub_.take_record(kFirst, bytes(two_, 9), later_);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(sent(hub_), Sent{}) << "the link is unknown";
+}
+
+TEST_F(HubWithTwoLinks, KeepsTheRouteOverABreakWithResume) {
+  hub_.begin_connection(kFirst, to(two_), later_);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst);
+  EXPECT_EQ(sent(hub_), (Sent{{1, 5}, {1, 2}, {1, 3}, {1, 0}})) << "the exchange begins anew";
+  hub_.begin_connection(kFirst, to(identity(2, 23)), later_ + seconds(1));
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{}) << "another process";
+}
+
+TEST_F(HubWithTwoLinks, DoesNotReportADampedLink) {
+  hub_.set_damped(kFirst, true);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.map().next_hops()[2], LinkNumber{});
+  EXPECT_EQ(sent(hub_).count({1, 5}), 1u) << "records cross it, too";
+  hub_.set_damped(kFirst, false);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.map().next_hops()[2], kFirst);
+}
+
+TEST_F(HubWithTwoLinks, UsesTheCheaperOfTwoLinksThenTheOneOfTheLowerDiallerThenTheName) {
+  constexpr LinkNumber kThird{3};
+  const auto carrying = [&](const LinkFacts& facts) {
+    later_ += seconds(1);
+    hub_.begin_connection(kThird, facts, later_);
+    hub_.take_mark(kThird);
+    hub_.advance(later_);
+    const auto found = hub_.map().next_hops()[2];
+    hub_.end_link(kThird);
+    return found;
+  };
+  EXPECT_EQ(carrying({two_, "z", true, 9}), kThird);
+  EXPECT_EQ(carrying({two_, "a", true, 11}), kFirst);
+  EXPECT_EQ(carrying({two_, "z", false, 10}), kThird) << "hub 2 dialled it";
+  EXPECT_EQ(carrying({two_, "a", true, 10}), kThird);
+  EXPECT_EQ(carrying({two_, "z", true, 10}), kFirst);
+}
+
+TEST_F(HubWithTwoLinks, RepairsRecordsThatDifferForASecond) {
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_);
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(999));
+  EXPECT_EQ(sent(hub_), Sent{});
+  hub_.take_digest(kFirst, hub_.digest(), later_ + milliseconds(999));
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(1'000));
+  EXPECT_EQ(sent(hub_), Sent{}) << "they were equal in between";
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(2'000));
+  EXPECT_EQ(sent(hub_), (Sent{{1, 2}, {1, 3}, {1, 5}}));
+  hub_.take_digest(kFirst, hub_.digest() + 1, later_ + milliseconds(2'999));
+  EXPECT_EQ(sent(hub_), Sent{}) << "at most once a second";
+}
+
+TEST_F(HubWithTwoLinks, ComputesAtOnceAndThenEach50Ms) {
+  hub_.end_link(kFirst);
+  hub_.advance(later_);
+  hub_.end_link(kSecond);
+  hub_.advance(later_ + milliseconds(49));
+  EXPECT_EQ(hub_.map().next_hops()[3], kSecond);
+  EXPECT_EQ(hub_.next_due(), later_ + milliseconds(50));
+  hub_.advance(later_ + milliseconds(50));
+  EXPECT_EQ(hub_.map().next_hops()[3], LinkNumber{});
+}
+
+TEST_F(HubWithTwoLinks, CountsWhatIsNoRecord) {
+  hub_.take_record(kFirst, proto::Payload(3), later_);
+  EXPECT_EQ(hub_.malformed(), 1u);
+}
+
+TEST_F(HubWithTwoLinks, LetsAFastPartWait) {
+  hub_.take_record(kFirst, bytes(two_, 2), later_);
+  hub_.take_record(kFirst, bytes(two_, 3), later_);
+  hub_.take_record(kFirst, bytes(two_, 4), later_);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.store().find(two_.key)->head()->sequence, 2u);
+  EXPECT_EQ(hub_.next_due(), later_ + PartPace::kPause);
+  hub_.advance(later_ + PartPace::kPause);
+  EXPECT_EQ(hub_.store().find(two_.key)->head()->sequence, 4u);
+}
+
+TEST_F(HubWithTwoLinks, LeavesWhenAnotherHubKeepsItsId) {
+  const HubIdentity other{{HubId{5}, {}}, proto::HubInstance{9}, true};
+  ASSERT_TRUE(is_preferred(other, hub_.self()));
+  hub_.take_record(kFirst, bytes(other, 1, {{hub_key(2), 10}}), later_);
+  hub_.take_record(kFirst, bytes(two_, 2, {{hub_key(5), 10}, {other.key, 10}}), later_);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.verdict(), Verdict::stay) << "records ascend, and these did not: malformed";
+  hub_.take_record(kFirst, bytes(two_, 3, {{other.key, 10}, {hub_key(5), 10}}), later_);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.verdict(), Verdict::id_taken);
+  EXPECT_EQ(hub_.map().own_id_holder(), other.key);
+  hub_.leave();
+  EXPECT_EQ(hub_.verdict(), Verdict::stay);
+  hub_.renumber(HubId{1'500});
+  hub_.begin_connection(kFirst, to(two_), later_ + seconds(2));
+  EXPECT_EQ(sent(hub_).count({1, 1'500}), 1u);
+}
+
+TEST_F(HubWithTwoLinks, LeavesToALivingCopyWithALowerInstance) {
+  auto copy = said(identity(5, 54), 90);
+  copy.behind = proto::HubInstance{55};
+  hub_.take_record(kFirst, make_part(copy)->bytes, later_);
+  EXPECT_EQ(hub_.verdict(), Verdict::copied);
+  hub_.leave();
+  EXPECT_EQ(hub_.verdict(), Verdict::stay);
+}
+
+TEST_F(HubWithTwoLinks, StaysWhereTheCopyHasTheHigherInstance) {
+  auto copy = said(identity(5, 56), 90);
+  copy.behind = proto::HubInstance{55};
+  hub_.take_record(kFirst, make_part(copy)->bytes, later_);
+  EXPECT_EQ(hub_.verdict(), Verdict::stay);
+  hub_.advance(later_);
+  EXPECT_EQ(sent(hub_), (Sent{{1, 5}, {2, 5}})) << "it goes on behind it";
+}
+
+TEST_F(HubWithTwoLinks, AdmitsANewcomer) {
+  EXPECT_EQ(hub_.admit(identity(7, 77)).admission, Admission::accept);
+  EXPECT_EQ(hub_.admit(two_).admission, Admission::accept) << "a second link";
+}
+
+TEST_F(HubWithTwoLinks, RefusesItselfAndCopies) {
+  EXPECT_EQ(hub_.admit(identity(9, 55)).admission, Admission::is_self);
+  EXPECT_EQ(hub_.admit(identity(5, 56)).admission, Admission::is_copy);
+  const auto answer = hub_.admit(identity(2, 23));
+  EXPECT_EQ(answer.admission, Admission::ask_old_link);
+  EXPECT_EQ(answer.old_link, kFirst);
+  const auto far = identity(8, 88);
+  hub_.take_record(kFirst, bytes(far, 1, {{hub_key(2), 10}}), later_);
+  hub_.take_record(kFirst, bytes(two_, 2, {{hub_key(5), 10}, {far.key, 10}}), later_);
+  hub_.advance(later_);
+  EXPECT_EQ(hub_.map().next_hops()[8], kFirst);
+  EXPECT_EQ(hub_.admit(identity(8, 89)).admission, Admission::is_copy);
+  EXPECT_EQ(hub_.admit(identity(8, 89)).holder, far.key);
+  hub_.end_link(kFirst);
+  hub_.advance(later_ + seconds(1));
+  EXPECT_EQ(hub_.admit(identity(8, 89)).admission, Admission::accept) << "out of reach: a restart";
+}
+
+TEST_F(HubWithTwoLinks, RefusesAnIdThatAnotherHubKeeps) {
+  const HubIdentity worse{hub_key(3, 99), proto::HubInstance{9}, true};
+  EXPECT_EQ(hub_.admit(worse).admission, Admission::id_taken);
+  EXPECT_EQ(hub_.admit(worse).holder, three_.key);
+  const HubIdentity better{{HubId{3}, {}}, proto::HubInstance{9}, true};
+  EXPECT_EQ(hub_.admit(better).admission, Admission::accept) << "hub 3 will see it, and leave";
+  const HubIdentity own{hub_key(5, 99), proto::HubInstance{9}, true};
+  EXPECT_EQ(hub_.admit(own).admission, Admission::id_taken);
+  EXPECT_EQ(hub_.admit(own).holder, hub_.self().key);
+}
+
+TEST(NetworkStateAdmission, DrawsAgainForAPreferredNewcomer) {
+  const NetworkState drawn({hub_key(1'500, 9), proto::HubInstance{55}, false}, {});
+  const HubIdentity configured{hub_key(1'500, 99), proto::HubInstance{9}, true};
+  EXPECT_EQ(drawn.admit(configured).admission, Admission::draw_again);
+  const HubIdentity drawn_too{hub_key(1'500, 99), proto::HubInstance{9}, false};
+  EXPECT_EQ(drawn.admit(drawn_too).admission, Admission::id_taken);
+  const HubIdentity lower{hub_key(1'500, 8), proto::HubInstance{9}, false};
+  EXPECT_EQ(drawn.admit(lower).admission, Admission::draw_again);
+}
+
+TEST(NetworkStateDraw, AvoidsIdsThatAreKnown) {
+  NetworkState hub(identity(5, 55), {});
+  EXPECT_EQ(hub.draw_hub_id(0), HubId{1'024});
+  EXPECT_EQ(hub.draw_hub_id(3'070), HubId{4'094});
+  EXPECT_EQ(hub.draw_hub_id(3'071), HubId{1'024});
+  hub.begin_connection(kFirst, to(identity(2, 22)), kNow);
+  hub.take_record(kFirst, bytes(identity(1'024, 1), 1), kNow);
+  EXPECT_EQ(hub.draw_hub_id(0), HubId{1'025});
+}
+
+}  // namespace
+}  // namespace gimnet::hub
