@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "client/nif/handshake.hpp"
 #include "client/nif/hub_clock.hpp"
 #include "client/nif/inbound.hpp"
 #include "client/nif/outbound.hpp"
 #include "client/nif/request_table.hpp"
 #include "fuzz/support/fuzz_input.hpp"
 #include "fuzz/support/stranger_frames.hpp"
+#include "net/dial_handshake.hpp"
 #include "proto/frame/frame_builder.hpp"
 
 namespace {
@@ -113,7 +113,7 @@ class Witness final : public InboundHost {
     delivered_.push_back(std::move(written));
   }
 
-  WakeSignal wake_;
+  net::WakeSignal wake_;
   Outbound outbound_;
   RequestTable requests_;
   HubClock clock_;
@@ -196,9 +196,10 @@ void check_strangers(std::span<const std::byte> bytes, std::size_t step) {
   });
 }
 
-Handshake::State shake(Handshake& handshake, std::span<const std::byte> bytes, std::size_t step) {
-  auto state = Handshake::State::need_more;
-  while (state == Handshake::State::need_more && !bytes.empty()) {
+net::DialHandshake::State shake(net::DialHandshake& handshake, std::span<const std::byte> bytes,
+                                std::size_t step) {
+  auto state = net::DialHandshake::State::need_more;
+  while (state == net::DialHandshake::State::need_more && !bytes.empty()) {
     const std::size_t size = std::min(step, bytes.size());
     const fuzz::ExactCopy piece(bytes.first(size));
     state = handshake.take(piece.span());
@@ -208,14 +209,17 @@ Handshake::State shake(Handshake& handshake, std::span<const std::byte> bytes, s
 }
 
 void check_handshake(std::span<const std::byte> bytes, std::size_t step) {
-  Handshake whole(true, 0x1234);
-  Handshake split(true, 0x1234);
+  net::DialHandshake whole;
+  net::DialHandshake split;
   const auto state = shake(whole, bytes, SIZE_MAX);
   FUZZ_MUST(shake(split, bytes, step) == state);
-  FUZZ_MUST(state != Handshake::State::failed || !whole.failure().sentence.empty());
-  if (state != Handshake::State::welcome) return;
-  const Session& session = whole.session();
-  FUZZ_MUST(session.id == split.session().id && session.token == split.session().token);
+  FUZZ_MUST(state != net::DialHandshake::State::failed || !whole.error().sentence.empty());
+  if (state != net::DialHandshake::State::welcome) return;
+  FUZZ_MUST(whole.welcome() == split.welcome());
+  const auto checked = session_of(whole.welcome(), true, 0x1234);
+  FUZZ_MUST(checked || !checked.error().sentence.empty());
+  if (!checked) return;
+  const Session& session = *checked;
   FUZZ_MUST(hub_of(NodeId{session.id}).value() == session.hub_id && !session.token.empty());
   FUZZ_MUST(session.keep_alive_ns > 0 && session.silent_after_ns >= 2 * session.keep_alive_ns);
   FUZZ_MUST(session.frame_bytes_max <= proto::kFrameLengthDefault);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "net/stream.hpp"
 
@@ -12,14 +13,15 @@ struct SocketOptions {
   std::uint32_t send_bytes = 0;
 };
 
-/// A connected TCP or Unix stream socket. It keeps nothing of its own, so it needs no lock. Thread
+/// A TCP or Unix stream socket. It keeps nothing of its own, so it needs no lock. Thread
 /// safety, ownership: as Stream.
 class SocketStream final : public Stream {
  public:
   enum class Family : std::uint8_t { tcp, unix_socket };
 
   /// Takes `descriptor`, makes it non-blocking, and sets no delay and the sizes of its buffers.
-  /// REQUIRES: a connected stream socket of that family.
+  /// REQUIRES: a stream socket of that family, connected
+  /// before anything is read or sent.
   SocketStream(int descriptor, Family family, const SocketOptions& options = {});
   ~SocketStream() override;
   SocketStream(const SocketStream&) = delete;
@@ -39,5 +41,11 @@ class SocketStream final : public Stream {
   const Family family_;
   const int send_buffer_bytes_;
 };
+
+/// The stream of a socket that was dialled or accepted: the one place that decides what stands
+/// between the two. It has a source file of its own, so that a test can put another one there.
+/// Arguments: as SocketStream's.
+[[nodiscard]] std::unique_ptr<Stream> make_stream(int descriptor, SocketStream::Family family,
+                                                  const SocketOptions& options);
 
 }  // namespace gimnet::net

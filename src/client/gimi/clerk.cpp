@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "base/clock.hpp"
+#include "base/signals_blocked.hpp"
 #include "client/gimi/stream_table.hpp"
-#include "client/nif/platform.hpp"
 
 namespace gimnet::gimi {
 namespace {
@@ -24,7 +24,7 @@ constexpr std::int64_t kLastAcksNs = 500'000'000;
 }  // namespace
 
 void Clerk::start() {
-  const nif::SignalsBlocked blocked;
+  const SignalsBlocked blocked;
   thread_ = std::thread([this] { run(); });
 }
 

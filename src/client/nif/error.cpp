@@ -18,7 +18,58 @@ constexpr std::array<const char*, 28> kTexts{
     "protocol error", "out of memory", "in callback", "forked",       "buffer too small",
     "system error",   "unknown host",  "not retained"};
 
+/// The meaning of a GOODBYE for nif_connect().
+nif_status status_of(proto::GoodbyeCode code) {
+  switch (code) {
+    case proto::GoodbyeCode::bad_version:
+      return NIF_BAD_VERSION;
+    case proto::GoodbyeCode::name_taken:
+      return NIF_NAME_TAKEN;
+    case proto::GoodbyeCode::bad_name:
+      return NIF_BAD_NAME;
+    case proto::GoodbyeCode::hub_full:
+    case proto::GoodbyeCode::no_memory:
+      return NIF_HUB_FULL;
+    case proto::GoodbyeCode::not_allowed:
+      return NIF_DENIED;
+    case proto::GoodbyeCode::replaced:
+      return NIF_REPLACED;
+    default:
+      return NIF_REFUSED;
+  }
+}
+
+nif_status status_of(const net::NetError& error) {
+  switch (error.fault) {
+    case net::Fault::bad_address:
+      return NIF_BAD_ARGUMENT;
+    case net::Fault::no_host:
+      return NIF_NO_HOST;
+    case net::Fault::no_peer:
+      return NIF_NO_HUB;
+    case net::Fault::not_permitted:
+      return NIF_SYSTEM;
+    case net::Fault::no_memory:
+      return NIF_NO_MEMORY;
+    case net::Fault::timeout:
+      return NIF_TIMEOUT;
+    case net::Fault::cancelled:
+      return NIF_CLOSED;
+    case net::Fault::bad_version:
+      return NIF_BAD_VERSION;
+    case net::Fault::refused:
+      return status_of(error.goodbye);
+    case net::Fault::protocol:
+      break;
+  }
+  return NIF_PROTOCOL;
+}
+
 }  // namespace
+
+Failure failure_of(const net::NetError& error) {
+  return {status_of(error), error.sentence, error.nobody_listens};
+}
 
 nif_status fail(nif_status status, std::string_view sentence) {
   const std::string_view kept = cut_text(sentence, NIF_SENTENCE_BYTES_MAX);

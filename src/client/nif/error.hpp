@@ -4,10 +4,11 @@
 #include <string>
 #include <string_view>
 
-#include "base/clock.hpp"
 #include "gimnet/nif.h"
+#include "net/net_error.hpp"
+#include "net/wait.hpp"
 
-// What calls answer, and the sentence that stands behind the answer.
+// The answers of calls, and the sentence that stands behind an answer.
 
 namespace gimnet::nif {
 
@@ -18,6 +19,9 @@ struct Failure {
   bool nobody_listens = false;  ///< at the hub's address: its process is gone
 };
 
+/// A failure to connect as the calls of NIF answer it.
+[[nodiscard]] Failure failure_of(const net::NetError& error);
+
 /// Stores the sentence for nif_error_text() of this thread and returns the status.
 nif_status fail(nif_status status, std::string_view sentence);
 nif_status fail(const Failure& failure);
@@ -26,10 +30,9 @@ nif_status fail(const Failure& failure);
 /// thread.
 [[nodiscard]] const char* error_text();
 
-/// A time of steady_now_ns(); INT64_MAX: never.
-using Deadline = std::int64_t;
-inline constexpr Deadline kNever = INT64_MAX;
-inline constexpr std::int64_t kNsPerMs = 1'000'000;
+using net::Deadline;
+using net::kNever;
+using net::kNsPerMs;
 
 [[nodiscard]] inline Deadline deadline_after(std::int32_t timeout_ms) {
   return timeout_ms < 0 ? kNever : steady_now_ns() + timeout_ms * kNsPerMs;

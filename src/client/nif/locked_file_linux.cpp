@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 
+#include "base/descriptor.hpp"
 #include "base/runtime_folder.hpp"
 #include "client/nif/locked_file.hpp"
 
@@ -68,7 +69,7 @@ PrivateFolder::PrivateFolder() {
   const RuntimeFolder folder = runtime_folder_of_user();
   descriptor_ = ::open(folder.above.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor_ < 0) {
-    fault_ = "cannot use the folder " + folder.above + ": " + system_error_text(errno);
+    fault_ = "cannot use the folder " + folder.above + ": " + system_text(errno);
     return;
   }
   enter(descriptor_, folder.name, folder.path());
@@ -81,13 +82,13 @@ PrivateFolder::~PrivateFolder() {
 
 void PrivateFolder::enter(Descriptor above, const std::string& name, const std::string& path) {
   if (::mkdirat(above, name.c_str(), kFolderMode) != 0 && errno != EEXIST) {
-    fault_ = "cannot make the folder " + path + ": " + system_error_text(errno);
+    fault_ = "cannot make the folder " + path + ": " + system_text(errno);
     return;
   }
   const Descriptor inner =
       ::openat(above, name.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (inner < 0) {
-    fault_ = "cannot use " + path + ": " + system_error_text(errno) + "; it has to be a folder";
+    fault_ = "cannot use " + path + ": " + system_text(errno) + "; it has to be a folder";
     return;
   }
   struct stat info{};

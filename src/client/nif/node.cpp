@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/random.hpp"
-#include "client/nif/handshake.hpp"
+#include "base/signals_blocked.hpp"
 #include "proto/frame/frame_builder.hpp"
 
 // A node as the program's threads see it, and what the receiving half asks of it; its thread is in
@@ -17,7 +17,7 @@ namespace gimnet::nif {
 namespace {
 
 /// Between two tries of nif_connect() with wait_for_hub.
-Deadline try_again_at(Backoff& backoff, Deadline deadline) {
+Deadline try_again_at(net::DialBackoff& backoff, Deadline deadline) {
   return std::min(deadline, steady_now_ns() + backoff.next_ns(random_bits()));
 }
 
@@ -72,12 +72,12 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
     return Failure{NIF_NO_MEMORY, "cannot connect: this process has no descriptors left"};
   }
   const Deadline deadline = deadline_after(node->options_.connect_timeout_ms);
-  Backoff backoff;
+  net::DialBackoff backoff;
   const auto token_for = [&node](const std::string& address) {
     return node->tokens_.find(address);
   };
   for (;;) {
-    auto admitted = admit(node->options_.endpoints, node->options_.socket, node->hello(), deadline,
+    auto admitted = admit(node->options_.addresses, node->options_.socket, node->hello(), deadline,
                           node->stop_, token_for);
     if (admitted) {
       if (!node->take_over(std::move(*admitted), true)) {
@@ -87,8 +87,7 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
     }
     const bool again = node->options_.wait_for_hub && may_come(admitted.error().status);
     if (!again || steady_now_ns() >= deadline) return admitted.error();
-    static_cast<void>(
-        wait_for(Socket(), false, false, node->stop_, try_again_at(backoff, deadline)));
+    static_cast<void>(net::wait_for(nullptr, {}, node->stop_, try_again_at(backoff, deadline)));
   }
   try {
     const SignalsBlocked blocked;
@@ -100,13 +99,13 @@ Result<std::unique_ptr<Node>, Failure> Node::connect(Options options) {
 }
 
 bool Node::take_over(Admitted admitted, bool first) {
-  socket_ = std::move(admitted.socket);
+  stream_ = std::move(admitted.stream);
   const bool same_id = admitted.session.id == session_.id;
   session_ = std::move(admitted.session);
   if (!first) outbound_.set_declaring(true);  // until declare_again() below knows better
   // Before anything can be posted: a total of the earlier connection would count as one of this.
   credits_.begin(session_.resumed);
-  const auto let_go = outbound_.attach(socket_, session_);
+  const auto let_go = outbound_.attach(*stream_, session_);
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
   last_heard_ns_ = last_tick_ns_ = steady_now_ns();
@@ -363,6 +362,6 @@ void Node::close() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Node::abandon() { socket_.close(); }
+void Node::abandon() { stream_.reset(); }
 
 }  // namespace gimnet::nif

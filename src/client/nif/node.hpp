@@ -28,7 +28,7 @@
 namespace gimnet::nif {
 
 /// One node: a connection to a hub, made again when it breaks, with its library thread.
-/// Thread safety: public functions from any thread. Ownership: of the socket and the thread.
+/// Thread safety: public functions from any thread. Ownership: of the stream and the thread.
 class Node final : private InboundHost {
  public:
   /// Dials, shakes hands, starts the thread. Errors: as nif_connect().
@@ -133,8 +133,8 @@ class Node final : private InboundHost {
   void push_event(Record* record);
 
   const Options options_;
-  WakeSignal wake_;
-  WakeSignal stop_;
+  net::WakeSignal wake_;
+  net::WakeSignal stop_;
   Outbound outbound_;
   ReceiveQueue received_;
   RequestTable requests_;
@@ -166,13 +166,13 @@ class Node final : private InboundHost {
   // The library's thread (before it starts: the connecting one).
   Inbound inbound_;
   TokenStore tokens_;
-  Socket socket_;
+  std::unique_ptr<net::Stream> stream_;  ///< null: not connected
   Session session_;
   std::vector<std::byte>
       behind_welcome_;   ///< came in one read with it, and is the first that is taken
   std::string address_;  ///< of the hub that admitted it last, as a URL
   std::string name_;     ///< to ask for
-  Backoff backoff_;
+  net::DialBackoff backoff_;
   std::uint64_t epoch_ = 0;
   std::uint64_t confirmed_ = 0;
   std::int64_t last_heard_ns_ = 0;

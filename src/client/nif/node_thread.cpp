@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "base/random.hpp"
-#include "client/nif/handshake.hpp"
 #include "client/nif/node.hpp"
+#include "net/dial_handshake.hpp"
 
 // The library's thread: reads, keeps alive, writes what senders left to it, calls back, dials
 // again.
@@ -42,9 +42,9 @@ void Node::run() {
     try {
       if (ended_) {
         call_back();
-        const Ready ready = wait_for(Socket(), false, false, wake_, kNever);
+        const net::Readiness ready = net::wait_for(nullptr, {}, wake_, kNever);
         if (ready.woken) wake_.clear();
-      } else if (socket_.open()) {
+      } else if (stream_ != nullptr) {
         turn();
       } else {
         redial();
@@ -79,15 +79,16 @@ void Node::turn() {
   }
   const bool read_already = reading && !behind_welcome_.empty();
   const Deadline until = read_already ? steady_now_ns() : next_timer(reading, wants.last_write_ns);
-  Ready ready = wait_for(socket_, reading, wants.writable, wake_, until);
+  const net::Interest interest = net::interest_of(reading, wants.blocked, wants.pending_out);
+  net::Readiness ready = net::wait_for(stream_.get(), interest, wake_, until);
   ready.readable = ready.readable || read_already;
   if (ready.woken) wake_.clear();
   if (ready.woken || ready.writable) outbound_.write_pending(ready.writable);
   const std::int64_t now = steady_now_ns();
   if (ready.readable) read_some(now);
-  if (!socket_.open()) return;
+  if (stream_ == nullptr) return;
   if (!ready.readable) on_timers(now, reading);
-  if (socket_.open()) {
+  if (stream_ != nullptr) {
     take_new_name();
     declarations_.go_on();
     watches_.go_on();
@@ -106,9 +107,9 @@ void Node::read_some(std::int64_t now) {
     behind_welcome_.erase(behind_welcome_.begin(), end);
     return take_read(bytes, now);
   }
-  const IoResult result = socket_.read(space);
-  if (result.state == IoResult::State::would_block) return;
-  if (result.state != IoResult::State::done) {
+  const net::IoResult result = stream_->receive(space);
+  if (result.status == net::IoStatus::would_block) return;
+  if (result.status != net::IoStatus::ok) {
     disconnect("the hub closed the connection", proto::GoodbyeCode::done);
     return;
   }
@@ -132,13 +133,13 @@ void Node::take_read(std::size_t bytes, std::int64_t now) {
       on_goodbye(inbound_.goodbye());
       break;
     case Inbound::Verdict::malformed: {
-      const auto goodbye = encode_goodbye(proto::GoodbyeCode::malformed, inbound_.fault());
+      const auto goodbye = net::encode_goodbye(proto::GoodbyeCode::malformed, inbound_.fault());
       static_cast<void>(outbound_.post(goodbye));
       disconnect("the hub broke the protocol: " + inbound_.fault(), proto::GoodbyeCode::malformed);
       break;
     }
   }
-  if (socket_.open() && now - last_tick_ns_ >= session_.keep_alive_ns) on_timers(now, true);
+  if (stream_ != nullptr && now - last_tick_ns_ >= session_.keep_alive_ns) on_timers(now, true);
 }
 
 void Node::confirm() {
@@ -163,7 +164,7 @@ void Node::on_timers(std::int64_t now, bool reading) {
   confirm();
   // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not
   // pile up.
-  if (due && !wants.writable) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
+  if (due && !wants.blocked) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
   outbound_.look_after_held();
   static_cast<void>(outbound_.flush());
 }
@@ -210,7 +211,7 @@ std::size_t Node::call_back_with(std::span<const Item> items) {
 void Node::redial() {
   const Deadline wait_until = steady_now_ns() + backoff_.next_ns(random_bits());
   while (!closing_.load() && steady_now_ns() < wait_until) {
-    const Ready ready = wait_for(Socket(), false, false, wake_, wait_until);
+    const net::Readiness ready = net::wait_for(nullptr, {}, wake_, wait_until);
     if (ready.woken) wake_.clear();
     call_back();
   }
@@ -218,7 +219,7 @@ void Node::redial() {
   take_new_name();
   Deadline deadline = steady_now_ns() + kRedialNs;
   if (resumes_only_) deadline = std::min(deadline, broke_ns_ + session_.grace_ns);
-  auto admitted = admit(options_.endpoints, options_.socket, hello(), deadline, stop_);
+  auto admitted = admit(options_.addresses, options_.socket, hello(), deadline, stop_);
   if (!admitted) {
     if (admitted.error().status == NIF_CLOSED) return;
     set_last_error(admitted.error().sentence);
@@ -253,9 +254,9 @@ void Node::end_of_dialing(Failure failure) {
 }
 
 void Node::turn_down(Admitted admitted) {
-  const auto goodbye = encode_goodbye(proto::GoodbyeCode::done, "");
-  const std::span<const std::byte> bytes(goodbye);
-  static_cast<void>(admitted.socket.write(std::span(&bytes, 1)));
+  const auto goodbye = net::encode_goodbye(proto::GoodbyeCode::done, "");
+  const iovec piece{const_cast<std::byte*>(goodbye.data()), goodbye.size()};
+  static_cast<void>(admitted.stream->send({&piece, 1}));
   const std::string why =
       "the connection to the hub broke, and it does not know this session any more";
   set_last_error(why);
@@ -296,7 +297,7 @@ void Node::disconnect(std::string why, proto::GoodbyeCode code) {
   resumes_only_ = may_resume(code);
   broke_ns_ = steady_now_ns();
   outbound_.detach(!ending);
-  socket_.close();
+  stream_.reset();
   requests_.fail_all();
   names_.clear();
   clock_.clear();
@@ -340,28 +341,30 @@ void Node::end(const Failure& failure, std::string why, proto::GoodbyeCode code)
 /// The last words: what waits, then GOODBYE, and then nothing is sent, but what the hub still says
 /// is read, so that closing does not throw away what is on its way to it.
 void Node::leave() {
-  if (!socket_.open()) return;
+  if (stream_ == nullptr) return;
   const Deadline deadline = steady_now_ns() + kLeaveNs;
-  const auto goodbye = encode_goodbye(proto::GoodbyeCode::done, "");
+  const auto goodbye = net::encode_goodbye(proto::GoodbyeCode::done, "");
   outbound_.begin_leaving(session_.resume ? inbound_.taken() : 0, goodbye);
   bool unsaid = true;
   while ((unsaid = outbound_.write_last()) && steady_now_ns() < deadline) {
-    static_cast<void>(wait_for(socket_, false, true, wake_, deadline));
+    static_cast<void>(net::wait_for(stream_.get(), {.write = true}, wake_, deadline));
     wake_.clear();
   }
   if (!unsaid && !outbound_.wants().broken) tokens_.forget();  // GOODBYE makes it worthless
-  socket_.shutdown_write();
+  stream_->shut_down();
   std::byte memory[4096];
   for (;;) {
-    const IoResult result = socket_.read(memory);
+    const net::IoResult result = stream_->receive(memory);
     if (steady_now_ns() >= deadline) break;  // also of a hub that never ends
-    if (result.state == IoResult::State::done) continue;
-    if (result.state != IoResult::State::would_block) break;
-    static_cast<void>(wait_for(socket_, true, false, wake_, deadline));
+    if (result.status == net::IoStatus::ok) continue;
+    if (result.status != net::IoStatus::would_block) break;
+    const net::Interest interest = net::interest_of(true, false, stream_->pending_out());
+    const net::Readiness ready = net::wait_for(stream_.get(), interest, wake_, deadline);
+    if (ready.writable && stream_->send({}).status == net::IoStatus::failed) break;
     wake_.clear();
   }
   outbound_.detach(false);
-  socket_.close();
+  stream_.reset();
 }
 
 }  // namespace gimnet::nif

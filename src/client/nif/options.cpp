@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "client/nif/hub_addresses.hpp"
 #include "client/nif/sized_struct.hpp"
 #include "proto/control/fields.hpp"
 #include "proto/control/names.hpp"
@@ -79,9 +80,9 @@ Result<Options, Failure> read_options(const nif_options* options) {
   checked.callback = given.callback;
   checked.user = given.user;
   checked.credit_by_program = given.credit_by_program != 0;
-  auto endpoints = endpoints_for(given.url != nullptr ? given.url : "");
-  if (!endpoints) return endpoints.error();
-  checked.endpoints = std::move(*endpoints);
+  auto addresses = hub_addresses(given.url != nullptr ? given.url : "");
+  if (!addresses) return addresses.error();
+  checked.addresses = std::move(*addresses);
   return checked;
 }
 

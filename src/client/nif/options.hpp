@@ -7,19 +7,19 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "client/nif/endpoint.hpp"
 #include "client/nif/error.hpp"
 #include "client/nif/last_messages.hpp"
-#include "client/nif/platform.hpp"
 #include "client/nif/send_queue.hpp"
 #include "gimnet/nif.h"
+#include "net/address.hpp"
+#include "net/socket_stream.hpp"
 #include "proto/frame/reassembler.hpp"
 
 namespace gimnet::nif {
 
 /// nif_options, checked and with the defaults filled in. A value type.
 struct Options {
-  std::vector<Endpoint> endpoints;
+  std::vector<net::Address> addresses;
   std::string name;
   std::string description;
   std::int32_t connect_timeout_ms = 5'000;
@@ -35,7 +35,7 @@ struct Options {
   std::size_t receive_queue_bytes = 16 * 1024 * 1024;
   proto::ReassemblyLimits reassembly{.message_bytes_max = 64u << 20,
                                      .waiting_bytes_max = 64u << 20};
-  SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
+  net::SocketOptions socket{.receive_bytes = 0, .send_bytes = 256 * 1024};
   nif_callback callback = nullptr;
   void* user = nullptr;
   bool credit_by_program = false;

@@ -46,24 +46,21 @@ bool Outbound::write_once() {
 bool Outbound::write_gathered() {
   if (!held_.empty()) put_held();
   const auto pieces = queue_.gather();
-  if (pieces.empty()) return false;
+  net::Stream& stream = *stream_;
+  if (pieces.empty() && stream.pending_out() == 0) return false;
   std::size_t offered = 0;
-  for (const auto& piece : pieces) offered += piece.size();
-  Socket* const socket = socket_;
+  for (const iovec& piece : pieces) offered += piece.iov_len;
   mutex_.unlock();
-  const IoResult result = socket->write(pieces);
+  const net::IoResult result = stream.send(pieces);
   mutex_.lock();
   ++write_calls_;
   bytes_sent_ += result.bytes;
   queue_.commit(result.bytes);
   if (result.bytes > 0) notify_waiting();
-  if (result.bytes == offered) {
-    full_ = false;  // a callback's time is not waited for: see write_or_leave()
-    return true;
-  }
-  broken_ = result.state == IoResult::State::failed;
-  full_ = !broken_;
-  return false;
+  broken_ = result.status == net::IoStatus::failed;
+  // A callback's time is not waited for: see write_or_leave().
+  full_ = !broken_ && (result.bytes < offered || stream.pending_out() != 0);
+  return !broken_ && !full_;
 }
 
 /// Also where nothing was written: detach() waits for the writer, and drain() does where the queue
@@ -112,7 +109,9 @@ void Outbound::end_callbacks() {
 
 Outbound::Wants Outbound::wants() {
   const MutexLock lock(mutex_);
-  return {full_ && !writing_, broken_, no_memory_, last_write_ns_};
+  const bool idle = !writing_ && stream_ != nullptr;
+  return {full_ && !writing_, idle ? stream_->pending_out() : 0, broken_, no_memory_,
+          last_write_ns_};
 }
 
 /// Copies a frame into the queue under the id that the node has now.

@@ -16,11 +16,11 @@
 #include "client/nif/last_messages.hpp"
 #include "client/nif/outgoing.hpp"
 #include "client/nif/pause_table.hpp"
-#include "client/nif/platform.hpp"
 #include "client/nif/reported_messages.hpp"
 #include "client/nif/send_queue.hpp"
 #include "client/nif/session.hpp"
 #include "gimnet/nif.h"
+#include "net/wait.hpp"
 #include "proto/frame/flow.hpp"
 #include "proto/frame/taken.hpp"
 #include "proto/frame/window.hpp"
@@ -40,7 +40,7 @@ namespace gimnet::nif {
 class Outbound {
  public:
   /// `wake` rouses the library's thread, which then calls write_pending().
-  Outbound(const SendQueue::Limits& limits, WakeSignal& wake,
+  Outbound(const SendQueue::Limits& limits, net::WakeSignal& wake,
            std::size_t last_message_bytes = LastMessages::kMessageBytesDefault)
       : wake_(wake), queue_(limits), held_(limits.queue_bytes), last_(last_message_bytes) {}
 
@@ -69,9 +69,9 @@ class Outbound {
   /// The connection stands. Returns what SKIP has to announce; nothing: the hub's count is
   /// impossible, and it is not attached. May throw std::bad_alloc, as may move_group(): then
   /// detach() must follow.
-  [[nodiscard]] std::optional<std::uint64_t> attach(Socket& socket, const Session& session)
+  [[nodiscard]] std::optional<std::uint64_t> attach(net::Stream& stream, const Session& session)
       GIMNET_EXCLUDES(mutex_);
-  /// The connection broke; `again`: another one will come. When this returns nobody uses the socket
+  /// The connection broke; `again`: another one will come. When this returns nobody uses the stream
   /// any more. After Wants::no_memory nothing is kept for the next one.
   void detach(bool again) GIMNET_EXCLUDES(mutex_);
   /// No connection will come any more: what waits answers with this.
@@ -85,11 +85,12 @@ class Outbound {
   void begin_leaving(std::uint64_t taken, std::span<const std::byte> goodbye)
       GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] bool write_last() GIMNET_EXCLUDES(mutex_);
-  /// What to wait for.
+  /// The state of writing, by which its thread waits.
   struct Wants {
-    bool writable = false;   ///< the kernel was full
-    bool broken = false;     ///< a write failed
-    bool no_memory = false;  ///< because there was no memory for it
+    bool blocked = false;         ///< the kernel was full
+    std::size_t pending_out = 0;  ///< as Stream::pending_out(); 0 while somebody writes
+    bool broken = false;          ///< a write failed
+    bool no_memory = false;       ///< because there was no memory for it
     std::int64_t last_write_ns = 0;
   };
   [[nodiscard]] Wants wants() GIMNET_EXCLUDES(mutex_);
@@ -186,11 +187,15 @@ class Outbound {
   [[nodiscard]] bool write_gathered() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] std::optional<std::uint64_t> take_up(const Session& session)
       GIMNET_REQUIRES(mutex_);
+  /// The kernel has all that was queued.
+  [[nodiscard]] bool all_sent() const GIMNET_REQUIRES(mutex_) {
+    return queue_.all_written() && (stream_ == nullptr || stream_->pending_out() == 0);
+  }
   void end_writing() GIMNET_REQUIRES(mutex_);
   void wake_library() GIMNET_REQUIRES(mutex_);
   void notify_waiting() GIMNET_REQUIRES(mutex_);
 
-  WakeSignal& wake_;
+  net::WakeSignal& wake_;
 
   Mutex mutex_;
   Condition changed_;
@@ -204,7 +209,7 @@ class Outbound {
       false;  ///< frames were given up unconfirmed, and drain() has not said so yet
   bool asked_ GIMNET_GUARDED_BY(mutex_) =
       false;  ///< drain() asked this hub for a CONFIRM, and none came since
-  Socket* socket_ GIMNET_GUARDED_BY(mutex_) = nullptr;
+  net::Stream* stream_ GIMNET_GUARDED_BY(mutex_) = nullptr;
   SendQueue queue_ GIMNET_GUARDED_BY(mutex_);
   std::vector<std::byte> goodbye_
       GIMNET_GUARDED_BY(mutex_);  ///< waits until everything else is written

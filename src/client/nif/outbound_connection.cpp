@@ -73,7 +73,7 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
   return missing;
 }
 
-std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& session) {
+std::optional<std::uint64_t> Outbound::attach(net::Stream& stream, const Session& session) {
   const MutexLock lock(mutex_);
   std::optional<std::uint64_t> missing;
   try {
@@ -87,7 +87,7 @@ std::optional<std::uint64_t> Outbound::attach(Socket& socket, const Session& ses
   frame_bytes_max_ = session.frame_bytes_max;
   hub_retains_ = session.retained_bytes_max;
   pauses_.clear();
-  socket_ = &socket;
+  stream_ = &stream;
   asked_ = false;
   full_ = false;
   broken_ = false;
@@ -108,7 +108,7 @@ void Outbound::detach(bool again) {
     away_since_ns_ = steady_now_ns();
   }
   while (writing_) static_cast<void>(wait(kNever));
-  socket_ = nullptr;
+  stream_ = nullptr;
   full_ = false;
   pauses_.clear();
   try {
@@ -144,7 +144,7 @@ void Outbound::begin_leaving(std::uint64_t taken, std::span<const std::byte> goo
 bool Outbound::write_last() {
   const MutexLock lock(mutex_);
   while (writing_) static_cast<void>(wait(kNever));
-  if (socket_ == nullptr || broken_) return false;
+  if (stream_ == nullptr || broken_) return false;
   writing_ = true;
   do {
     if (!held_.empty()) put_held();
@@ -154,7 +154,7 @@ bool Outbound::write_last() {
     }
   } while (write_once());
   end_writing();
-  return !broken_ && !queue_.all_written();
+  return !broken_ && !all_sent();
 }
 
 nif_status Outbound::wait_connected(Deadline deadline) {

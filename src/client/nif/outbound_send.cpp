@@ -93,8 +93,7 @@ void Outbound::write_or_leave(bool more) {
 /// Writes in this thread if there is something to write and nobody else does. True: it tried,
 /// without the lock, so that everything may be different now.
 bool Outbound::write_here() {
-  if (state_ != State::connected || writing_ || full_ || broken_ || queue_.all_written())
-    return false;
+  if (state_ != State::connected || writing_ || full_ || broken_ || all_sent()) return false;
   const std::uint64_t before = write_calls_;
   write_rounds(false);
   return write_calls_ != before;
@@ -380,7 +379,7 @@ nif_status Outbound::drain(Deadline deadline) {
                   "have arrived");
     }
     const bool nothing_waits =
-        queue_.all_written() && queue_.parked_bytes() == 0 && held_.empty() && !writing_;
+        all_sent() && queue_.parked_bytes() == 0 && held_.empty() && !writing_;
     if (nothing_waits && queue_.retained_bytes() == 0) return NIF_OK;
     if (write_here() || ask_for_confirm()) continue;
     if (deadline != kNever && steady_now_ns() >= deadline) {

@@ -101,10 +101,10 @@ void ReceiveQueue::close() {
   filled_.notify_all();
 }
 
-Descriptor ReceiveQueue::event_descriptor() {
+int ReceiveQueue::event_descriptor() {
   const MutexLock lock(mutex_);
   if (!event_) {
-    event_ = std::make_unique<WakeSignal>();
+    event_ = std::make_unique<net::WakeSignal>();
     if (!items_.empty() || end_.status != NIF_OK) event_->raise();
   }
   return event_->descriptor();

@@ -7,19 +7,20 @@
 
 #include "base/mutex.hpp"
 #include "client/nif/error.hpp"
-#include "client/nif/platform.hpp"
 #include "client/nif/storage.hpp"
 #include "gimnet/nif.h"
+#include "net/wait.hpp"
 
 namespace gimnet::nif {
 
-/// What was received and waits for the program, in order, bounded in bytes. It overwrites nothing:
-/// who fills it asks has_room() before reading more, so it exceeds its limit by at most what one
-/// read brings. Thread safety: push() and has_room() from the library's thread, the rest from any.
+/// Items that were received and wait for the program, in order, bounded in bytes. It overwrites
+/// nothing: who fills it asks has_room() before reading more, so it exceeds its limit by at most
+/// what one read brings. Thread safety: push() and has_room() from the library's thread, the rest
+/// from any.
 class ReceiveQueue {
  public:
   /// `room` is raised when there is room again after has_room() said no.
-  ReceiveQueue(std::size_t bytes_max, WakeSignal& room) : bytes_max_(bytes_max), room_(room) {}
+  ReceiveQueue(std::size_t bytes_max, net::WakeSignal& room) : bytes_max_(bytes_max), room_(room) {}
   ~ReceiveQueue();
 
   /// Takes over the items' references.
@@ -45,7 +46,7 @@ class ReceiveQueue {
   void close() GIMNET_EXCLUDES(mutex_);
 
   /// A descriptor that is readable while something waits; -1: no descriptor left.
-  [[nodiscard]] Descriptor event_descriptor() GIMNET_EXCLUDES(mutex_);
+  [[nodiscard]] int event_descriptor() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::size_t bytes() GIMNET_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t stops() GIMNET_EXCLUDES(mutex_);
 
@@ -54,7 +55,7 @@ class ReceiveQueue {
   void after_removal() GIMNET_REQUIRES(mutex_);
 
   const std::size_t bytes_max_;
-  WakeSignal& room_;
+  net::WakeSignal& room_;
 
   Mutex mutex_;
   Condition filled_;
@@ -64,7 +65,7 @@ class ReceiveQueue {
   bool stopped_ GIMNET_GUARDED_BY(mutex_) = false;
   bool closed_ GIMNET_GUARDED_BY(mutex_) = false;
   Failure end_ GIMNET_GUARDED_BY(mutex_);  ///< NIF_OK: more may come
-  std::unique_ptr<WakeSignal> event_ GIMNET_GUARDED_BY(mutex_);
+  std::unique_ptr<net::WakeSignal> event_ GIMNET_GUARDED_BY(mutex_);
   std::uint64_t stops_ GIMNET_GUARDED_BY(mutex_) = 0;
 };
 

@@ -159,7 +159,7 @@ void SendQueue::stage_first(Runs& from) {
   }
 }
 
-std::span<const std::span<const std::byte>> SendQueue::gather() {
+std::span<const iovec> SendQueue::gather() {
   stage_first(control_);
   stage_first(resend_);
   // Frames of the lanes are counted after all that is sent again.
@@ -167,7 +167,7 @@ std::span<const std::span<const std::byte>> SendQueue::gather() {
   std::size_t count = 0;
   std::size_t skip = first_written_;
   for (const FrameRun& run : staged_) {
-    pieces_[count++] = {run.bytes() + skip, run.size() - skip};
+    pieces_[count++] = {const_cast<std::byte*>(run.bytes() + skip), run.size() - skip};
     skip = 0;
   }
   return {pieces_.data(), count};

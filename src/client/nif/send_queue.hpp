@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/uio.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -68,7 +70,7 @@ class SendQueue {
   /// Chooses what to write next, at most kGatherBytesMax, lower lanes first, but at least 1/16 for
   /// each lane that waits. Returns the pieces in order; empty: nothing waits. Valid until:
   /// commit().
-  [[nodiscard]] std::span<const std::span<const std::byte>> gather();
+  [[nodiscard]] std::span<const iovec> gather();
   /// `bytes` of the gathered pieces were written.
   void commit(std::size_t bytes);
 
@@ -147,7 +149,7 @@ class SendQueue {
   Runs staged_;                    ///< gathered; outside a write at most the rest of one frame
   std::size_t staged_bytes_ = 0;   ///< without what was written of the first
   std::size_t first_written_ = 0;  ///< bytes of the first staged frame that were written
-  std::array<std::span<const std::byte>, kGatherPiecesMax> pieces_;
+  std::array<iovec, kGatherPiecesMax> pieces_;
 
   std::size_t unsent_bytes_ = 0;
   RetainedFrames retained_;

@@ -5,9 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "base/result.hpp"
+#include "client/nif/error.hpp"
+#include "proto/control/link.hpp"
+
 namespace gimnet::nif {
 
-/// What a WELCOME settled for one connection. A value type.
+/// The terms of one connection, as WELCOME settled them. A value type.
 struct Session {
   std::uint32_t id = 0;
   std::uint32_t hub_id = 0;
@@ -27,5 +31,11 @@ struct Session {
   std::optional<std::uint32_t> retained_bytes_max;  ///< as Welcome::retained_bytes_max
   std::string earlier_goodbye;  ///< why the hub closed the session's last connection
 };
+
+/// Checks a hub's WELCOME, which is not trusted. `resume`: the HELLO asked for it;
+/// `former_hub_epoch`: the hub's earlier epoch as HELLO named it, 0: none. Only with both may
+/// WELCOME say `resumed`. Errors: NIF_PROTOCOL.
+[[nodiscard]] Result<Session, Failure> session_of(const proto::Welcome& welcome, bool resume,
+                                                  std::uint64_t former_hub_epoch);
 
 }  // namespace gimnet::nif

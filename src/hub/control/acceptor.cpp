@@ -79,8 +79,7 @@ Acceptor::After Acceptor::accept_some(const std::function<void(Stranger)>& take)
 std::unique_ptr<net::Stream> Acceptor::stream_of(int descriptor,
                                                  net::SocketStream::Family family) const {
   const auto send_bytes = static_cast<std::uint32_t>(limits_.socket_send_bytes);
-  return std::make_unique<net::SocketStream>(descriptor, family,
-                                             net::SocketOptions{.send_bytes = send_bytes});
+  return net::make_stream(descriptor, family, net::SocketOptions{.send_bytes = send_bytes});
 }
 
 Stranger Acceptor::stranger(int descriptor) const {

@@ -56,7 +56,7 @@ void WaitingRoom::enter(Stranger stranger, milliseconds now) {
   peer.self = std::prev(waiting_.end());
   peer.stranger = std::move(stranger);
   if (!address.empty()) join_crowd(peer, address);
-  peer.handshake = std::make_unique<Handshake>(limits_);
+  peer.handshake = std::make_unique<net::AcceptHandshake>(limits_.handshake_bytes);
   peer.deadline = now + milliseconds{limits_.handshake_ms};
   epoll_event event{};
   event.events = EPOLLIN;
@@ -156,15 +156,15 @@ void WaitingRoom::read(Peer& peer, milliseconds now) {
     return remove(peer);
   }
   switch (peer.handshake->took(result.bytes)) {
-    case Handshake::Verdict::more:
+    case net::AcceptHandshake::Verdict::more:
       return;
-    case Handshake::Verdict::hello:
+    case net::AcceptHandshake::Verdict::hello:
       return judge(peer, now);
-    case Handshake::Verdict::refused: {
+    case net::AcceptHandshake::Verdict::refused: {
       const Goodbye goodbye = peer.handshake->refusal();
       return turn_away(peer, goodbye, now);
     }
-    case Handshake::Verdict::garbage:
+    case net::AcceptHandshake::Verdict::garbage:
       refusals_.garbage.add(1);
       log_line(LogLevel::debug,
                {"garbage", log_peer(peer.stranger.peer.transport, peer.stranger.peer.address)},

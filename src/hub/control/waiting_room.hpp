@@ -11,9 +11,9 @@
 #include <string_view>
 
 #include "hub/control/acceptor.hpp"
-#include "hub/control/handshake.hpp"
 #include "hub/limits.hpp"
 #include "hub/observe/refusal_counters.hpp"
+#include "net/accept_handshake.hpp"
 
 namespace gimnet::hub {
 
@@ -69,7 +69,7 @@ class WaitingRoom {
   using Crowds = std::map<std::string, Crowd, std::less<>>;
   struct Peer {
     Stranger stranger;
-    std::unique_ptr<Handshake> handshake;  ///< null: leaving
+    std::unique_ptr<net::AcceptHandshake> handshake;  ///< null: leaving
     std::chrono::milliseconds deadline{};
     std::size_t discarded = 0;
     Peers::iterator self;

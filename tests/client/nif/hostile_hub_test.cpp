@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/endian.hpp"
-#include "client/nif/handshake.hpp"
+#include "net/dial_handshake.hpp"
 #include "proto/control/ns_watch.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/recording_host.hpp"
@@ -227,10 +227,12 @@ TEST(HostileHub, NoWelcomeThatLiesIsTaken) {
   for (const Bytes& body : hostile_bodies()) {
     Bytes bytes(proto::kOpening.begin(), proto::kOpening.end());
     add_control(bytes, proto::Kind::link, control(proto::Welcome::kOperation, 0, body));
-    Handshake handshake(true, 0x1234);
-    const Handshake::State state = handshake.take(bytes);
-    EXPECT_EQ(state, Handshake::State::failed);
-    EXPECT_NE(handshake.failure().sentence, "");
+    net::DialHandshake handshake;
+    if (handshake.take(bytes) == net::DialHandshake::State::welcome) {
+      EXPECT_FALSE(session_of(handshake.welcome(), true, 0x1234));
+    } else {
+      EXPECT_NE(handshake.error().sentence, "");
+    }
   }
 }
 

@@ -28,7 +28,7 @@ proto::Report report_of(proto::Kind kind, std::uint32_t count) {
 }
 
 TEST(Outbound, KeepsNoReportFromAProgramThatAskedForOne) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   Outbound outbound({}, wake);
   EXPECT_TRUE(outbound.on_report(report_of(proto::Kind::unicast, 2))) << "nobody asked";
   EXPECT_TRUE(outbound.on_report(report_of(proto::Kind::taken, 2)));

@@ -32,7 +32,7 @@ std::string pop(ReceiveQueue& queue, Deadline deadline = 0) {
 }
 
 TEST(ReceiveQueue, GivesOutInOrder) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(1000, wake);
   push(queue, "a");
   push(queue, "b");
@@ -42,7 +42,7 @@ TEST(ReceiveQueue, GivesOutInOrder) {
 }
 
 TEST(ReceiveQueue, GivesOutManyAtOnce) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(1u << 20, wake);
   for (int i = 0; i < 10; ++i) push(queue, std::to_string(i));
   std::array<nif_incoming, 7> in;
@@ -55,7 +55,7 @@ TEST(ReceiveQueue, GivesOutManyAtOnce) {
 }
 
 TEST(ReceiveQueue, IsFullAtItsLimitAndHasRoomAgainAtTheHalf) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   const std::size_t cost = 100 + sizeof(Item);
   ReceiveQueue queue(4 * cost, wake);
   for (int i = 0; i < 3; ++i) push(queue, "x", 100);
@@ -64,15 +64,15 @@ TEST(ReceiveQueue, IsFullAtItsLimitAndHasRoomAgainAtTheHalf) {
   EXPECT_FALSE(queue.has_room());
   EXPECT_EQ(queue.stops(), 1u);
   for (int i = 0; i < 2; ++i) EXPECT_EQ(pop(queue), "x");
-  EXPECT_FALSE(wait_for(Socket(), false, false, wake, 0).woken);
+  EXPECT_FALSE(net::wait_for(nullptr, {}, wake, 0).woken);
   EXPECT_FALSE(queue.has_room()) << "half is not less than half";
   EXPECT_EQ(pop(queue), "x");
-  EXPECT_TRUE(wait_for(Socket(), false, false, wake, 0).woken);
+  EXPECT_TRUE(net::wait_for(nullptr, {}, wake, 0).woken);
   EXPECT_TRUE(queue.has_room());
 }
 
 TEST(ReceiveQueue, HoldsOneMessageOfAnySize) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(10, wake);
   EXPECT_TRUE(queue.has_room());
   push(queue, "huge", 1u << 30);
@@ -82,7 +82,7 @@ TEST(ReceiveQueue, HoldsOneMessageOfAnySize) {
 }
 
 TEST(ReceiveQueue, WaitersGetWhatComesOrTheEnd) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(1000, wake);
   std::thread waiting([&] { EXPECT_EQ(pop(queue, kNever), "late"); });
   push(queue, "late");
@@ -99,7 +99,7 @@ TEST(ReceiveQueue, WaitersGetWhatComesOrTheEnd) {
 }
 
 TEST(ReceiveQueue, AConsumerMayGiveBackWhatItHasNoRoomFor) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(1u << 20, wake);
   std::array<Item, 3> items;
   EXPECT_EQ(queue.take(items), 0u);
@@ -116,7 +116,7 @@ TEST(ReceiveQueue, AConsumerMayGiveBackWhatItHasNoRoomFor) {
 }
 
 TEST(ReceiveQueue, ThereIsRoomOnlyForWhatIsNotGivenBack) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   const std::size_t cost = 100 + sizeof(Item);
   ReceiveQueue queue(2 * cost, wake);
   for (int i = 0; i < 2; ++i) push(queue, "x", 100);
@@ -128,13 +128,13 @@ TEST(ReceiveQueue, ThereIsRoomOnlyForWhatIsNotGivenBack) {
   EXPECT_EQ(queue.stops(), 1u) << "it is still the same stop";
   ASSERT_EQ(queue.take(items), 2u);
   queue.give_back({});
-  EXPECT_TRUE(wait_for(Socket(), false, false, wake, 0).woken);
+  EXPECT_TRUE(net::wait_for(nullptr, {}, wake, 0).woken);
   EXPECT_TRUE(queue.has_room());
   for (Item& item : items) item.storage->release();
 }
 
 TEST(ReceiveQueue, ItsDescriptorFollowsWhetherSomethingWaits) {
-  WakeSignal wake;
+  net::WakeSignal wake;
   ReceiveQueue queue(1000, wake);
   push(queue, "before it was asked for");
   EXPECT_GE(queue.event_descriptor(), 0);

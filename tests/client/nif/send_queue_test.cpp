@@ -181,7 +181,7 @@ TEST(SendQueue, AConfirmationMayOvertakeTheWritersReturn) {
   queue.set_resume(true);
   put(queue, NIF_NORMAL, "a");
   std::size_t bytes = 0;
-  for (const auto& piece : queue.gather()) bytes += piece.size();
+  for (const iovec& piece : queue.gather()) bytes += piece.iov_len;
   EXPECT_TRUE(queue.confirm(1)) << "the hub was quicker than sendmsg()";
   queue.commit(bytes);
   EXPECT_EQ(queue.retained_bytes(), 0u);

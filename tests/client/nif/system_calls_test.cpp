@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/nif/outbound.hpp"
+#include "net/socket_stream.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
 // What sending costs in system calls, as the kernel counts them: one for a small message by itself,
@@ -40,12 +41,12 @@ class SystemCalls : public ::testing::Test {
   SystemCalls() {
     std::array<int, 2> ends{};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()), 0);
-    socket_ = Socket(ends[0]);
-    peer_ = Socket(ends[1]);
+    socket_ = std::make_unique<net::SocketStream>(ends[0], net::SocketStream::Family::unix_socket);
+    peer_ = std::make_unique<net::SocketStream>(ends[1], net::SocketStream::Family::unix_socket);
     Session session;
     session.id = kOwnId;
     session.frame_bytes_max = 65'536;
-    EXPECT_TRUE(outbound_.attach(socket_, session));
+    EXPECT_TRUE(outbound_.attach(*socket_, session));
   }
   ~SystemCalls() override { outbound_.detach(false); }
 
@@ -69,7 +70,7 @@ class SystemCalls : public ::testing::Test {
   /// Until the kernel takes no more.
   void fill() {
     const std::array<std::byte, 4096> bytes{};
-    while (::send(socket_.descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >
+    while (::send(socket_->descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >
            0) {
     }
   }
@@ -78,18 +79,18 @@ class SystemCalls : public ::testing::Test {
     std::array<std::byte, 65'536> bytes;
     std::size_t all = 0;
     for (;;) {
-      const IoResult result = peer_.read(bytes);
-      if (result.state != IoResult::State::done) return all;
+      const net::IoResult result = peer_->receive(bytes);
+      if (result.status != net::IoStatus::ok) return all;
       all += result.bytes;
     }
   }
 
   static constexpr std::size_t kFrame = proto::kHeaderSize + kSmall.size();
   static constexpr int kMessages = 1'000;
-  WakeSignal wake_;
+  net::WakeSignal wake_;
   Outbound outbound_{{}, wake_};
-  Socket socket_;
-  Socket peer_;
+  std::unique_ptr<net::Stream> socket_;
+  std::unique_ptr<net::Stream> peer_;
   bool ok_ = true;
 };
 
@@ -173,7 +174,7 @@ TEST(SystemCallsOfNif, OneForASmallMessage) {
 TEST(SystemCallsOfNif, TellsEachCallOnce) {
   const auto call = [] {
     static_cast<void>(::getppid());
-    WakeSignal wake;
+    net::WakeSignal wake;
     wake.raise();
   };
   GIMNET_COUNT_OR_SKIP(calls, [] { static_cast<void>(::getppid()); }, call);

@@ -27,7 +27,7 @@ ns::WatchEvents events(std::uint32_t watch, std::uint64_t after, std::uint64_t v
 /// A table that is not connected: what it would send goes nowhere.
 class WatchTableTest : public testing::Test {
  protected:
-  WakeSignal wake_;
+  net::WakeSignal wake_;
   Outbound outbound_{SendQueue::Limits{}, wake_};
   RequestTable requests_{outbound_};
   WatchTable watches_{requests_};

@@ -57,10 +57,10 @@ inline void append(std::vector<std::byte>& to, const std::vector<std::byte>& mor
 /// One write of which the kernel takes at most `bytes_max`.
 inline std::vector<std::byte> write_once(SendQueue& queue, std::size_t bytes_max) {
   std::vector<std::byte> written;
-  for (const auto& piece : queue.gather()) {
-    const std::size_t bytes = std::min(piece.size(), bytes_max - written.size());
-    written.insert(written.end(), piece.begin(),
-                   piece.begin() + static_cast<std::ptrdiff_t>(bytes));
+  for (const iovec& piece : queue.gather()) {
+    const std::size_t bytes = std::min(piece.iov_len, bytes_max - written.size());
+    const auto* begin = static_cast<const std::byte*>(piece.iov_base);
+    written.insert(written.end(), begin, begin + bytes);
   }
   queue.commit(written.size());
   return written;

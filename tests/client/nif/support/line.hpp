@@ -5,11 +5,12 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "client/nif/outbound.hpp"
-#include "client/nif/platform.hpp"
+#include "net/socket_stream.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 
 namespace gimnet::nif::test {
@@ -30,9 +31,9 @@ struct Line {
   void attach(const Session& session) {
     std::array<int, 2> ends{};
     ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()), 0);
-    socket = Socket(ends[0]);
-    peer = Socket(ends[1]);
-    EXPECT_TRUE(outbound.attach(socket, session));
+    socket = net::make_stream(ends[0], net::SocketStream::Family::unix_socket, {});
+    peer = net::make_stream(ends[1], net::SocketStream::Family::unix_socket, {});
+    EXPECT_TRUE(outbound.attach(*socket, session));
   }
 
   [[nodiscard]] nif_status send(std::string_view payload, Deadline deadline = 0) {
@@ -50,23 +51,23 @@ struct Line {
   }
 
   /// The library's thread was asked to write.
-  [[nodiscard]] bool woken() const { return wait_for(Socket(), false, false, wake, 0).woken; }
+  [[nodiscard]] bool woken() const { return net::wait_for(nullptr, {}, wake, 0).woken; }
 
   /// What was written by now.
   [[nodiscard]] std::vector<std::byte> read() {
     std::vector<std::byte> all;
     std::array<std::byte, 4096> some;
     for (;;) {
-      const IoResult result = peer.read(some);
-      if (result.state != IoResult::State::done) return all;
+      const net::IoResult result = peer->receive(some);
+      if (result.status != net::IoStatus::ok) return all;
       all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(result.bytes));
     }
   }
 
-  WakeSignal wake;
+  net::WakeSignal wake;
   Outbound outbound{{}, wake};
-  Socket socket;
-  Socket peer;
+  std::unique_ptr<net::Stream> socket;
+  std::unique_ptr<net::Stream> peer;
 };
 
 }  // namespace gimnet::nif::test

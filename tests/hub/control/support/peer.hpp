@@ -12,28 +12,12 @@
 #include "hub/control/acceptor.hpp"
 #include "net/socket_stream.hpp"
 #include "proto/control/link.hpp"
-#include "proto/frame/frame_header.hpp"
+#include "tests/net/support/link_frames.hpp"
 
 namespace gimnet::hub {
 
-/// The bytes of a frame of kind LINK.
-inline std::vector<std::byte> link_frame(std::span<const std::byte> payload) {
-  proto::FrameHeader header;
-  header.kind = proto::Kind::link;
-  header.length = static_cast<std::uint32_t>(payload.size());
-  std::vector<std::byte> bytes(proto::kHeaderSize);
-  proto::store_header(bytes.data(), header);
-  bytes.insert(bytes.end(), payload.begin(), payload.end());
-  return bytes;
-}
-
-/// What a dialer sends: the opening and HELLO.
-inline std::vector<std::byte> opening_and(const proto::Hello& hello) {
-  std::vector<std::byte> bytes(proto::kOpening.begin(), proto::kOpening.end());
-  const std::vector<std::byte> frame = link_frame(proto::encode(hello));
-  bytes.insert(bytes.end(), frame.begin(), frame.end());
-  return bytes;
-}
+using net::link_frame;
+using net::opening_and;
 
 /// The far end of a connection, as a test holds it.
 class Peer {

@@ -5,17 +5,16 @@
 #include <memory>
 #include <span>
 
-#include "hub/limits.hpp"
 #include "proto/control/link.hpp"
 
-namespace gimnet::hub {
+namespace gimnet::net {
 
-/// What a peer said before it was admitted: the opening and HELLO, looked at byte by byte, so that
-/// the first impossible byte ends it. Thread safety: none. Ownership: of one buffer of
-/// limits.handshake_bytes, all that a stranger costs.
-class Handshake {
+/// The acceptor's side of the handshake: takes the opening and HELLO of a peer that is not admitted
+/// yet. It looks at each byte, so that the first impossible one ends it. Thread safety: one thread;
+/// no sockets, no clocks. Ownership: of one buffer of `bytes_max`, all that a stranger costs.
+class AcceptHandshake {
  public:
-  explicit Handshake(const Limits& limits);
+  explicit AcceptHandshake(std::size_t bytes_max);
 
   enum class Verdict : std::uint8_t {
     more,     ///< right so far
@@ -24,7 +23,7 @@ class Handshake {
     garbage,  ///< not this protocol: not worth an answer
   };
 
-  /// Where the next bytes go; never empty while the verdict is `more`.
+  /// The place of the next bytes; never empty while the verdict is `more`.
   [[nodiscard]] std::span<std::byte> room();
   /// `bytes` were put there. REQUIRES: at most room().size().
   [[nodiscard]] Verdict took(std::size_t bytes);
@@ -47,4 +46,4 @@ class Handshake {
   proto::Goodbye refusal_;
 };
 
-}  // namespace gimnet::hub
+}  // namespace gimnet::net

@@ -1,4 +1,4 @@
-#include "client/nif/host_lookup.hpp"
+#include "net/host_lookup.hpp"
 
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -10,12 +10,10 @@
 #include <mutex>
 #include <thread>
 
-#include "client/nif/endpoint.hpp"
-
-namespace gimnet::nif::test {
+namespace gimnet::net {
 namespace {
 
-Endpoint endpoint_of(const char* url) { return *parse_endpoint(url); }
+Address address_of(const char* url) { return *parse_address(url); }
 
 HostAddresses nothing_found(const std::string&, std::uint16_t) { return {"nobody knows it", {}}; }
 
@@ -56,7 +54,7 @@ class SilentServer {
 
 TEST(HostLookup, ReadsNumbersWithoutAskingAnybody) {
   const WakeSignal cancel;
-  const auto found = find_addresses(endpoint_of("tcp://127.0.0.1:7450"), 0, cancel);
+  const auto found = find_addresses(address_of("tcp://127.0.0.1:7450"), 0, cancel);
   ASSERT_TRUE(found);
   ASSERT_EQ(found->size(), 1u);
   sockaddr_in address{};
@@ -65,7 +63,7 @@ TEST(HostLookup, ReadsNumbersWithoutAskingAnybody) {
   EXPECT_EQ(address.sin_family, AF_INET);
   EXPECT_EQ(ntohs(address.sin_port), 7450);
   EXPECT_EQ(ntohl(address.sin_addr.s_addr), INADDR_LOOPBACK);
-  EXPECT_TRUE(find_addresses(endpoint_of("tcp://[::1]:1"), 0, cancel));
+  EXPECT_TRUE(find_addresses(address_of("tcp://[::1]:1"), 0, cancel));
 }
 
 TEST(HostLookup, GivesAllThatIsFound) {
@@ -73,7 +71,7 @@ TEST(HostLookup, GivesAllThatIsFound) {
   const HostAddress one(sizeof(sockaddr_in), std::byte{1});
   const HostAddress two(sizeof(sockaddr_in6), std::byte{2});
   std::string asked;
-  const auto found = find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel,
+  const auto found = find_addresses(address_of("tcp://robot.local:5"), kNever, cancel,
                                     [&](const std::string& host, std::uint16_t port) {
                                       asked = host + " " + std::to_string(port);
                                       return HostAddresses{"", {one, two}};
@@ -86,12 +84,12 @@ TEST(HostLookup, GivesAllThatIsFound) {
 TEST(HostLookup, SaysWhyThereIsNone) {
   const WakeSignal cancel;
   const auto found =
-      find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, nothing_found);
+      find_addresses(address_of("tcp://robot.local:5"), kNever, cancel, nothing_found);
   ASSERT_FALSE(found);
-  EXPECT_EQ(found.error().status, NIF_NO_HOST);
+  EXPECT_EQ(found.error().fault, Fault::no_host);
   EXPECT_EQ(found.error().sentence, "cannot find the host of tcp://robot.local:5: nobody knows it");
   const auto failed = find_addresses(
-      endpoint_of("tcp://robot.local:5"), kNever, cancel,
+      address_of("tcp://robot.local:5"), kNever, cancel,
       [](const std::string&, std::uint16_t) -> HostAddresses { throw std::bad_alloc(); });
   ASSERT_FALSE(failed);
   EXPECT_NE(failed.error().sentence.find("out of memory"), std::string::npos);
@@ -100,10 +98,10 @@ TEST(HostLookup, SaysWhyThereIsNone) {
 TEST(HostLookup, LeavesAtTheDeadlineWhereNobodyAnswers) {
   const SilentServer server;
   const WakeSignal cancel;
-  const auto found = find_addresses(endpoint_of("tcp://robot.local:5"), steady_now_ns() + kNsPerMs,
+  const auto found = find_addresses(address_of("tcp://robot.local:5"), steady_now_ns() + kNsPerMs,
                                     cancel, server.lookup());
   ASSERT_FALSE(found);
-  EXPECT_EQ(found.error().status, NIF_TIMEOUT);
+  EXPECT_EQ(found.error().fault, Fault::timeout);
 }
 
 TEST(HostLookup, LeavesWhenItIsCancelled) {
@@ -114,31 +112,31 @@ TEST(HostLookup, LeavesWhenItIsCancelled) {
     cancel.raise();
   });
   const auto found =
-      find_addresses(endpoint_of("tcp://robot.local:5"), kNever, cancel, server.lookup());
+      find_addresses(address_of("tcp://robot.local:5"), kNever, cancel, server.lookup());
   closing.join();
   ASSERT_FALSE(found);
-  EXPECT_EQ(found.error().status, NIF_CLOSED);
+  EXPECT_EQ(found.error().fault, Fault::cancelled);
 }
 
 TEST(HostLookup, BeginsNoMoreThanSomeAtATime) {
   const SilentServer server;
   const WakeSignal never;
-  Result<std::vector<HostAddress>, Failure> last = Failure{};
+  Result<std::vector<HostAddress>, NetError> last = NetError(Fault::protocol, "");
   // Searches of the tests before may still be on their way to their end: they count, too.
   for (int begun = 0; begun <= kHostLookupsMax; ++begun) {
-    last = find_addresses(endpoint_of("tcp://robot.local:5"), 1, never, server.lookup());
+    last = find_addresses(address_of("tcp://robot.local:5"), 1, never, server.lookup());
     ASSERT_FALSE(last);
-    if (last.error().status != NIF_TIMEOUT) break;
+    if (last.error().fault != Fault::timeout) break;
   }
-  EXPECT_EQ(last.error().status, NIF_NO_HOST);
+  EXPECT_EQ(last.error().fault, Fault::no_host);
   EXPECT_NE(last.error().sentence.find("too many"), std::string::npos);
   server.answer();
   const auto quick = [](const std::string&, std::uint16_t) {
     return HostAddresses{"", {HostAddress(16)}};
   };
-  while (!find_addresses(endpoint_of("tcp://robot.local:5"), kNever, never, quick))
+  while (!find_addresses(address_of("tcp://robot.local:5"), kNever, never, quick))
     std::this_thread::yield();
 }
 
 }  // namespace
-}  // namespace gimnet::nif::test
+}  // namespace gimnet::net

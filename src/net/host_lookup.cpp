@@ -1,4 +1,4 @@
-#include "client/nif/host_lookup.hpp"
+#include "net/host_lookup.hpp"
 
 #include <netdb.h>
 #include <sys/socket.h>
@@ -13,9 +13,9 @@
 #include <utility>
 
 #include "base/mutex.hpp"
-#include "client/nif/endpoint.hpp"
+#include "base/signals_blocked.hpp"
 
-namespace gimnet::nif {
+namespace gimnet::net {
 namespace {
 
 constinit std::atomic<int> g_lookups{0};
@@ -63,15 +63,15 @@ class Search {
   std::optional<HostAddresses> addresses_ GIMNET_GUARDED_BY(mutex_);
 };
 
-Failure not_found(const Endpoint& endpoint, const std::string& why) {
-  return {NIF_NO_HOST, "cannot find the host of " + endpoint.url() + ": " + why};
+NetError not_found(const Address& address, const std::string& why) {
+  return {Fault::no_host, "cannot find the host of " + address.url() + ": " + why};
 }
 
 /// False: the system has no thread left.
-bool begin(std::shared_ptr<Search> search, const Endpoint& endpoint, const HostLookup& lookup) {
+bool begin(std::shared_ptr<Search> search, const Address& address, const HostLookup& lookup) {
   try {
     const SignalsBlocked blocked;
-    std::thread([search = std::move(search), lookup, host = endpoint.host, port = endpoint.port] {
+    std::thread([search = std::move(search), lookup, host = address.host, port = address.port] {
       try {
         search->end(lookup(host, port));
       } catch (const std::exception&) {
@@ -86,42 +86,41 @@ bool begin(std::shared_ptr<Search> search, const Endpoint& endpoint, const HostL
 
 }  // namespace
 
-Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
-                                                         Deadline deadline,
-                                                         const WakeSignal& cancel) {
+Result<std::vector<HostAddress>, NetError> find_addresses(const Address& address, Deadline deadline,
+                                                          const WakeSignal& cancel) {
   // A number needs nobody to be asked.
-  HostAddresses numeric = ask_system(endpoint.host, endpoint.port, AI_NUMERICHOST);
+  HostAddresses numeric = ask_system(address.host, address.port, AI_NUMERICHOST);
   if (numeric.fault.empty()) return std::move(numeric.found);
-  return find_addresses(
-      endpoint, deadline, cancel,
-      [](const std::string& host, std::uint16_t port) { return ask_system(host, port, 0); });
+  return find_addresses(address, deadline, cancel, [](const std::string& host, std::uint16_t port) {
+    return ask_system(host, port, 0);
+  });
 }
 
-Result<std::vector<HostAddress>, Failure> find_addresses(const Endpoint& endpoint,
-                                                         Deadline deadline,
-                                                         const WakeSignal& cancel,
-                                                         const HostLookup& lookup) {
+Result<std::vector<HostAddress>, NetError> find_addresses(const Address& address, Deadline deadline,
+                                                          const WakeSignal& cancel,
+                                                          const HostLookup& lookup) {
   if (g_lookups.load(std::memory_order_relaxed) >= kHostLookupsMax) {  // a number by itself
     return not_found(
-        endpoint, "too many searches for hosts have no answer yet; does the name server answer?");
+        address, "too many searches for hosts have no answer yet; does the name server answer?");
   }
   const auto search = std::make_shared<Search>();
-  if (!search->ended().valid() || !begin(search, endpoint, lookup)) {
-    return Failure{NIF_NO_MEMORY, "cannot find the host of " + endpoint.url() +
-                                      ": no descriptor or thread is left"};
+  if (!search->ended().valid() || !begin(search, address, lookup)) {
+    return NetError{Fault::no_memory, "cannot find the host of " + address.url() +
+                                          ": no descriptor or thread is left"};
   }
   for (;;) {
     const Raised raised = wait_for_either(search->ended(), cancel, deadline);
-    if (raised.other) return Failure{NIF_CLOSED, "closed while connecting to " + endpoint.url()};
+    if (raised.other)
+      return NetError{Fault::cancelled, "closed while connecting to " + address.url()};
     if (raised.one) break;
     if (deadline != kNever && steady_now_ns() >= deadline) {
-      return Failure{NIF_TIMEOUT, "cannot find the host of " + endpoint.url() +
-                                      " within the time given: does the name server answer?"};
+      return NetError{Fault::timeout, "cannot find the host of " + address.url() +
+                                          " within the time given: does the name server answer?"};
     }
   }
   HostAddresses addresses = search->take().value_or(HostAddresses{"it has no address", {}});
-  if (!addresses.fault.empty()) return not_found(endpoint, addresses.fault);
+  if (!addresses.fault.empty()) return not_found(address, addresses.fault);
   return std::move(addresses.found);
 }
 
-}  // namespace gimnet::nif
+}  // namespace gimnet::net

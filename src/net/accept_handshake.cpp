@@ -1,4 +1,4 @@
-#include "hub/control/handshake.hpp"
+#include "net/accept_handshake.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,14 +6,14 @@
 #include "base/check.hpp"
 #include "proto/frame/frame_header.hpp"
 
-namespace gimnet::hub {
+namespace gimnet::net {
 namespace {
 
 using proto::GoodbyeCode;
 
 constexpr std::size_t kLengthBytes = 4;
 
-/// What a HELLO frame's header has after its length: dst, src, kind, flags, hops. The lane is the
+/// A HELLO frame's header after its length: dst, src, kind, flags, hops. The lane is the
 /// dialer's to choose.
 constexpr std::array<std::byte, 11> kAfterLength{
     std::byte{}, std::byte{}, std::byte{},   std::byte{}, std::byte{}, std::byte{},
@@ -23,12 +23,12 @@ static_assert(static_cast<std::uint8_t>(kAfterLength[8]) ==
 
 }  // namespace
 
-Handshake::Handshake(const Limits& limits)
-    : capacity_(limits.handshake_bytes), buffer_(std::make_unique<std::byte[]>(capacity_)) {}
+AcceptHandshake::AcceptHandshake(std::size_t bytes_max)
+    : capacity_(bytes_max), buffer_(std::make_unique<std::byte[]>(capacity_)) {}
 
-std::span<std::byte> Handshake::room() { return {buffer_.get() + size_, capacity_ - size_}; }
+std::span<std::byte> AcceptHandshake::room() { return {buffer_.get() + size_, capacity_ - size_}; }
 
-Handshake::Verdict Handshake::took(std::size_t bytes) {
+AcceptHandshake::Verdict AcceptHandshake::took(std::size_t bytes) {
   GIMNET_CHECK(bytes <= capacity_ - size_);
   size_ += bytes;
   const std::span<const std::byte> all{buffer_.get(), size_};
@@ -58,7 +58,7 @@ Handshake::Verdict Handshake::took(std::size_t bytes) {
   return read_hello(rest);
 }
 
-Handshake::Verdict Handshake::check_header(std::span<const std::byte> frame) {
+AcceptHandshake::Verdict AcceptHandshake::check_header(std::span<const std::byte> frame) {
   const std::size_t size = std::min(frame.size(), proto::kHeaderSize);
   if (size >= kLengthBytes) {
     std::uint32_t length = 0;
@@ -84,16 +84,16 @@ Handshake::Verdict Handshake::check_header(std::span<const std::byte> frame) {
   return Verdict::hello;
 }
 
-Handshake::Verdict Handshake::read_hello(std::span<const std::byte> payload) {
+AcceptHandshake::Verdict AcceptHandshake::read_hello(std::span<const std::byte> payload) {
   Result<proto::Hello> hello = proto::decode<proto::Hello>(payload);
   if (!hello) return refuse(GoodbyeCode::malformed, hello.error().sentence);
   hello_ = std::move(*hello);
   return Verdict::hello;
 }
 
-Handshake::Verdict Handshake::refuse(GoodbyeCode code, std::string sentence) {
+AcceptHandshake::Verdict AcceptHandshake::refuse(GoodbyeCode code, std::string sentence) {
   refusal_ = proto::Goodbye{code, std::move(sentence)};
   return Verdict::refused;
 }
 
-}  // namespace gimnet::hub
+}  // namespace gimnet::net

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+#include "client/nif/error.hpp"
+#include "net/address.hpp"
+
+namespace gimnet::nif {
+
+/// The addresses to try, in this order: `url` if not empty, else GIMNET_HUB of the environment,
+/// else the user's default Unix socket (left out where its folder is missing or another user's) and
+/// then tcp://127.0.0.1:7450. Errors: NIF_BAD_ARGUMENT.
+[[nodiscard]] Result<std::vector<net::Address>, Failure> hub_addresses(std::string_view url);
+
+}  // namespace gimnet::nif

@@ -1,0 +1,198 @@
+#include "net/dial.hpp"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/descriptor.hpp"
+#include "net/dial_handshake.hpp"
+#include "net/host_lookup.hpp"
+
+namespace gimnet::net {
+namespace {
+
+using StreamPointer = std::unique_ptr<Stream>;
+
+bool is_unix(const Address& address) { return address.scheme == Address::Scheme::unix_socket; }
+
+NetError cannot_connect(const Address& address, int error) {
+  Fault fault = Fault::no_peer;
+  if (error == EMFILE || error == ENFILE || error == ENOMEM || error == ENOBUFS)
+    fault = Fault::no_memory;
+  if (error == EACCES || error == EPERM) fault = Fault::not_permitted;
+  std::string remedy = fault == Fault::no_peer ? "; is the hub running there?" : "";
+  if (error == EACCES && is_unix(address)) {
+    remedy = "; it is another user's: connect as the user that runs the hub, or over TCP";
+  }
+  struct stat info{};
+  if (is_unix(address) && ::stat(address.path.c_str(), &info) == 0 && S_ISDIR(info.st_mode)) {
+    const std::string folder = address.path.substr(0, address.path.find_last_not_of('/') + 1);
+    return {Fault::bad_address, "cannot connect to " + address.url() +
+                                    ": it is a folder; name the hub's socket in it, as in unix:" +
+                                    folder + "/tcphub.sock"};
+  }
+  NetError failed(fault, "cannot connect to " + address.url() + ": " + system_text(error) + remedy);
+  failed.nobody_listens = error == ECONNREFUSED || error == ENOENT;
+  return failed;
+}
+
+NetError cancelled(const Address& address) {
+  return {Fault::cancelled, "closed while connecting to " + address.url()};
+}
+
+NetError closed_early(const Address& address) {
+  return {Fault::no_peer, "the peer at " + address.url() +
+                              " closed the connection before it said WELCOME; is it a hub?"};
+}
+
+/// Waits for a connect() under way.
+Result<StreamPointer, NetError> finish_dial(StreamPointer stream, const Address& address,
+                                            Deadline deadline, const WakeSignal& cancel) {
+  for (;;) {
+    const Readiness ready = wait_for(stream.get(), {.write = true}, cancel, deadline);
+    if (ready.woken) return cancelled(address);
+    if (ready.writable) break;
+    if (steady_now_ns() >= deadline) {
+      return NetError{Fault::timeout,
+                      "no connection to " + address.url() + " within the time given"};
+    }
+  }
+  int error = 0;
+  socklen_t size = sizeof error;
+  if (::getsockopt(stream->descriptor(), SOL_SOCKET, SO_ERROR, &error, &size) != 0) error = errno;
+  if (error != 0) return cannot_connect(address, error);
+  return stream;
+}
+
+Result<StreamPointer, NetError> dial_one(const sockaddr* to, socklen_t size, const Address& address,
+                                         const SocketOptions& options, Deadline deadline,
+                                         const WakeSignal& cancel) {
+  const int descriptor = ::socket(to->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (descriptor < 0) return cannot_connect(address, errno);
+  StreamPointer stream = make_stream(
+      descriptor, is_unix(address) ? SocketStream::Family::unix_socket : SocketStream::Family::tcp,
+      options);
+  if (::connect(descriptor, to, size) == 0) return stream;
+  if (errno != EINPROGRESS && errno != EINTR) return cannot_connect(address, errno);
+  return finish_dial(std::move(stream), address, deadline, cancel);
+}
+
+Result<StreamPointer, NetError> dial_unix(const Address& address, const SocketOptions& options,
+                                          Deadline deadline, const WakeSignal& cancel) {
+  sockaddr_un to{};
+  static_assert(sizeof to.sun_path == kSocketPathMax + 1);
+  to.sun_family = AF_UNIX;
+  std::memcpy(to.sun_path, address.path.data(), std::min(address.path.size(), kSocketPathMax));
+  return dial_one(reinterpret_cast<const sockaddr*>(&to), sizeof to, address, options, deadline,
+                  cancel);
+}
+
+/// Nothing: all is written.
+std::optional<NetError> write_all(Stream& stream, std::span<const std::byte> bytes,
+                                  const Address& address, Deadline deadline,
+                                  const WakeSignal& cancel) {
+  while (!bytes.empty() || stream.pending_out() != 0) {
+    const iovec piece{const_cast<std::byte*>(bytes.data()), bytes.size()};
+    const IoResult result = stream.send({&piece, bytes.empty() ? 0u : 1u});
+    bytes = bytes.subspan(result.bytes);
+    if (result.status == IoStatus::failed) return closed_early(address);
+    if (result.status != IoStatus::would_block && stream.pending_out() == 0) continue;
+    const Readiness ready = wait_for(&stream, {.write = true}, cancel, deadline);
+    if (ready.woken) return cancelled(address);
+    if (!ready.writable && steady_now_ns() >= deadline) {
+      return NetError{Fault::timeout, "the peer at " + address.url() + " takes no bytes"};
+    }
+  }
+  return std::nullopt;
+}
+
+NetError refused(const proto::Goodbye& goodbye, const Address& address) {
+  const std::string reason =
+      goodbye.sentence.empty() ? std::string(proto::goodbye_name(goodbye.code)) : goodbye.sentence;
+  NetError error(Fault::refused, "the hub at " + address.url() + " refused: " + reason);
+  error.goodbye = goodbye.code;
+  return error;
+}
+
+/// Reads until the handshake is over, one way or the other.
+std::optional<NetError> await_answer(Stream& stream, DialHandshake& handshake,
+                                     const Address& address, Deadline deadline,
+                                     const WakeSignal& cancel) {
+  std::array<std::byte, 4096> memory;
+  for (;;) {
+    const IoResult result = stream.receive(memory);
+    if (result.status == IoStatus::closed || result.status == IoStatus::failed)
+      return closed_early(address);
+    if (result.status == IoStatus::would_block) {
+      const Interest interest = interest_of(true, false, stream.pending_out());
+      const Readiness ready = wait_for(&stream, interest, cancel, deadline);
+      if (ready.woken) return cancelled(address);
+      if (ready.writable && stream.send({}).status == IoStatus::failed)
+        return closed_early(address);
+      if (!ready.readable && steady_now_ns() >= deadline) {
+        return NetError{Fault::timeout,
+                        "the peer at " + address.url() + " does not answer HELLO; is it a hub?"};
+      }
+      continue;
+    }
+    switch (handshake.take(std::span(memory).first(result.bytes))) {
+      case DialHandshake::State::need_more:
+        break;
+      case DialHandshake::State::welcome:
+        return std::nullopt;
+      case DialHandshake::State::goodbye:
+        return refused(handshake.goodbye(), address);
+      case DialHandshake::State::failed:
+        return NetError{handshake.error().fault, address.url() + ": " + handshake.error().sentence};
+    }
+  }
+}
+
+}  // namespace
+
+Result<StreamPointer, NetError> dial(const Address& address, const SocketOptions& options,
+                                     Deadline deadline, const WakeSignal& cancel) {
+  if (is_unix(address)) return dial_unix(address, options, deadline, cancel);
+  const auto found = find_addresses(address, deadline, cancel);
+  if (!found) return found.error();
+  std::optional<NetError> last;
+  for (const HostAddress& each : *found) {
+    auto dialed = dial_one(reinterpret_cast<const sockaddr*>(each.data()),
+                           static_cast<socklen_t>(each.size()), address, options, deadline, cancel);
+    if (dialed || dialed.error().fault == Fault::cancelled) return dialed;
+    last = dialed.error();
+  }
+  return *last;  // find_addresses() gave one at least
+}
+
+Result<Welcomed, NetError> dial_hub(const Address& address, const SocketOptions& options,
+                                    const proto::Hello& hello, Deadline deadline,
+                                    const WakeSignal& cancel) {
+  auto dialed = dial(address, options, deadline, cancel);
+  if (!dialed) return dialed.error();
+  Stream& stream = **dialed;
+  // A hub that refuses may close before it has read everything: its words are still there to read.
+  const auto unwritten = write_all(stream, encode_hello(hello), address, deadline, cancel);
+  if (unwritten && unwritten->fault != Fault::no_peer) return *unwritten;
+  DialHandshake handshake;
+  if (auto error = await_answer(stream, handshake, address, deadline, cancel))
+    return std::move(*error);
+  const auto rest = handshake.rest();
+  return Welcomed{std::move(*dialed), handshake.welcome(), {rest.begin(), rest.end()}};
+}
+
+std::int64_t DialBackoff::next_ns(std::uint64_t random) {
+  const auto wait = static_cast<std::int64_t>(random % static_cast<std::uint64_t>(limit_ns_));
+  limit_ns_ = std::min(limit_ns_ * 2, kLastNs);
+  return wait;
+}
+
+}  // namespace gimnet::net

@@ -1,0 +1,66 @@
+#include "client/nif/hub_addresses.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "tests/client/nif/support/environment.hpp"
+
+namespace gimnet::nif::test {
+namespace {
+
+TEST(HubAddresses, PrefersTheUrlThenTheEnvironmentThenTheDefaults) {
+  const Environment hub("GIMNET_HUB", "tcp://h:1");
+  EXPECT_EQ((*hub_addresses("tcp://given:2"))[0].url(), "tcp://given:2");
+  EXPECT_EQ((*hub_addresses(""))[0].url(), "tcp://h:1");
+  const Environment none("GIMNET_HUB", "");
+  const Environment runtime("XDG_RUNTIME_DIR", "/run/user/7");
+  const auto defaults = hub_addresses("");
+  ASSERT_TRUE(defaults);
+  ASSERT_EQ(defaults->size(), 2u);
+  EXPECT_EQ((*defaults)[0].url(), "unix:/run/user/7/gimnet/tcphub.sock");
+  EXPECT_EQ((*defaults)[1].url(), "tcp://127.0.0.1:7450");
+  const Environment wrong("GIMNET_HUB", "nonsense");
+  const auto refused = hub_addresses("");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().sentence.find("GIMNET_HUB"), std::string::npos);
+}
+
+// As a hub does: else it would look where none is.
+TEST(HubAddresses, LooksNowhereElseForAVariableThatIsNoAbsolutePath) {
+  std::string folder = ::testing::TempDir() + "nif_hub_addresses_XXXXXX";
+  ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+  const Environment hub("GIMNET_HUB", "");
+  const Environment runtime("XDG_RUNTIME_DIR", "run/user");
+  const Environment temporary("TMPDIR", folder.c_str());
+  const std::string own = folder + "/gimnet-" + std::to_string(::geteuid());
+  ASSERT_EQ(::mkdir(own.c_str(), 0700), 0);
+  EXPECT_EQ((*hub_addresses(""))[0].url(), "unix:" + own + "/tcphub.sock");
+  ::rmdir(own.c_str());
+  ::rmdir(folder.c_str());
+}
+
+TEST(HubAddresses, TrustsOnlyAFolderOfItsOwnUser) {
+  std::string folder = ::testing::TempDir() + "nif_hub_addresses_XXXXXX";
+  ASSERT_NE(::mkdtemp(folder.data()), nullptr);
+  const Environment runtime("XDG_RUNTIME_DIR", "");
+  const Environment hub("GIMNET_HUB", "");
+  const Environment temporary("TMPDIR", folder.c_str());
+  EXPECT_EQ(hub_addresses("")->size(), 1u) << "no folder: only TCP";
+  const std::string own = folder + "/gimnet-" + std::to_string(::getuid());
+  ASSERT_EQ(::mkdir(own.c_str(), 0700), 0);
+  EXPECT_EQ((*hub_addresses(""))[0].url(), "unix:" + own + "/tcphub.sock");
+  ASSERT_EQ(::chmod(own.c_str(), 0770), 0);
+  EXPECT_EQ(hub_addresses("")->size(), 1u) << "others may write there";
+  ASSERT_EQ(::rmdir(own.c_str()), 0);
+  ASSERT_EQ(::symlink("/tmp", own.c_str()), 0);
+  EXPECT_EQ(hub_addresses("")->size(), 1u) << "a link may lead anywhere";
+  ::unlink(own.c_str());
+  ::rmdir(folder.c_str());
+}
+
+}  // namespace
+}  // namespace gimnet::nif::test
