@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TABLE = ROOT / "tests" / "planted" / "bugs.toml"
+SIMULATIONS = ("gimnet-sim", "gimnet-sim-routes")
 FUZZ_SECONDS = 60  # a fuzz target has so long for its bug
 SLOW_LEAST, SLOW_MOST = 0.03, 0.08  # a planted slow-down adds about a twentieth, to show that no half is needed
 
@@ -39,7 +40,7 @@ class Bug:
     breaks: str
     program: str
     edits: list[Edit]
-    argument: str = ""  # the checker of gimnet-sim, or the script of instruction_scripts
+    argument: str = ""  # the checker of a simulation, or the script of instruction_scripts
     compiles: list[str] = field(default_factory=list)  # sources that include a changed header
     quick: bool = False  # ./dev test runs it
 
@@ -172,7 +173,7 @@ def found(bug: Bug, build: pathlib.Path) -> bool | None:
     program = build / "bin" / bug.target
     if bug.program.endswith("_fuzz"):
         return found_by_fuzzer(bug, program, build)
-    if bug.program == "gimnet-sim":
+    if bug.program in SIMULATIONS:
         return found_by_simulation(bug, program)
     if bug.program == "instruction_scripts":
         return found_by_counting(bug, program, build)

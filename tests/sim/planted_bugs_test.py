@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Each checker of the simulation has a planted bug that it must find: planted_bugs_test.py PROGRAM FOLDER_OF_PLANTED"""
 
+import pathlib
 import subprocess
 import sys
 
@@ -12,7 +13,7 @@ def main():
 
     answer = subprocess.run([program, "--checkers"], capture_output=True, text=True, check=True)
     checkers = set(answer.stdout.split())
-    found = {bug.argument for bug in planted.load() if bug.program == "gimnet-sim"}
+    found = {bug.argument for bug in planted.load() if bug.program == pathlib.Path(program).name}
     for name in sorted(checkers - found):
         print(f"no bug is planted for the checker {name}")
     for name in sorted(found - checkers):
