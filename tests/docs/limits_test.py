@@ -84,14 +84,13 @@ class Tables(unittest.TestCase):
                             ("bytes of a sentence", "kSentenceBytesMax"),
                             ("bytes of KICK's reason, LOG_LEVEL's level and the words of other answers", "kRemarkBytesMax"),
                             ("bytes of a message in fragments", "kMessageBytesMax"),
-                            ("groups in between in a SERVICE_MOVED (key 12)", "kGroupsBetweenMax"),
-                            ("REASSIGNs of a node from one WELCOME without `resumed` to the next", "kFormerNodesMax")):
+                            ("groups in between in a SERVICE_MOVED (key 12)", "kGroupsBetweenMax")):
             self.assertEqual(said.pop(words), str(constant(name)), words)
         self.assertEqual(list(said), ["what"], "of which the source is not named here")
 
     def test_the_states_name_only_codes_and_states_that_there_are(self):
         for heading, names in (("States of a connection", ["stranger", "admitted", "held", "draining", "ending", "closed"]),
-                               ("States of a session", ["connected", "declaring", "away", "renumbered", "ended"])):
+                               ("States of a session", ["connected", "declaring", "away", "ended"])):
             table = rows(heading)
             self.assertEqual([row[0] for row in table[1:]], names)
             for row in table[1:]:

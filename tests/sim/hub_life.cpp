@@ -179,8 +179,6 @@ void HubLife::take_event(std::size_t shard) {
     setting_.trace.note("conductor: shard {a} lost connection {b} of node {c}: {t}", shard,
                         detached->attachment, index_of(detached->node), detached->sentence);
   }
-  std::optional<hub::HeardEvent> first;
-  if (const auto* heard = std::get_if<hub::HeardEvent>(&event.what)) first = *heard;
   const bool is_frame = frame != nullptr;
   const bool is_end = detached != nullptr;
   conductor_.on_event(std::move(event), now);
@@ -199,8 +197,6 @@ void HubLife::take_event(std::size_t shard) {
     model_.asked(asked, answer, closed, now);
   } else if (is_end) {
     model_.detached(ended, now);
-  } else if (first) {
-    model_.heard(*first);
   }
   after_step();
 }

@@ -163,6 +163,7 @@ void Model::admitted(const Hello& hello, const hub::AttachCommand& attach, milli
   past_.tokens[attach.welcome.token] = {index, session.token_number, session.name, session.identity,
                                         session.token_expiry};
   session.connected = true;
+  session.renumbered = false;
   ++session.attachment;
   require(attach.welcome.node == attach.node && attach.welcome.name == session.name, Checker::names,
           "WELCOME says another id or name than the session has");
@@ -215,12 +216,6 @@ void Model::take_name(std::uint32_t index, const std::string& name, milliseconds
   }
   session.name = name;
   if (!name.empty()) names_[name] = index;
-}
-
-void Model::heard(const hub::HeardEvent& event) {
-  const Session* found = known(event.session, event.node);
-  if (found == nullptr || found->attachment != event.attachment) return;
-  sessions_.at(present(index_of(event.node))).renumbered = false;
 }
 
 void Model::detached(const hub::DetachedEvent& event, milliseconds now) {

@@ -108,7 +108,7 @@ class Model final : public Witness {
     bool held_back = false;  ///< by the rate of declarations, the last time
     proto::Role role{};
     bool connected = false;
-    bool renumbered = false;  ///< and not heard of since it was welcomed
+    bool renumbered = false;  ///< and has not come back since
     std::uint32_t attachment = 0;
     std::string name;
     std::string description;
@@ -173,7 +173,6 @@ class Model final : public Witness {
   };
   void admitted(const Hello& hello, const hub::AttachCommand& attach, milliseconds now);
   void refused(const Hello& hello, const proto::Goodbye& goodbye, milliseconds now);
-  void heard(const hub::HeardEvent& event);
   void detached(const hub::DetachedEvent& event, milliseconds now);
   void ticked(milliseconds now);
   void stood_still(milliseconds time, milliseconds now);

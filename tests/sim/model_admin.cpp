@@ -77,7 +77,7 @@ void Model::judge_reassign(const Asked& asked) {
   const bool rests = this->rests(resting_ids_, to, asked.now);
   const bool awaiting = asked.now < past_.returns_until;
   const bool awaited = awaiting && past_.nodes.used.contains(to);
-  if (sessions_.contains(to) || rests || awaited || sessions_.at(index).renumbered) {
+  if (sessions_.contains(to) || rests || awaited) {
     if (awaited && !rests && !sessions_.contains(to)) census_.add(Happening::renumbered_to_awaited);
     census_.add(Happening::renumbered_to_taken);
     return require_status(asked, Status::taken, Checker::ids);

@@ -213,7 +213,6 @@ void SimNode::forget_life() {
   known_.clear();
   view_ = {};
   wants_watch_ = false;
-  former_ids_.clear();
 }
 
 void SimNode::dial() {
@@ -341,7 +340,6 @@ void SimNode::on_welcome(const WirePointer& wire, const proto::Welcome& welcome)
   if (wire != wire_) return;
   // Those of another session are not replaced by this one.
   if (welcome.node != id_) {
-    if (id_ != NodeId{}) former_ids_.insert(id_);
     Link kept = std::move(to);
     links_.erase(wire->number);
     give_up_others();

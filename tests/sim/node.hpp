@@ -188,7 +188,6 @@ class SimNode {
   std::vector<std::byte> token_;
   std::vector<std::byte> old_token_;  ///< of a session before
   NodeId id_;
-  std::set<NodeId> former_ids_;  ///< under which frames may still come
   bool was_kicked_ = false;
   std::string registered_;  ///< the name that it has
   std::map<std::string, Provided> provides_;

@@ -204,8 +204,8 @@ void SimNode::on_event(Link& from, std::uint16_t operation, std::span<const std:
 void SimNode::on_data(Link& from, const proto::FrameHeader& header, const Bytes& frame) {
   Census& census = around_.setting.census;
   if (header.kind == Kind::unicast) {
-    require(header.dst == from.id.value() || former_ids_.contains(NodeId{header.dst}),
-            Checker::right_session, "a node gets a frame for another one");
+    require(header.dst == from.id.value(), Checker::right_session,
+            "a node gets a frame for another one");
     census.add(Happening::unicast_delivered);
   } else if (header.kind == Kind::group) {
     // A subscriber is in the table before its answer leaves, so that frames may come before the

@@ -40,10 +40,6 @@ void SimShards::read(std::size_t index, Seat& seat) {
        --most) {
     Bytes frame = std::move(wire->at_hub.front());
     wire->at_hub.pop_front();
-    if (std::exchange(seat.tell_heard, false)) {
-      push_event(index, {ShardIndex{static_cast<std::uint8_t>(index)},
-                         hub::HeardEvent{seat.session, seat.attachment, seat.node}});
-    }
     if (!handle(index, seat, std::move(frame))) return;
   }
   if (!wire->at_hub.empty()) return has_something(*wire);

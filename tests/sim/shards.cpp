@@ -135,8 +135,9 @@ void SimShards::execute(std::size_t index, ShardCommand& command) {
     for (auto& [group, kept] : shards_[index].kept) {
       if (kept.provider == seat->node) kept.provider = renumbered->node;
     }
-    seat->node = renumbered->node;
     if (seat->wire) close(index, *seat, GoodbyeCode::renumbered, renumbered->sentence.c_str());
+    lose_data(*seat);
+    seat->node = renumbered->node;
   } else if (const auto* released = std::get_if<hub::ReleaseCommand>(&command)) {
     release(index, released->session);
   } else if (const auto* pace = std::get_if<hub::PaceCommand>(&command)) {
@@ -197,7 +198,6 @@ void SimShards::attach(std::size_t index, AttachCommand& command) {
   seat.attachment = command.attachment;
   seat.wire = wire;
   seat.waits_when_away = command.resume_wanted;
-  seat.tell_heard = command.tell_heard;
   wire->attached = true;
   wire->shard = index;
   wire->slot = command.session.slot.value();
@@ -292,7 +292,10 @@ void SimShards::detach(Seat& seat, std::optional<proto::Goodbye> told) {
   seat.requests = 0;
   seat.control.clear();
   seat.reading.clear();
-  if (seat.waits_when_away) return;
+  if (!seat.waits_when_away) lose_data(seat);
+}
+
+void SimShards::lose_data(Seat& seat) {
   if (!seat.data.empty()) setting_.census.add(Happening::frames_lost_with_connection);
   for (auto& [group, pace] : seat.paces) pace->held.clear();
   seat.data.clear();

@@ -108,7 +108,6 @@ class SimShards final : public hub::ShardProxy {
     std::uint32_t attachment = 0;
     WirePointer wire;
     bool waits_when_away = false;
-    bool tell_heard = false;
     std::uint64_t requests = 0;
     std::deque<Bytes> control;
     std::uint32_t pings = 0;
@@ -166,6 +165,7 @@ class SimShards final : public hub::ShardProxy {
   bool handle_control(std::size_t shard, Seat& seat, Bytes frame);
   void close(std::size_t shard, Seat& seat, proto::GoodbyeCode code, const char* sentence);
   void detach(Seat& seat, std::optional<proto::Goodbye> told);
+  void lose_data(Seat& seat);
   void tell(std::size_t shard, const Seat& seat, bool said_by_peer, proto::GoodbyeCode code,
             std::string sentence);
   void push_event(std::size_t shard, hub::ShardEvent event);

@@ -89,7 +89,6 @@ class LongRun : public ::testing::Test {
     new_ids_ += member.node.id == former ? 0 : 1;
     member.token = member.node.welcome.token;
     member.connected = true;
-    hub_.hear(member.node);
     declare(member);
     settle();
   }

@@ -110,6 +110,9 @@ class Ctl(Case):
         receiver = start_recv(self, receiving, "B", "-n", "2")
         former = self.id_of(hub, "B")
         self.assertEqual(run_gimnet(sending, "send", "B", data=b"one\n").code, 0)
+        # What it has not confirmed by then would count as lost.
+        hub.expect_ledger(self, accepted=lambda: receiving.sent() + sending.sent(),
+                          delivered=lambda: receiving.got() + sending.got(), dropped={})
         self.assertEqual(self.ctl("reassign", "B", "7.500").code, 0)
         wait_until(lambda: any(node["id"] == "7.500" and node["connected"] for node in hub.nodes()), "B as 7.500")
         self.assertEqual(self.id_of(hub, "B"), "7.500")

@@ -33,11 +33,6 @@ Inbound::Verdict Inbound::malformed(std::string why) {
 void Inbound::begin(const Session& session) {
   filled_ = parsed_ = charged_ = uncharged_bytes_ = 0;
   if (slab_ != nullptr && !slab_->is_only_reference()) std::exchange(slab_, nullptr)->release();
-  // Also where the hub begins anew: what waited in its queues comes all the same.
-  if (session.id != id_ && id_ != 0) {
-    if (former_ids_.size() == kFormerIdsMax) former_ids_.erase(former_ids_.begin());
-    former_ids_.push_back(id_);
-  }
   id_ = session.id;
   confirm_bytes_ =
       session.resume ? std::max<std::uint64_t>(session.hub_resume_bytes / 4, 1) : UINT64_MAX;
@@ -148,7 +143,7 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
   switch (view.header.kind) {
     case proto::Kind::unicast:
       // Never to another node than the one addressed, whatever the hub thinks.
-      if (!is_for_this_node(view.header.dst)) break;
+      if (view.header.dst != id_) break;
       return take_message(view, frame);
     case proto::Kind::group:
     case proto::Kind::list:
@@ -156,7 +151,7 @@ Inbound::Verdict Inbound::take_data(const proto::FrameView& view, const std::byt
     case proto::Kind::service:
       return take_message(view, frame);
     case proto::Kind::taken: {
-      if (!is_for_this_node(view.header.dst)) break;
+      if (view.header.dst != id_) break;
       const auto taken = proto::decode_taken(view.payload);
       if (taken) {
         host_.on_taken(view.header.src, *taken);

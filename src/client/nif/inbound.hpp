@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -113,9 +112,6 @@ class Inbound {
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
  private:
-  /// What waits through more REASSIGNs than that is for an id that this node has forgotten.
-  static constexpr std::size_t kFormerIdsMax = 16;
-
   [[nodiscard]] Verdict malformed(std::string why);
   [[nodiscard]] Verdict take_run(const proto::RunView& run);
   void drop_unreadable(const std::byte* frame);
@@ -142,11 +138,6 @@ class Inbound {
   void deliver();
   void tell_taken(const std::vector<MessageAssembler::Notice>& notices);
 
-  [[nodiscard]] bool is_for_this_node(std::uint32_t dst) const {
-    return dst == id_ ||
-           std::find(former_ids_.begin(), former_ids_.end(), dst) != former_ids_.end();
-  }
-
   InboundHost& host_;
   MessageAssembler assembler_;
   Slab* slab_ = nullptr;
@@ -155,9 +146,6 @@ class Inbound {
   std::size_t charged_ = 0;          ///< up to here slab_ is in the size of items
   std::size_t uncharged_bytes_ = 0;  ///< of former slabs that items keep
   std::uint32_t id_ = 0;
-  /// The last ids before id_: frames which waited while the node was given another one are for
-  /// them.
-  std::vector<std::uint32_t> former_ids_;
   std::uint64_t taken_ = 0;
   std::uint64_t unconfirmed_bytes_ = 0;
   std::uint64_t confirm_bytes_ = UINT64_MAX;

@@ -60,9 +60,6 @@ std::optional<std::uint64_t> Outbound::take_up(const Session& session) {
     if (!skipped) return std::nullopt;
     missing = *skipped;
     lost_ |= missing > 0;
-    // What was queued under an id that the node does not have any more, which the hub need not
-    // remember.
-    if (session.id != id_) queue_.set_source(session.id);
   } else {
     lost_ |= queue_.retained_bytes() > 0;
     queue_.restart(session.id);

@@ -120,13 +120,13 @@ void Conductor::attach(Stranger& stranger, const proto::Hello& hello,
   command.known_taken = hello.resume_taken;
   command.peer_resume_bytes = hello.resume_buffer_bytes;
   command.peer_frame_bytes = hello.frame_length_max;
-  command.tell_heard = session.renumbered;
   runner_.tell_again(session, command);
   // Before the command, which lets WELCOME out: who has seen that can be reached. The id is
   // nobody's before.
   publisher_.publish_node(session.index, membership_);
   wiring_.shards.send(session.place.shard, std::move(command));
   session.closing.reset();
+  session.renumbered = false;
   log_line(LogLevel::info, subject("joined", session),
            title(node_id(session), session) +
                (session.came_back ? " came back over " : " joined over ") +
@@ -160,8 +160,6 @@ proto::Welcome Conductor::welcome(const Session& session, const proto::Hello& he
 void Conductor::on_event(ShardEvent event, milliseconds now) {
   if (const auto* frame = std::get_if<ControlFrameEvent>(&event.what)) {
     on_frame(*frame, now);
-  } else if (const auto* heard = std::get_if<HeardEvent>(&event.what)) {
-    on_heard(*heard);
   } else if (const auto* read = std::get_if<MovesReadEvent>(&event.what)) {
     on_moves_read(*read);
   } else if (const auto* detached = std::get_if<DetachedEvent>(&event.what)) {
@@ -230,11 +228,6 @@ void Conductor::on_oddity(const ControlFrameEvent& event, milliseconds now) {
         "more than " + std::to_string(limits_.oddities_burst) +
             " requests were answered bad_request, not_supported or denied in a short time; look at "
             "the answers");
-}
-
-void Conductor::on_heard(const HeardEvent& event) {
-  Session* session = find(event.session, event.node);
-  if (session != nullptr && event.attachment == session->attachment) session->renumbered = false;
 }
 
 void Conductor::on_moves_read(const MovesReadEvent& event) {

@@ -29,14 +29,12 @@ void Attacher::attach(AttachCommand command) {
   connection.transport->limit_unsent(connection.unsent_limit);
   connection.attachment = command.attachment;
   connection.connected = true;
-  connection.tell_heard = command.tell_heard;
   connection.frame_bytes = command.peer_frame_bytes;
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};
   connection.read_again = Backoff{};
   connection.ingress.node = connection.node;
-  connection.ingress.former_nodes = connection.former_nodes;
   connection.posted_shards = kAllShards;
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
@@ -62,13 +60,11 @@ void Attacher::tell_again(Connection& connection, const AttachCommand& command) 
 }
 
 void Attacher::renumber(Connection& connection, NodeId node) {
-  connection.ingress.former_nodes = {};
-  if (connection.former_nodes.size() == kFormerNodesMax) {
-    connection.former_nodes.erase(connection.former_nodes.begin());
-    if (connection.resume) connection.resume->hub_epoch = random_epoch();
-  }
+  closer_.lose_all(connection);
+  // The node begins anew: no connection of before it knew its id is gone on with.
+  if (connection.resume) connection.resume->hub_epoch = random_epoch();
   state_.retained.renumber_provider(connection.node, node);
-  connection.former_nodes.push_back(std::exchange(connection.node, node));
+  connection.node = node;
   // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold
   // the new one anew.
   connection.holds = 0;
@@ -139,10 +135,6 @@ void Attacher::begin_anew(Connection& connection, const AttachCommand& command,
   connection.outbox.drop_replay(proto::DropReason::link_lost, state_.egress);
   connection.outbox.set_resume(nullptr);
   connection.resume.reset();
-  // The node sends nothing of before again, under whatever id. Else no later REASSIGN would leave
-  // room for one more.
-  connection.ingress.former_nodes = {};
-  connection.former_nodes.clear();
   count_anew(connection);
   if (!command.resume_wanted) return;
   connection.resume = std::make_unique<ResumeState>(state_.limits.resume_bytes);

@@ -12,8 +12,7 @@ class Attacher {
   Attacher(ShardState& state, Closer& closer) : state_(state), closer_(closer) {}
 
   void attach(AttachCommand command);
-  /// The session goes on under another id. Its connection is to be closed next: it comes back under
-  /// the new one.
+  /// The session goes on under another id, without what waits. REQUIRES: its connection is closed.
   void renumber(Connection& connection, NodeId node);
 
  private:

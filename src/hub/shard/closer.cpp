@@ -102,7 +102,10 @@ void Closer::detach(Connection& connection, bool said_goodbye) {
   }
   state_.counters.connections.subtract(1);
   connection.outbox.clear_control();
-  if (connection.waits_when_away) return;
+  if (!connection.waits_when_away) lose_all(connection);
+}
+
+void Closer::lose_all(Connection& connection) {
   lose_unconfirmed(connection, connection.writer.take_partial());
   connection.outbox.drop_all(proto::DropReason::link_lost, state_.egress);
   state_.pacer.on_away(connection);

@@ -26,6 +26,8 @@ class Closer {
   /// What the connection's peer did not say that it took is lost, and each sender is told that
   /// asked for it. `partial`: a frame that was written in part, or none.
   void lose_unconfirmed(Connection& connection, const Run& partial);
+  /// What waits for the session, and what it did not confirm, is lost.
+  void lose_all(Connection& connection);
   /// The session is over.
   void release(SessionRef session);
 

@@ -63,9 +63,6 @@ struct AttachCommand {
   std::uint64_t known_taken = 0;
   std::uint32_t peer_resume_bytes = 0;
   std::uint32_t peer_frame_bytes = 0;
-  /// Whether the shard says so, with HeardEvent, when it first hears of the node on this
-  /// connection.
-  bool tell_heard = false;
   /// Control frames that the node gets ahead of all that waits for it, whatever their size: events
   /// that it may have missed. `told_move`: as SendControlCommand::move.
   std::vector<std::byte> told;
@@ -134,8 +131,7 @@ struct ForgetRetainedCommand {
 };
 
 /// The session's node has another id. Its connection, if it has one, is told so with GOODBYE
-/// `renumbered`; frames that it sent under the former id are taken for its own until it has come
-/// back and confirmed them.
+/// `renumbered`. What waits for it is dropped (`link_lost`): its next connection is not resumed.
 struct RenumberCommand {
   SessionRef session;
   NodeId node;
@@ -176,14 +172,6 @@ struct ControlFrameEvent {
   std::uint32_t attachment = 0;  ///< of the connection that it came by
   NodeId node;
   std::vector<std::byte> frame;
-};
-
-/// Something came by this connection: its node has read WELCOME, since it says nothing before.
-/// Where that was wanted.
-struct HeardEvent {
-  SessionRef session;
-  std::uint32_t attachment = 0;
-  NodeId node;
 };
 
 /// The node has read the frame that came with that `move`, and all that was sent before it by this
@@ -227,8 +215,8 @@ struct FencePassedEvent {
 
 struct ShardEvent {
   ShardIndex shard;
-  std::variant<ControlFrameEvent, HeardEvent, MovesReadEvent, DetachedEvent, FarewellEvent,
-               DrainedEvent, FencePassedEvent>
+  std::variant<ControlFrameEvent, MovesReadEvent, DetachedEvent, FarewellEvent, DrainedEvent,
+               FencePassedEvent>
       what;
 };
 

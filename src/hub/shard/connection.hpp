@@ -47,11 +47,6 @@ struct Progress {
   std::uint64_t rate_since_ms = 0;
 };
 
-/// Former ids of a session that count as its own. A node that was renumbered more often without
-/// having begun anew begins anew: it may hold frames under an id that is forgotten, and would be
-/// refused for them at each return.
-inline constexpr std::size_t kFormerNodesMax = 8;
-
 /// A session on its shard, and its connection while it has one. There are as many as nodes, most of
 /// them idle: what few of them need is made when they need it, and the members stand so that little
 /// is lost between them. Thread safety: one shard.
@@ -65,7 +60,6 @@ struct Connection : Recipient {
   bool gauged = false;        ///< its queue gauge is not 0
   bool missed_resume = false;  ///< RESUME had no place: it would stay paused for ever
   bool draining = false;       ///< closes once everything is written
-  bool tell_heard = false;     ///< the conductor waits for the first that is heard of it
   Backoff read_again;          ///< of reading it twice in a turn
   std::uint32_t attachment = 0;
   std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
@@ -73,7 +67,6 @@ struct Connection : Recipient {
   std::uint32_t ping_sequence = 0;
   std::uint32_t unsent_limit = 0;            ///< of the transport; 0: not limited
   std::unique_ptr<net::Stream> transport;    ///< nullptr: away
-  std::vector<NodeId> former_nodes;          ///< under which it may still send, the latest last
   TokenBucket oddities;                      ///< CREDITs of no use
   std::uint64_t posted_shards = kAllShards;  ///< that its last read sent to; all, before the first
   GatherWriter writer;

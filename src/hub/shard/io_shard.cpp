@@ -251,9 +251,9 @@ void IoShard::execute(ShardCommand& command) {
                  [&](ReleaseCommand& release) { closer_.release(release.session); },
                  [&](RenumberCommand& renumber) {
                    if (Connection* connection = state_.find(renumber.session)) {
-                     attacher_.renumber(*connection, renumber.node);
                      closer_.close(*connection, proto::GoodbyeCode::renumbered,
                                    std::move(renumber.sentence));
+                     attacher_.renumber(*connection, renumber.node);
                    }
                  },
                  [&](const LimitsCommand& changed) { state_.limits = changed.limits; },

@@ -64,7 +64,6 @@ void Reader::read(Connection& connection) {
   connection.outbox.counters()->received_bytes.add(result.bytes);
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
   if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
-  if (connection.tell_heard) tell_heard(connection);
   route_all(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
 }
 
@@ -76,12 +75,6 @@ void Reader::go_on(Connection& connection) {
   // It may have said more, which is not read before this is done.
   if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
   route_all(connection, state_.receive_buffer.go_on(connection.tail));
-}
-
-void Reader::tell_heard(Connection& connection) {
-  connection.tell_heard = false;
-  state_.tell_conductor(
-      {state_.self, HeardEvent{connection.session(), connection.attachment, connection.node}});
 }
 
 void Reader::wait_for_room(Connection& connection) {

@@ -29,8 +29,6 @@ class Reader {
   void let_go() { mail_rest_ = Run{}; }
 
  private:
-  /// Apart from read(), of which nearly every call has no use for it.
-  [[gnu::noinline]] void tell_heard(Connection& connection);
   /// Not read until the shards that it sends to have room.
   void wait_for_room(Connection& connection);
   void route_all(Connection& connection, ReceiveBuffer::Received received);

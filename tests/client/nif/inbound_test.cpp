@@ -350,35 +350,6 @@ TEST(Inbound, AResumedConnectionGoesOn) {
   EXPECT_EQ(receiving.host.texts(), (std::vector<std::string>{"abcdef"}));
 }
 
-TEST(Inbound, TakesWhatWaitedUnderEachOfItsLastIds) {
-  Receiving receiving;
-  Session session = receiving.session();
-  session.resume = session.resumed = true;
-  for (const std::uint32_t id : {kOwnId + 100, kOwnId + 200}) {
-    session.id = id;
-    receiving.inbound.begin(session);
-  }
-  std::vector<std::byte> bytes;
-  for (const std::uint32_t dst : {0u, 100u, 200u, 300u}) {
-    add_frame(bytes, from_peer(proto::Kind::unicast, kOwnId + dst), std::to_string(dst));
-  }
-  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  EXPECT_EQ(receiving.host.texts(), (std::vector<std::string>{"0", "100", "200"}));
-  EXPECT_EQ(receiving.inbound.counts().ignored, 1u);
-  session.resumed = false;
-  receiving.inbound.begin(session);
-  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  EXPECT_EQ(receiving.inbound.counts().ignored, 2u)
-      << "what waited in the hub's queues comes also where it begins anew";
-  for (std::uint32_t i = 0; i < 16; ++i) {
-    session.id = kOwnId + 1'000 + i;
-    receiving.inbound.begin(session);
-  }
-  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
-  EXPECT_EQ(receiving.inbound.counts().ignored, 2u + 3u)
-      << "16 are remembered: the last of these four, no other";
-}
-
 TEST(Inbound, ConfirmationIsDueAfterAQuarterOfTheHubsBuffer) {
   Receiving receiving;
   Session session = receiving.session();

@@ -149,26 +149,6 @@ TEST(Node, ResumesInBothDirectionsWithoutLossOrRepeat) {
   EXPECT_EQ(counters_of(node).frames_resent, 2u);
 }
 
-TEST(Node, SendsAgainUnderTheIdThatItHasNow) {
-  FakeHub hub;
-  proto::Welcome welcome = make_welcome(kResumeBytes);
-  Connected connected = connect_to(hub, default_options("robot"), welcome);
-  nif_node* const node = connected.node.get();
-  ASSERT_EQ(nif_send_to(node, kPeerId, "0", 1), NIF_OK);
-  ASSERT_TRUE(connected.hub.next_message());
-  welcome.resumed = true;
-  // Twice, before anything is confirmed.
-  for (const std::uint32_t id : {kOwnId + 100, kOwnId + 200}) {
-    connected.hub.close();
-    welcome.node = NodeId{id};
-    connected.hub = hub.admit(welcome);
-    const auto frame = connected.hub.next_message();
-    ASSERT_TRUE(frame);
-    EXPECT_EQ(frame->payload(), "0");
-    EXPECT_EQ(frame->header.src, id);
-  }
-}
-
 TEST(Node, AnnouncesWhatItLetGo) {
   FakeHub hub;
   nif_options options = default_options("robot");

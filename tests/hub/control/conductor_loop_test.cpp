@@ -34,7 +34,7 @@ TEST(ConductorLoop, ANameThatWasGivenBackIsFreeHoweverMuchWasToldBefore) {
   ControlInbox inbox(2);
   // Of a session that is not there any more.
   for (int i = 0; i < 50'000; ++i)
-    inbox.push({ShardIndex{0}, HeardEvent{SessionRef{ConnectionSlot{500}, 9}, 1, {}}});
+    inbox.push({ShardIndex{0}, ControlFrameEvent{SessionRef{ConnectionSlot{500}, 9}, 1, {}, {}}});
   inbox.push({former.shard, DetachedEvent{former.session, former.attachment, former.id, true,
                                           proto::GoodbyeCode::done, ""}});
   std::vector<std::unique_ptr<Listener>> listeners;

@@ -36,36 +36,6 @@ TEST(Attacher, WritesTheOpeningAndWelcome) {
   EXPECT_EQ(rig.sum(&ShardCounters::connections), 1u);
 }
 
-TEST(Attacher, TheFirstThatIsHeardOfANodeIsToldWhereThatIsWanted) {
-  HubRig rig;
-  FakeNode& told = rig.join(0, {.tell_heard = true});
-  FakeNode& other = rig.join(0);
-  const auto heard = [&rig] {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> found;
-    for (const ShardEvent& event : rig.take_events()) {
-      const auto* one = std::get_if<HeardEvent>(&event.what);
-      if (one != nullptr) found.emplace_back(one->node.value(), one->attachment);
-    }
-    return found;
-  };
-  rig.settle();
-  EXPECT_THAT(heard(), SizeIs(0));
-  for (int i = 0; i < 2; ++i) {
-    rig.send(told, other.id.value(), "x");
-    rig.send(other, told.id.value(), "x");
-    rig.settle();
-  }
-  EXPECT_THAT(heard(), ElementsAre(std::pair{told.id.value(), 1u}));
-  rig.rejoin(told, {.tell_heard = true});
-  told.pipe.close();
-  rig.settle();
-  EXPECT_THAT(heard(), SizeIs(0)) << "an end is nothing that the node said";
-  rig.rejoin(told);
-  rig.send(told, other.id.value(), "x");
-  rig.settle();
-  EXPECT_THAT(heard(), SizeIs(0));
-}
-
 TEST(Attacher, OffersResumeWhereItIsAskedFor) {
   HubRig rig;
   FakeNode& a = rig.join(0, kResume);

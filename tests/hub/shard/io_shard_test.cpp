@@ -243,31 +243,48 @@ TEST(IoShard, RunsOnAThreadOfItsOwnUntilItIsStopped) {
   EXPECT_GE(rig.sum(&ShardCounters::turns), 1u);
 }
 
-TEST(IoShard, ARenumberedNodeIsToldAndComesBackWithWhatWaited) {
+// What waited for the former id is lost and counted, and the node begins anew.
+TEST(IoShard, ARenumberedNodeIsToldAndBeginsAnew) {
   HubRig rig(1);
   FakeNode& a = rig.join(0);
   FakeNode& b = rig.join(0, {.resume = true});
   const std::uint32_t former = b.id.value();
+  b.pipe.close();
+  rig.settle();
+  rig.rejoin(b, {.resume = true});
+  EXPECT_TRUE(b.welcome->resumed);
+  b.pipe.set_room(0);
+  rig.send(a, former, "waits", {.flags = proto::kFlagReport});
+  rig.settle_without_reading();
+  rig.renumber(b, 400);
+  rig.settle();
+  const auto detached = rig.take_detached();
+  ASSERT_TRUE(detached);
+  EXPECT_EQ(rig.dropped(proto::DropReason::link_lost), 1u);
+  ASSERT_EQ(a.reports().size(), 1u);
+  rig.send(a, former, "old");
+  rig.send(a, b.id.value(), "new");
+  rig.settle();
+  EXPECT_EQ(rig.dropped(proto::DropReason::renumbered), 1u);
+  b.frames.clear();
+  rig.rejoin(b, {.resume = true});
+  rig.settle();
+  EXPECT_FALSE(b.welcome->resumed);
+  EXPECT_EQ(b.texts(), (std::vector<std::string>{"new"}));
+  EXPECT_TRUE(rig.ledger().exact());
+  rig.send(b, a.id.value(), "late", {.src = former});
+  rig.settle();
+  ASSERT_TRUE(b.goodbye) << "the former id is not its own any more";
+  EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::wrong_source);
+}
+
+TEST(IoShard, ARenumberedNodeIsToldSo) {
+  HubRig rig(1);
+  FakeNode& b = rig.join(0);
   rig.renumber(b, 400);
   rig.settle();
   ASSERT_TRUE(b.goodbye);
   EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::renumbered);
-  const auto detached = rig.take_detached();
-  ASSERT_TRUE(detached);
-  EXPECT_EQ(detached->node, b.id);
-  rig.send(a, former, "old", {.flags = proto::kFlagReport});
-  rig.send(a, b.id.value(), "new");
-  rig.settle();
-  EXPECT_EQ(rig.dropped(proto::DropReason::renumbered), 1u);
-  rig.rejoin(b, {.resume = true});
-  rig.settle();
-  EXPECT_EQ(b.texts(), (std::vector<std::string>{"new"}));
-  // What it had sent before it knew is taken for its own.
-  rig.send(b, a.id.value(), "late", {.src = former});
-  rig.settle();
-  EXPECT_EQ(a.texts(), (std::vector<std::string>{"late"}));
-  EXPECT_EQ(a.frames.back().header.src, b.id.value());
-  EXPECT_TRUE(rig.ledger().exact());
 }
 
 // The conductor publishes the group, then sends the pace: a shard may see the one in the middle of
@@ -337,39 +354,6 @@ TEST(IoShard, AHeldNodeThatIsRenumberedIsReadAgain) {
   rig.send(flooder, other.id.value(), "still there");
   rig.settle();
   EXPECT_THAT(other.texts(), ElementsAre("still there"));
-}
-
-// A client may send again under any of them what was not confirmed.
-TEST(IoShard, EveryIdThatANodeHadCountsAsItsOwnUpToTheLimit) {
-  HubRig rig;
-  FakeNode& a = rig.join(0);
-  FakeNode& b = rig.join(0, {.resume = true});
-  std::uint32_t next = 400;
-  const auto resumes_under_another_id = [&] {
-    rig.renumber(b, next++);
-    rig.settle();
-    rig.rejoin(b, {.resume = true});
-    return b.welcome && b.welcome->resumed;
-  };
-  // What it would send again under the first of one id too many is given up, instead of refused at
-  // each return. From then on it has as many again.
-  for (int round = 0; round < 3; ++round) {
-    std::vector<std::uint32_t> former;
-    for (std::size_t i = 0; i < kFormerNodesMax; ++i) {
-      former.push_back(b.id.value());
-      ASSERT_TRUE(resumes_under_another_id()) << round << ", " << i;
-    }
-    a.frames.clear();
-    for (const std::uint32_t src : former) rig.send(b, a.id.value(), "late", {.src = src});
-    rig.settle();
-    EXPECT_THAT(a.frames, SizeIs(kFormerNodesMax)) << round;
-    EXPECT_FALSE(b.goodbye);
-    EXPECT_FALSE(resumes_under_another_id()) << round;
-  }
-  rig.send(b, a.id.value(), "forgotten", {.src = make_id<NodeId>(rig.hub(), next - 2).value()});
-  rig.settle();
-  ASSERT_TRUE(b.goodbye) << "the former id is of before it began anew";
-  EXPECT_EQ(b.goodbye->code, proto::GoodbyeCode::wrong_source);
 }
 
 TEST(IoShard, GoesByNewLimitsFromTheNextTurnOn) {

@@ -39,7 +39,8 @@ struct CloseDue {
   std::string sentence;
 };
 /// Tell the shard that the session's node has another id, by index, and that its connection is to
-/// learn it: GOODBYE `renumbered`, after which the node comes back with its token.
+/// learn it: GOODBYE `renumbered`, after which the node comes back with its token. What waits for
+/// it is dropped.
 struct RenumberDue {
   Place place;
   NodeIndex former;

@@ -194,13 +194,6 @@ std::optional<proto::Refusal> Membership::take_for(const Session& session, NodeI
                                                     to_string(sessions_.node_id(session)) +
                                                     " already; choose a free one"};
   }
-  // Messages for an id that the node never learned of would wait for it, and it would take none of
-  // them. A WELCOME that was sent may have been lost: that is why it has to be heard of.
-  if (session.renumbered) {
-    return proto::Refusal{proto::Status::taken,
-                          "this node was given the id " + to_string(sessions_.node_id(session)) +
-                              " and has not come back under it yet; try again when it has"};
-  }
   const bool awaited = sessions_.find(index) == nullptr &&
                        sessions_.indices().used(index.value()) &&
                        sessions_.returns_expected_for(now) > milliseconds{0};
@@ -232,8 +225,7 @@ std::optional<proto::Refusal> Membership::renumber(Session& session, NodeIndex i
   for (Redeclaring& due : redeclaring_) {
     if (due.index == former && due.generation == session.place.generation) due.index = index;
   }
-  // The new id leads to the node before the old one says that it moved. Its groups may be published
-  // at any time: what is sent to them goes by places.
+  // The new id leads to the node before the old one says that it moved.
   effects.emplace_back(NodeChanged{index});
   effects.emplace_back(NodeChanged{former});
   // Who hears of the new id may send to it at once: by then no frame goes to the connection on

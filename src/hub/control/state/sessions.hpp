@@ -50,7 +50,7 @@ struct Session {
   Place place;
   proto::Role role{};
   bool connected = false;
-  bool renumbered = false;  ///< and not heard of since a WELCOME that told it its id
+  bool renumbered = false;  ///< and has not come back since
   bool came_back = false;   ///< with a token, to this hub or to this hub before its restart
   bool resumes = false;     ///< its latest HELLO asked for resume
   CompactText name;         ///< "" for a node without one

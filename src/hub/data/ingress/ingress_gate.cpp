@@ -1,6 +1,5 @@
 #include "hub/data/ingress/ingress_gate.hpp"
 
-#include <algorithm>
 #include <memory>
 
 namespace gimnet::hub {
@@ -16,19 +15,6 @@ constexpr std::uint64_t kFrameBytesPerByte = 2;
 Admission refuse(IngressState& state, proto::FrameError error) {
   state.error = error;
   return Admission::malformed;
-}
-
-void write_source(std::byte* run, const proto::RunView& view, std::uint32_t source) {
-  for (std::uint32_t done = 0; done < view.size;) {
-    const auto frame = static_cast<std::uint32_t>(proto::load_header(run + done).frame_size());
-    store_le(run + done + proto::kSrcOffset, source);
-    done += frame;
-  }
-}
-
-bool is_former(const IngressState& state, NodeId source) {
-  return std::find(state.former_nodes.begin(), state.former_nodes.end(), source) !=
-         state.former_nodes.end();
 }
 
 /// Shortens the run to the frames before the first that has no room for its key.
@@ -49,13 +35,9 @@ void keep_frames_with_key(proto::RunView& view) {
 
 Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunView& view,
                                std::uint64_t now_ms) {
-  proto::FrameHeader header = proto::load_header(view.bytes);
+  const proto::FrameHeader header = proto::load_header(view.bytes);
   const auto attributes = load_le<std::uint32_t>(view.bytes + proto::kAttributesOffset);
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
-    if (is_former(state, NodeId{header.src})) {
-      header.src = state.node.value();
-      write_source(run, view, header.src);
-    }
     if (const Admission refused = check(state, header, view); refused != Admission::data)
       return refused;
     const bool plain = proto::may_form_run(header) && !header.has(proto::kFlagKeyed);

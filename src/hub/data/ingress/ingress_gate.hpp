@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
 
 #include "base/endian.hpp"
 #include "base/ids.hpp"
@@ -30,9 +29,6 @@ struct IngressState {
   static constexpr std::uint64_t kNoneAdmitted = ~std::uint64_t{0};
 
   NodeId node;
-  /// Ids that it had before it was renumbered, under which it sends again what was not confirmed.
-  /// Its session's.
-  std::span<const NodeId> former_nodes;
   std::uint64_t admitted_attributes =
       kNoneAdmitted;              ///< kind, flags, hops and lane of the last plain data run
   std::uint64_t lane0_bytes = 0;  ///< since lane0_since_ms
@@ -50,10 +46,9 @@ class IngressGate {
   IngressGate(const Limits& limits, Tally& tally) : limits_(limits), tally_(tally) {}
 
   /// One run of the parser (neighbouring frames with one header but for the length). `run` may be
-  /// changed in its lane byte, and in its source where that is the node's former id: its bytes
-  /// belong to the reading connection alone until they are handed on. Where a later frame of the
-  /// run is malformed, `view` is shortened to the frames before it, and the next run begins with
-  /// that one.
+  /// changed in its lane byte: its bytes belong to the reading connection alone until they are
+  /// handed on. Where a later frame of the run is malformed, `view` is shortened to the frames
+  /// before it, and the next run begins with that one.
   [[nodiscard]] Admission admit(IngressState& state, std::byte* run, proto::RunView& view,
                                 std::uint64_t now_ms) {
     // Most runs are like the one before.

@@ -30,9 +30,7 @@ struct PacedMember {
 /// table publisher, which frees it when no shard can still look at it (concurrent/quiescence.hpp).
 struct GroupMembers {
   NodeId provider;
-  /// Where its provider's session lives: constant while the group lives, whatever id the provider
-  /// has. Frames to and of the service go by it and not by the id, of which the node table may know
-  /// more or less than this (Router).
+  /// Where its provider's session lives: frames to the service go there.
   NodePlace provider_place;
   /// One entry per shard of the hub, each with the members that live there.
   std::vector<MemberList<GroupMember>> by_shard;

@@ -112,22 +112,11 @@ const GroupMembers* Router::find_group(const Run& run, const proto::FrameHeader&
   return members;
 }
 
-/// Does the frame come from the provider under another id than the group knows? Its session here
-/// has not heard of its new id yet, and neither has the node.
-bool Router::provider_goes_by(const GroupMembers& members, NodeId source) const {
-  const NodePlace& place = members.provider_place;
-  if (members.ends() || place.shard != fanout_.self()) return false;
-  const Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
-  return recipient != nullptr && recipient->node == source;
-}
-
 void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
-  // What was handed over was looked at by the shard that took it in; its provider may have been
-  // renumbered since.
-  if (!arrival.handed_over && members->provider != NodeId{header.src} &&
-      !provider_goes_by(*members, NodeId{header.src})) {
+  // What was handed over was looked at by the shard that took it in.
+  if (!arrival.handed_over && members->provider != NodeId{header.src}) {
     return drop(
         run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
@@ -197,8 +186,6 @@ void Router::to_other_shards(const Run& run, std::uint64_t shards, std::size_t d
   }
 }
 
-/// By the provider's place: by its id a frame would be lost where this turn sees a group of before
-/// REASSIGN and the node table of after it, in whatever order the two are published.
 void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;

@@ -91,7 +91,6 @@ class Router {
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);
   void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
                 Arrival arrival);
-  [[nodiscard]] bool provider_goes_by(const GroupMembers& members, NodeId source) const;
   void to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
                                        Arrival arrival, const MemberList<PacedMember>& here);

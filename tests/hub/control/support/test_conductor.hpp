@@ -86,9 +86,6 @@ class TestConductor {
                                                   said_by_peer, code, std::move(sentence)}},
                        now);
   }
-  void hear(const Node& node) {
-    conductor.on_event({node.shard, HeardEvent{node.session, node.attachment, node.id}}, now);
-  }
   void send_frame(const Node& node, proto::Kind kind, std::span<const std::byte> payload,
                   NodeId dst = {}) {
     conductor.on_event({node.shard, ControlFrameEvent{node.session, node.attachment, node.id,

@@ -68,19 +68,6 @@ TEST_F(IngressGateTest, LooksAtTheSourceOfEveryFrame) {
   EXPECT_EQ(admit("x", {.kind = Kind::ns, .src = 2}), Admission::wrong_source);
 }
 
-TEST_F(IngressGateTest, ARenumberedNodesFormerSourceBecomesItsPresentOne) {
-  const std::array former{NodeId{7u << 20 | 9}, NodeId{7u << 20 | 2}};
-  state.former_nodes = former;
-  auto two = EgressRig::bytes("x", {.src = 2});
-  const auto second = EgressRig::bytes("yy", {.src = 2});
-  two.insert(two.end(), second.begin(), second.end());
-  EXPECT_EQ(admit(two, 2), Admission::data);
-  EXPECT_EQ(proto::load_header(two.data()).src, state.node.value());
-  EXPECT_EQ(proto::load_header(two.data() + proto::kHeaderSize + 1).src, state.node.value());
-  EXPECT_EQ(admit("x", {.kind = Kind::ns, .src = 2}), Admission::control);
-  EXPECT_EQ(admit("x", {.src = 3}), Admission::wrong_source);
-}
-
 TEST_F(IngressGateTest, OnlyFlowAndLinkMayGoWithoutASource) {
   for (const Kind kind : {Kind::unicast, Kind::ns, Kind::flow, Kind::link}) {
     auto bytes = EgressRig::bytes("x", {.kind = kind});

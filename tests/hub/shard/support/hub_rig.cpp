@@ -145,7 +145,6 @@ void HubRig::attach(FakeNode& node, const JoinSpec& spec, bool new_session) {
   command.known_taken = new_session ? 0 : node.data_frames;
   command.peer_resume_bytes = spec.resume_bytes;
   command.peer_frame_bytes = spec.frame_bytes;
-  command.tell_heard = spec.tell_heard;
   command.told.assign(spec.told.begin(), spec.told.end());
   command.told_move = spec.told_move;
   node.welcome.reset();

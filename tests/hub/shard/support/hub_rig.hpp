@@ -40,7 +40,6 @@ struct JoinSpec {
   std::uint64_t epoch = 77;
   std::uint32_t frame_bytes = proto::kFrameLengthDefault;
   std::uint32_t resume_bytes = 1u << 20;
-  bool tell_heard = false;
   std::span<const std::byte> told{};  ///< control frames that it gets first
   std::uint64_t told_move = 0;
 };
