@@ -348,7 +348,7 @@ typedef enum nif_incoming_type {
   /** A message [from, to, kind, lane, flags, key, payload, extensions]. */
   NIF_MESSAGE = 0,
   /** The hub could not deliver messages of this node [from: the hub, reason, count, text: name of
-   * the reason, payload: the last such frame's 16-byte header and up to 16 bytes after it; to,
+   * the reason, payload: one such frame's 16-byte header and up to 16 bytes after it; to,
    * kind, lane and flags are those of that frame, so is key where it is KEYED]. Of a message over 4
    * KiB those bytes are as if it had come in one frame without a fragment header, as long as it is
    * among the last 1,024 such messages that asked for reports or have over 1 MiB. Hubs merge

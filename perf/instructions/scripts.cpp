@@ -112,7 +112,7 @@ Work router(std::uint32_t nodes) {
               const hub::Run& run = routing->runs[i % kDestinations];
               // As the reader does it.
               if (routing->rig.router.append(run.bytes, run.size, run.frames)) continue;
-              routing->rig.router.route(run, run.header());
+              routing->rig.router.route(run, run.header(), run.size);
             }
             routing->flush();
           }};

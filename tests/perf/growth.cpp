@@ -260,7 +260,7 @@ Work retained(std::size_t count) {
       proto::FrameHeader header = world->message.header();
       header.dst = make_id<GroupId>(HubId{7}, i).value();
       header.src = make_id<NodeId>(HubId{7}, i).value();
-      kept.keep(world->message, header);
+      kept.keep(world->message, header, world->message.size);
     }
     if (kept.groups() != count) wrong("a message was not kept");
     for (std::uint32_t i = 1; i <= count; ++i) kept.forget_provider(make_id<NodeId>(HubId{7}, i));
@@ -346,7 +346,7 @@ Work forwarding(std::size_t count) {
   return [world, count] {
     for (std::size_t i = 1; i <= count; ++i) {
       const hub::Run& run = world->runs[i % kDestinations];
-      world->rig.router.route(run, run.header());
+      world->rig.router.route(run, run.header(), run.size / run.frames);
       if (i % 800 != 0) continue;
       for (Recipient* recipient : world->rig.recipients.dirty()) {
         recipient->dirty = false;

@@ -72,7 +72,7 @@ void Closer::give_up_rest(Connection& connection) {
     if (admission == Admission::data && !senders) {
       state_.tally.accepted += view.frames;
       connection.outbox.counters()->accepted.add(view.frames);
-      state_.drops.drop(view.bytes, view.size, view.frames, proto::DropReason::link_lost);
+      state_.drops.drop(view.bytes, view.frames, proto::DropReason::link_lost);
     }
     next += view.size;
   }

@@ -220,7 +220,6 @@ void IoShard::read_waiting() {
 void IoShard::flush() { flush_again_ = flusher_.flush_dirty(); }
 
 void IoShard::finish_turn() {
-  state_.egress.starts.forget();
   state_.counters.turns.add(1);
   state_.counters.mailbox_wakeups.add(state_.fanout.take_wakeups());
   if (state_.budget.scarce()) state_.counters.scarce_turns.add(1);

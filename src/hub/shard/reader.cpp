@@ -210,7 +210,7 @@ void Reader::route(Connection& connection, const proto::NextRun& found) {
   const proto::FrameHeader header = proto::load_header(view.bytes);
   if (header.has(proto::kFlagExt)) stamp_arrival(view);
   const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
-  state_.router.route(run, header, found.shortest_bytes);
+  state_.router.route(run, header, view.last_bytes);
 }
 
 void Reader::count(Connection& connection, const proto::RunView& view) {

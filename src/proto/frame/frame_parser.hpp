@@ -23,6 +23,7 @@ struct RunView {
   const std::byte* bytes = nullptr;
   std::uint32_t size = 0;
   std::uint32_t frames = 0;
+  std::uint32_t last_bytes = 0;  ///< of its last frame, header included
 };
 
 enum class Found : std::uint8_t {
@@ -36,11 +37,11 @@ struct NextRun {
   Found found = Found::need_more;
   RunView run;
   std::uint32_t needed = 0;
-  std::uint32_t shortest_bytes = 0;  ///< of a run: of its frames, header included
 };
 
-/// Bytes of a read buffer that one call looks at.
-inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
+/// A run ends here, unless it is one larger frame. It bounds what is lost at a time at a full queue
+/// (docs/protocol.md, section 5), and what it takes to look through a run.
+inline constexpr std::size_t kRunBytesMax = 64 * 1024;
 
 /// True where neighbouring frames with equal headers mean the same to a router, so that they may
 /// travel as one run: not for LIST (its ids differ), FLOW and control kinds, fragments, extensions
@@ -61,23 +62,23 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
                                               std::size_t frame_size, const std::byte* like);
 
 /// The longest run of whole frames at `begin` whose bytes 4..15 (dst, src, kind, flags, hops, lane)
-/// are all equal; a frame that may_form_run() excludes is a run of its own. Of the rules of section
-/// 2 only the length is checked: the caller checks one header per run. REQUIRES: begin <= end.
+/// are all equal, up to kRunBytesMax; a frame that may_form_run() excludes is a run of its own. Of
+/// the rules of section 2 only the length is checked: the caller checks one header per run.
+/// REQUIRES: begin <= end.
 [[nodiscard]] inline NextRun next_run(const std::byte* begin, const std::byte* end,
                                       std::uint32_t max_length) {
-  const std::size_t available = std::min(static_cast<std::size_t>(end - begin), kRunBytesMax);
+  std::size_t available = static_cast<std::size_t>(end - begin);
   if (available < kHeaderSize)
-    return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize), 0};
+    return {Found::need_more, {}, static_cast<std::uint32_t>(kHeaderSize)};
   const FrameHeader header = load_header(begin);
-  if (header.length > max_length) return {Found::too_long, {}, 0, 0};
-  if (header.frame_size() > available) {
-    return {Found::need_more, {}, static_cast<std::uint32_t>(header.frame_size()), 0};
-  }
+  if (header.length > max_length) return {Found::too_long, {}, 0};
+  if (header.frame_size() > available)
+    return {Found::need_more, {}, static_cast<std::uint32_t>(header.frame_size())};
   std::size_t size = header.frame_size();
-  auto shortest = static_cast<std::uint32_t>(size);
+  std::size_t frame_size = size;
   std::uint32_t frames = 1;
   if (may_form_run(header)) {
-    std::size_t frame_size = size;
+    if (available > kRunBytesMax) available = std::max(size, kRunBytesMax);
     auto length_and_dst = load_le<std::uint64_t>(begin);
     const auto dst = load_le<std::uint32_t>(begin + kDstOffset);
     const auto src_and_attributes = load_le<std::uint64_t>(begin + kSrcOffset);
@@ -101,11 +102,12 @@ inline constexpr std::size_t kRunBytesMax = std::size_t{1} << 30;
       const auto length = load_le<std::uint32_t>(next);
       if (length > max_length || kHeaderSize + length > available - size) break;
       frame_size = kHeaderSize + length;
-      shortest = std::min(shortest, static_cast<std::uint32_t>(kHeaderSize) + length);
       length_and_dst = load_le<std::uint64_t>(next);
     }
   }
-  return {Found::run, {begin, static_cast<std::uint32_t>(size), frames}, 0, shortest};
+  return {Found::run,
+          {begin, static_cast<std::uint32_t>(size), frames, static_cast<std::uint32_t>(frame_size)},
+          0};
 }
 
 /// Who sent the frame: what a hub sends may have hops and reserved flags, and LIST comes with dst 0

@@ -131,8 +131,34 @@ TEST(NextRun, GoesOnBehindEqualFramesWithOneOfAnotherLength) {
     const auto next = run_of(bytes);
     EXPECT_EQ(next.run.frames, 2 * equal + 1);
     EXPECT_EQ(next.run.size, bytes.size());
-    EXPECT_EQ(next.shortest_bytes, kHeaderSize + 3);
+    EXPECT_EQ(next.run.last_bytes, kHeaderSize + 40);
   }
+}
+
+TEST(NextRun, EndsAt64KiB) {
+  constexpr std::size_t kPayload = 84;  // frames of 100 bytes
+  Bytes bytes;
+  while (bytes.size() < 3 * kRunBytesMax) append_frame(bytes, header_to(1), kPayload);
+  const auto next = run_of(bytes);
+  EXPECT_EQ(next.run.frames, kRunBytesMax / 100);
+  EXPECT_EQ(next.run.last_bytes, 100u);
+  for (const std::size_t more : {0u, 1u}) {
+    Bytes exact;
+    append_frame(exact, header_to(1), kPayload);
+    append_frame(exact, header_to(1), kRunBytesMax - 100 - kHeaderSize + more);
+    append_frame(exact, header_to(1), 0);
+    EXPECT_EQ(run_of(exact, kFrameLengthMax).run.frames, more == 0 ? 2u : 1u);
+  }
+}
+
+TEST(NextRun, OfALargerFrameIsThatFrame) {
+  Bytes bytes;
+  append_frame(bytes, header_to(1), kRunBytesMax);
+  append_frame(bytes, header_to(1), 0);
+  const auto next = run_of(bytes, kFrameLengthMax);
+  EXPECT_EQ(next.run.frames, 1u);
+  EXPECT_EQ(next.run.size, kHeaderSize + kRunBytesMax);
+  EXPECT_EQ(next.run.last_bytes, next.run.size);
 }
 
 TEST(NextRun, GivesSomeFramesSingly) {

@@ -20,7 +20,7 @@ class Kept {
     proto::FrameHeader header = run_.header();
     header.dst = make_id<GroupId>(HubId{7}, group).value();
     header.src = make_id<NodeId>(HubId{7}, provider).value();
-    rig_.retained.keep(run_, header);
+    rig_.retained.keep(run_, header, run_.size);
   }
   void end_session(std::uint32_t node) {
     rig_.retained.forget_provider(make_id<NodeId>(HubId{7}, node));

@@ -1,5 +1,5 @@
 // Bursts of several sources to a full outbox: it keeps and drops what docs/protocol.md, section 5,
-// says, message by message. Input: choices, five bytes and more for each burst.
+// says, burst by burst. Input: choices, five bytes and more for each burst.
 
 #include <cstddef>
 #include <cstdint>
@@ -49,17 +49,20 @@ class Lane {
     if (frame.flags == kBlock && ++block_bursts_ > kBlockBurstsMax) frame.flags = 0;
     const std::uint32_t size = kFrameBytesMin + choices.byte();
     const std::uint32_t spread = 1 + choices.byte();
+    // No burst joins the one before it.
+    frame.dst = 100 + made_;
+    LaneRule::Entry entry{
+        NodeId{7u << 20 | frame.src}, 0, frame.flags == kBlock, frame.flags == kDrop, {}};
     std::vector<std::string> payloads(1 + choices.below(12));
     for (std::string& payload : payloads) {
       payload = std::to_string(++made_);
       payload.resize(size - proto::kHeaderSize + (spread == 1 ? 0 : choices.below(spread)), '.');
-      rule_.come({NodeId{7u << 20 | frame.src},
-                  static_cast<std::uint32_t>(proto::kHeaderSize + payload.size()),
-                  frame.flags == kBlock, frame.flags == kDrop, payload});
+      entry.size += static_cast<std::uint32_t>(proto::kHeaderSize + payload.size());
     }
+    entry.payloads = payloads;
+    rule_.come(std::move(entry));
     const hub::Run run = rig_.run(payloads, frame);
-    connection_.outbox.push(run, run.header(), {choices.below(2) == 0, kFrameBytesMin},
-                            rig_.context);
+    connection_.outbox.push(run, run.header(), {choices.below(2) == 0}, rig_.context);
     FUZZ_MUST(rig_.dropped(proto::DropReason::queue_full) == rule_.dropped);
     FUZZ_MUST(connection_.outbox.has_untold_losses() == (rule_.dropped != 0));
   }

@@ -7,18 +7,7 @@
 
 namespace gimnet::hub {
 
-void DropBook::drop(const std::byte* first, std::uint32_t size, std::uint32_t frames,
-                    proto::DropReason reason) {
-  tally_.drop(reason, frames);
-  if (!wants_report(proto::load_header(first))) return;
-  const std::byte* last = first;
-  for (const std::byte* next = first; next < first + size;
-       next += proto::load_header(next).frame_size())
-    last = next;
-  remember(last, frames, reason);
-}
-
-void DropBook::drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason) {
+void DropBook::drop(const std::byte* start, std::uint32_t frames, proto::DropReason reason) {
   tally_.drop(reason, frames);
   if (wants_report(proto::load_header(start))) remember(start, frames, reason);
 }
@@ -26,7 +15,7 @@ void DropBook::drop_start(const std::byte* start, std::uint32_t frames, proto::D
 void DropBook::drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason) {
   for (std::uint32_t done = 0; done < size;) {
     const auto frame = static_cast<std::uint32_t>(proto::load_header(first + done).frame_size());
-    drop(first + done, frame, 1, reason);
+    drop(first + done, 1, reason);
     done += frame;
   }
 }

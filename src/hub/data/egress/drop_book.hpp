@@ -22,15 +22,9 @@ class DropBook {
   DropBook(Tally& tally, std::uint64_t interval_ms, std::uint64_t notes_max)
       : tally_(tally), interval_ms_(interval_ms), notes_max_(notes_max) {}
 
-  /// `first` is the first of `frames` whole frames, one behind the other in `size` bytes, with one
-  /// header but for the length. Where a REPORT is wanted all are looked at; who knows the last one
-  /// calls drop_start() with that.
-  void drop(const std::byte* first, std::uint32_t size, std::uint32_t frames,
-            proto::DropReason reason);
-
-  /// The same for one frame that counts as `frames`: of what follows its header only what a REPORT
-  /// shows need be there.
-  void drop_start(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
+  /// `frames` with one header but for the length. A REPORT shows the one at `start`: of what
+  /// follows its header only that need be there.
+  void drop(const std::byte* start, std::uint32_t frames, proto::DropReason reason);
 
   /// The same for frames with any headers.
   void drop_mixed(const std::byte* first, std::uint32_t size, proto::DropReason reason);

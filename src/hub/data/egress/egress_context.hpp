@@ -7,7 +7,6 @@
 #include "hub/data/budget.hpp"
 #include "hub/data/buffer_pool.hpp"
 #include "hub/data/egress/drop_book.hpp"
-#include "hub/data/egress/frame_lengths.hpp"
 #include "hub/data/egress/piece_pool.hpp"
 #include "hub/data/tally.hpp"
 #include "hub/limits.hpp"
@@ -41,15 +40,6 @@ struct EgressContext {
   std::int64_t now_wall_ns = 0;  ///< since 1970, for AGE and TRACE
   HubId hub{};                   ///< for TRACE
   OwnerThread owner{};           ///< the shard's: asked wherever the data plane is entered
-  FrameStarts starts{};          ///< of this turn
-
-  /// A run that is not delivered, whoever's queue it was for. No frame of it is shorter than
-  /// `shortest_bytes`.
-  void drop(const Run& run, std::uint32_t shortest_bytes, proto::DropReason reason) {
-    const bool told = DropBook::wants_report(run.header());
-    drops.drop_start(told ? last_frame(run, shortest_bytes, starts) : run.bytes, run.frames,
-                     reason);
-  }
 };
 
 }  // namespace gimnet::hub

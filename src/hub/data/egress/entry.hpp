@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <utility>
 
-#include "hub/data/egress/frame_lengths.hpp"
 #include "hub/data/egress/piece_pool.hpp"
 #include "hub/data/egress/run.hpp"
 
@@ -18,8 +17,7 @@ struct Entry {
   std::uint32_t size = 0;  ///< of all pieces
   std::uint32_t frames =
       0;  ///< of all pieces; 0: this entry was dropped or replaced and is skipped
-  std::uint32_t message_number = 0;                   ///< of a fragmented message
-  std::uint32_t shortest_bytes = proto::kHeaderSize;  ///< no frame is shorter
+  std::uint32_t message_number = 0;  ///< of a fragmented message
   std::uint8_t source = 0;  ///< its place in the lane's SourceBytes, once those are counted
   bool fragmented = false;
   bool complete = true;   ///< the last fragment is here
@@ -30,7 +28,6 @@ struct Entry {
   bool shared = false;    ///< fanned out to many: stays a reference while it waits
 
   void append(Run piece, PiecePool& pool) {
-    shortest_bytes = proto::kHeaderSize;
     size += piece.size;
     frames += piece.frames;
     Run& tail = last != nullptr ? last->run : run;
@@ -48,24 +45,6 @@ struct Entry {
     more = std::move(node->next);
     if (!more) last = nullptr;
     return true;
-  }
-  /// The first messages of a run, which this entry loses. REQUIRES: there are so many; all, or
-  /// neither FRAGMENT, EXT, LATEST nor BLOCK.
-  [[nodiscard]] Entry take_front(const Leading& front) {
-    Entry taken;
-    if (front.frames == frames) {
-      taken = std::move(*this);
-    } else {
-      taken.run = run.take_front(front.frames, front.size);
-      taken.size = front.size;
-      taken.frames = front.frames;
-      taken.source = source;
-      taken.shared = shared;
-      taken.shortest_bytes = shortest_bytes;
-    }
-    size -= front.size;
-    frames -= front.frames;
-    return taken;
   }
 };
 

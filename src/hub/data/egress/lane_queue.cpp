@@ -92,10 +92,10 @@ void LaneQueue::push(Entry entry) {
   if (!entries_.empty()) {
     Entry& last = entries_.back();
     if (is_plain(entry) && is_plain(last) && last.frames != 0 && !last.more &&
+        last.size + entry.size <= proto::kRunBytesMax &&
         same_header(last.run.bytes, entry.run.bytes) && last.run.extend(entry.run)) {
       last.size += entry.size;
       last.frames += entry.frames;
-      last.shortest_bytes = std::min(last.shortest_bytes, entry.shortest_bytes);
       return;
     }
   }
@@ -169,21 +169,17 @@ bool LaneQueue::replace_latest(Entry& entry, Entry& older) {
   return true;
 }
 
-bool LaneQueue::drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped) {
+bool LaneQueue::drop_oldest(Entry& dropped) {
   oldest_hint_ = std::max(oldest_hint_, entries_.first_number());
   while (oldest_hint_ != entries_.end_number() && !is_droppable(entries_.at(oldest_hint_)))
     ++oldest_hint_;
   if (oldest_hint_ == entries_.end_number()) return false;
-  const std::uint64_t number = find_oldest_of(sources_.loser());
-  Entry& entry = entries_.at(number);
-  discount(entry);
-  // Of a message in fragments all go.
-  const Leading whole{entry.frames, entry.size};
-  dropped = entry.take_front(
-      entry.fragmented ? whole : leading_from(entry.run, entry.shortest_bytes, bytes, starts));
-  count(entry);
-  if (entry.frames == 0) close_gap(number);
-  skip_dead();
+  const std::uint64_t number = find_oldest_of(sources().loser());
+  dropped = std::move(entries_.at(number));
+  discount(dropped);
+  close_gap(number);
+  // The counts stay, since a new entry may be among them (Outbox::admit_to_full()).
+  while (!entries_.empty() && entries_.front().frames == 0) entries_.pop_front();
   return true;
 }
 

@@ -51,7 +51,7 @@ class LaneQueue {
   [[nodiscard]] std::uint64_t latest_bytes() const { return latest_bytes_; }
 
   /// Adds the entry, or joins it to the last one where both are plain runs of the same header in
-  /// neighbouring memory.
+  /// neighbouring memory, and not too much to be dropped at a time.
   void push(Entry entry);
   /// Counts more frames into the last entry, behind which the caller has put them. REQUIRES: it is
   /// plain, of one piece, and they have its header.
@@ -79,8 +79,8 @@ class LaneQueue {
   template <class Lose>
   void replace_all_latest(Lose&& lose);
 
-  /// Waiting bytes by source, and the source that loses messages when the lane is full. Counted
-  /// from the first call on until the lane is empty, since most lanes are never full.
+  /// Waiting bytes by source. Counted from the first call on until the lane is empty, since most
+  /// lanes are never full.
   [[nodiscard]] SourceBytes& sources() {
     if (!counts_sources_) count_sources();
     return sources_;
@@ -94,10 +94,9 @@ class LaneQueue {
   [[nodiscard]] NodeId source_at(std::uint8_t place);
 
   /// Takes out the oldest entry that may be dropped for room of the source sources().loser(). If
-  /// none of the first 64 is of that source, it takes the oldest one that may be dropped. Of a run
-  /// it takes as many frames as come to `bytes`, if it has those. Returns false if nothing may be
-  /// dropped. REQUIRES: bytes is not 0.
-  [[nodiscard]] bool drop_oldest(std::uint64_t bytes, FrameStarts& starts, Entry& dropped);
+  /// none of the first 64 is of that source, it takes the oldest one that may be dropped. Returns
+  /// false if nothing may be dropped.
+  [[nodiscard]] bool drop_oldest(Entry& dropped);
 
   /// The oldest entry that is neither dropped nor replaced. REQUIRES: there is one.
   [[nodiscard]] Entry& front();

@@ -43,13 +43,8 @@ std::uint64_t Outbox::room(std::size_t lane, bool block, const Limits& limits) c
   const LaneQueue& queue = lanes_->queues[lane];
   const std::uint64_t half = limits.lane_bytes(lane) / 2;
   if (block) return half - std::min(half, queue.block_bytes());
-  const std::uint64_t share = share_of_others(lane, limits);
+  const std::uint64_t share = limits.lane_bytes(lane) - std::min(half, queue.block_bytes());
   return share - std::min(share, queue.bytes() - queue.block_bytes());
-}
-
-std::uint64_t Outbox::share_of_others(std::size_t lane, const Limits& limits) const {
-  const std::uint64_t whole = limits.lane_bytes(lane);
-  return whole - std::min(whole / 2, lanes_->queues[lane].block_bytes());
 }
 
 std::uint64_t Outbox::held_bytes() const {
@@ -116,7 +111,6 @@ Entry Outbox::make_entry(const Run& run, const proto::FrameHeader& header, Hando
   entry.block = proto::is_block(header);
   entry.latest = header.policy() == proto::Policy::latest;
   entry.shared = handover.fan_out;
-  entry.shortest_bytes = handover.shortest_bytes;
   if (header.has(proto::kFlagFragment)) {
     const auto frame = proto::parse_frame({entry.run.bytes, entry.run.size}, proto::Origin::hub);
     if (frame && frame->fragment) {
@@ -164,8 +158,6 @@ void Outbox::push(const Run& run, const proto::FrameHeader& header, Handover han
 
 void Outbox::open_run(LaneQueue& lane, const Limits& limits, std::size_t lane_index) {
   Entry& last = lane.entries().back();
-  last.shortest_bytes =
-      proto::kHeaderSize;  // nobody looks at the lengths of what is copied behind it
   std::uint32_t open_room = chunk_->capacity - chunk_used_;
   if (!surely_fits(lane.bytes() + open_room, lane_index, limits)) {
     open_room = static_cast<std::uint32_t>(

@@ -21,8 +21,6 @@ namespace gimnet::hub {
 /// How a run came to an outbox.
 struct Handover {
   bool fan_out = false;  ///< the same bytes go to many: keep a reference instead of a copy
-  std::uint32_t shortest_bytes =
-      proto::kHeaderSize;  ///< no frame of the run is shorter, header included
 };
 
 /// What waits to be written to one connection: control frames, and four lanes of messages, with the
@@ -98,6 +96,11 @@ class Outbox {
   /// room for so many bytes in the share.
   void release_written(std::uint64_t bytes, EgressContext& context);
 
+  /// Would a message of so many bytes that is not sent with BLOCK wait in the lane, and no other be
+  /// dropped for it? Besides what is being written one may always wait, however large it is.
+  [[nodiscard]] bool has_room(std::uint64_t bytes, std::size_t lane, const Limits& limits) const {
+    return !lanes_ || !lanes_->queues[lane].holds_whole() || bytes <= room(lane, false, limits);
+  }
   /// Messages of that group of which the end still waits in a lane.
   [[nodiscard]] std::uint64_t waiting_messages(GroupId group);
   /// Frames that were for this connection did not get here. REQUIRES: as push().
@@ -218,8 +221,6 @@ class Outbox {
                                         const Limits& limits) {
     return bytes <= limits.lane_bytes(lane) / 2;
   }
-  /// Bytes that may wait of messages that are not sent with BLOCK.
-  [[nodiscard]] std::uint64_t share_of_others(std::size_t lane, const Limits& limits) const;
   [[nodiscard]] bool fits(const Entry& entry, std::size_t lane, const Limits& limits) const {
     return entry.size <= room(lane, entry.block, limits);
   }
@@ -237,14 +238,9 @@ class Outbox {
            (backlog_ && !entry.block && over_share(entry.size, context));
   }
   void admit(Entry entry, const proto::FrameHeader& header, EgressContext& context);
-  void admit_first(Entry entry, std::size_t lane_index, EgressContext& context);
-  void admit_newest(Entry entry, std::size_t lane_index, EgressContext& context);
-  void admit_alone(Entry entry, std::size_t lane_index, EgressContext& context);
-  void admit_own(Entry entry, std::size_t lane_index, EgressContext& context);
-  [[nodiscard]] bool loses_own(const Entry& entry, std::size_t lane_index,
-                               const Limits& limits) const;
-  bool drop_for_room(std::uint64_t bytes, std::size_t lane_index, proto::DropReason reason,
-                     EgressContext& context);
+  void admit_to_full(Entry entry, const proto::FrameHeader& header, EgressContext& context);
+  void make_room(const Entry& entry, std::size_t lane_index, EgressContext& context);
+  bool drop_for_room(std::size_t lane_index, proto::DropReason reason, EgressContext& context);
   void lose_for_room(Entry& lost, std::size_t lane_index, proto::DropReason reason,
                      EgressContext& context);
   /// A message sent with BLOCK came although its lane is full: asks its sender to pause. Returns

@@ -63,18 +63,17 @@ bool Outbox::follow_message(const Entry& entry, EgressContext& context) {
   tell_lost(entry);
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
-  context.drops.drop(entry.run.bytes, entry.run.size, entry.run.frames,
-                     proto::DropReason::cut_message);
+  context.drops.drop(entry.run.bytes, entry.run.frames, proto::DropReason::cut_message);
   return false;
 }
 
 void Outbox::push_in_pieces(const Run& run, const proto::FrameHeader& header, Handover handover,
                             EgressContext& context) {
   for (Run rest = run.share(); rest.frames != 0;) {
-    Leading piece =
-        leading_within(rest, handover.shortest_bytes, kSharedChunkBytes, context.starts);
-    if (piece.frames == 0) piece = leading_from(rest, handover.shortest_bytes, 1, context.starts);
-    push(rest.take_front(piece.frames, piece.size), header, handover, context);
+    const Leading piece = rest.leading([](const Leading& before, std::uint32_t next) {
+      return before.frames == 0 || before.size + next <= kSharedChunkBytes;
+    });
+    push(rest.take_front(piece), header, handover, context);
   }
 }
 
@@ -93,12 +92,9 @@ void Outbox::make_share(const Entry& entry, const proto::FrameHeader& header,
   if (entry.block || header.policy() == proto::Policy::drop) return;
   const std::uint64_t share = context.budget.share_bytes();
   for (std::size_t lane = proto::kLaneCount; lane-- > (header.lane & proto::kLaneMask);) {
-    SourceBytes& sources = lanes_->queues[lane].sources();
-    for (std::uint64_t wanted = held_bytes() + entry.size; wanted > share;
-         wanted = held_bytes() + entry.size) {
-      if (sources.choice_due()) sources.choose(context.limits.lane_bytes(lane));
-      if (!drop_for_room(wanted - share, lane, proto::DropReason::over_budget, context)) break;
-    }
+    while (held_bytes() + entry.size > share &&
+           drop_for_room(lane, proto::DropReason::over_budget, context))
+      continue;
   }
 }
 
@@ -131,11 +127,23 @@ void Outbox::admit(Entry entry, const proto::FrameHeader& header, EgressContext&
     }
   } else if (entry.touched) {
     lane.push(std::move(entry));
-  } else if (header.policy() == proto::Policy::drop) {
-    admit_first(std::move(entry), header.lane & proto::kLaneMask, context);
   } else {
-    admit_newest(std::move(entry), header.lane & proto::kLaneMask, context);
+    admit_to_full(std::move(entry), header, context);
   }
+}
+
+void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, EgressContext& context) {
+  const std::size_t lane_index = header.lane & proto::kLaneMask;
+  LaneQueue& lane = lanes_->queues[lane_index];
+  LaneQueue::note_source(entry);
+  // While a source is looked for that loses or fills the lane, the new entry counts.
+  const std::uint32_t size = entry.size;
+  lane.sources().add(entry.source, size);
+  if (header.policy() != proto::Policy::drop) make_room(entry, lane_index, context);
+  const bool stays = has_room(size, lane_index, context.limits);
+  if (!stays) lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
+  lane.sources().take(entry.source, size);
+  if (stays) lane.push(std::move(entry));
 }
 
 bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
@@ -164,121 +172,23 @@ bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
   return !comes_though_held || bytes <= reserves;
 }
 
-/// Policies count messages: of a run the first that fit are taken.
-void Outbox::admit_first(Entry entry, std::size_t lane_index, EgressContext& context) {
+/// Drops waiting entries until the new one fits, each of the source that has the most bytes. Where
+/// that is the new one's, and no other entry of it waits, the new one goes.
+void Outbox::make_room(const Entry& entry, std::size_t lane_index, EgressContext& context) {
   LaneQueue& lane = lanes_->queues[lane_index];
-  while (entry.frames != 0) {
-    Leading fitting = leading_within(entry.run, entry.shortest_bytes,
-                                     room(lane_index, false, context.limits), context.starts);
-    // Besides what is being written one message may wait, however large it is.
-    if (fitting.frames == 0 && !lane.holds_whole())
-      fitting = leading_from(entry.run, entry.shortest_bytes, 1, context.starts);
-    if (fitting.frames != 0) lane.push(entry.take_front(fitting));
-    if (entry.frames == 0) return;
-    // Behind those that do not fit there may be shorter ones.
-    Entry lost = entry.take_front(
-        leading_beyond(entry.run, entry.shortest_bytes, room(lane_index, false, context.limits)));
-    lose_for_room(lost, lane_index, proto::DropReason::queue_full, context);
+  // Behind much of BLOCK the oldest messages would always be dropped before their turn came.
+  const bool new_goes = lane.block_bytes() > context.limits.lane_bytes(lane_index) / 4;
+  while (!fits(entry, lane_index, context.limits)) {
+    const bool own = lane.sources().loser() == entry.source;
+    if (own && (new_goes || lane.sources().droppable(entry.source) == entry.size)) return;
+    if (!drop_for_room(lane_index, proto::DropReason::queue_full, context)) return;
   }
 }
 
-/// As if each message came alone, and dropped as many older ones as it takes, each of the source
-/// that loses then. Where it is always the same source, or does not change for a while, they are
-/// dropped together.
-void Outbox::admit_newest(Entry entry, std::size_t lane_index, EgressContext& context) {
-  LaneQueue& lane = lanes_->queues[lane_index];
-  SourceBytes& sources = lane.sources();
-  LaneQueue::note_source(entry);
-  const std::uint64_t limit = context.limits.lane_bytes(lane_index);
-  // Behind much of BLOCK the oldest messages would be dropped before their turn came, always.
-  const bool new_goes = lane.block_bytes() > limit / 4;
-  while (entry.frames != 0 && !fits(entry, lane_index, context.limits)) {
-    if (sources.is_alone(entry.source)) {
-      sources.choose(limit);
-      if (new_goes) return admit_first(std::move(entry), lane_index, context);
-      return admit_alone(std::move(entry), lane_index, context);
-    }
-    const std::uint64_t left = room(lane_index, false, context.limits);
-    const bool one_source = sources.at_most_one();
-    if (one_source || sources.choice_due()) {
-      // Those that still fit count in the choice.
-      const Leading fitting = leading_within(entry.run, entry.shortest_bytes, left, context.starts);
-      if (fitting.frames != 0) {
-        lane.push(entry.take_front(fitting));
-        continue;
-      }
-      sources.choose(limit);
-    }
-    const bool own = sources.loser() == entry.source;
-    if (own && new_goes) return admit_first(std::move(entry), lane_index, context);
-    if (own && entry.frames > 1) {
-      if (loses_own(entry, lane_index, context.limits))
-        return admit_own(std::move(entry), lane_index, context);
-      admit_newest(
-          entry.take_front(leading_from(entry.run, entry.shortest_bytes, 1, context.starts)),
-          lane_index, context);
-      continue;
-    }
-    // Once the first of them waits there are two sources.
-    const std::uint64_t wanted = one_source ? entry.run.header().frame_size() : entry.size;
-    std::uint64_t bytes = wanted - std::min(wanted, left);
-    if (!one_source) {
-      bytes = std::min<std::uint64_t>(bytes, sources.droppable(sources.loser()) - sources.floor());
-    }
-    if (!drop_for_room(bytes, lane_index, proto::DropReason::queue_full, context))
-      return admit_alone(std::move(entry), lane_index, context);
-  }
-  if (entry.frames != 0) lane.push(std::move(entry));
-}
-
-/// Nothing of another source may be dropped: what waits goes first, then the first of those that
-/// come.
-void Outbox::admit_alone(Entry entry, std::size_t lane_index, EgressContext& context) {
-  LaneQueue& lane = lanes_->queues[lane_index];
-  while (!fits(entry, lane_index, context.limits) &&
-         drop_for_room(entry.size - room(lane_index, false, context.limits), lane_index,
-                       proto::DropReason::queue_full, context))
-    continue;
-  if (const std::uint64_t left = room(lane_index, false, context.limits); entry.size > left) {
-    Leading lost = leading_from(entry.run, entry.shortest_bytes, entry.size - left, context.starts);
-    // Besides what is being written the newest message may wait, however large it is.
-    if (lost.frames == entry.frames && !lane.holds_whole())
-      lost = all_but_last(entry.run, entry.shortest_bytes, context.starts);
-    Entry older = entry.take_front(lost);
-    lose_for_room(older, lane_index, proto::DropReason::queue_full, context);
-  }
-  if (entry.frames != 0) lane.push(std::move(entry));
-}
-
-/// The source of a run loses, and will until all of it waits: before each message is dropped it has
-/// more than the floor.
-bool Outbox::loses_own(const Entry& entry, std::size_t lane_index, const Limits& limits) const {
-  LaneQueue& lane = lanes_->queues[lane_index];
-  const SourceBytes& sources = lane.sources();
-  const std::uint64_t others = lane.bytes() - lane.block_bytes() - sources.droppable(entry.source);
-  const std::uint64_t longest =
-      entry.size - std::uint64_t{entry.shortest_bytes} * (entry.frames - 1);
-  return others + longest + sources.floor() <= share_of_others(lane_index, limits);
-}
-
-/// REQUIRES: loses_own().
-void Outbox::admit_own(Entry entry, std::size_t lane_index, EgressContext& context) {
-  LaneQueue& lane = lanes_->queues[lane_index];
-  while (!fits(entry, lane_index, context.limits) && lane.sources().droppable(entry.source) != 0)
-    static_cast<void>(drop_for_room(entry.size - room(lane_index, false, context.limits),
-                                    lane_index, proto::DropReason::queue_full, context));
-  if (const std::uint64_t left = room(lane_index, false, context.limits); entry.size > left) {
-    Entry older = entry.take_front(
-        leading_from(entry.run, entry.shortest_bytes, entry.size - left, context.starts));
-    lose_for_room(older, lane_index, proto::DropReason::queue_full, context);
-  }
-  if (entry.frames != 0) lane.push(std::move(entry));
-}
-
-bool Outbox::drop_for_room(std::uint64_t bytes, std::size_t lane_index, proto::DropReason reason,
+bool Outbox::drop_for_room(std::size_t lane_index, proto::DropReason reason,
                            EgressContext& context) {
   Entry older;
-  if (!lanes_->queues[lane_index].drop_oldest(bytes, context.starts, older)) return false;
+  if (!lanes_->queues[lane_index].drop_oldest(older)) return false;
   lose_for_room(older, lane_index, reason, context);
   return true;
 }
@@ -302,8 +212,7 @@ void Outbox::lose(Entry& entry, proto::DropReason reason, EgressContext& context
   count_dropped(entry.frames);
   context.tally.queued -= entry.frames;
   do {
-    if (entry.run.frames == 0) continue;
-    context.drop(entry.run, entry.shortest_bytes, reason);
+    if (entry.run.frames != 0) context.drops.drop(entry.run.bytes, entry.run.frames, reason);
   } while (entry.next_piece());
   entry.size = entry.frames = 0;
 }

@@ -2,11 +2,18 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "hub/data/buffer.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
+
+/// The first frames of a run.
+struct Leading {
+  std::uint32_t frames = 0;
+  std::uint32_t size = 0;
+};
 
 /// Complete frames that lie one behind the other in one buffer, all with the same header but for
 /// the length.
@@ -33,13 +40,26 @@ struct Run {
     frame.frames = 1;
     return frame;
   }
-  /// The first `first_frames` of it, which this run loses. REQUIRES: they have `first_size` bytes.
-  [[nodiscard]] Run take_front(std::uint32_t first_frames, std::uint32_t first_size) {
-    Run front{buffer.share(), bytes, first_size, first_frames};
-    bytes += first_size;
-    size -= first_size;
-    frames -= first_frames;
+  /// The frames at the front for which takes(those before, bytes of the next one) is true.
+  template <class Takes>
+  [[nodiscard]] Leading leading(Takes&& takes) const {
+    Leading front;
+    while (front.frames != frames) {
+      const auto next =
+          static_cast<std::uint32_t>(proto::load_header(bytes + front.size).frame_size());
+      if (!takes(std::as_const(front), next)) break;
+      front.size += next;
+      ++front.frames;
+    }
     return front;
+  }
+  /// The frames at the front, which this run loses.
+  [[nodiscard]] Run take_front(const Leading& front) {
+    Run taken{buffer.share(), bytes, front.size, front.frames};
+    bytes += front.size;
+    size -= front.size;
+    frames -= front.frames;
+    return taken;
   }
   /// Extends this run by `next` if that lies right behind it in the same buffer.
   bool extend(const Run& next) {

@@ -24,7 +24,7 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
                      Handover handover) {
   context_.owner.check_here();
   if (!recipient.connected && !recipient.waits_when_away) {
-    lose(recipient, run, header, handover, proto::DropReason::away);
+    lose(recipient, run, header, proto::DropReason::away);
     return;
   }
   // Only the first frame's length is in `header`; what is short altogether has no long frame in it.
@@ -39,23 +39,23 @@ void Fanout::deliver(Recipient& recipient, const Run& run, const proto::FrameHea
 void Fanout::deliver_short_ones(Recipient& recipient, const Run& run,
                                 const proto::FrameHeader& header, Handover handover) {
   const std::uint64_t longest = recipient.frame_bytes + proto::kHeaderSize;
-  Run rest = run.share();
-  while (rest.frames != 0) {
-    const Leading taken = leading_up_to(rest, handover.shortest_bytes, longest);
-    if (taken.frames != 0)
-      push(recipient, rest.take_front(taken.frames, taken.size), header, handover);
-    if (rest.frames == 0) break;
-    const Leading too_large = leading_beyond(rest, handover.shortest_bytes, longest);
-    lose(recipient, rest.take_front(too_large.frames, too_large.size), header, handover,
-         proto::DropReason::too_large);
+  for (Run rest = run.share(); rest.frames != 0;) {
+    const bool short_enough = rest.header().frame_size() <= longest;
+    const Run alike = rest.take_front(rest.leading(
+        [&](const Leading&, std::uint32_t next) { return (next <= longest) == short_enough; }));
+    if (short_enough) {
+      push(recipient, alike, header, handover);
+    } else {
+      lose(recipient, alike, header, proto::DropReason::too_large);
+    }
   }
 }
 
 void Fanout::lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header,
-                  Handover handover, proto::DropReason reason) {
+                  proto::DropReason reason) {
   recipient.outbox.tell_lost(run, header);
   recipient.outbox.count_dropped(run.frames);
-  context_.drop(run, handover.shortest_bytes, reason);
+  context_.drops.drop(run.bytes, run.frames, reason);
 }
 
 void Fanout::push(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
@@ -166,10 +166,9 @@ void Fanout::drop_for(ShardIndex to, const Run& frame) {
       recipients == 0 ? proto::DropReason::no_subscriber : proto::DropReason::shard_full;
   context_.tally.copies += outcomes - 1;
   const proto::FrameHeader header = frame.header();
-  if (header.kind != proto::Kind::list)
-    return context_.drops.drop_start(frame.bytes, outcomes, reason);
+  if (header.kind != proto::Kind::list) return context_.drops.drop(frame.bytes, outcomes, reason);
   const auto start = SharedList::unpack(header.dst).as_sent(frame.bytes, elsewhere_.hub());
-  context_.drops.drop_start(start.data(), outcomes, reason);
+  context_.drops.drop(start.data(), outcomes, reason);
 }
 
 void Fanout::put(ShardIndex to, const Run& run, std::uint32_t deliveries) {

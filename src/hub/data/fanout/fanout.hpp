@@ -70,7 +70,7 @@ class Fanout {
   void deliver_short_ones(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
                           Handover handover);
   void lose(const Recipient& recipient, const Run& run, const proto::FrameHeader& header,
-            Handover handover, proto::DropReason reason);
+            proto::DropReason reason);
   void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
             Handover handover);
   [[nodiscard]] bool gather(Stretch& stretch, const Run& run);

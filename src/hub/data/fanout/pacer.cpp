@@ -54,7 +54,7 @@ bool Pacer::offer(PacedSubscription& subscription, const Run& run, const proto::
   if (subscription.awaits_start) return false;
   const Recipient& recipient = subscription.recipient();
   if (!recipient.connected && !recipient.waits_when_away) {
-    drop(subscription, run, DropReason::away, handover.shortest_bytes);
+    drop(subscription, run, DropReason::away);
   } else if (header.has(proto::kFlagFragment)) {
     give_up_stalled(subscription);
     offer_fragment(subscription, run, header, handover);
@@ -95,58 +95,36 @@ void Pacer::offer_plain(PacedSubscription& subscription, const Run& run,
     return pass(subscription, run, run.frames, header, handover);
   }
   Run rest = run.share();
+  const Outbox& outbox = subscription.recipient().outbox;
+  const std::size_t lane = header.lane & proto::kLaneMask;
   // What is lost at once of those that went makes room for more.
   while (rest.frames != 0 && subscription.held() == 0 && subscription.may_begin(now_us())) {
+    // A full outbox refuses them, and would refuse each of a long run by itself.
+    if (header.policy() == proto::Policy::drop &&
+        !outbox.has_room(rest.header().frame_size(), lane, context_.limits))
+      return drop(subscription, rest, DropReason::queue_full);
     const std::uint64_t most = any_time ? subscription.space() : 1;
-    const Leading begun = leading_frames_of(rest, handover.shortest_bytes, most, context_.starts);
     subscription.on_begun(now_us());
-    const std::uint64_t space = subscription.space();
-    pass(subscription, rest.take_front(begun.frames, begun.size), begun.frames, header, handover);
-    if (any_time && header.policy() == proto::Policy::drop && subscription.space() == space) {
-      drop_what_has_no_room(subscription, rest, header.lane & proto::kLaneMask, handover);
-    }
+    const Run begun = rest.take_front(
+        rest.leading([&](const Leading& before, std::uint32_t) { return before.frames < most; }));
+    pass(subscription, begun, begun.frames, header, handover);
   }
-  if (rest.frames != 0)
-    hold_newest(subscription, std::move(rest), header.lane & proto::kLaneMask, handover);
+  if (rest.frames != 0) hold_newest(subscription, std::move(rest), lane, handover);
   release(subscription);
-}
-
-/// The frames at the front that a full outbox would refuse one by one, each of which would leave
-/// the window open.
-void Pacer::drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane,
-                                  Handover handover) {
-  Recipient& recipient = subscription.recipient();
-  const LaneQueue& queue = recipient.outbox.lane(lane);
-  if (rest.frames == 0 || !queue.holds_whole()) return;
-  const std::uint64_t limit = context_.limits.lane_bytes(lane);
-  const std::uint64_t room = limit - std::min(limit, queue.bytes());
-  // What is too large for the recipient is dropped for that reason.
-  const Leading legal =
-      leading_up_to(rest, handover.shortest_bytes, recipient.frame_bytes + proto::kHeaderSize);
-  Leading refused = leading_beyond(rest, handover.shortest_bytes, room);
-  if (legal.frames < refused.frames) refused = legal;
-  if (refused.frames == 0) return;
-  const DropReason reason =
-      context_.budget.exhausted() ? DropReason::over_budget : DropReason::queue_full;
-  drop(subscription, rest.take_front(refused.frames, refused.size), reason,
-       handover.shortest_bytes);
 }
 
 /// As if each had come alone and replaced an older one; what would have been held for a moment is
 /// never kept.
 void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane,
                         Handover handover) {
-  if (context_.budget.exhausted())
-    return drop(subscription, rest, DropReason::over_budget, handover.shortest_bytes);
+  if (context_.budget.exhausted()) return drop(subscription, rest, DropReason::over_budget);
+  const std::uint32_t depth = subscription.terms().depth;
+  if (rest.frames > depth) {
+    while (subscription.held() != 0) drop_oldest(subscription, DropReason::replaced);
+    const std::uint32_t passed_over = rest.size - last_frames_.bytes_of(depth);
+    drop(subscription, rest.take_front({rest.frames - depth, passed_over}), DropReason::replaced);
+  }
   while (rest.frames != 0) {
-    const Leading passed_over = replaced_at_once(subscription, rest, lane, handover);
-    if (passed_over.frames != 0) {
-      // In the order in which they came: a REPORT shows the last one.
-      while (subscription.held() != 0) drop_oldest(subscription, DropReason::replaced);
-      drop(subscription, rest.take_front(passed_over.frames, passed_over.size),
-           DropReason::replaced, handover.shortest_bytes);
-      continue;
-    }
     const Run frame = rest.take_frame();
     if (context_.budget.exhausted() || !make_share(subscription, frame.size)) {
       drop(subscription, frame, DropReason::over_budget);
@@ -155,23 +133,6 @@ void Pacer::hold_newest(PacedSubscription& subscription, Run rest, std::size_t l
       hold(subscription, scratch_, lane);
     }
   }
-}
-
-/// Those at the front that others of the run replace, and with them all that is held; none if it
-/// has to be looked at one by one, since their bytes may be too many first.
-Leading Pacer::replaced_at_once(const PacedSubscription& subscription, const Run& run,
-                                std::size_t lane, Handover handover) {
-  const std::uint32_t depth = subscription.terms().depth;
-  if (run.frames <= depth) return {};
-  Leading fitting{run.frames, run.size};
-  // One is held however large it is.
-  if (depth != 1) {
-    const std::uint64_t limit = context_.limits.lane_bytes(lane);
-    const std::uint64_t room = limit - std::min(limit, subscription.held_bytes());
-    fitting = leading_within(run, handover.shortest_bytes, room, context_.starts);
-  }
-  if (fitting.frames <= depth) return {};
-  return leading_frames_of(run, handover.shortest_bytes, fitting.frames - depth, context_.starts);
 }
 
 void Pacer::offer_fragment(PacedSubscription& subscription, const Run& run,
@@ -295,16 +256,13 @@ void Pacer::drop(PacedSubscription& subscription, const KeptMessage& message, Dr
   uncount(subscription, message);
   message.for_each([&](const Run& run) {
     subscription.recipient().outbox.count_dropped(run.frames);
-    // Nobody else drops of the same run: it is not worth a place among the starts of those that
-    // come.
-    context_.drops.drop(run.bytes, run.size, run.frames, reason);
+    context_.drops.drop(run.bytes, run.frames, reason);
   });
 }
 
-void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason,
-                 std::uint32_t shortest_bytes) {
+void Pacer::drop(PacedSubscription& subscription, const Run& run, DropReason reason) {
   subscription.recipient().outbox.count_dropped(run.frames);
-  context_.drop(run, shortest_bytes, reason);
+  context_.drops.drop(run.bytes, run.frames, reason);
 }
 
 bool Pacer::on_credit(const Recipient& recipient, GroupId group, std::uint64_t total) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hub/data/fanout/fanout.hpp"
+#include "hub/data/fanout/last_frames.hpp"
 #include "hub/data/fanout/paced_book.hpp"
 
 namespace gimnet::hub {
@@ -26,8 +27,10 @@ class Pacer {
   /// The subscription of that group; nullptr if the recipient has none that is active.
   [[nodiscard]] static PacedSubscription* find(const Recipient& recipient, GroupId group);
 
-  /// Frames of the group, as a router has them. False: they are not for this subscriber. REQUIRES:
-  /// as Outbox::push().
+  /// The next run is offered to subscriptions. Its last frame has `last_bytes`.
+  void begin_run(const Run& run, std::uint32_t last_bytes) { last_frames_.begin(run, last_bytes); }
+  /// That run, or a single frame. False: it is not for this subscriber. REQUIRES: as
+  /// Outbox::push().
   [[nodiscard]] bool offer(PacedSubscription& subscription, const Run& run,
                            const proto::FrameHeader& header, Handover handover);
   /// The recipient says how many messages of the group it took. False: it has no such subscription,
@@ -56,12 +59,8 @@ class Pacer {
   [[nodiscard]] std::uint64_t now_us() const { return context_.now_ms * 1000; }
   void offer_plain(PacedSubscription& subscription, const Run& run,
                    const proto::FrameHeader& header, Handover handover);
-  void drop_what_has_no_room(PacedSubscription& subscription, Run& rest, std::size_t lane,
-                             Handover handover);
   /// Frames that may not begin. REQUIRES: there are some.
   void hold_newest(PacedSubscription& subscription, Run rest, std::size_t lane, Handover handover);
-  [[nodiscard]] Leading replaced_at_once(const PacedSubscription& subscription, const Run& run,
-                                         std::size_t lane, Handover handover);
   void offer_fragment(PacedSubscription& subscription, const Run& run,
                       const proto::FrameHeader& header, Handover handover);
   void begin_plain(PacedSubscription& subscription) const;
@@ -80,8 +79,7 @@ class Pacer {
   void drop_oldest(PacedSubscription& subscription, proto::DropReason reason);
   void drop_held(PacedSubscription& subscription, proto::DropReason reason);
   void drop(PacedSubscription& subscription, const KeptMessage& message, proto::DropReason reason);
-  void drop(PacedSubscription& subscription, const Run& run, proto::DropReason reason,
-            std::uint32_t shortest_bytes = proto::kHeaderSize);
+  void drop(PacedSubscription& subscription, const Run& run, proto::DropReason reason);
   void release(PacedSubscription& subscription);
   void release_oldest(PacedSubscription& subscription);
   [[nodiscard]] bool release_open(PacedSubscription& subscription);
@@ -105,6 +103,7 @@ class Pacer {
   std::vector<PacedSubscription*> ripe_now_;
   std::vector<Scheduled> scheduled_;  ///< a heap, the next one first
   KeptMessage scratch_;
+  LastFrames last_frames_;  ///< of the run that is offered
 };
 
 }  // namespace gimnet::hub

@@ -104,10 +104,10 @@ void RetainedMessages::refuse(Entry& entry, const Run& run) {
   context_.drops.tell(run.bytes, proto::DropReason::not_retained);
 }
 
-void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header) {
+void RetainedMessages::keep(const Run& run, const proto::FrameHeader& header,
+                            std::uint32_t last_bytes) {
   Entry& kept = entry(header);
-  Run last = run.share();
-  while (last.frames > 1) last.skip_frame();
+  const Run last{run.buffer.share(), run.bytes + (run.size - last_bytes), last_bytes, 1};
   const auto frame = proto::parse_frame({last.bytes, last.size}, proto::Origin::hub);
   GIMNET_CHECK(frame);  // the gate parsed it
   if (frame->fragment) return keep_fragment(kept, last, *frame);
@@ -261,7 +261,7 @@ void RetainedMessages::on_handed(const GroupStart& start, const Run& frames) {
     const Run frame = rest.take_frame();
     const bool taken = subscription != nullptr && subscription->active &&
                        pacer_.offer(*subscription, frame, frame.header(), Handover{});
-    if (!taken) context_.drops.drop(frame.bytes, frame.size, 1, proto::DropReason::no_subscriber);
+    if (!taken) context_.drops.drop(frame.bytes, 1, proto::DropReason::no_subscriber);
   }
 }
 

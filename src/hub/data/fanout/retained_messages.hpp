@@ -42,7 +42,7 @@ class RetainedMessages {
   // ---- the provider's shard
 
   /// Frames of a retained group from their provider, as Router::route() gets them.
-  void keep(const Run& run, const proto::FrameHeader& header);
+  void keep(const Run& run, const proto::FrameHeader& header, std::uint32_t last_bytes);
   /// The group is gone.
   void forget(GroupId group);
   /// The provider's session is over.

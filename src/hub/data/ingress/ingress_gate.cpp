@@ -20,14 +20,17 @@ Admission refuse(IngressState& state, proto::FrameError error) {
 /// Shortens the run to the frames before the first that has no room for its key.
 void keep_frames_with_key(proto::RunView& view) {
   std::uint32_t size = 0;
+  std::uint32_t last = 0;
   for (std::uint32_t frame = 0; frame < view.frames; ++frame) {
     const proto::FrameHeader header = proto::load_header(view.bytes + size);
     if (header.length < sizeof(std::uint64_t)) {
       view.size = size;
       view.frames = frame;
+      view.last_bytes = last;
       return;
     }
-    size += static_cast<std::uint32_t>(header.frame_size());
+    last = static_cast<std::uint32_t>(header.frame_size());
+    size += last;
   }
 }
 

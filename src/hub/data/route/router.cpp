@@ -16,7 +16,7 @@ constexpr std::size_t kReferenceRecipients = 4;
 }  // namespace
 
 void Router::drop(const Run& run, proto::DropReason reason) {
-  fanout_.context().drops.drop(run.bytes, run.size, run.frames, reason);
+  fanout_.context().drops.drop(run.bytes, run.frames, reason);
 }
 
 /// A frame that was counted once has `outcomes` outcomes now.
@@ -71,7 +71,7 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max,
     fanout_.context().tally.queued -= found.run.frames;
     if (append(found.run.bytes, found.run.size, found.run.frames)) continue;
     const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
-    dispatch(run, run.header(), {true, found.shortest_bytes});
+    dispatch(run, run.header(), {true, found.run.last_bytes});
   }
 }
 
@@ -84,7 +84,7 @@ inline void Router::to_place(const Run& run, const proto::FrameHeader& header,
   }
   Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
   if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
-  fanout_.deliver(*recipient, run, header, Handover{.shortest_bytes = arrival.shortest_bytes});
+  fanout_.deliver(*recipient, run, header, Handover{});
 }
 
 void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node,
@@ -121,8 +121,7 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival 
         run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
   const MemberList<GroupMember>& here = members->by_shard[fanout_.self().value()];
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients,
-                          .shortest_bytes = arrival.shortest_bytes};
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
   here.for_each([&](const GroupMember& member) {
@@ -136,7 +135,7 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival 
   }
   if (!arrival.handed_over) {
     outcomes += to_members_elsewhere(run, *members);
-    if (members->retain) retained_.keep(run, header);
+    if (members->retain) retained_.keep(run, header, arrival.last_bytes);
   }
   settle(run, outcomes);
 }
@@ -158,10 +157,10 @@ std::uint32_t Router::to_members_elsewhere(const Run& run, const GroupMembers& m
 /// without the other.
 std::uint32_t Router::to_paced(const Run& run, const proto::FrameHeader& header, Arrival arrival,
                                const MemberList<PacedMember>& here) {
-  const Handover handover{.fan_out = here.size() >= kReferenceRecipients,
-                          .shortest_bytes = arrival.shortest_bytes};
+  const Handover handover{.fan_out = here.size() >= kReferenceRecipients};
   std::uint32_t outcomes = 0;
   deliveries_ += here.size();
+  pacer_.begin_run(run, arrival.last_bytes);
   here.for_each([&](const PacedMember& member) {
     Recipient* recipient = fanout_.recipients().find(member.slot, member.generation);
     if (recipient == nullptr) return;
@@ -273,7 +272,7 @@ inline void Router::to_listed(Listed& listed, NodeId node, const NodePlace& plac
 
 void Router::drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason) {
   const SharedList::FrameStart start = listed.list.as_sent(listed.run.bytes, hub_);
-  fanout_.context().drops.drop_start(start.data(), outcomes, reason);
+  fanout_.context().drops.drop(start.data(), outcomes, reason);
 }
 
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
@@ -284,7 +283,7 @@ void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arri
   std::uint32_t outcomes = 0;
   const std::size_t slots = fanout_.recipients().by_slot().size();
   deliveries_ += slots;
-  const Handover handover{.fan_out = true, .shortest_bytes = arrival.shortest_bytes};
+  const Handover handover{.fan_out = true};
   for (Recipient* recipient : fanout_.recipients().by_slot()) {
     if (recipient == nullptr || recipient->node == NodeId{header.src}) continue;
     fanout_.deliver(*recipient, run, header, handover);

@@ -62,11 +62,10 @@ class Router {
   }
 
   /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for
-  /// the length, alone if LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; none shorter
-  /// than `shortest_bytes`.
-  void route(const Run& run, const proto::FrameHeader& header,
-             std::uint32_t shortest_bytes = proto::kHeaderSize) {
-    dispatch(run, header, {false, shortest_bytes});
+  /// the length, alone if LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; the last one
+  /// has `last_bytes`.
+  void route(const Run& run, const proto::FrameHeader& header, std::uint32_t last_bytes) {
+    dispatch(run, header, {false, last_bytes});
   }
 
   /// Frames that another shard handed over, any mix: to their recipients on this shard, until
@@ -84,8 +83,8 @@ class Router {
  private:
   /// How a run came here.
   struct Arrival {
-    bool handed_over;  ///< by another shard
-    std::uint32_t shortest_bytes;
+    bool handed_over;          ///< by another shard
+    std::uint32_t last_bytes;  ///< of the run's last frame
   };
   void dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);

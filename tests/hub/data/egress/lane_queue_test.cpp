@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/frame/frame_parser.hpp"
 #include "tests/hub/data/support/egress_rig.hpp"
 
 namespace gimnet::hub {
@@ -26,7 +27,7 @@ class LaneQueueTest : public ::testing::Test {
   /// The payload of the entry that goes for room.
   std::string drop() {
     Entry dropped;
-    if (!lane.drop_oldest(1, starts, dropped)) return "none";
+    if (!lane.drop_oldest(dropped)) return "none";
     return {reinterpret_cast<const char*>(dropped.run.bytes + proto::kHeaderSize),
             dropped.run.size - proto::kHeaderSize};
   }
@@ -42,7 +43,6 @@ class LaneQueueTest : public ::testing::Test {
     return payloads;
   }
   EgressRig rig;
-  FrameStarts starts;
   LaneQueue lane;
 };
 
@@ -65,57 +65,41 @@ TEST_F(LaneQueueTest, CountsBlockAndLatestBytes) {
   EXPECT_EQ(lane.latest_bytes(), proto::kHeaderSize + 8);
 }
 
-TEST_F(LaneQueueTest, DropsTheOldestFrameOfARunFirst) {
+TEST_F(LaneQueueTest, DropsAWaitingEntryAtATime) {
   lane.push(entry("one"));
   lane.push(entry("two"));
   lane.push(entry("block", {.flags = 1}));
   lane.push(entry("three"));
   Entry dropped;
-  for (const std::uint32_t expected : {3u, 3u, 5u}) {
-    ASSERT_TRUE(lane.drop_oldest(1, starts, dropped));
-    EXPECT_EQ(dropped.size, proto::kHeaderSize + expected);
-    EXPECT_EQ(dropped.frames, 1u);
+  for (const std::uint32_t frames : {2u, 1u}) {
+    ASSERT_TRUE(lane.drop_oldest(dropped));
+    EXPECT_EQ(dropped.frames, frames);
+    EXPECT_EQ(dropped.size, frames * proto::kHeaderSize + (frames == 2 ? 6 : 5));
   }
-  EXPECT_FALSE(lane.drop_oldest(1, starts, dropped)) << "only BLOCK is left";
+  EXPECT_FALSE(lane.drop_oldest(dropped)) << "only BLOCK is left";
   EXPECT_EQ(lane.bytes(), proto::kHeaderSize + 5);
   EXPECT_EQ(lane.front().block, true);
 }
 
-TEST_F(LaneQueueTest, DropsAsManyFramesOfARunAsItTakes) {
-  // Together they are as large as if all were as long as the first ones.
-  const auto push = [this](const std::vector<std::string>& payloads, std::uint32_t shortest_bytes) {
-    Entry made;
-    made.run = rig.run(payloads);
-    made.size = made.run.size;
-    made.frames = made.run.frames;
-    made.shortest_bytes = shortest_bytes;
-    lane.push(std::move(made));
-  };
-  push({"four", "four"}, 20);
-  push({"", "12345678"}, 16);
-  ASSERT_EQ(lane.entries().size(), 1u);
-  Entry dropped;
-  ASSERT_TRUE(lane.drop_oldest(41, starts, dropped));
-  EXPECT_EQ(dropped.frames, 3u);
-  EXPECT_EQ(dropped.size, 20u + 20u + 16u);
-  EXPECT_EQ(lane.bytes(), 24u);
-  ASSERT_TRUE(lane.drop_oldest(1'000, starts, dropped));
-  EXPECT_EQ(dropped.frames, 1u);
-  EXPECT_FALSE(lane.drop_oldest(1, starts, dropped));
-  EXPECT_TRUE(lane.empty());
+TEST_F(LaneQueueTest, AnEntryIsNoLongerThanARun) {
+  const std::string half(proto::kRunBytesMax / 2 - proto::kHeaderSize, 'h');
+  lane.push(entry(half));
+  lane.push(entry(half));
+  EXPECT_EQ(lane.entries().size(), 1u);
+  lane.push(entry(""));
+  EXPECT_EQ(lane.entries().size(), 2u);
 }
 
-TEST_F(LaneQueueTest, TheOldestOfTheSourceThatLosesGoes) {
+TEST_F(LaneQueueTest, TheOldestOfTheSourceWithTheMostGoes) {
   lane.push(entry("quiet 1", {.src = 1}));
   lane.push(entry("block", {.flags = 1, .src = 2}));
   lane.push(entry("flood 1", {.src = 2}));
   lane.push(entry("quiet 2", {.src = 1}));
   lane.push(entry("flood 2, longer", {.src = 2}));
-  lane.sources().choose(1'000);
   EXPECT_EQ(drop(), "flood 1");
+  EXPECT_EQ(drop(), "quiet 1");
+  EXPECT_EQ(waiting(), (std::vector<std::string>{"block", "quiet 2", "flood 2, longer"}));
   EXPECT_EQ(drop(), "flood 2, longer");
-  EXPECT_EQ(waiting(), (std::vector<std::string>{"quiet 1", "block", "quiet 2"}));
-  EXPECT_EQ(drop(), "quiet 1") << "nothing of it is left";
   EXPECT_EQ(drop(), "quiet 2");
   EXPECT_EQ(drop(), "none");
   EXPECT_EQ(lane.source_at(lane.sources().fullest()), (NodeId{7u << 20 | 2}));
@@ -127,7 +111,6 @@ TEST_F(LaneQueueTest, ItIsLookedForAmongTheFirst64Entries) {
     for (int i = 0; i < before; ++i)
       lane.push(entry("quiet", {.src = static_cast<std::uint32_t>(i % 2 == 0 ? 1 : 3)}));
     lane.push(entry(std::string(10'000, 'f'), {.src = 2}));
-    lane.sources().choose(1'000);
     EXPECT_EQ(drop() == "quiet", before == 64) << before;
   }
 }
@@ -140,10 +123,7 @@ TEST_F(LaneQueueTest, AFloodLeavesNoEntriesBehind) {
   for (int i = 0; i < 1'000; ++i) {
     lane.push(entry("key_____", {.flags = proto::kFlagKeyed, .src = 2}));  // not of one run
     lane.push(entry(flood, {.src = 2}));
-    for (int drops = 0; drops < 2; ++drops) {
-      lane.sources().choose(1'000);
-      static_cast<void>(drop());
-    }
+    for (int drops = 0; drops < 2; ++drops) static_cast<void>(drop());
     // Empty ones are left in front at most, and go when the first one leaves.
     ASSERT_LE(lane.entries().capacity_bytes(), 64 * sizeof(Entry));
   }
@@ -165,10 +145,7 @@ TEST_F(LaneQueueTest, FindsWhatMovedUp) {
   for (int i = 0; i < 100; ++i)
     lane.push(entry("other", {.src = static_cast<std::uint32_t>(4 + i % 2)}));
   ASSERT_NE(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "is indexed from here on";
-  while (lane.entries().size() > 4) {
-    lane.sources().choose(1'000);
-    ASSERT_EQ(drop(), "other");
-  }
+  while (lane.entries().size() > 4) ASSERT_EQ(drop(), "other");
   Entry* found = lane.find_message(NodeId{7u << 20 | 3}, 77);
   ASSERT_NE(found, nullptr);
   EXPECT_EQ(found->message_number, 77u);
@@ -187,7 +164,6 @@ TEST_F(LaneQueueTest, NothingIsReplacedInThePlaceOfALatestThatWasDropped) {
     EXPECT_FALSE(lane.replace_latest(each, older));
     lane.push(std::move(each));
   }
-  lane.sources().choose(1'000);
   EXPECT_EQ(drop().size(), 28u) << "that of source 2, in whose place stands now that of source 1";
   Entry next = entry("key____1next", latest(2));
   EXPECT_FALSE(lane.replace_latest(next, older));
@@ -199,7 +175,6 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   part.fragmented = true;
   part.complete = false;
   part.message_number = 77;
-  part.shortest_bytes = part.size;
   lane.push(std::move(part));
   lane.push(entry("behind it"));
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 4}, 77), nullptr);
@@ -208,7 +183,6 @@ TEST_F(LaneQueueTest, FindsAMessageThatWaitsForMore) {
   ASSERT_NE(found, nullptr);
   lane.append_fragment(*found, rig.run({"the end"}, {.src = 3}), true, rig.pieces);
   EXPECT_EQ(found->frames, 2u);
-  EXPECT_EQ(found->shortest_bytes, proto::kHeaderSize) << "the end may be shorter";
   EXPECT_EQ(lane.find_message(NodeId{7u << 20 | 3}, 77), nullptr) << "complete";
   EXPECT_EQ(lane.bytes(), 4u + 9u + 7u + 3 * proto::kHeaderSize);
 }

@@ -48,21 +48,6 @@ TEST_F(OpenRunTest, FramesLikeTheLastOneAreAppended) {
   EXPECT_EQ(connection.outbox.lane(1).bytes(), 0u);
 }
 
-// Nobody looks at their lengths while they come: together these are as large as three like the
-// first one.
-TEST_F(OpenRunTest, AppendedFramesMayHaveAnyLength) {
-  const TestFrame to_group{.kind = proto::Kind::group};
-  const hub::Run first = rig.run({"four"}, to_group);
-  connection.outbox.push(first, first.header(), {.shortest_bytes = first.size}, rig.context);
-  EXPECT_TRUE(offer({""}, to_group));
-  EXPECT_TRUE(offer({"12345678"}, to_group));
-  Entry dropped;
-  ASSERT_TRUE(connection.outbox.lane(1).drop_oldest(21, rig.context.starts, dropped));
-  EXPECT_EQ(dropped.size, 20u + 16u);
-  connection.outbox.lose(dropped, proto::DropReason::queue_full, rig.context);
-  EXPECT_THAT(flush_and_take(), ElementsAre("12345678"));
-}
-
 TEST_F(OpenRunTest, EverySizeIsCopiedWhole) {
   std::vector<std::string> sent;
   for (std::uint32_t size = 0; size < 200; ++size) {

@@ -75,40 +75,51 @@ TEST(FullOutbox, WhatIsRefusedTakesNoMemory) {
   }
 }
 
-// What arrives in one read is as many messages as it is.
-TEST(FullOutbox, DropTakesTheMessagesOfABurstThatFit) {
+TEST(FullOutbox, ABurstIsTakenOrRefusedWhole) {
+  const std::vector<std::string> burst(4, sized(kKiB));
+  for (const std::uint32_t waiting : {12u, 13u}) {
+    EgressRig rig(small_limits());
+    TestConnection connection(rig);
+    block(connection);
+    rig.push(connection.outbox, sized(waiting * kKiB), {.flags = kDrop, .src = 2});
+    const hub::Run run = rig.run(burst, {.flags = kDrop});
+    connection.outbox.push(run, run.header(), {}, rig.context);
+    EXPECT_EQ(rig.dropped(DropReason::queue_full), waiting == 12 ? 0u : 4u);
+    EXPECT_TRUE(rig.ledger_exact());
+  }
+}
+
+TEST(FullOutbox, AWaitingBurstMakesRoomWhole) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  std::vector<std::string> burst;
-  for (char c = 'a'; c < 'a' + 20; ++c) burst.push_back(sized(kKiB, c));
-  const hub::Run run = rig.run(burst, {.flags = kDrop});
-  connection.outbox.push(run, run.header(), Handover{}, rig.context);
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 4u);
-  connection.peer.set_room(MemoryPeer::kAll);
-  connection.flush();
-  const auto texts = connection.take();
-  ASSERT_THAT(texts, SizeIs(17));
-  EXPECT_EQ(texts[0][0], 'a');
-  EXPECT_EQ(texts[15][0], 'p');
+  std::uint32_t src = 0;
+  for (const std::size_t messages : {3u, 5u, 4u, 4u}) {
+    const hub::Run run = rig.run(std::vector<std::string>(messages, sized(kKiB)),
+                                 {.kind = Kind::group, .src = ++src});
+    connection.outbox.push(run, run.header(), {.fan_out = true}, rig.context);
+  }
+  EXPECT_FALSE(rig.tally.any_dropped);
+  rig.push(connection.outbox, "", {.kind = Kind::group, .src = 5});
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 5u) << "of the source with the most";
+  EXPECT_EQ(connection.outbox.lane(1).front().run.header().src, 7u << 20 | 1);
   EXPECT_TRUE(rig.ledger_exact());
 }
 
-TEST(FullOutbox, OfABurstToAGroupTheNewestStay) {
+// A source whose one burst is longer than the lane.
+TEST(FullOutbox, ABurstLargerThanItsLaneMayWaitAlone) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  std::vector<std::string> burst;
-  for (char c = 'a'; c < 'a' + 20; ++c) burst.push_back(sized(kKiB, c));
-  const hub::Run run = rig.run(burst, {.kind = Kind::group});
-  connection.outbox.push(run, run.header(), Handover{.fan_out = true}, rig.context);
-  EXPECT_EQ(rig.dropped(DropReason::queue_full), 4u);
-  connection.peer.set_room(MemoryPeer::kAll);
-  connection.flush();
-  const auto texts = connection.take();
-  ASSERT_THAT(texts, SizeIs(17));
-  EXPECT_EQ(texts[0][0], 'e');
-  EXPECT_EQ(texts[15][0], 't');
+  for (int i = 0; i < 2; ++i) {
+    const hub::Run run =
+        rig.run(std::vector<std::string>(20, sized(kKiB)), {.kind = Kind::group, .dst = 1});
+    connection.outbox.push(run, run.header(), {.fan_out = true}, rig.context);
+    static_cast<void>(rig.run({"between"}));
+    --rig.accepted;
+  }
+  EXPECT_EQ(rig.dropped(DropReason::queue_full), 20u);
+  EXPECT_EQ(connection.outbox.lane(1).bytes(), 20 * kKiB);
   EXPECT_TRUE(rig.ledger_exact());
 }
 
@@ -116,8 +127,9 @@ TEST(FullOutbox, GroupDropsTheOldestForTheNewest) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
+  std::uint32_t dst = 1;  // so that none joins the one before it
   for (char c = 'a'; c < 'a' + 16; ++c)
-    rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group});
+    rig.push(connection.outbox, sized(kKiB, c), {.kind = Kind::group, .dst = ++dst});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 0u);
   rig.push(connection.outbox, sized(2 * kKiB, 'z'), {.kind = Kind::group});
   EXPECT_EQ(rig.dropped(DropReason::queue_full), 2u) << "as many of the oldest as it takes";
@@ -164,7 +176,8 @@ TEST(FullOutbox, ALaneFullOfOthersTakesHalfOfItAgainInBlock) {
   EgressRig rig(small_limits());
   TestConnection connection(rig);
   block(connection);
-  for (int i = 0; i < 16; ++i) rig.push(connection.outbox, sized(kKiB), {.kind = Kind::group});
+  for (std::uint32_t i = 0; i < 16; ++i)
+    rig.push(connection.outbox, sized(kKiB), {.kind = Kind::group, .dst = 1 + i});
   for (int i = 0; i < 8; ++i) rig.push(connection.outbox, sized(kKiB), {.flags = kBlock});
   EXPECT_THAT(rig.signals.take(), IsEmpty());
   EXPECT_FALSE(rig.tally.any_dropped);

@@ -259,9 +259,9 @@ TEST_F(OutboxShare, WhatHasToWaitIsCopied) {
 TEST_F(OutboxShare, ALongRunIsTakenInPieces) {
   block();
   const Frames run = rig.run(std::vector<std::string>(100, sized(kKiB)), kOldest);
-  connection.outbox.push(run, run.header(), {false, kKiB}, rig.context);
+  connection.outbox.push(run, run.header(), Handover{}, rig.context);
   EXPECT_LE(connection.outbox.held_bytes(), share + sizeof(Entry));
-  EXPECT_GT(connection.outbox.held_bytes(), share - 2 * kKiB) << "the newest";
+  EXPECT_GT(connection.outbox.held_bytes(), share - kSharedChunkBytes) << "the newest";
   EXPECT_LE(rig.pool.pinned_bytes(), share + 2 * kSharedChunkBytes);
   RingQueue<Entry>& entries = connection.outbox.lane(1).entries();
   EXPECT_GT(entries.size(), 1u);

@@ -7,7 +7,6 @@
 namespace gimnet::hub {
 namespace {
 
-constexpr std::uint64_t kLaneBytes = 3'200;  // 100 bytes from one choice to the next
 constexpr std::uint8_t kOne = 3;
 constexpr std::uint8_t kOther = 9;
 
@@ -21,20 +20,13 @@ TEST(SourceBytes, NeighboursHaveCountersOfTheirOwn) {
   }
 }
 
-TEST(SourceBytes, TheOneWithTheMostLosesUntilItLostA32ndOfTheLane) {
+TEST(SourceBytes, TheOneWithTheMostLoses) {
   SourceBytes sources;
-  EXPECT_TRUE(sources.choice_due());
   sources.add(kOne, 1'000);
+  EXPECT_EQ(sources.loser(), kOne);
   sources.add(kOther, 1'050);
-  EXPECT_TRUE(sources.choice_due());
-  sources.choose(kLaneBytes);
   EXPECT_EQ(sources.loser(), kOther);
-  EXPECT_EQ(sources.floor(), 950u);
-  sources.take(kOther, 99);
-  EXPECT_FALSE(sources.choice_due()) << "though the other one has more";
-  sources.take(kOther, 1);
-  EXPECT_TRUE(sources.choice_due());
-  sources.choose(kLaneBytes);
+  sources.take(kOther, 51);
   EXPECT_EQ(sources.loser(), kOne);
 }
 
@@ -42,36 +34,8 @@ TEST(SourceBytes, WhatIsNeverDroppedLosesNothingButFills) {
   SourceBytes sources;
   sources.add(kOne + SourceBytes::kFixed, 2'000);
   sources.add(kOther, 100);
-  sources.choose(kLaneBytes);
   EXPECT_EQ(sources.loser(), kOther);
   EXPECT_EQ(sources.fullest(), kOne);
-  EXPECT_EQ(sources.droppable(kOne), 0u);
-}
-
-TEST(SourceBytes, AChoiceOfOneIsNone) {
-  SourceBytes sources;
-  EXPECT_TRUE(sources.at_most_one());
-  EXPECT_TRUE(sources.is_alone(kOne)) << "where nobody has anything";
-  sources.add(kOne, 100);
-  EXPECT_TRUE(sources.is_alone(kOne));
-  EXPECT_FALSE(sources.is_alone(kOther));
-  sources.choose(kLaneBytes);
-  EXPECT_EQ(sources.loser(), kOne);
-  EXPECT_TRUE(sources.choice_due()) << "once another one comes";
-  sources.add(kOther, 1);
-  EXPECT_FALSE(sources.at_most_one());
-  sources.choose(kLaneBytes);
-  EXPECT_EQ(sources.floor(), 0u);
-  EXPECT_FALSE(sources.choice_due());
-}
-
-TEST(SourceBytes, TheSmallestLaneHasAChoiceToo) {
-  SourceBytes sources;
-  sources.add(kOne, 10);
-  sources.add(kOther, 20);
-  sources.choose(1);
-  EXPECT_FALSE(sources.choice_due());
-  EXPECT_EQ(sources.floor(), 19u);
 }
 
 }  // namespace

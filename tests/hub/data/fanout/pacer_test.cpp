@@ -26,9 +26,10 @@ class PacerTest : public ::testing::Test {
     return rig.pacer.subscribe(recipient, kGroup, terms);
   }
   void offer(PacedSubscription& subscription, const std::vector<std::string>& texts,
-             std::uint8_t lane = 1) {
-    const hub::Run run =
-        rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group, .lane = lane});
+             std::uint8_t lane = 1, std::uint8_t flags = 0) {
+    const TestFrame frame{.kind = proto::Kind::group, .flags = flags, .lane = lane};
+    const hub::Run run = rig.make_run(kGroup.value(), texts, frame);
+    rig.pacer.begin_run(run, testing::last_bytes_of(run));
     EXPECT_TRUE(rig.pacer.offer(subscription, run, run.header(), {}));
   }
   hub::Run fragment(std::uint32_t number, std::uint32_t offset, std::uint32_t total,
@@ -337,32 +338,33 @@ TEST_F(PacerTest, WhileMemoryIsScarceHoldsWithinTheShare) {
   lease.give_back(rig.egress.limits.budget_bytes * 3 / 4);
 }
 
-// Only the first frame of what is dropped is looked at, and what is held: the others say nonsense
-// about their length.
 TEST_F(PacerTest, OfALongRunOnlyWhatStaysIsCopied) {
-  constexpr std::uint32_t kFrames = 1'000;
-  for (const PaceTerms& terms :
-       {PaceTerms{.window = 1, .depth = 2}, PaceTerms{.depth = 2, .interval_us = 1'000'000}}) {
-    PacedSubscription& one = subscribe(terms);
+  std::vector<std::string> texts(1'000, "new!");
+  for (std::size_t i = 0; i < 998; ++i) texts[i].resize(i % 5);
+  for (const std::uint32_t depth : {1u, 2u}) {
+    PacedSubscription& one = subscribe({.window = 1, .depth = depth});
     offer(one, {"open"});
-    EXPECT_THAT(sent(), ElementsAre("open"));
-    std::vector<std::string> texts(kFrames, "same");
-    texts[kFrames - 2] = "last";
-    texts[kFrames - 1] = "new!";
-    const hub::Run run = rig.make_run(kGroup.value(), texts, {.kind = proto::Kind::group});
-    const std::uint32_t size = run.size / kFrames;
-    for (std::uint32_t frame = 1; frame + 2 < kFrames; ++frame) {
-      store_le(const_cast<std::byte*>(run.bytes) + std::size_t{frame} * size, ~std::uint32_t{0});
-    }
     const std::uint64_t copied = rig.egress.tally.copied_bytes;
-    EXPECT_TRUE(rig.pacer.offer(one, run, run.header(), {.shortest_bytes = size}));
-    EXPECT_EQ(rig.egress.tally.copied_bytes - copied, 2 * size);
-    EXPECT_EQ(one.held(), 2u);
-    subscribe({.window = 3, .depth = 2});
-    EXPECT_THAT(sent(), ElementsAre("last", "new!"));
+    offer(one, texts);
+    EXPECT_EQ(rig.egress.tally.copied_bytes - copied, depth * (proto::kHeaderSize + 4));
+    subscribe({.window = 3, .depth = depth});
+    EXPECT_EQ(sent().size(), 1 + depth);
     rig.pacer.unsubscribe(recipient, kGroup, true);
   }
-  EXPECT_EQ(dropped(DropReason::replaced), 2 * (kFrames - 2));
+  EXPECT_EQ(dropped(DropReason::replaced), 999u + 998u);
+}
+
+// Each of a long run would be refused by itself, and leave the window open.
+TEST_F(PacerTest, WhatAFullOutboxRefusesOfARunTakesTheRestAlong) {
+  constexpr std::uint8_t kDrop = 2;
+  rig.egress.limits.lane1_bytes = 100;
+  PacedSubscription& one = subscribe({.window = 2});
+  offer(one, {std::string(64, 'x')}, 1, kDrop);
+  offer(one, {"12345", "1234", "1"}, 1, kDrop);
+  offer(one, {"1234", "1", "2"}, 1, kDrop);
+  EXPECT_EQ(dropped(DropReason::queue_full), 3u);
+  EXPECT_EQ(dropped(DropReason::replaced), 1u) << "the window is used up";
+  EXPECT_THAT(sent(), ElementsAre(std::string(64, 'x'), "1234"));
 }
 
 TEST_F(PacerTest, ForASubscriberThatIsAway) {

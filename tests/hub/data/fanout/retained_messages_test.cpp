@@ -247,7 +247,7 @@ TEST(RetainedMessages, KeepsNothingOfAProviderThatLeft) {
         std::uint32_t& of = provider_of.try_emplace(group, provider).first->second;
         if (below(5) == 0) of = provider;
         header.src = node(of).value();
-        rig.retained.keep(run, header);
+        rig.retained.keep(run, header, run.size);
       }
     }
     ASSERT_EQ(rig.retained.groups(), provider_of.size()) << "step " << step;

@@ -35,7 +35,8 @@ class RecentRecipientsTest : public ::testing::Test {
   /// One frame the long way, and noted where it was appended.
   void route(const Frame& frame) {
     const hub::Run run = rig.make_run(kHub | frame.index, {frame.payload}, frame.how);
-    if (!rig.router.append(run.bytes, run.size, run.frames)) rig.router.route(run, run.header());
+    if (!rig.router.append(run.bytes, run.size, run.frames))
+      rig.router.route(run, run.header(), run.size);
   }
   /// As if it had got such frames from the same bytes already.
   void note(std::uint32_t index, const TestFrame& how = {}) {

@@ -47,7 +47,7 @@ TEST_F(RouterTest, SmallFramesLikeTheLastOnesAreAppended) {
                              const testing::TestFrame& frame = {}) {
     const hub::Run run = rig.make_run(dst, {payload}, frame);
     if (rig.router.append(run.bytes, run.size, run.frames)) return true;
-    rig.router.route(run, run.header());
+    rig.router.route(run, run.header(), run.size);
     return false;
   };
   EXPECT_FALSE(append(kHub | 2, "the first"));
@@ -73,7 +73,7 @@ TEST_F(RouterTest, AGroupOfTheSameNumberIsNoNode) {
   for (int i = 0; i < 2; ++i) {
     const hub::Run run = rig.make_run(kHub | 2, {"to both"}, {.kind = Kind::group});
     EXPECT_FALSE(rig.router.append(run.bytes, run.size, run.frames));
-    rig.router.route(run, run.header());
+    rig.router.route(run, run.header(), run.size);
   }
   EXPECT_EQ(a.outbox.lane(1).front().frames, 2u);
   EXPECT_EQ(b.outbox.lane(1).front().frames, 2u);
@@ -290,7 +290,7 @@ TEST_F(RouterTest, OfAListEachShardCountsWhatWasLeftToIt) {
   const hub::Run taken_in = rig.make_run(3, {ids + "payload"}, {.kind = Kind::list});
   rig.nodes.publish(2, {ShardIndex{1}, ConnectionSlot{2}, 2});
   rig.nodes.publish(3, {ShardIndex{1}, ConnectionSlot{3}, 3});
-  rig.router.route(taken_in, taken_in.header());
+  rig.router.route(taken_in, taken_in.header(), taken_in.size);
   EXPECT_EQ(rig.egress.tally.copies, 0u) << "three for another shard are one there";
   std::byte* const marks = const_cast<std::byte*>(taken_in.bytes) + proto::kHeaderSize;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -332,7 +332,7 @@ TEST_F(RouterTest, ReportsAListAsItWasSent) {
   };
   const hub::Run run =
       rig.make_run(4, {ids + "payload"}, {.kind = Kind::list, .flags = proto::kFlagReport});
-  rig.router.route(run, run.header());
+  rig.router.route(run, run.header(), run.size);
   rig.fanout.post_all();
   EXPECT_EQ(dropped(DropReason::no_route), 1u);
   EXPECT_EQ(dropped(DropReason::no_such_node), 1u);

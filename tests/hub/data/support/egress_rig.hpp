@@ -116,6 +116,13 @@ class EgressRig {
   std::uint32_t used_ = 0;
 };
 
+/// Bytes of the run's last frame, as a parser says.
+inline std::uint32_t last_bytes_of(const Run& run) {
+  Run last = run.share();
+  while (last.frames > 1) last.skip_frame();
+  return last.size;
+}
+
 /// An outbox, its writer and the far end of its connection.
 struct TestConnection {
   explicit TestConnection(EgressRig& egress_rig) : rig(egress_rig) {

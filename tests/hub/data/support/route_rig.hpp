@@ -63,7 +63,7 @@ class RouteRig {
   void route(std::uint32_t dst, const std::vector<std::string>& payloads,
              const TestFrame& frame = {}) {
     hub::Run run = make_run(dst, payloads, frame);
-    router.route(run, run.header());
+    router.route(run, run.header(), last_bytes_of(run));
     fanout.post_all();
   }
   hub::Run make_run(std::uint32_t dst, const std::vector<std::string>& payloads,
