@@ -23,7 +23,7 @@ ShardState::ShardState(ShardIndex index, const HubShared& hub_shared)
              .signals = signals,
              .hub = hub_shared.hub},
       fanout(index, hub_shared.mailboxes, recipients, egress,
-             {hub_shared.hub, hub_shared.nodes, hub_shared.groups}),
+             {hub_shared.nodes, hub_shared.groups}),
       pacer(fanout),
       retained(hub_shared.groups, fanout, pacer, hub_shared.retained_budget),
       router(hub_shared.hub, {hub_shared.nodes, hub_shared.groups, fanout, pacer, retained}),

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "hub/data/route/shared_list.hpp"
+#include "base/endian.hpp"
 
 namespace gimnet::hub {
 
@@ -166,9 +166,8 @@ void Fanout::drop_for(ShardIndex to, const Run& frame) {
       recipients == 0 ? proto::DropReason::no_subscriber : proto::DropReason::shard_full;
   context_.tally.copies += outcomes - 1;
   const proto::FrameHeader header = frame.header();
-  if (header.kind != proto::Kind::list) return context_.drops.drop(frame.bytes, outcomes, reason);
-  const auto start = SharedList::unpack(header.dst).as_sent(frame.bytes, elsewhere_.hub());
-  context_.drops.drop(start.data(), outcomes, reason);
+  const bool list = header.kind == proto::Kind::list;
+  context_.drops.drop(frame.bytes + (list ? list_frame_offset(header.dst) : 0), outcomes, reason);
 }
 
 void Fanout::put(ShardIndex to, const Run& run, std::uint32_t deliveries) {
@@ -186,22 +185,48 @@ void Fanout::put(ShardIndex to, const Run& run, std::uint32_t deliveries) {
   if (deliveries != 0 ? mailbox.post_to_many(self_, mail) : mailbox.post(self_, mail)) ++wakeups_;
 }
 
-Run Fanout::cut_ids(const Run& frame, const proto::FrameHeader& header, std::uint32_t ids_size) {
+Run Fanout::copy_without_ids(const Run& frame, const proto::FrameHeader& header) {
   context_.owner.check_here();
   const auto size = static_cast<std::uint32_t>(header.frame_size());
-  if (lists_ && lists_->references == 1) lists_used_ = 0;
-  if (!lists_ || lists_->capacity - lists_used_ < size) {
-    lists_ = size <= kListChunkBytes ? context_.pool.take_chunk(kListChunkBytes)
-                                     : context_.pool.take_slab();
+  std::byte* const place = list_room(size);
+  write_without_ids(place, frame, header);
+  return Run{lists_.share(), place, size, 1};
+}
+
+Run Fanout::copy_for(std::span<const NodeId> ids, const Run& frame,
+                     const proto::FrameHeader& header) {
+  const std::uint32_t offset = list_frame_offset(static_cast<std::uint32_t>(ids.size()));
+  const auto size = static_cast<std::uint32_t>(offset + header.frame_size());
+  std::byte* const place = list_room(size);
+  proto::FrameHeader outer = header;
+  outer.dst = static_cast<std::uint32_t>(ids.size());
+  outer.length = size - static_cast<std::uint32_t>(proto::kHeaderSize);
+  proto::store_header(place, outer);
+  std::byte* at = place + proto::kHeaderSize;
+  for (const NodeId id : ids) {
+    store_le(at, id.value());
+    at += kNodeIdBytes;
+  }
+  write_without_ids(at, frame, header);
+  return Run{lists_.share(), place, size, 1};
+}
+
+std::byte* Fanout::list_room(std::uint32_t bytes) {
+  // acquire pairs with the release in BufferPool::end_loan(), as in make_room().
+  if (lists_ && lists_->references == 1 && lists_->lent.load(std::memory_order_acquire) == 0)
+    lists_used_ = 0;
+  if (!lists_ || lists_->capacity - lists_used_ < bytes) {
+    lists_ = bytes <= kListChunkBytes ? context_.pool.take_chunk(kListChunkBytes)
+                                      : context_.pool.take_slab();
     lists_used_ = 0;
   }
-  std::byte* place = lists_->data + lists_used_;
-  proto::store_header(place, header);
-  std::memcpy(place + proto::kHeaderSize, frame.bytes + proto::kHeaderSize + ids_size,
-              header.length);
-  lists_used_ += size;
+  return lists_->data + std::exchange(lists_used_, lists_used_ + bytes);
+}
+
+void Fanout::write_without_ids(std::byte* to, const Run& frame, const proto::FrameHeader& header) {
+  proto::store_header(to, header);
+  std::memcpy(to + proto::kHeaderSize, frame.bytes + frame.size - header.length, header.length);
   context_.tally.copied_bytes += header.length;
-  return Run{lists_.share(), place, size, 1};
 }
 
 void Fanout::look_for_room() {

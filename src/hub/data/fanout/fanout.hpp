@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "hub/data/egress/egress_context.hpp"
@@ -9,6 +10,13 @@
 #include "hub/data/route/shard_recipients.hpp"
 
 namespace gimnet::hub {
+
+inline constexpr std::uint32_t kNodeIdBytes = 4;
+/// Where the frame for the recipients begins in a LIST frame that another shard gets with so many
+/// ids (Fanout::copy_for).
+[[nodiscard]] constexpr std::uint32_t list_frame_offset(std::uint32_t ids) {
+  return proto::kHeaderSize + kNodeIdBytes * ids;
+}
 
 /// Hands frames to their recipients: a reference or a small copy into each outbox on this shard,
 /// and for other shards one mailbox entry for a whole stretch of frames. Thread safety: one shard.
@@ -28,10 +36,13 @@ class Fanout {
   /// No frame behind the last one will come: what was handed over is posted.
   void post_all();
 
-  /// A LIST frame as its recipients get it: `header`, and what follows the first `ids_size` bytes
-  /// behind the old one. One copy for all recipients on this shard.
-  [[nodiscard]] Run cut_ids(const Run& frame, const proto::FrameHeader& header,
-                            std::uint32_t ids_size);
+  /// A LIST frame as its recipients get it: `header`, and the last header.length bytes of the
+  /// frame. One copy for all recipients on this shard.
+  [[nodiscard]] Run copy_without_ids(const Run& frame, const proto::FrameHeader& header);
+  /// The same for another shard: a LIST frame with the ids of its nodes, and behind them such a
+  /// copy.
+  [[nodiscard]] Run copy_for(std::span<const NodeId> ids, const Run& frame,
+                             const proto::FrameHeader& header);
 
   /// The shards (a bit set) that frames were handed over to since the last call.
   [[nodiscard]] std::uint64_t take_posted() { return std::exchange(posted_, 0); }
@@ -73,6 +84,10 @@ class Fanout {
             proto::DropReason reason);
   void push(Recipient& recipient, const Run& run, const proto::FrameHeader& header,
             Handover handover);
+  /// Memory for a LIST frame.
+  [[nodiscard]] std::byte* list_room(std::uint32_t bytes);
+  /// `to`: as many bytes as the header says.
+  void write_without_ids(std::byte* to, const Run& frame, const proto::FrameHeader& header);
   [[nodiscard]] bool gather(Stretch& stretch, const Run& run);
   void make_room(Stretch& stretch, std::uint32_t bytes);
   [[nodiscard]] std::byte* copy_behind(Stretch& stretch, const Run& run);
@@ -92,7 +107,7 @@ class Fanout {
   const ShardRecipients elsewhere_;
   std::vector<Stretch> stretches_;  ///< by shard
   std::uint64_t open_shards_ = 0;   ///< bit set of those with frames
-  BufferRef lists_;                 ///< where LIST frames without their ids are put
+  BufferRef lists_;                 ///< where LIST frames are copied to
   std::uint32_t lists_used_ = 0;
   std::uint64_t posted_ = 0;
   std::uint64_t crowded_ = 0;

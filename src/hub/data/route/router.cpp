@@ -1,9 +1,7 @@
 #include "hub/data/route/router.hpp"
 
 #include <bit>
-#include <cstring>
 
-#include "hub/data/route/shared_list.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {
@@ -38,7 +36,7 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, Arrival 
     case proto::Kind::group:
       return to_group(run, header, arrival);
     case proto::Kind::list:
-      return to_list(run, header, arrival);
+      return arrival.handed_over ? to_listed_here(run, header) : to_list(run, header);
     case proto::Kind::broadcast:
       return to_everybody(run, header, arrival);
     case proto::Kind::service:
@@ -64,7 +62,8 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max,
     if (deliveries_ >= deliveries_end) {
       return Run{frames.buffer.share(), next, static_cast<std::uint32_t>(end - next), left};
     }
-    const proto::NextRun found = proto::next_run(next, end, length_max);
+    // A LIST frame for this shard has two headers.
+    const proto::NextRun found = proto::next_run(next, end, length_max + proto::kHeaderSize);
     GIMNET_CHECK(found.found == proto::Found::run);  // the sending shard parsed them
     next += found.run.size;
     left -= found.run.frames;
@@ -193,86 +192,71 @@ void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arriv
   to_place(run, header, members->provider_place, arrival);
 }
 
-/// A LIST frame while it goes to its recipients on this shard.
-struct Router::Listed {
-  Listed(const Run& run_, const proto::FrameHeader& header, const SharedList& list_)
-      : run(run_), list(list_), local(header) {
-    local.dst = 0;
-    local.length -= list.bytes();
-  }
-  const Run& run;
-  const SharedList list;
-  proto::FrameHeader local;  ///< as its recipients get it
-  Run shared;  ///< header and payload without the ids, one for all, made when the first one needs
-               ///< it
-};
-
-void Router::to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival) {
-  if (arrival.handed_over) return to_listed_here(run, header);
-  // Nobody else has the frame yet: it is told in it whose business each id is, for the other
-  // shards.
-  std::byte* const frame = run.buffer->data + (run.bytes - run.buffer->data);
-  std::byte* const ids = frame + proto::kHeaderSize;
-  Listed listed(run, header, SharedList::find(ids, header.dst, hub_));
+/// Each shard gets its own ids and the frame without ids: the tables may change until it looks, and
+/// two of them would count a node then, or none.
+void Router::to_list(const Run& run, const proto::FrameHeader& header) {
+  const proto::ListIds ids(run.bytes + proto::kHeaderSize, header.dst);
+  proto::FrameHeader without_ids = header;
+  without_ids.dst = 0;
+  without_ids.length -= kNodeIdBytes * ids.size();
+  Run here;  // made when somebody needs it
+  const auto copy_here = [&] {
+    if (here.frames == 0) here = fanout_.copy_without_ids(run, without_ids);
+  };
   std::uint64_t shards = 0;
+  std::uint32_t foreign = 0;
   std::uint32_t outcomes = 0;
-  deliveries_ += header.dst;
-  for (std::uint32_t i = listed.list.first; i < listed.list.end(); ++i) {
-    const NodeId node = SharedList::id_at(ids, i);
-    const NodePlace place = nodes_.find(index_of(node));
-    if (place.exists() && place.shard != fanout_.self()) {
-      SharedList::mark(ids, i, node, place.shard);
-      shards |= std::uint64_t{1} << place.shard.value();
+  deliveries_ += ids.size();
+  for (std::uint32_t i = 0; i < ids.size(); ++i) {
+    const NodeId node = ids[i];
+    if (hub_of(node) != hub_) {
+      ++foreign;
       continue;
     }
-    to_listed(listed, node, place);
+    const NodePlace place = nodes_.find(index_of(node));
+    if (place.exists() && place.shard != fanout_.self()) {
+      shards |= std::uint64_t{1} << place.shard.value();
+      listed_[place.shard.value()].push_back(node);
+      continue;
+    }
+    copy_here();
+    to_listed(here, without_ids, node, place);
     ++outcomes;
   }
-  if (const std::uint32_t foreign = header.dst - listed.list.count; foreign != 0) {
-    drop_listed(listed, foreign, proto::DropReason::no_route);
+  if (foreign != 0) {
+    copy_here();
+    fanout_.context().drops.drop(here.bytes, foreign, proto::DropReason::no_route);
     outcomes += foreign;
   }
-  if (shards != 0) {
-    store_le(frame + proto::kDstOffset, listed.list.pack());
-    // How many of them are there is not counted: no more than all.
-    to_other_shards(run, shards, header.dst, outcomes);
+  for (; shards != 0; shards &= shards - 1, ++outcomes) {
+    const ShardIndex shard{static_cast<std::uint8_t>(std::countr_zero(shards))};
+    std::vector<NodeId>& there = listed_[shard.value()];
+    fanout_.hand_over(shard, fanout_.copy_for(there, run, without_ids), there.size());
+    there.clear();
   }
   settle(run, outcomes);
 }
 
-/// The tables may have changed since another shard looked: what it left to this one is this one's
-/// to count, and nothing else.
+/// What Fanout::copy_for() made on another shard.
 void Router::to_listed_here(const Run& run, const proto::FrameHeader& header) {
-  const std::byte* const ids = run.bytes + proto::kHeaderSize;
-  Listed listed(run, header, SharedList::unpack(header.dst));
-  std::uint32_t outcomes = 0;
-  deliveries_ += listed.list.size;
-  for (std::uint32_t i = listed.list.first; i < listed.list.end(); ++i) {
-    const NodeId found = SharedList::id_at(ids, i);
-    const auto node = make_id<NodeId>(hub_, index_of(found));
-    if (found != SharedList::marked(node, fanout_.self())) continue;
-    to_listed(listed, node, place_of(node));
-    ++outcomes;
-  }
-  settle(run, outcomes);
+  const proto::ListIds ids(run.bytes + proto::kHeaderSize, header.dst);
+  Run frame = run.share();
+  static_cast<void>(frame.take_front({0, list_frame_offset(ids.size())}));
+  const proto::FrameHeader without_ids = frame.header();
+  deliveries_ += ids.size();
+  for (std::uint32_t i = 0; i < ids.size(); ++i)
+    to_listed(frame, without_ids, ids[i], place_of(ids[i]));
+  settle(run, ids.size());
 }
 
-/// To one recipient of the frame, here or nowhere.
-inline void Router::to_listed(Listed& listed, NodeId node, const NodePlace& place) {
+/// To one recipient of a LIST frame, here or nowhere.
+inline void Router::to_listed(const Run& frame, const proto::FrameHeader& header, NodeId node,
+                              const NodePlace& place) {
   const bool here = place.exists() && place.shard == fanout_.self();
   Recipient* recipient = here ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
-  if (recipient == nullptr) {
-    return drop_listed(listed, 1,
-                       place.exists() ? proto::DropReason::no_such_node : why_absent(node));
-  }
-  if (listed.shared.frames == 0)
-    listed.shared = fanout_.cut_ids(listed.run, listed.local, listed.list.bytes());
-  fanout_.deliver(*recipient, listed.shared, listed.local, Handover{.fan_out = true});
-}
-
-void Router::drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason) {
-  const SharedList::FrameStart start = listed.list.as_sent(listed.run.bytes, hub_);
-  fanout_.context().drops.drop(start.data(), outcomes, reason);
+  if (recipient == nullptr)
+    return drop(frame, place.exists() ? proto::DropReason::no_such_node : why_absent(node));
+  fanout_.deliver(*recipient, frame, header, Handover{.fan_out = true});
 }
 
 void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival) {

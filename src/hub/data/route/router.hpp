@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "base/endian.hpp"
 #include "base/ids.hpp"
@@ -31,7 +32,10 @@ class Router {
         groups_(parts.groups),
         fanout_(parts.fanout),
         pacer_(parts.pacer),
-        retained_(parts.retained) {}
+        retained_(parts.retained),
+        listed_(parts.fanout.shards()) {
+    for (auto& ids : listed_) ids.reserve(proto::kListRecipientsMax);
+  }
 
   /// The usual case of small messages, made short: to a node here that got some with the same
   /// header in this turn. False: nothing was done, route() them. REQUIRES: as route().
@@ -94,11 +98,10 @@ class Router {
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
                                        Arrival arrival, const MemberList<PacedMember>& here);
   void to_provider(const Run& run, const proto::FrameHeader& header, Arrival arrival);
-  void to_list(const Run& run, const proto::FrameHeader& header, Arrival arrival);
+  void to_list(const Run& run, const proto::FrameHeader& header);
   void to_listed_here(const Run& run, const proto::FrameHeader& header);
-  struct Listed;
-  void to_listed(Listed& listed, NodeId node, const NodePlace& place);
-  void drop_listed(const Listed& listed, std::uint32_t outcomes, proto::DropReason reason);
+  void to_listed(const Run& frame, const proto::FrameHeader& header, NodeId node,
+                 const NodePlace& place);
   void to_everybody(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   /// deliveries: at each of them.
   void to_other_shards(const Run& run, std::uint64_t shards, std::size_t deliveries,
@@ -117,6 +120,7 @@ class Router {
   Pacer& pacer_;
   RetainedMessages& retained_;
   RecentRecipients recent_;
+  std::vector<std::vector<NodeId>> listed_;  ///< of the present LIST, by shard; else empty
   std::uint64_t deliveries_ = 0;
 };
 

@@ -1,6 +1,6 @@
 #include "hub/data/route/shard_recipients.hpp"
 
-#include "hub/data/route/shared_list.hpp"
+#include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
 
@@ -10,7 +10,7 @@ std::uint32_t ShardRecipients::count(ShardIndex shard, const std::byte* frame) c
     case proto::Kind::group:
       return count_members(shard, GroupId{header.dst});
     case proto::Kind::list:
-      return SharedList::unpack(header.dst).count_of(shard, frame + proto::kHeaderSize, hub_);
+      return header.dst;  // each shard gets the ids of its own nodes
     case proto::Kind::broadcast:
       return nodes_.nodes_on(shard);  // its sender lives where it was taken in
     default:

@@ -12,18 +12,15 @@ namespace gimnet::hub {
 /// never gets it. Thread safety: one shard; the tables are published by the conductor.
 class ShardRecipients {
  public:
-  ShardRecipients(HubId hub, const NodeTable& nodes, const GroupTable& groups)
-      : hub_(hub), nodes_(nodes), groups_(groups) {}
+  ShardRecipients(const NodeTable& nodes, const GroupTable& groups)
+      : nodes_(nodes), groups_(groups) {}
 
-  /// REQUIRES: a whole frame that the router handed over to that shard (of LIST: a SharedList).
+  /// REQUIRES: a whole frame that the router handed over to that shard.
   [[nodiscard]] std::uint32_t count(ShardIndex shard, const std::byte* frame) const;
-
-  [[nodiscard]] HubId hub() const { return hub_; }
 
  private:
   [[nodiscard]] std::uint32_t count_members(ShardIndex shard, GroupId group) const;
 
-  const HubId hub_;
   const NodeTable& nodes_;
   const GroupTable& groups_;
 };

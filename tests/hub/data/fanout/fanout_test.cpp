@@ -130,7 +130,7 @@ TEST(Fanout, AFullMailboxDropsWhatMayBeDropped) {
   EXPECT_EQ(rig.fanout.crowded(), 0u);
 }
 
-TEST(Fanout, CutsIdsIntoOneCopyForAll) {
+TEST(Fanout, CopiesAListWithoutItsIds) {
   RouteRig rig;
   proto::FrameHeader header;
   header.kind = proto::Kind::list;
@@ -138,11 +138,17 @@ TEST(Fanout, CutsIdsIntoOneCopyForAll) {
   const hub::Run frame = rig.egress.run({"idididid"
                                          "payload"},
                                         {.kind = proto::Kind::list});
-  const hub::Run first = rig.fanout.cut_ids(frame, header, 8);
+  const hub::Run first = rig.fanout.copy_without_ids(frame, header);
   EXPECT_EQ(first.size, proto::kHeaderSize + 7);
   EXPECT_EQ(std::memcmp(first.bytes + proto::kHeaderSize, "payload", 7), 0);
-  const hub::Run second = rig.fanout.cut_ids(frame, header, 8);
+  const NodeId ids[] = {NodeId{1}, NodeId{2}, NodeId{3}};
+  const hub::Run second = rig.fanout.copy_for(ids, frame, header);
   EXPECT_EQ(second.bytes, first.bytes + first.size) << "behind what is still kept";
+  EXPECT_EQ(second.header().dst, 3u);
+  EXPECT_EQ(second.header().frame_size(), second.size);
+  EXPECT_EQ(second.size, list_frame_offset(3) + first.size);
+  EXPECT_EQ(proto::ListIds(second.bytes + proto::kHeaderSize, 3)[2], NodeId{3});
+  EXPECT_EQ(std::memcmp(second.bytes + list_frame_offset(3), first.bytes, first.size), 0);
 }
 
 TEST(Fanout, DropsSinglyWhatIsTooLarge) {

@@ -278,76 +278,86 @@ TEST_F(RouterTest, LeavesWhatWasHandedOverBeyondItsEnd) {
   EXPECT_EQ(rig.egress.tally.queued, 14);
 }
 
-TEST_F(RouterTest, OfAListEachShardCountsWhatWasLeftToIt) {
-  Recipient& a = rig.add_here(2);
-  rig.add_here(3);
-  rig.add_there(4);
-  std::string ids(12, '\0');
-  const std::uint32_t all[] = {kHub | 2, kHub | 3, kHub | 4};
-  std::memcpy(ids.data(), all, sizeof all);
-  // Shard 0 takes the frame in, and what it hands over comes back to it as if it were shard 1,
-  // where one has left and another has come.
-  const hub::Run taken_in = rig.make_run(3, {ids + "payload"}, {.kind = Kind::list});
-  rig.nodes.publish(2, {ShardIndex{1}, ConnectionSlot{2}, 2});
-  rig.nodes.publish(3, {ShardIndex{1}, ConnectionSlot{3}, 3});
-  rig.router.route(taken_in, taken_in.header(), taken_in.size);
-  EXPECT_EQ(rig.egress.tally.copies, 0u) << "three for another shard are one there";
-  std::byte* const marks = const_cast<std::byte*>(taken_in.bytes) + proto::kHeaderSize;
-  for (std::size_t i = 0; i < 2; ++i) {
-    std::byte* const mark = marks + 4 * i;
-    store_le(mark, load_le<std::uint32_t>(mark) - (1u << kIndexBits));  // for shard 0
-  }
-  rig.nodes.publish(2, {ShardIndex{0}, ConnectionSlot{2}, 2});
-  rig.nodes.publish(3, {});
-  rig.nodes.publish(4, {ShardIndex{0}, ConnectionSlot{4}, 4});
-  rig.egress.tally.queued += 1;
-  rig.egress.accepted += 1;
-  EXPECT_EQ(rig.router.route_handed_over(taken_in, 65'536, kNoEnd).frames, 0u);
-  EXPECT_EQ(a.outbox.lane(1).front().run.header().length, 7u);
-  EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
-  EXPECT_EQ(rig.egress.tally.copies, 1u) << "the one on shard 1 is not counted here";
-  rig.fanout.post_all();
+std::string with_ids(const std::vector<std::uint32_t>& ids, const std::string& payload) {
+  std::string all(4 * ids.size(), '\0');
+  std::memcpy(all.data(), ids.data(), all.size());
+  return all + payload;
 }
 
-TEST_F(RouterTest, ReportsAListAsItWasSent) {
+/// This shard takes the mail for the other one, as if it were that.
+std::uint64_t take_back_mail(RouteRig& rig) {
+  std::uint64_t frames = 0;
+  rig.mailbox_there.drain(
+      1'000, [] {},
+      [&](const Mail& mail) {
+        const hub::Run run{rig.egress.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames};
+        frames += mail.frames;
+        EXPECT_EQ(rig.router.route_handed_over(run, 65'536, kNoEnd).frames, 0u);
+      });
+  return frames;
+}
+
+TEST_F(RouterTest, OfAListEachShardCountsItsIds) {
   Recipient& a = rig.add_here(2);
+  Recipient& b = rig.add_here(4);
+  rig.add_there(2);
   rig.add_there(3);
-  std::string ids(16, '\0');
-  const std::uint32_t all[] = {6u << 20 | 2, kHub | 2, kHub | 3, kHub | 4};
-  std::memcpy(ids.data(), all, sizeof all);
-  const auto expect_reports = [&](int expected) {
-    int reports = 0;
-    rig.egress.drops.flush(1'000, [&](NodeId sender, std::span<const std::byte> payload) {
-      const auto report = proto::decode_report(payload);
-      ASSERT_TRUE(report);
-      ++reports;
-      EXPECT_EQ(sender, NodeId{kHub | 1});
-      EXPECT_EQ(report->count, 1u);
-      EXPECT_EQ(report->header.dst, 4u);
-      EXPECT_EQ(report->header.length, 16u + 7u);
-      EXPECT_EQ(std::memcmp(report->following.data(), ids.data(), ids.size()), 0);
-    });
-    EXPECT_EQ(reports, expected);
-    rig.egress.drops.flush(2'000, [](NodeId, std::span<const std::byte>) {});
-  };
-  const hub::Run run =
-      rig.make_run(4, {ids + "payload"}, {.kind = Kind::list, .flags = proto::kFlagReport});
-  rig.router.route(run, run.header(), run.size);
-  rig.fanout.post_all();
-  EXPECT_EQ(dropped(DropReason::no_route), 1u);
+  rig.route(3, {with_ids({kHub | 2, kHub | 3, kHub | 4}, "payload")}, {.kind = Kind::list});
+  EXPECT_EQ(b.outbox.lane(1).front().run.header().length, 7u);
+  EXPECT_EQ(rig.egress.tally.copies, 1u) << "two for another shard are one there";
+  // Until it looks one of them has left.
+  rig.nodes.publish(2, {ShardIndex{0}, a.slot, a.generation});
+  rig.nodes.publish(3, {});
+  EXPECT_EQ(take_back_mail(rig), 1u);
+  EXPECT_EQ(a.outbox.lane(1).front().run.header().dst, 0u);
+  EXPECT_EQ(a.outbox.lane(1).front().run.size, proto::kHeaderSize + 7u);
+  EXPECT_EQ(b.outbox.lane(1).front().frames, 1u) << "once";
   EXPECT_EQ(dropped(DropReason::no_such_node), 1u);
-  expect_reports(2);
-  // The same bytes as the other shard gets them, if that were this one and the node had left.
-  std::byte* const mark = const_cast<std::byte*>(run.bytes) + proto::kHeaderSize + 8;
-  ASSERT_NE(load_le<std::uint32_t>(mark), kHub | 3);
-  store_le(mark, load_le<std::uint32_t>(mark) - (1u << kIndexBits));
-  rig.egress.tally.queued += 1;
-  rig.egress.accepted += 1;
-  EXPECT_EQ(rig.router.route_handed_over(run, 65'536, kNoEnd).frames, 0u);
+  EXPECT_EQ(rig.egress.tally.copies, 2u);
+  EXPECT_TRUE(rig.ledger_exact());
+  // The next one has none of these ids.
+  rig.add_there(5);
+  rig.route(1, {with_ids({kHub | 5}, "next")}, {.kind = Kind::list});
+  rig.nodes.publish(5, {});
+  EXPECT_EQ(take_back_mail(rig), 1u);
   EXPECT_EQ(dropped(DropReason::no_such_node), 2u);
-  expect_reports(1);
-  EXPECT_EQ(a.outbox.lane(1).front().run.size, proto::kHeaderSize + 7u) << "once";
-  EXPECT_THAT(rig.take_mail(), ElementsAre(1u));
+  EXPECT_EQ(a.outbox.lane(1).front().frames, 1u);
+}
+
+TEST_F(RouterTest, AListOfTheLargestFrameIsHandedOver) {
+  const auto length = static_cast<std::uint32_t>(rig.egress.limits.frame_bytes);
+  Recipient& a = rig.add_here(2);
+  rig.add_there(2);
+  rig.route(1, {with_ids({kHub | 2}, std::string(length - 4, 'x'))}, {.kind = Kind::list});
+  rig.nodes.publish(2, {ShardIndex{0}, a.slot, a.generation});
+  rig.mailbox_there.drain(
+      1'000, [] {},
+      [&](const Mail& mail) {
+        const hub::Run run{rig.egress.pool.adopt(mail.lent), mail.bytes, mail.size, mail.frames};
+        EXPECT_EQ(rig.router.route_handed_over(run, length, kNoEnd).frames, 0u);
+      });
+  EXPECT_EQ(a.outbox.lane(1).front().run.header().length, length - 4);
+}
+
+TEST_F(RouterTest, ReportsAListWithoutItsIds) {
+  rig.add_there(3);
+  rig.route(4, {with_ids({6u << 20 | 2, kHub | 2, kHub | 3, kHub | 4}, "payload")},
+            {.kind = Kind::list, .flags = proto::kFlagReport});
+  rig.nodes.publish(3, {});
+  EXPECT_EQ(take_back_mail(rig), 1u);
+  std::uint32_t lost = 0;
+  rig.egress.drops.flush(1'000, [&](NodeId sender, std::span<const std::byte> payload) {
+    const auto report = proto::decode_report(payload);
+    ASSERT_TRUE(report);
+    lost += report->count;
+    EXPECT_EQ(sender, NodeId{kHub | 1});
+    EXPECT_EQ(report->header.dst, 0u);
+    EXPECT_EQ(report->header.length, 7u);
+    EXPECT_EQ(std::memcmp(report->following.data(), "payload", 7), 0);
+  });
+  EXPECT_EQ(lost, 4u);
+  EXPECT_EQ(dropped(DropReason::no_route), 1u);
+  EXPECT_EQ(dropped(DropReason::no_such_node), 3u);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ class RouteRig {
         mailbox_here(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         mailbox_there(2, {limits.mailbox_entries, limits.mailbox_bytes}, waker),
         fanout(ShardIndex{0}, {&mailbox_here, &mailbox_there}, recipients, egress.context,
-               {HubId{7}, nodes, groups}),
+               {nodes, groups}),
         pacer(fanout),
         retained(groups, fanout, pacer, retained_budget),
         router(HubId{7}, {nodes, groups, fanout, pacer, retained}) {}
