@@ -29,6 +29,7 @@ void Attacher::attach(AttachCommand command) {
   connection.transport->limit_unsent(connection.unsent_limit);
   connection.attachment = command.attachment;
   connection.connected = true;
+  connection.write = WriteState::open;
   connection.frame_bytes = command.peer_frame_bytes;
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
   connection.tail_since_ms = 0;
@@ -39,7 +40,8 @@ void Attacher::attach(AttachCommand command) {
   state_.counters.connections.add(1);
   const std::uint64_t gap = settle_counts(connection, command);
   if (connection.holds != 0) state_.signals.watch_unread(connection);
-  connection.armed = Interest{.read = connection.holds == 0, .write = false};
+  connection.armed =
+      interest_of(connection.gate, connection.write, false, connection.transport->pending_out());
   const int descriptor = connection.transport->descriptor();
   if (descriptor >= 0 && !state_.poller.add(descriptor, connection.token(), connection.armed)) {
     // GOODBYE stands behind the opening, as WELCOME would.
@@ -68,6 +70,7 @@ void Attacher::renumber(Connection& connection, NodeId node) {
   // Outboxes release whom they held by the id that they knew, which leads to nobody now. They hold
   // the new one anew.
   connection.holds = 0;
+  connection.gate.clear(ReadGate::held);
   state_.signals.arm(connection);
 }
 

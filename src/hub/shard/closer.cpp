@@ -59,7 +59,7 @@ void Closer::give_up_rest(Connection& connection) {
   const std::byte* next = connection.tail.buffer->data + connection.tail.begin;
   const std::byte* const end = next + connection.tail.size;
   // Its sender keeps what was not confirmed, or sees that the hub ends.
-  const bool senders = connection.resume != nullptr || connection.draining;
+  const bool senders = connection.resume != nullptr || connection.gate.has(ReadGate::draining);
   while (next != end) {
     proto::NextRun found =
         proto::next_run(next, end, static_cast<std::uint32_t>(state_.limits.frame_bytes));
@@ -79,25 +79,25 @@ void Closer::give_up_rest(Connection& connection) {
 }
 
 void Closer::detach(Connection& connection, bool said_goodbye) {
-  if (connection.tail.rest) give_up_rest(connection);
+  if (connection.gate.has(ReadGate::rest)) give_up_rest(connection);
   std::unique_ptr<net::Stream> transport = std::move(connection.transport);
   if (transport->descriptor() >= 0) {
     state_.poller.remove(transport->descriptor());
     if (said_goodbye) state_.tell_conductor({state_.self, FarewellEvent{std::move(transport)}});
   }
   connection.connected = false;
-  connection.blocked = false;
-  connection.write_failed = false;
+  connection.write = WriteState::gone;
   connection.missed_resume = false;
   connection.must_confirm = false;
-  connection.draining = false;
+  connection.gate.clear(ReadGate::draining);
+  connection.gate.clear(ReadGate::rest);
   connection.armed = Interest{};
   connection.requests = 0;
   connection.progress.reset();
   state_.readings.erase(connection.slot.value());
   state_.receive_buffer.forget(connection.tail);
-  if (connection.waits_for_room) {
-    connection.waits_for_room = false;
+  if (connection.gate.has(ReadGate::no_room)) {
+    connection.gate.clear(ReadGate::no_room);
     std::erase(state_.waiting_for_room, &connection);
   }
   state_.counters.connections.subtract(1);

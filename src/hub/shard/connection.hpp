@@ -12,6 +12,7 @@
 #include "hub/data/ingress/receive_buffer.hpp"
 #include "hub/shard/backoff.hpp"
 #include "hub/shard/commands.hpp"
+#include "hub/shard/connection_state.hpp"
 #include "hub/shard/poller.hpp"
 #include "net/stream.hpp"
 
@@ -52,17 +53,14 @@ struct Progress {
 /// is lost between them. Thread safety: one shard.
 struct Connection : Recipient {
   Interest armed;
-  bool blocked = false;  ///< the transport took less than was offered: wait for it
-  bool write_failed =
-      false;  ///< takes nothing any more: read to its end, which tells that it broke
-  bool waits_for_room = false;  ///< not read: a shard that it sends to has too much to do
+  ReadGate gate;
+  WriteState write = WriteState::gone;
   bool must_confirm = false;  ///< nothing more can be written before its CONFIRM: read even if held
   bool gauged = false;        ///< its queue gauge is not 0
   bool missed_resume = false;  ///< RESUME had no place: it would stay paused for ever
-  bool draining = false;       ///< closes once everything is written
   Backoff read_again;          ///< of reading it twice in a turn
   std::uint32_t attachment = 0;
-  std::uint32_t holds = 0;     ///< by outboxes; not read while it is not 0
+  std::uint32_t holds = 0;     ///< by outboxes
   std::uint32_t requests = 0;  ///< that are unanswered
   std::uint32_t ping_sequence = 0;
   std::uint32_t unsent_limit = 0;            ///< of the transport; 0: not limited

@@ -42,7 +42,7 @@ bool Flusher::flush_dirty() {
 }
 
 void Flusher::flush(Connection& connection) {
-  if (!connection.connected || connection.blocked) return let_wait(connection);
+  if (connection.write != WriteState::open) return let_wait(connection);
   if (connection.outbox.has_untold_losses()) tell_losses(connection);
   const std::uint64_t sent_before = state_.tally.sent_bytes;
   const std::uint64_t control_before = state_.tally.sent_control_bytes;
@@ -102,13 +102,13 @@ void Flusher::on_emptied(Connection& connection) {
   connection.outbox.on_emptied(state_.egress);
   connection.outbox.signal_room(state_.egress);
   if (std::exchange(connection.gauged, false)) state_.sessions.set_queued(connection.slot, 0);
-  if (connection.draining && state_.nothing_follows) {
+  if (connection.gate.has(ReadGate::draining) && state_.nothing_follows) {
     closer_.close(connection, proto::GoodbyeCode::draining, "the hub is shutting down");
   }
 }
 
 void Flusher::on_blocked(Connection& connection) {
-  connection.blocked = true;
+  connection.write = WriteState::blocked;
   state_.signals.arm(connection);
   watch(connection);
 }
@@ -117,9 +117,10 @@ void Flusher::on_blocked(Connection& connection) {
 /// them, said GOODBYE and left, and those of a sender that is not read because of BLOCK, which
 /// promises that nothing is lost.
 void Flusher::on_write_failed(Connection& connection) {
-  if (connection.draining) return closer_.on_broken(connection);  // it is read no more
+  if (connection.gate.has(ReadGate::draining))
+    return closer_.on_broken(connection);  // it is read no more
   let_wait(connection);
-  connection.write_failed = connection.blocked = true;
+  connection.write = WriteState::failed;
   connection.on_read_again(state_.now_ms);
   state_.signals.arm(connection);
   watch(connection);
@@ -152,8 +153,7 @@ void Flusher::tell_losses(Connection& connection) {
 }
 
 void Flusher::on_writable(Connection& connection) {
-  if (connection.write_failed) return;
-  connection.blocked = false;
+  connection.write = WriteState::open;
   state_.signals.arm(connection);
   state_.recipients.mark_dirty(connection);
 }
@@ -162,7 +162,7 @@ void Flusher::look_after(Connection& connection) {
   if (!connection.connected || !connection.progress) return;
   // Nobody is slow whom nothing reaches any more: what waits for it waits as it will while it is
   // away.
-  if (connection.write_failed && connection.waits_when_away) return;
+  if (connection.write == WriteState::failed && connection.waits_when_away) return;
   Progress& progress = *connection.progress;
   // Where messages were dropped because it took nothing, an empty queue does not say that it has
   // caught up.
@@ -192,7 +192,7 @@ void Flusher::look_after(Connection& connection) {
   if (taken - progress.taken_bytes >= state_.limits.slow_consumer_bytes || nothing_waits) {
     progress.taken_bytes = taken;
     progress.since_ms = state_.now_ms;
-  } else if (!connection.write_failed &&
+  } else if (connection.write != WriteState::failed &&
              state_.now_ms - progress.since_ms >= state_.limits.slow_consumer_ms) {
     state_.counters.slow_consumers.add(1);
     closer_.close(connection, proto::GoodbyeCode::slow_consumer,

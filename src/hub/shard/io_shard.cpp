@@ -181,7 +181,8 @@ void IoShard::serve(std::span<const Ready> ready) {
     }
     Connection* connection = state_.find_token(each.token);
     if (connection == nullptr) continue;
-    if (each.writable && connection->blocked) flusher_.on_writable(*connection);
+    if (each.writable && connection->write == WriteState::blocked)
+      flusher_.on_writable(*connection);
     if (each.readable && connection->armed.read) reader_.read(*connection);
     if (state_.tally.received_bytes - flushed_at >= kReadBytesPerFlush) {
       flush();
@@ -194,7 +195,7 @@ void IoShard::serve(std::span<const Ready> ready) {
 void IoShard::go_on() {
   for (const std::uint64_t token : going_on_) {
     Connection* connection = state_.find_token(token);
-    if (connection == nullptr || !connection->tail.rest) continue;
+    if (connection == nullptr || !connection->gate.has(ReadGate::rest)) continue;
     if (connection->armed.read) {
       reader_.go_on(*connection);
     } else {
@@ -210,7 +211,7 @@ void IoShard::read_waiting() {
   // Each waits for those shards only to which it sends.
   std::erase_if(state_.waiting_for_room, [this](Connection* connection) {
     if ((connection->posted_shards & state_.fanout.crowded()) != 0) return false;
-    connection->waits_for_room = false;
+    connection->gate.clear(ReadGate::no_room);
     connection->on_read_again(state_.now_ms);
     state_.signals.arm(*connection);
     return true;

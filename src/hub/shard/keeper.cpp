@@ -46,7 +46,7 @@ bool Keeper::is_silent(Connection& connection) {
   // What it said may lie unread: the hub stood still, the wait for who is ready was interrupted, or
   // more were ready than are told at a time.
   reader_.read(connection);
-  return connection.connected && !connection.waits_for_room && over();
+  return connection.connected && !connection.gate.has(ReadGate::no_room) && over();
 }
 
 std::uint64_t Keeper::next_tick_at_ms() const {
@@ -69,14 +69,13 @@ void Keeper::look_at(Connection& connection) {
   }
   // What a peer sent before it was gone waits for who holds it, but no longer than its session
   // would wait for the peer: it may be held by what waits for itself, and would be for ever.
-  if (connection.write_failed &&
+  if (connection.write == WriteState::failed &&
       state_.now_ms - connection.last_heard_ms >= std::max(limits.grace_ms, limits.silent_ms)) {
     return closer_.on_broken(connection);
   }
-  const bool read = connection.holds == 0 && !connection.waits_for_room && !connection.tail.rest;
-  const bool heard = read && !connection.draining;
+  const bool heard = connection.gate.is_open();
   if (heard && is_silent(connection)) {
-    if (connection.write_failed) return closer_.on_broken(connection);
+    if (connection.write == WriteState::failed) return closer_.on_broken(connection);
     state_.counters.silent.add(1);
     return closer_.close(connection, proto::GoodbyeCode::silent,
                          "nothing was heard for " + std::to_string(limits.silent_ms) + " ms");
@@ -95,7 +94,7 @@ void Keeper::look_at(Connection& connection) {
     connection.last_sent_ms = state_.now_ms;
     connection.outbox.trim();
     if (connection.resume) connection.resume->kept.trim();
-    if (!connection.blocked) say_ping(connection);
+    if (connection.write == WriteState::open) say_ping(connection);
     if (!connection.connected) return;
     if (connection.resume) send_confirm(state_, connection);
   }
@@ -115,11 +114,11 @@ void Keeper::drain(std::uint64_t deadline_ms) {
   next_tick_at_ms_ = state_.now_ms;
   for (const std::unique_ptr<Connection>& connection : state_.connections) {
     if (connection == nullptr || !connection->connected) continue;
-    if (connection->write_failed) {
+    if (connection->write == WriteState::failed) {
       closer_.on_broken(*connection);
       continue;
     }
-    connection->draining = true;
+    connection->gate.shut(ReadGate::draining);
     state_.signals.arm(*connection);
   }
   state_.fanout.post_last();

@@ -48,7 +48,7 @@ std::uint64_t Reader::share() const {
 
 void Reader::read(Connection& connection) {
   state_.egress.owner.check_here();
-  if (connection.tail.rest) return;
+  if (connection.gate.has(ReadGate::rest)) return;
   std::uint64_t most =
       state_.receive_buffer.many_rests() ? kFirstReadBytes : state_.limits.turn_bytes;
   if ((connection.posted_shards & state_.fanout.crowded()) != 0) {
@@ -63,7 +63,7 @@ void Reader::read(Connection& connection) {
   state_.tally.received_bytes += result.bytes;
   connection.outbox.counters()->received_bytes.add(result.bytes);
   // A peer that takes nothing may go on sending for ever: that does not count as a sign of life.
-  if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
+  if (connection.write != WriteState::failed) connection.last_heard_ms = state_.now_ms;
   route_all(connection, state_.receive_buffer.commit(connection.tail, result.bytes));
 }
 
@@ -73,13 +73,14 @@ void Reader::go_on(Connection& connection) {
     return wait_for_room(connection);
   }
   // It may have said more, which is not read before this is done.
-  if (!connection.write_failed) connection.last_heard_ms = state_.now_ms;
+  if (connection.write != WriteState::failed) connection.last_heard_ms = state_.now_ms;
+  connection.gate.clear(ReadGate::rest);
   route_all(connection, state_.receive_buffer.go_on(connection.tail));
 }
 
 void Reader::wait_for_room(Connection& connection) {
-  if (connection.waits_for_room) return;
-  connection.waits_for_room = true;
+  if (connection.gate.has(ReadGate::no_room)) return;
+  connection.gate.shut(ReadGate::no_room);
   state_.waiting_for_room.push_back(&connection);
   state_.signals.arm(connection);
 }
@@ -124,6 +125,7 @@ bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
 
 void Reader::keep_rest(Connection& connection, std::span<const std::byte> rest) {
   state_.receive_buffer.keep_rest(connection.tail, rest.data(), rest.data() + rest.size());
+  connection.gate.shut(ReadGate::rest);
   state_.with_rest.push_back(connection.token());
 }
 
@@ -145,10 +147,9 @@ Connection* Reader::begun_before(const Connection& connection) const {
   Connection* oldest = nullptr;
   std::uint64_t since_ms = connection.tail_since_ms;
   for (const std::unique_ptr<Connection>& each : state_.connections) {
-    if (each == nullptr || each->tail.empty() || each->tail.rest || each->tail_since_ms >= since_ms)
-      continue;
-    // Who is not read cannot end its frame.
-    if (each->holds != 0 || each->waits_for_room) continue;
+    if (each == nullptr || each->tail.empty() || each->tail_since_ms >= since_ms) continue;
+    // A connection that is not read cannot end its frame.
+    if (each->gate.has(ReadGate::held | ReadGate::no_room | ReadGate::rest)) continue;
     since_ms = each->tail_since_ms;
     oldest = each.get();
   }
@@ -160,7 +161,7 @@ bool Reader::handle_run(Connection& connection, proto::NextRun& found) {
   auto* bytes = const_cast<std::byte*>(view.bytes);  // ours until it is handed on
   const Admission admission = state_.gate.admit(connection.ingress, bytes, view, state_.now_ms);
   if (admission == Admission::data) {
-    if (connection.draining) {
+    if (connection.gate.has(ReadGate::draining)) {
       // Read for the CONFIRM behind it. All shards were told that nothing follows, and may have
       // closed whom it is for: it stays its sender's, like what is not read any more.
       state_.counters.untaken_frames.add(view.frames);
@@ -301,7 +302,7 @@ void Reader::on_confirm(Connection& connection, const proto::flow::Confirm& conf
 bool Reader::on_skip(Connection& connection, const proto::flow::Skip& skip) {
   if (!connection.resume || skip.count == proto::flow::kSkipUnknown) return true;
   // What stands before it may not have been taken, nor may it be confirmed with it.
-  if (connection.draining) return true;
+  if (connection.gate.has(ReadGate::draining)) return true;
   std::uint64_t& taken = connection.resume->taken;
   if (skip.count > UINT64_MAX - 1 - std::min(taken, UINT64_MAX - 1)) {
     return refuse(connection, proto::DropReason::malformed, proto::GoodbyeCode::malformed,

@@ -71,10 +71,14 @@ void Signals::apply_hold(NodeId node, bool hold) {
   Connection* connection = state_.find(node);
   if (connection == nullptr) return;
   if (hold) {
+    connection->gate.shut(ReadGate::held);
     if (++connection->holds == 1) watch_unread(*connection);
     state_.counters.held_reads.add(1);
   } else if (connection->holds != 0) {
-    if (--connection->holds == 0) watch_unread(*connection);
+    if (--connection->holds == 0) {
+      connection->gate.clear(ReadGate::held);
+      watch_unread(*connection);
+    }
     connection->on_read_again(state_.now_ms);
   }
   arm(*connection);
@@ -105,12 +109,8 @@ void Signals::send_reports() {
 
 void Signals::arm(Connection& connection) {
   if (!connection.connected) return;
-  // Its CONFIRM may lie behind the data for which it is held; two nodes that flood each other would
-  // wait for ever. And what waits for that could not be written before the hub ends.
-  const bool may_read = (connection.holds == 0 && !connection.draining) || connection.must_confirm;
-  const Interest wanted = net::interest_of(may_read && !connection.waits_for_room,
-                                           connection.blocked && !connection.write_failed,
-                                           connection.transport->pending_out());
+  const Interest wanted = interest_of(connection.gate, connection.write, connection.must_confirm,
+                                      connection.transport->pending_out());
   if (wanted == connection.armed) return;
   connection.armed = wanted;
   const int descriptor = connection.transport->descriptor();

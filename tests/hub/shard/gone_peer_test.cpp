@@ -301,7 +301,7 @@ TEST_P(GonePeer, BrokeNoFrameWhereTheHubEndsInTheMiddleOfOne) {
   vanish();
   rig_.now_ms += 1'100;
   turn();  // PING cannot be written
-  ASSERT_TRUE(rig_.state(0).find(sender_.id)->write_failed);
+  ASSERT_EQ(rig_.state(0).find(sender_.id)->write, WriteState::failed);
   rig_.command(0, DrainCommand{60'000});
   deliver(to);
   EXPECT_EQ(rig_.sum(&ShardCounters::connections), 0u);

@@ -367,7 +367,7 @@ TEST(TurnShare, WhoSendsMoreToAnotherShardThanItHandsOnIsReadLater) {
   }
   for (int i = 0; i < 10; ++i) rig.turn_shard(0);
   EXPECT_EQ(rig.ledger().accepted, 10u) << "half of eight shares, and what passes it";
-  EXPECT_TRUE(rig.connection(a)->waits_for_room);
+  EXPECT_TRUE(rig.connection(a)->gate.has(ReadGate::no_room));
   rig.settle();
   for (const FakeNode* member : members) EXPECT_THAT(member->frames, SizeIs(30));
 }

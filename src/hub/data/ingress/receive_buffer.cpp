@@ -83,7 +83,7 @@ bool ReceiveBuffer::keep(FrameTail& tail, const std::byte* begin, const std::byt
 
 void ReceiveBuffer::keep_rest(FrameTail& tail, const std::byte* begin, const std::byte* end) {
   tail.size = static_cast<std::uint32_t>(end - begin);
-  tail.rest = true;
+  tail.needed = 0;
   if (tail.size > kSharedChunkBytes) {
     tail.begin = static_cast<std::uint32_t>(begin - reading_->data);
     tail.buffer = reading_.share();
@@ -125,11 +125,11 @@ bool ReceiveBuffer::owns_slab(const FrameTail& tail) {
 }
 
 std::uint32_t ReceiveBuffer::cost(const FrameTail& tail) {
-  return tail.own || tail.rest ? tail.buffer->capacity : tail.size;
+  return tail.own || tail.is_rest() ? tail.buffer->capacity : tail.size;
 }
 
 void ReceiveBuffer::forget(FrameTail& tail) {
-  if (tail.rest) {
+  if (tail.is_rest()) {
     rest_bytes_ -= cost(tail);
     --rests_;
   } else if (!tail.empty()) {

@@ -16,11 +16,12 @@ struct FrameTail {
   BufferRef buffer;
   std::uint32_t begin = 0;
   std::uint32_t size = 0;
-  std::uint32_t needed = 0;  ///< bytes of the whole frame, as far as known
+  std::uint32_t needed = 0;  ///< bytes of the whole frame, as far as known; 0: it is a rest
   bool own = false;          ///< read on behind it: nobody else reads into that buffer
-  bool rest = false;         ///< begins with a whole frame; nothing is read before it was handed on
 
   [[nodiscard]] bool empty() const { return size == 0; }
+  /// It begins with a whole frame; nothing is read before it was handed on.
+  [[nodiscard]] bool is_rest() const { return size != 0 && needed == 0; }
 };
 
 /// Where the connections of a shard read into: one slab for all of them, rewound while nobody keeps
@@ -53,7 +54,7 @@ class ReceiveBuffer {
                           std::uint32_t needed);
   /// Instead: [begin, end) of buffer() begins with a whole frame, and is left for a later turn.
   void keep_rest(FrameTail& tail, const std::byte* begin, const std::byte* end);
-  /// That turn. REQUIRES: tail.rest. `tail` is empty then, as after commit().
+  /// That turn. REQUIRES: tail.is_rest(). `tail` is empty then, as after commit().
   [[nodiscard]] Received go_on(FrameTail& tail);
   /// Rests that are kept, and their bytes. A connection reads nothing while it has one, and little
   /// while they are more than kRestBytesMax, so that they are no more than that and a read each.
