@@ -111,8 +111,7 @@ Work router(std::uint32_t nodes) {
             for (std::uint32_t i = 0; i < kFramesPerTurn; ++i) {
               const hub::Run& run = routing->runs[i % kDestinations];
               // As the reader does it.
-              if (routing->rig.router.append(run.bytes, run.size, run.frames)) continue;
-              routing->rig.router.route(run, run.header(), run.size);
+              routing->rig.router.route(run.buffer, {run.bytes, run.size, run.frames, run.size});
             }
             routing->flush();
           }};

@@ -346,7 +346,7 @@ Work forwarding(std::size_t count) {
   return [world, count] {
     for (std::size_t i = 1; i <= count; ++i) {
       const hub::Run& run = world->runs[i % kDestinations];
-      world->rig.router.route(run, run.header(), run.size / run.frames);
+      world->rig.router.route(run.buffer, {run.bytes, run.size, run.frames, run.size});
       if (i % 800 != 0) continue;
       for (Recipient* recipient : world->rig.recipients.dirty()) {
         recipient->dirty = false;

@@ -61,8 +61,9 @@ struct Crowd {
   /// Seconds of one turn with one run.
   double turn(const std::vector<std::string>& texts) {
     const hub::Run run = rig.make_run(group().value(), texts, {.kind = Kind::group});
+    const std::uint32_t last_bytes = last_bytes_of(run);
     const double before = thread_seconds();
-    rig.router.route(run, run.header(), last_bytes_of(run));
+    rig.router.route(run.buffer, {run.bytes, run.size, run.frames, last_bytes});
     return thread_seconds() - before;
   }
 

@@ -12,7 +12,7 @@ from comments import comments_open_with_their_subject  # noqa: E402
 
 FILE_LINES_MAX = 400
 # Grew beyond it when the columns went from 120 to 100; each leaves the list with its next change.
-FILE_LINES_EXCUSED = ("include/gimnet/nif.h", "src/hub/data/fanout/pacer.cpp",
+FILE_LINES_EXCUSED = ("include/gimnet/nif.h",
                       "tests/client/gimi/service_table_moves_test.cpp", "tests/client/nif/declarations_test.cpp",
                       "tests/client/nif/outbound_send_test.cpp", "tests/hub/control/handle/administer_test.cpp",
                       "tests/hub/control/state/membership_test.cpp", "tests/hub/shard/reader_test.cpp",
@@ -46,6 +46,9 @@ MAY_INCLUDE = {
     "hub/observe/counters.cpp": _PROTO + ("hub/observe/counters.hpp",),
     "hub/concurrent": _CONCURRENT,
     "hub/data": _DATA,
+    "hub/data/tables": _CONCURRENT + ("hub/data/tables",),
+    "hub/data/fanout": _CONCURRENT + tuple(f"hub/data/{part}" for part in (
+        "tables", "egress", "fanout", "buffer.hpp", "budget.hpp", "ring_queue.hpp")),
     "hub/shard": _SHARD,
     "hub/crypto": _BASE + ("hub/crypto",),
     "hub/control/state": _PROTO + ("hub/limits.hpp", "hub/crypto", "hub/control/state"),

@@ -9,8 +9,8 @@
 
 #include "hub/concurrent/quiescence.hpp"
 #include "hub/control/state/membership.hpp"
-#include "hub/data/route/group_table.hpp"
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/group_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 
 namespace gimnet::hub {
 

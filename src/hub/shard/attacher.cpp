@@ -31,6 +31,7 @@ void Attacher::attach(AttachCommand command) {
   connection.connected = true;
   connection.write = WriteState::open;
   connection.frame_bytes = command.peer_frame_bytes;
+  state_.router.forget_flows();
   connection.last_heard_ms = connection.last_sent_ms = state_.now_ms;
   connection.tail_since_ms = 0;
   connection.ingress = IngressState{};

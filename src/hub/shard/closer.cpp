@@ -148,6 +148,7 @@ void Closer::release(SessionRef session) {
   state_.retained.forget_provider(connection->node);
   state_.sessions.set_queued(connection->slot, 0);
   state_.recipients.remove(*connection);
+  state_.router.forget_flows();
   state_.counters.sessions.subtract(1);
   state_.connections[session.slot.value()].reset();
 }

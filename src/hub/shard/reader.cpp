@@ -88,7 +88,7 @@ void Reader::wait_for_room(Connection& connection) {
 bool Reader::process(Connection& connection, ReceiveBuffer::Received received) {
   const auto length_max = static_cast<std::uint32_t>(state_.limits.frame_bytes);
   const std::byte* next = received.begin;
-  state_.router.begin_bytes();
+  state_.router.begin_bytes(connection.node);
   while (next != received.end) {
     const proto::RunView repeats = state_.router.append_repeats(next, received.end);
     if (repeats.frames != 0) {
@@ -207,11 +207,8 @@ bool Reader::refuse(Connection& connection, proto::DropReason reason, proto::Goo
 void Reader::route(Connection& connection, const proto::NextRun& found) {
   const proto::RunView& view = found.run;
   count(connection, view);
-  if (state_.router.append(view.bytes, view.size, view.frames)) return;
-  const proto::FrameHeader header = proto::load_header(view.bytes);
-  if (header.has(proto::kFlagExt)) stamp_arrival(view);
-  const Run run{state_.receive_buffer.buffer().share(), view.bytes, view.size, view.frames};
-  state_.router.route(run, header, view.last_bytes);
+  if (proto::load_header(view.bytes).has(proto::kFlagExt)) stamp_arrival(view);
+  state_.router.route(state_.receive_buffer.buffer(), view);
 }
 
 void Reader::count(Connection& connection, const proto::RunView& view) {

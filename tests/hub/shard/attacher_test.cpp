@@ -36,6 +36,33 @@ TEST(Attacher, WritesTheOpeningAndWelcome) {
   EXPECT_EQ(rig.sum(&ShardCounters::connections), 1u);
 }
 
+TEST(Attacher, ANewConnectionMayTakeLess) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  FakeNode& c = rig.join(0);
+  const auto send_in_turns = [&](std::size_t second_size) {
+    std::vector<std::byte> bytes;
+    for (const std::size_t size : {std::size_t{10}, second_size}) {
+      for (const FakeNode* to : {&b, &c}) {
+        const auto frame = HubRig::frame(a, to->id.value(), std::string(size, 'x'));
+        bytes.insert(bytes.end(), frame.begin(), frame.end());
+      }
+    }
+    rig.write(a, bytes);
+    rig.settle();
+  };
+  send_in_turns(200);
+  EXPECT_THAT(b.frames, SizeIs(2));
+  rig.rejoin(b, {.frame_bytes = 100});
+  rig.settle();
+  b.frames.clear();
+  send_in_turns(200);
+  EXPECT_THAT(b.frames, SizeIs(1));
+  EXPECT_THAT(c.frames, SizeIs(4));
+  EXPECT_EQ(rig.dropped(DropReason::too_large), 1u);
+}
+
 TEST(Attacher, OffersResumeWhereItIsAskedFor) {
   HubRig rig;
   FakeNode& a = rig.join(0, kResume);

@@ -216,6 +216,24 @@ TEST(Closer, ASlotIsReusedWithoutItsPast) {
   EXPECT_EQ(rig.dropped(DropReason::no_such_node), 1u);
 }
 
+// The table may name it a little longer.
+TEST(Closer, NothingIsSentToASessionThatIsOver) {
+  HubRig rig;
+  FakeNode& a = rig.join(0);
+  FakeNode& b = rig.join(0);
+  for (int i = 0; i < 2; ++i) {
+    rig.send(a, b.id.value(), "x");
+    rig.settle();
+  }
+  rig.command(0, ReleaseCommand{b.session});
+  rig.settle();
+  rig.send(a, b.id.value(), "x", {.flags = static_cast<std::uint8_t>(proto::Policy::drop)});
+  rig.send(a, b.id.value(), "x");
+  rig.settle();
+  EXPECT_EQ(rig.dropped(DropReason::no_such_node), 2u);
+  EXPECT_TRUE(rig.ledger().exact());
+}
+
 TEST(Closer, DeliversNothingOfAFrameThatIsCutAnywhere) {
   for (const bool broken : {false, true}) {
     for (std::size_t cut = 0; cut < proto::kHeaderSize + 8; ++cut) {

@@ -52,8 +52,7 @@ class Forwarding {
     next_ = (next_ + 1) % kBuffers;
     for (const std::byte* at = slab->data; at != end;) {
       const proto::RunView found = proto::next_run(at, end, proto::kFrameLengthDefault).run;
-      const hub::Run run{slab.share(), found.bytes, found.size, found.frames};
-      rig_.router.route(run, run.header(), run.size / run.frames);
+      rig_.router.route(slab, found);
       at += found.size;
     }
   }

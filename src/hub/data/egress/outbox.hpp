@@ -43,6 +43,10 @@ class Outbox {
     chunk_used_ += size;
     return true;
   }
+  /// Nothing is appended before the next push().
+  void close_run() {
+    if (lanes_) lanes_->open.close();
+  }
   /// Runs below this are cheaper to copy than to reference: up to a fifth of in_turns at 1 to 2
   /// KiB, and the same from there to 4 KiB (docs/why-these-figures.md;
   /// bench/hub/data/egress/outbox_bench.cpp).
@@ -202,9 +206,6 @@ class Outbox {
   [[nodiscard]] Lanes& lanes() {
     if (!lanes_) lanes_ = std::make_unique<Lanes>();
     return *lanes_;
-  }
-  void close_run() {
-    if (lanes_) lanes_->open.close();
   }
   /// More may be copied behind what was just put into the lane. REQUIRES: its last entry ends in
   /// the chunk.

@@ -7,7 +7,7 @@
 #include "hub/data/egress/egress_context.hpp"
 #include "hub/data/fanout/mailbox.hpp"
 #include "hub/data/fanout/recipient.hpp"
-#include "hub/data/route/shard_recipients.hpp"
+#include "hub/data/fanout/shard_recipients.hpp"
 
 namespace gimnet::hub {
 

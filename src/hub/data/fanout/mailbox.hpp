@@ -14,7 +14,7 @@
 #include "hub/concurrent/waker.hpp"
 #include "hub/data/buffer.hpp"
 #include "hub/data/ring_queue.hpp"
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 #include "hub/limits.hpp"
 
 namespace gimnet::hub {

@@ -8,7 +8,7 @@
 #include "hub/data/budget.hpp"
 #include "hub/data/egress/kept_message.hpp"
 #include "hub/data/fanout/pacer.hpp"
-#include "hub/data/route/group_table.hpp"
+#include "hub/data/tables/group_table.hpp"
 #include "proto/frame/frame_parser.hpp"
 
 namespace gimnet::hub {

@@ -43,8 +43,8 @@ Admission IngressGate::look_at(IngressState& state, std::byte* run, proto::RunVi
   if (attributes != state.admitted_attributes || header.src != state.node.value()) {
     if (const Admission refused = check(state, header, view); refused != Admission::data)
       return refused;
-    const bool plain = proto::may_form_run(header) && !header.has(proto::kFlagKeyed);
-    state.admitted_attributes = plain ? attributes : IngressState::kNoneAdmitted;
+    if (proto::may_form_run(header) && !header.has(proto::kFlagKeyed))
+      state.admitted_attributes = attributes;
   }
   if (header.lane == static_cast<std::uint8_t>(proto::Lane::real_time))
     limit_lane0(state, run, view, now_ms);

@@ -25,12 +25,12 @@ enum class Admission : std::uint8_t {
 
 /// What the gate remembers of one connection. Thread safety: one shard.
 struct IngressState {
-  /// Equal to no frame's attributes, which are 32 bits.
-  static constexpr std::uint64_t kNoneAdmitted = ~std::uint64_t{0};
+  /// Of a plain UNICAST frame in lane 1, which is always legal.
+  static constexpr std::uint32_t kPlainUnicast = 1u << 24;
 
   NodeId node;
-  std::uint64_t admitted_attributes =
-      kNoneAdmitted;              ///< kind, flags, hops and lane of the last plain data run
+  /// Kind, flags, hops and lane of the last legal run of plain data.
+  std::uint32_t admitted_attributes = kPlainUnicast;
   std::uint64_t lane0_bytes = 0;  ///< since lane0_since_ms
   std::uint64_t lane0_since_ms = 0;
   std::uint64_t demoted_until_ms = 0;

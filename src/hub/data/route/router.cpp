@@ -36,7 +36,7 @@ void Router::dispatch(const Run& run, const proto::FrameHeader& header, Arrival 
     case proto::Kind::group:
       return to_group(run, header, arrival);
     case proto::Kind::list:
-      return arrival.handed_over ? to_listed_here(run, header) : to_list(run, header);
+      return arrival.handed_over() ? to_listed_here(run, header) : to_list(run, header);
     case proto::Kind::broadcast:
       return to_everybody(run, header, arrival);
     case proto::Kind::service:
@@ -52,7 +52,7 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max,
   const std::byte* next = frames.bytes;
   const std::byte* const end = frames.bytes + frames.size;
   std::uint32_t left = frames.frames;
-  begin_bytes();
+  begin_bytes(NodeId{});
   while (true) {
     const proto::RunView repeats = append_repeats(next, end);
     next += repeats.size;
@@ -68,22 +68,20 @@ Run Router::route_handed_over(const Run& frames, std::uint32_t length_max,
     next += found.run.size;
     left -= found.run.frames;
     fanout_.context().tally.queued -= found.run.frames;
-    if (append(found.run.bytes, found.run.size, found.run.frames)) continue;
-    const Run run{frames.buffer.share(), found.run.bytes, found.run.size, found.run.frames};
-    dispatch(run, run.header(), {true, found.run.last_bytes});
+    route(frames.buffer, found.run, Origin::another_shard);
   }
 }
 
-inline void Router::to_place(const Run& run, const proto::FrameHeader& header,
-                             const NodePlace& place, Arrival arrival) {
-  if (place.shard != fanout_.self()) {
-    // A frame that was handed over here and would have to go on is for a node that left meanwhile.
-    if (arrival.handed_over) return drop(run, proto::DropReason::no_such_node);
-    return fanout_.hand_over(place.shard, run);
+inline Recipient* Router::find_here(const Run& run, const NodePlace& place, Arrival arrival) {
+  // A frame that was handed over here and would have to go on is for a node that left meanwhile.
+  const bool here = place.shard == fanout_.self();
+  if (!here && !arrival.handed_over()) {
+    fanout_.hand_over(place.shard, run);
+    return nullptr;
   }
-  Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
-  if (recipient == nullptr) return drop(run, proto::DropReason::no_such_node);
-  fanout_.deliver(*recipient, run, header, Handover{});
+  Recipient* recipient = here ? fanout_.recipients().find(place.slot, place.generation) : nullptr;
+  if (recipient == nullptr) drop(run, proto::DropReason::no_such_node);
+  return recipient;
 }
 
 void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId node,
@@ -91,7 +89,10 @@ void Router::to_node(const Run& run, const proto::FrameHeader& header, NodeId no
   if (hub_of(node) != hub_) return drop(run, proto::DropReason::no_route);
   const NodePlace place = nodes_.find(index_of(node));
   if (!place.exists()) return drop(run, why_absent(node));
-  to_place(run, header, place, arrival);
+  Recipient* recipient = find_here(run, place, arrival);
+  if (recipient == nullptr) return;
+  flows_.note(*recipient, run.bytes);
+  fanout_.deliver(*recipient, run, header, Handover{});
 }
 
 proto::DropReason Router::why_absent(NodeId node) const {
@@ -115,7 +116,7 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival 
   const GroupMembers* members = find_group(run, header);
   if (members == nullptr) return;
   // What was handed over was looked at by the shard that took it in.
-  if (!arrival.handed_over && members->provider != NodeId{header.src}) {
+  if (!arrival.handed_over() && members->provider != NodeId{header.src}) {
     return drop(
         run, members->ends() ? proto::DropReason::no_such_group : proto::DropReason::not_allowed);
   }
@@ -132,7 +133,7 @@ void Router::to_group(const Run& run, const proto::FrameHeader& header, Arrival 
   if (!members->paced_by_shard.empty()) {
     outcomes += to_paced(run, header, arrival, members->paced_by_shard[fanout_.self().value()]);
   }
-  if (!arrival.handed_over) {
+  if (!arrival.handed_over()) {
     outcomes += to_members_elsewhere(run, *members);
     if (members->retain) retained_.keep(run, header, arrival.last_bytes);
   }
@@ -189,7 +190,8 @@ void Router::to_provider(const Run& run, const proto::FrameHeader& header, Arriv
   if (members == nullptr) return;
   if (members->ends()) return drop(run, proto::DropReason::no_such_group);
   if (!members->accepts) return drop(run, proto::DropReason::not_allowed);
-  to_place(run, header, members->provider_place, arrival);
+  Recipient* recipient = find_here(run, members->provider_place, arrival);
+  if (recipient != nullptr) fanout_.deliver(*recipient, run, header, Handover{});
 }
 
 /// Each shard gets its own ids and the frame without ids: the tables may change until it looks, and
@@ -274,7 +276,7 @@ void Router::to_everybody(const Run& run, const proto::FrameHeader& header, Arri
     ++outcomes;
   }
   // Nodes are spread over the shards: there are about as many on each other one.
-  if (!arrival.handed_over) to_other_shards(run, nodes_.shards(), slots, outcomes);
+  if (!arrival.handed_over()) to_other_shards(run, nodes_.shards(), slots, outcomes);
   settle(run, outcomes);
 }
 

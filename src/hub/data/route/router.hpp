@@ -3,14 +3,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/endian.hpp"
 #include "base/ids.hpp"
 #include "hub/data/fanout/fanout.hpp"
 #include "hub/data/fanout/pacer.hpp"
 #include "hub/data/fanout/retained_messages.hpp"
-#include "hub/data/route/group_table.hpp"
-#include "hub/data/route/node_table.hpp"
-#include "hub/data/route/recent_recipients.hpp"
+#include "hub/data/route/flow_cache.hpp"
+#include "hub/data/tables/group_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 #include "proto/frame/frame_header.hpp"
 
 namespace gimnet::hub {
@@ -37,39 +36,22 @@ class Router {
     for (auto& ids : listed_) ids.reserve(proto::kListRecipientsMax);
   }
 
-  /// The usual case of small messages, made short: to a node here that got some with the same
-  /// header in this turn. False: nothing was done, route() them. REQUIRES: as route().
-  [[nodiscard]] bool append(const std::byte* frames, std::uint32_t size, std::uint32_t count) {
-    // Only of these is dst all that decides where they go.
-    if (static_cast<proto::Kind>(frames[proto::kKindOffset]) != proto::Kind::unicast) return false;
-    const NodeId node{load_le<std::uint32_t>(frames + proto::kDstOffset)};
-    if (hub_of(node) != hub_) return false;
-    const NodePlace place = nodes_.find(index_of(node));
-    if (place.shard != fanout_.self()) return false;
-    // No session has generation 0, so that nobody is found where none exists.
-    Recipient* recipient = fanout_.recipients().find(place.slot, place.generation);
-    if (recipient == nullptr || size - proto::kHeaderSize > recipient->frame_bytes) return false;
-    if (!recipient->outbox.append(frames, size, count)) return false;
-    fanout_.context().tally.queued += count;
-    fanout_.context().tally.copied_bytes += size;
-    recent_.note(*recipient, frames);
-    return true;
-  }
-
-  /// Other bytes are looked at from here on than before.
-  void begin_bytes() { recent_.forget(); }
-  /// Shorter still: frames from `begin` on that are like those that append() took from the same
-  /// bytes, to different nodes in turns. Returns what was done. REQUIRES: begin <= end;
+  /// Bytes of `source`'s connection are looked at from here on, or those that other shards handed
+  /// over (0).
+  void begin_bytes(NodeId source) { flows_.begin(source, nodes_.epoch()); }
+  /// The usual case of small messages, made short: frames from `begin` on that are like those
+  /// before them, to different nodes in turns. Returns what was done. REQUIRES: begin <= end;
   /// begin_bytes() was called for them.
   [[nodiscard]] proto::RunView append_repeats(const std::byte* begin, const std::byte* end) {
-    return recent_.append(begin, end, fanout_.context().tally);
+    return flows_.append(begin, end, fanout_.context().tally);
   }
+  /// A recipient goes, or has another connection.
+  void forget_flows() { flows_.forget(); }
 
-  /// Frames from a connection of this shard. REQUIRES: whole legal frames with one header but for
-  /// the length, alone if LIST, FRAGMENT, EXT or LATEST; admitted by the ingress gate; the last one
-  /// has `last_bytes`.
-  void route(const Run& run, const proto::FrameHeader& header, std::uint32_t last_bytes) {
-    dispatch(run, header, {false, last_bytes});
+  /// Frames in that buffer from a connection of this shard. REQUIRES: a run of the parser, admitted
+  /// by the ingress gate; begin_bytes() was called for them.
+  void route(const BufferRef& buffer, const proto::RunView& view) {
+    route(buffer, view, Origin::connection);
   }
 
   /// Frames that another shard handed over, any mix: to their recipients on this shard, until
@@ -85,15 +67,34 @@ class Router {
   [[nodiscard]] NodePlace place_of(NodeId node) const;
 
  private:
+  enum class Origin : std::uint8_t { connection, another_shard };
   /// How a run came here.
   struct Arrival {
-    bool handed_over;          ///< by another shard
+    Origin origin;
     std::uint32_t last_bytes;  ///< of the run's last frame
+
+    [[nodiscard]] bool handed_over() const { return origin == Origin::another_shard; }
   };
+  void route(const BufferRef& buffer, const proto::RunView& view, Origin origin) {
+    Recipient* const known = flows_.find(view.bytes);
+    if (known != nullptr && append(*known, view)) return;
+    const Run run{buffer.share(), view.bytes, view.size, view.frames};
+    if (known != nullptr) return fanout_.deliver(*known, run, run.header(), Handover{});
+    dispatch(run, run.header(), {origin, view.last_bytes});
+  }
+  /// Right behind the frames that came last, where they are alike and small. False: nothing was
+  /// done.
+  [[nodiscard]] bool append(Recipient& recipient, const proto::RunView& view) {
+    if (view.size - proto::kHeaderSize > recipient.frame_bytes) return false;
+    if (!recipient.outbox.append(view.bytes, view.size, view.frames)) return false;
+    fanout_.context().tally.queued += view.frames;
+    fanout_.context().tally.copied_bytes += view.size;
+    return true;
+  }
   void dispatch(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   void to_node(const Run& run, const proto::FrameHeader& header, NodeId node, Arrival arrival);
-  void to_place(const Run& run, const proto::FrameHeader& header, const NodePlace& place,
-                Arrival arrival);
+  /// nullptr: it is not here. The run was handed over or dropped then.
+  [[nodiscard]] Recipient* find_here(const Run& run, const NodePlace& place, Arrival arrival);
   void to_group(const Run& run, const proto::FrameHeader& header, Arrival arrival);
   [[nodiscard]] std::uint32_t to_paced(const Run& run, const proto::FrameHeader& header,
                                        Arrival arrival, const MemberList<PacedMember>& here);
@@ -119,7 +120,7 @@ class Router {
   Fanout& fanout_;
   Pacer& pacer_;
   RetainedMessages& retained_;
-  RecentRecipients recent_;
+  FlowCache flows_;
   std::vector<std::vector<NodeId>> listed_;  ///< of the present LIST, by shard; else empty
   std::uint64_t deliveries_ = 0;
 };

@@ -43,26 +43,17 @@ TEST_F(RouterTest, UnicastThere) {
 TEST_F(RouterTest, SmallFramesLikeTheLastOnesAreAppended) {
   Recipient& a = rig.add_here(2);
   rig.add_there(3);
-  const auto append = [this](std::uint32_t dst, const std::string& payload,
-                             const testing::TestFrame& frame = {}) {
-    const hub::Run run = rig.make_run(dst, {payload}, frame);
-    if (rig.router.append(run.bytes, run.size, run.frames)) return true;
-    rig.router.route(run, run.header(), run.size);
-    return false;
-  };
-  EXPECT_FALSE(append(kHub | 2, "the first"));
-  EXPECT_TRUE(append(kHub | 2, "more"));
-  EXPECT_FALSE(append(kHub | 3, "for another shard"));
-  EXPECT_FALSE(append(kHub | 4, "for nobody"));
-  EXPECT_FALSE(append(8u << 20 | 2, "for another hub's node"));
-  EXPECT_TRUE(append(kHub | 2, "more"));
+  rig.route(kHub | 2, {"the first"});
+  rig.route(kHub | 2, {"more"});
+  rig.route(kHub | 3, {"for another shard"});
+  rig.route(kHub | 4, {"for nobody"});
+  rig.route(8u << 20 | 2, {"for another hub's node"});
+  rig.route(kHub | 2, {"more"});
   a.frame_bytes = 3;
-  EXPECT_FALSE(append(kHub | 2, "more than it takes"));
+  rig.route(kHub | 2, {"more than it takes"});
   EXPECT_EQ(dropped(DropReason::too_large), 1u);
-  EXPECT_TRUE(append(kHub | 2, "few"));
+  rig.route(kHub | 2, {"few"});
   EXPECT_EQ(a.outbox.lane(1).front().frames, 4u);
-  EXPECT_THAT(rig.take_mail(), IsEmpty());
-  rig.fanout.post_all();
   EXPECT_THAT(rig.take_mail(), ElementsAre(1u));
 }
 
@@ -70,13 +61,21 @@ TEST_F(RouterTest, AGroupOfTheSameNumberIsNoNode) {
   Recipient& a = rig.add_here(2);
   Recipient& b = rig.add_here(3);
   rig.publish_group(2, 1, {2, 3}, {});
-  for (int i = 0; i < 2; ++i) {
-    const hub::Run run = rig.make_run(kHub | 2, {"to both"}, {.kind = Kind::group});
-    EXPECT_FALSE(rig.router.append(run.bytes, run.size, run.frames));
-    rig.router.route(run, run.header(), run.size);
-  }
-  EXPECT_EQ(a.outbox.lane(1).front().frames, 2u);
+  rig.route(kHub | 2, {"to one"});
+  for (int i = 0; i < 2; ++i) rig.route(kHub | 2, {"to both"}, {.kind = Kind::group});
+  EXPECT_EQ(a.outbox.lane(1).entries().size(), 2u);
   EXPECT_EQ(b.outbox.lane(1).front().frames, 2u);
+}
+
+TEST_F(RouterTest, AskedAgainAfterTheTablesChanged) {
+  rig.add_here(2);
+  Recipient& b = rig.add_here(3);
+  rig.router.begin_bytes(NodeId{kHub | 1});
+  rig.route(kHub | 2, {"to the first"});
+  rig.nodes.publish(2, {ShardIndex{0}, b.slot, b.generation});
+  rig.router.begin_bytes(NodeId{kHub | 1});
+  rig.route(kHub | 2, {"to its successor"});
+  EXPECT_EQ(b.outbox.lane(1).front().frames, 1u);
 }
 
 TEST_F(RouterTest, UnicastToNobody) {

@@ -63,8 +63,11 @@ class RouteRig {
   void route(std::uint32_t dst, const std::vector<std::string>& payloads,
              const TestFrame& frame = {}) {
     hub::Run run = make_run(dst, payloads, frame);
-    router.route(run, run.header(), last_bytes_of(run));
+    route(run);
     fanout.post_all();
+  }
+  void route(const hub::Run& run) {
+    router.route(run.buffer, {run.bytes, run.size, run.frames, last_bytes_of(run)});
   }
   hub::Run make_run(std::uint32_t dst, const std::vector<std::string>& payloads,
                     const TestFrame& frame = {}) {

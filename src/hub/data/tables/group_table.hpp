@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/ids.hpp"
-#include "hub/data/route/member_list.hpp"
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/member_list.hpp"
+#include "hub/data/tables/node_table.hpp"
 
 namespace gimnet::hub {
 

@@ -1,4 +1,4 @@
-#include "hub/data/route/recent_recipients.hpp"
+#include "hub/data/route/flow_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ struct Frame {
   TestFrame how = {};
 };
 
-class RecentRecipientsTest : public ::testing::Test {
+class FlowCacheTest : public ::testing::Test {
  protected:
   void TearDown() override { EXPECT_TRUE(rig.ledger_exact()); }
 
@@ -32,11 +32,9 @@ class RecentRecipientsTest : public ::testing::Test {
     }
     return bytes;
   }
-  /// One frame the long way, and noted where it was appended.
+  /// One frame the long way.
   void route(const Frame& frame) {
-    const hub::Run run = rig.make_run(kHub | frame.index, {frame.payload}, frame.how);
-    if (!rig.router.append(run.bytes, run.size, run.frames))
-      rig.router.route(run, run.header(), run.size);
+    rig.route(rig.make_run(kHub | frame.index, {frame.payload}, frame.how));
   }
   /// As if it had got such frames from the same bytes already.
   void note(std::uint32_t index, const TestFrame& how = {}) {
@@ -57,7 +55,7 @@ class RecentRecipientsTest : public ::testing::Test {
   Recipient& b = rig.add_here(3);
 };
 
-TEST_F(RecentRecipientsTest, FramesInTurnsGoBehindTheOnesBefore) {
+TEST_F(FlowCacheTest, FramesInTurnsGoBehindTheOnesBefore) {
   note(2);
   note(3);
   const auto bytes = bytes_of({{2, "x"}, {3, "yy"}, {2, ""}, {3, "zzz"}});
@@ -72,25 +70,52 @@ TEST_F(RecentRecipientsTest, FramesInTurnsGoBehindTheOnesBefore) {
   EXPECT_EQ(behind.substr(16, 1), "x");
 }
 
-TEST_F(RecentRecipientsTest, NobodyIsKnownInOtherBytes) {
+TEST_F(FlowCacheTest, NobodyIsKnownInBytesOfAnotherConnection) {
+  rig.router.begin_bytes(NodeId{kHub | 1});
   note(2);
-  rig.router.begin_bytes();
+  rig.router.begin_bytes(NodeId{kHub | 1});
+  EXPECT_EQ(appended({{2, "x"}}), 1u);
+  rig.router.begin_bytes(NodeId{kHub | 9});
   EXPECT_EQ(appended({{2, "x"}}), 0u);
 }
 
-TEST_F(RecentRecipientsTest, FramesForOneNodeInARowAreLeftToFormARun) {
+TEST_F(FlowCacheTest, NobodyIsKnownAfterTheTableChanged) {
+  note(2);
+  rig.nodes.publish(30, {});
+  rig.router.begin_bytes(NodeId{});
+  EXPECT_EQ(appended({{2, "x"}}), 0u);
+}
+
+TEST_F(FlowCacheTest, NobodyIsKnownAfterARecipientWent) {
+  note(2);
+  rig.router.forget_flows();
+  EXPECT_EQ(appended({{2, "x"}}), 0u);
+}
+
+// The outbox has taken frames of the other one just before.
+TEST_F(FlowCacheTest, OfAConnectionOnlyItsOwnFramesAreTaken) {
+  rig.router.begin_bytes(NodeId{kHub | 1});
+  note(2);
+  rig.router.begin_bytes(NodeId{kHub | 9});
+  a.frame_bytes = Outbox::kAppendBytesMax;
+  route({2, std::string(a.frame_bytes + 1, 'x'), {.src = 9}});
+  EXPECT_EQ(rig.egress.dropped(proto::DropReason::too_large), 1u);
+  EXPECT_EQ(appended({{2, "x", {.src = 1}}}), 0u);
+}
+
+TEST_F(FlowCacheTest, FramesForOneNodeInARowAreLeftToFormARun) {
   note(2);
   note(3);
   EXPECT_EQ(appended({{2, "x"}, {2, "y"}, {3, "z"}}), 1u);
 }
 
-TEST_F(RecentRecipientsTest, WhoHasTheSamePlaceIsNotMistaken) {
+TEST_F(FlowCacheTest, WhoHasTheSamePlaceIsNotMistaken) {
   rig.add_here(2 + 32);
   note(2);
   EXPECT_EQ(appended({{2 + 32, "for another node"}}), 0u);
 }
 
-TEST_F(RecentRecipientsTest, AFrameThatIsNotWholeIsLeft) {
+TEST_F(FlowCacheTest, AFrameThatIsNotWholeIsLeft) {
   note(2);
   auto bytes = bytes_of({{2, "x"}});
   bytes.pop_back();
@@ -102,7 +127,7 @@ TEST_F(RecentRecipientsTest, AFrameThatIsNotWholeIsLeft) {
   EXPECT_EQ(append(endless).frames, 0u);
 }
 
-TEST_F(RecentRecipientsTest, OtherHeadersAreLookedAt) {
+TEST_F(FlowCacheTest, OtherHeadersAreLookedAt) {
   note(2);
   EXPECT_EQ(appended({{2, "x", {.lane = 2}}}), 0u);
   EXPECT_EQ(appended({{2, "x", {.flags = proto::kFlagReport}}}), 0u);
@@ -111,21 +136,20 @@ TEST_F(RecentRecipientsTest, OtherHeadersAreLookedAt) {
   EXPECT_EQ(appended({{2, "x"}}), 1u);
 }
 
-TEST_F(RecentRecipientsTest, AfterFramesOfAnotherSortTheFirstAreNewAgain) {
+TEST_F(FlowCacheTest, EachNodeHasASortOfItsOwn) {
   note(2);
   note(3, {.lane = 2});
-  EXPECT_EQ(appended({{2, "x"}}), 0u);
-  EXPECT_EQ(appended({{3, "x", {.lane = 2}}}), 1u);
+  EXPECT_EQ(appended({{2, "x"}, {3, "x", {.lane = 2}}, {2, "x"}}), 3u);
 }
 
-TEST_F(RecentRecipientsTest, WhatTheGateCountsOrReadsIsNeverNoted) {
+TEST_F(FlowCacheTest, WhatTheGateCountsOrReadsIsNeverNoted) {
   note(2, {.lane = 0});
   EXPECT_EQ(appended({{2, "x", {.lane = 0}}}), 0u);
   note(3, {.flags = proto::kFlagKeyed});
   EXPECT_EQ(appended({{3, "not 8 bytes", {.flags = proto::kFlagKeyed}}}), 0u);
 }
 
-TEST_F(RecentRecipientsTest, WhoTakesOnlySmallFramesIsAsked) {
+TEST_F(FlowCacheTest, WhoTakesOnlySmallFramesIsAsked) {
   a.frame_bytes = Outbox::kAppendBytesMax - 1;
   b.frame_bytes = Outbox::kAppendBytesMax;
   note(2);
@@ -134,7 +158,7 @@ TEST_F(RecentRecipientsTest, WhoTakesOnlySmallFramesIsAsked) {
   EXPECT_EQ(appended({{3, "x"}}), 1u);
 }
 
-TEST_F(RecentRecipientsTest, FromTheSizeOnThatIsCheaperToReferenceNothingIsAppended) {
+TEST_F(FlowCacheTest, FromTheSizeOnThatIsCheaperToReferenceNothingIsAppended) {
   note(2);
   const std::string most(Outbox::kAppendBytesMax - proto::kHeaderSize - 1, 'x');
   for (int i = 0; i < 8; ++i)

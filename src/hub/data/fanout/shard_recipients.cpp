@@ -1,4 +1,4 @@
-#include "hub/data/route/shard_recipients.hpp"
+#include "hub/data/fanout/shard_recipients.hpp"
 
 #include "proto/frame/frame_header.hpp"
 

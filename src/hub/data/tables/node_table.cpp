@@ -1,4 +1,4 @@
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 
 #include <sys/mman.h>
 
@@ -36,6 +36,7 @@ void NodeTable::publish(std::uint32_t index, NodePlace place) {
                                        place.slot.value()
                                  : place.slot.value();
   words_[index].store(word, std::memory_order_release);  // pairs with the acquire load in find()
+  epoch_.fetch_add(1, std::memory_order_release);        // pairs with the acquire load in epoch()
   std::uint64_t shards = shards_.load(std::memory_order_relaxed);  // relaxed: this thread wrote it
   if (before.exists() && change_count(before.shard, -1) == 0)
     shards &= ~(std::uint64_t{1} << before.shard.value());

@@ -1,4 +1,4 @@
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "hub/data/route/group_table.hpp"
+#include "hub/data/tables/group_table.hpp"
 
 #include <sys/mman.h>
 

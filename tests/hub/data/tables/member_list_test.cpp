@@ -1,4 +1,4 @@
-#include "hub/data/route/member_list.hpp"
+#include "hub/data/tables/member_list.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "hub/data/route/group_table.hpp"
+#include "hub/data/tables/group_table.hpp"
 
 namespace gimnet::hub {
 namespace {

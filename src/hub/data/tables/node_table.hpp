@@ -48,6 +48,11 @@ class NodeTable {
         std::memory_order_acquire));  // pairs with the release store in publish()
   }
 
+  /// Changes with each publish(), and after it: what find() said before then may be so no longer.
+  [[nodiscard]] std::uint64_t epoch() const {
+    return epoch_.load(std::memory_order_acquire);  // pairs with the release in publish()
+  }
+
   /// That node may be on its way back to a hub that was restarted: until it is there, or
   /// expect_nobody(), it is `away`, not unknown. REQUIRES: 0 < index < 2^20.
   void expect(std::uint32_t index);
@@ -81,6 +86,7 @@ class NodeTable {
   std::atomic<std::uint64_t>* words_;
   std::atomic<std::uint64_t>* expected_;  ///< a bit for each index, in the same memory
   std::atomic<std::uint64_t> shards_{0};
+  std::atomic<std::uint64_t> epoch_{0};
   std::array<std::atomic<std::uint32_t>, kShardsMax> nodes_by_shard_{};
 };
 

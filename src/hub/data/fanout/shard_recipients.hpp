@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "base/ids.hpp"
-#include "hub/data/route/group_table.hpp"
-#include "hub/data/route/node_table.hpp"
+#include "hub/data/tables/group_table.hpp"
+#include "hub/data/tables/node_table.hpp"
 
 namespace gimnet::hub {
 

@@ -1,4 +1,4 @@
-#include "hub/data/route/shard_recipients.hpp"
+#include "hub/data/fanout/shard_recipients.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,11 +94,11 @@ TEST_F(ShardRecipientsTest, WhatIsForOneIsDroppedOnce) {
 TEST_F(ShardRecipientsTest, OneWhoLeftSinceIsNotCounted) {
   rig.publish_group(5, 1, {}, {10, 11});
   const hub::Run run = rig.make_run(kHub | 5, {"x"}, {.kind = Kind::group});
-  rig.router.route(run, run.header(), run.size);
+  rig.route(run);
   rig.members.by_shard[1].erase(ConnectionSlot{10});
   rig.fanout.post_all();
   EXPECT_EQ(dropped(), 1u);
-  rig.router.route(rig.make_run(kHub | 5, {"x"}, {.kind = Kind::group}), run.header(), run.size);
+  rig.route(rig.make_run(kHub | 5, {"x"}, {.kind = Kind::group}));
   rig.members.by_shard[1].erase(ConnectionSlot{11});
   rig.fanout.post_all();
   EXPECT_EQ(dropped(), 1u);
