@@ -23,7 +23,7 @@ SECONDS_MAX = 250  # of one program: what takes longer hangs, however loaded the
 # The function below which counting is on (perf/instructions/*.cpp).
 COUNTED = "counted"
 # What plays the nodes is not the hub.
-NOT_COUNTED = ("::testing::", "MemoryTransport", "MemoryPipe", "MemoryPeer")
+NOT_COUNTED = ("::testing::", "MemoryStream", "MemoryPipe", "MemoryPeer")
 # glibc's tunables: its copies for a processor without AVX, and none by way of memory where much is copied, which depends on the cache.
 LIBRARY_TUNING = ("glibc.cpu.hwcaps=-AVX_Fast_Unaligned_Load,-AVX2,-AVX512F,-AVX512VL,-SSSE3,-SSE4_1,-SSE4_2,-ERMS"
                   ":glibc.cpu.x86_non_temporal_threshold=0x10000000")

@@ -54,7 +54,7 @@ cob=/lib/libstdc++.so.6
 cfn=operator new(unsigned long)
 calls=1 0
 14 54
-cfn=gimnet::hub::MemoryTransport::send(int)
+cfn=gimnet::hub::MemoryStream::send(int)
 calls=1 0
 15 300
 
@@ -65,7 +65,7 @@ cfn=memcpy
 calls=1 0
 * 50
 
-fn=gimnet::hub::MemoryTransport::send(int)
+fn=gimnet::hub::MemoryStream::send(int)
 3 200
 cfn=gimnet::hub::append()
 calls=1 0
