@@ -136,14 +136,14 @@ void Outbox::admit_to_full(Entry entry, const proto::FrameHeader& header, Egress
   const std::size_t lane_index = header.lane & proto::kLaneMask;
   LaneQueue& lane = lanes_->queues[lane_index];
   LaneQueue::note_source(entry);
-  // While a source is looked for that loses or fills the lane, the new entry counts.
+  // The new entry counts while a source is looked for that loses. One that is refused did not wait,
+  // and so does not count in who filled the lane.
   const std::uint32_t size = entry.size;
   lane.sources().add(entry.source, size);
   if (header.policy() != proto::Policy::drop) make_room(entry, lane_index, context);
-  const bool stays = has_room(size, lane_index, context.limits);
-  if (!stays) lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
   lane.sources().take(entry.source, size);
-  if (stays) lane.push(std::move(entry));
+  if (has_room(size, lane_index, context.limits)) return lane.push(std::move(entry));
+  lose_for_room(entry, lane_index, proto::DropReason::queue_full, context);
 }
 
 bool Outbox::ask_to_pause(const Entry& entry, const proto::FrameHeader& header,
