@@ -7,7 +7,7 @@
 #include "base/log.hpp"
 #include "hub/config/folders.hpp"
 #include "hub/config/reloader.hpp"
-#include "hub/config/start_state.hpp"
+#include "hub/config/state_folder.hpp"
 #include "hub/control/conductor.hpp"
 #include "hub/control/conductor_loop.hpp"
 #include "hub/shard/io_shard.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/result.hpp"
-#include "hub/config/hub_options.hpp"
+#include "hub/config/settings.hpp"
 #include "hub/config/sources.hpp"
 
 namespace gimnet::hub {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <vector>
 
 namespace gimnet {
 namespace {
@@ -52,4 +53,62 @@ TEST(DidYouMean, IsSilentWhenNothingIsNear) {
 }
 
 }  // namespace
+
+namespace {
+
+std::string wrong(const std::vector<const char*>& words) {
+  return wrong_option_word(words, [](std::string_view name) {
+    if (name == "--help") return Takes::nothing;
+    if (name == "--spin") return Takes::boolean;
+    return name == "--name" || name == "-n" ? Takes::value : Takes::unknown;
+  });
+}
+
+TEST(OptionWords, AFlagIsTrueOrFalse) {
+  EXPECT_EQ(wrong({"--spin", "--spin=true", "--spin=false"}), "");
+  for (const std::string value : {"", "2", "True", "no", "true ", "=true"}) {
+    const std::string word = "--spin=" + value;
+    EXPECT_EQ(wrong({"--spin", word.c_str(), "--spin=maybe"}),
+              "--spin cannot be '" + value + "': write --spin alone, --spin=true or --spin=false");
+  }
+}
+
+TEST(OptionWords, AnEmptyValueIsNotTheNextWord) {
+  EXPECT_EQ(wrong({"--name=", "--spin"}), "--name is empty: give it a value, or leave it out");
+  EXPECT_EQ(wrong({"--name", "", "--name=x", "--name=="}), "");
+}
+
+TEST(OptionWords, AnotherOptionIsNoValue) {
+  EXPECT_EQ(wrong({"--name", "--spin"}),
+            "--name needs a value, and '--spin' looks like an option; if it is meant, write "
+            "--name=--spin");
+  EXPECT_EQ(
+      wrong({"-n", "--name=x"}),
+      "-n needs a value, and '--name=x' looks like an option; if it is meant, write -n--name=x");
+  for (const char* word : {"--", "--other", "--spin=2", "-n", "-n=3"})
+    EXPECT_NE(wrong({"--name", word}), "") << word;
+  for (const char* word : {"-", "-1", "-.5", "-x", "- no", "spin", "a--b"})
+    EXPECT_EQ(wrong({"--name", word}), "");
+  EXPECT_EQ(wrong({"--name=--spin", "--name=-n"}), "");
+  EXPECT_EQ(wrong({"--name", "x", "--spin", "-n"}), "")
+      << "that one is missing is for others to say";
+}
+
+TEST(OptionWords, WhatTakesNothingIsGivenNothing) {
+  EXPECT_EQ(wrong({"--help"}), "");
+  for (const char* word : {"--help=", "--help=true", "--help=false"}) {
+    EXPECT_EQ(wrong({word}), "--help takes no value: write --help alone, or leave it out");
+  }
+}
+
+TEST(OptionWords, OtherWordsAreNotLookedAt) {
+  EXPECT_EQ(wrong({}), "");
+  EXPECT_EQ(wrong({"spin=2", "--other=2", "--other=", "-"}), "");
+  EXPECT_EQ(wrong({"--", "--spin=2"}), "");
+  EXPECT_NE(wrong({"--name=x", "--spin=2"}), "");
+  EXPECT_EQ(wrong({"--name"}), "");
+}
+
+}  // namespace
+
 }  // namespace gimnet

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "bench/hub/data/support/null_stream.hpp"
-#include "client/gimi/ack_book.hpp"
+#include "client/gimi/clerk.hpp"
 #include "client/nif/name_cache.hpp"
 #include "client/nif/pause_table.hpp"
 #include "hub/control/state/directory.hpp"

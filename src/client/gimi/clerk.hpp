@@ -1,14 +1,64 @@
 #pragma once
 
+#include <compare>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <thread>
 #include <vector>
 
 #include "base/mutex.hpp"
-#include "client/gimi/ack_book.hpp"
 #include "client/gimi/uplink.hpp"
+#include "gimnet/gimi/message.hpp"
+#include "proto/gimi/message_header.hpp"
 
 namespace gimnet::gimi {
+
+/// One stream as a table names it: the other node, the key, and of one to a service its group. A
+/// sender that does not know who has the service names nobody.
+struct StreamName {
+  Peer peer;
+  MessageKey key;
+  std::uint32_t group = 0;
+  friend auto operator<=>(const StreamName&, const StreamName&) = default;
+};
+struct StreamNameHash {
+  std::size_t operator()(const StreamName& name) const noexcept {
+    const std::uint64_t key = name.key.type | (static_cast<std::uint64_t>(name.key.instance) << 32);
+    // Fibonacci hashing: ids and keys are small numbers that differ in their low bits.
+    const std::uint64_t ids =
+        (static_cast<std::uint64_t>(name.peer.id) << 17) ^ (std::uint64_t{name.group} << 31);
+    return static_cast<std::size_t>((key ^ ids) * 0x9E3779B97F4A7C15u);
+  }
+};
+
+/// Which DATA of each sender were taken: the highest sequence and the 64 before it, which is what
+/// an ACK says. In the order of streams, which no choice of keys can make slow. Thread safety: one
+/// thread at a time. Limits: `kStreamsMax` streams; beyond them one is forgotten that is next to
+/// the new one, mostly of the same sender, and its next ACK speaks only of what came after.
+class AckBook {
+ public:
+  static constexpr std::size_t kStreamsMax = 65536;
+
+  /// A DATA that asked for an ACK was taken; of another epoch it begins a new count. True: the
+  /// sender is due for an ACK, and was not before.
+  bool take(const StreamName& sender, const proto::gimi::MessageHeader& data);
+
+  struct Entry {
+    std::uint32_t epoch = 0;
+    std::uint32_t sequence = 0;
+    std::uint64_t bitmap = 0;
+    bool due = false;
+  };
+  /// What is to be acknowledged, now: it is no longer due. Zeros if nothing came from there.
+  Entry acknowledge(const StreamName& sender);
+  /// An acknowledgement could not be sent: it stays due. True: it had become due anew.
+  bool hold(const StreamName& sender);
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+
+ private:
+  std::map<StreamName, Entry> entries_;
+};
 
 class StreamTable;
 

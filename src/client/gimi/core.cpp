@@ -7,9 +7,9 @@
 
 #include "base/clock.hpp"
 #include "base/endian.hpp"
-#include "client/gimi/deadline.hpp"
-#include "client/gimi/message_access.hpp"
-#include "client/gimi/report_words.hpp"
+#include "client/gimi/ending.hpp"
+#include "client/gimi/loss_tally.hpp"
+#include "client/gimi/message.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/frame/frame_header.hpp"
 #include "proto/frame/window.hpp"

@@ -4,7 +4,7 @@
 #include <span>
 #include <utility>
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/uplink.hpp"
 #include "client/nif/answer_status.hpp"
 #include "proto/control/ctrl.hpp"

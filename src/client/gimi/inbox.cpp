@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
 namespace {

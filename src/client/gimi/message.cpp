@@ -1,7 +1,8 @@
+#include "client/gimi/message.hpp"
+
 #include <utility>
 
 #include "base/id_text.hpp"
-#include "client/gimi/message_access.hpp"
 
 namespace gimnet {
 

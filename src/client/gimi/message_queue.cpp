@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/check.hpp"
-#include "client/gimi/message_access.hpp"
+#include "client/gimi/message.hpp"
 
 namespace gimnet::gimi {
 

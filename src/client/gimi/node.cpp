@@ -3,7 +3,7 @@
 
 #include "base/check.hpp"
 #include "client/gimi/core.hpp"
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/hub_records.hpp"
 #include "gimnet/gimi.hpp"
 

@@ -1,6 +1,6 @@
 #include "client/gimi/ping_table.hpp"
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
 

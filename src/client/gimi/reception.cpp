@@ -6,8 +6,8 @@
 #include <string_view>
 #include <utility>
 
-#include "client/gimi/message_access.hpp"
-#include "client/gimi/report_words.hpp"
+#include "client/gimi/loss_tally.hpp"
+#include "client/gimi/message.hpp"
 #include "proto/control/control_message.hpp"
 #include "proto/frame/frame_header.hpp"
 

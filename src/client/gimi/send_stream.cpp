@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "base/endian.hpp"
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/mutex.hpp"
-#include "client/gimi/ack_book.hpp"
+#include "client/gimi/clerk.hpp"
 #include "client/gimi/ending.hpp"
-#include "client/gimi/report_words.hpp"
+#include "client/gimi/loss_tally.hpp"
 #include "client/gimi/send_window.hpp"
 #include "client/gimi/uplink.hpp"
 #include "gimnet/gimi.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 #include "proto/control/ns.hpp"
 
 namespace gimnet::gimi {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/gimi/report_words.hpp"
+#include "client/gimi/loss_tally.hpp"
 #include "proto/frame/report.hpp"
 
 namespace gimnet::gimi {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 #include "client/gimi/hub_records.hpp"
 
 namespace gimnet::gimi {

@@ -7,88 +7,68 @@
 #include <span>
 #include <string_view>
 
-#include "base/option_words.hpp"
 #include "base/suggest.hpp"
-#include "hub/config/config_text.hpp"
+#include "hub/config/sources.hpp"
 #include "hub/version.hpp"
 
 namespace gimnet::hub {
 namespace {
 
-constexpr std::array<std::string_view, 16> kOptionNames{
-    "--listen",       "--shards",       "--hub-id",    "--hub-name", "--state-dir", "--limit",
-    "--help",         "--help-limits",  "--placement", "--insecure", "--log-level", "--version",
-    "--check-config", "--print-config", "--config",    "--spin"};
-
-/// The arguments as they were given.
-struct Raw {
-  std::vector<std::string> listen;
-  std::string shards;
-  std::string hub_id;
-  std::string hub_name;
-  std::string state_dir;
-  std::vector<std::string> limits;
-  std::string placement;
-  std::string log_level;
-  std::string config;
-  bool insecure = false;
-  bool spin = false;
-  bool help = false;
-  bool help_limits = false;
-  bool version = false;
-  bool check_config = false;
-  bool print_config = false;
+/// An option: its words in the help, and its value; without one it is a flag.
+struct OptionText {
+  const char* name;
+  const char* takes;
+  const std::string help;
 };
+
+/// In the order of the help.
+const std::array<OptionText, 16>& option_texts() {
+  static const std::array<OptionText, 16> texts{
+      {{"-h,--help", "", "Says this and ends"},
+       {"--listen", "URL",
+        "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free "
+        "port),\nunix:/path. Default: tcp://127.0.0.1:7450 and a Unix socket in the user's runtime "
+        "folder"},
+       {"--shards", "N",
+        "Threads that carry data, 1 to 16. Default: half of the processors, at most 8"},
+       {"--hub-id", "N", "This hub's number in its network, 1 to 4094. Default: 1"},
+       {"--hub-name", "NAME", "Its name for people. Default: hub-ID"},
+       {"--state-dir", "DIR", "Folder for what the hub keeps, created if needed"},
+       {"--limit", "NAME=VALUE", "Sets a limit, may be repeated; --help-limits lists them"},
+       {"--help-limits", "", "Lists all limits and ends"},
+       {"--placement", "HOW",
+        "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)"},
+       {"--spin", "", "Shards never sleep: shorter round trips, for a whole processor each"},
+       {"--insecure", "", "Allows to listen on addresses that other machines reach"},
+       {"--log-level", "LEVEL", "error, warning, info (default), debug or off"},
+       {"--config", "FILE",
+        "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the first that "
+        "is "
+        "there of\ngimnet/tcphub.toml in the user's configuration folder, /etc/gimnet/tcphub.toml. "
+        "No file is needed"},
+       {"--check-config", "", "Says everything that is wrong with the configuration, and ends"},
+       {"--print-config", "", "Shows every value and where it came from, and ends"},
+       {"--version", "", "Says the version and ends"}}};
+  return texts;
+}
 
 CommandLineEnding wrong(const std::string& sentence) { return {2, "tcphub: " + sentence + "\n"}; }
 
-void declare(CLI::App& app, Raw& raw) {
+void declare(CLI::App& app) {
   app.allow_extras();
   app.set_help_flag();  // it knows no --help=false
-  app.add_flag("-h,--help", raw.help, "Says this and ends");
-  app.add_option(
-         "--listen", raw.listen,
-         "Address to listen on, may be repeated: tcp://127.0.0.1:7450, tcp://[::1]:0 (any free "
-         "port),\n"
-         "unix:/path. Default: tcp://127.0.0.1:7450 and a Unix socket in the user's runtime folder")
-      ->type_name("URL")
-      ->expected(1)
-      ->take_all();
-  app.add_option("--shards", raw.shards,
-                 "Threads that carry data, 1 to 16. Default: half of the processors, at most 8")
-      ->type_name("N");
-  app.add_option("--hub-id", raw.hub_id, "This hub's number in its network, 1 to 4094. Default: 1")
-      ->type_name("N");
-  app.add_option("--hub-name", raw.hub_name, "Its name for people. Default: hub-ID")
-      ->type_name("NAME");
-  app.add_option("--state-dir", raw.state_dir, "Folder for what the hub keeps, created if needed")
-      ->type_name("DIR");
-  app.add_option("--limit", raw.limits, "Sets a limit, may be repeated; --help-limits lists them")
-      ->type_name("NAME=VALUE")
-      ->expected(1)
-      ->take_all();
-  app.add_flag("--help-limits", raw.help_limits, "Lists all limits and ends");
-  app.add_option(
-         "--placement", raw.placement,
-         "Where new nodes live: spread (the least loaded shard; default) or hint (as HELLO wishes)")
-      ->type_name("HOW");
-  app.add_flag("--spin", raw.spin,
-               "Shards never sleep: shorter round trips, for a whole processor each");
-  app.add_flag("--insecure", raw.insecure,
-               "Allows to listen on addresses that other machines reach");
-  app.add_option("--log-level", raw.log_level, "error, warning, info (default), debug or off")
-      ->type_name("LEVEL");
-  app.add_option("--config", raw.config,
-                 "Configuration file (TOML); conf.d/*.toml beside it are read too. Default: the "
-                 "first that is there of\n"
-                 "gimnet/tcphub.toml in the user's configuration folder, /etc/gimnet/tcphub.toml. "
-                 "No file is needed")
-      ->type_name("FILE");
-  app.add_flag("--check-config", raw.check_config,
-               "Says everything that is wrong with the configuration, and ends");
-  app.add_flag("--print-config", raw.print_config,
-               "Shows every value and where it came from, and ends");
-  app.add_flag("--version", raw.version, "Says the version and ends");
+  for (const OptionText& text : option_texts()) {
+    if (*text.takes == '\0') {
+      app.add_flag(text.name, text.help);
+      continue;
+    }
+    CLI::Option* option = app.add_option(text.name, text.help)->type_name(text.takes);
+    if (text.help.find("may be repeated") != std::string::npos) option->expected(1)->take_all();
+  }
+}
+
+bool is_on(const CLI::App& app, const char* flag) {
+  return app.count(flag) != 0 && app.get_option(flag)->as<bool>();
 }
 
 std::string help_limits() {
@@ -156,9 +136,11 @@ std::string leftover_fault(std::vector<std::string> words) {
   if (words.empty()) return {};
   const std::string word =
       behind_end ? words.front() : words.front().substr(0, words.front().find('='));
+  std::vector<std::string_view> names;
+  for (const OptionText& text : option_texts())
+    names.push_back(std::string_view{text.name}.substr(std::string_view{text.name}.find("--")));
   return "there is no argument '" + escaped(word, kQuotedMax) + "'" +
-         (behind_end ? " behind --" : did_you_mean(word, kOptionNames)) +
-         " (tcphub --help shows all)";
+         (behind_end ? " behind --" : did_you_mean(word, names)) + " (tcphub --help shows all)";
 }
 
 Given flag(const std::string& key, const std::string& label, std::string text) {
@@ -172,33 +154,25 @@ Given flag(const std::string& key, const std::string& label, std::string text) {
 
 /// The flags that were given, as values of their keys. Returns what is wrong with their form, or
 /// "".
-std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sources) {
-  if (!raw.listen.empty()) {
+std::string read_flags(const CLI::App& app, ConfigSources& sources) {
+  if (app.count("--listen") != 0) {
     Given& listen = sources.flags.emplace_back(flag("listen", "--listen", {}));
     listen.value.kind = Value::Kind::list;
-    for (const std::string& url : raw.listen)
+    for (const std::string& url : app.get_option("--listen")->results())
       listen.value.items.push_back({Value::Kind::words, url, {}, {}});
   }
-  const std::array<std::pair<const char*, const std::string*>, 6> texts{
-      {{"--shards", &raw.shards},
-       {"--hub-id", &raw.hub_id},
-       {"--hub-name", &raw.hub_name},
-       {"--state-dir", &raw.state_dir},
-       {"--placement", &raw.placement},
-       {"--log-level", &raw.log_level}}};
-  for (const auto& [name, text] : texts) {
+  for (const char* name : {"--shards", "--hub-id", "--hub-name", "--state-dir", "--placement",
+                           "--log-level", "--spin", "--insecure"}) {
     if (app.count(name) == 0) continue;
     std::string key = std::string{name}.substr(2);
     std::ranges::replace(key, '-', '_');
-    sources.flags.push_back(flag(key, name, *text));
-  }
-  for (const auto& [key, value] :
-       {std::pair{"spin", raw.spin}, std::pair{"insecure", raw.insecure}}) {
-    const std::string name = "--" + std::string{key};
+    const CLI::Option* option = app.get_option(name);
+    const bool is_flag = option->get_items_expected_max() == 0;
     // Also --spin=false, which is stronger than what a file says.
-    if (app.count(name) != 0) sources.flags.push_back(flag(key, name, value ? "true" : "false"));
+    const std::string on = is_flag && option->as<bool>() ? "true" : "false";
+    sources.flags.push_back(flag(key, name, is_flag ? on : option->results().front()));
   }
-  for (const std::string& assignment : raw.limits) {
+  for (const std::string& assignment : app.get_option("--limit")->results()) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos) {
       return "--limit " + escaped(assignment, kQuotedMax) +
@@ -211,10 +185,9 @@ std::string read_flags(const CLI::App& app, const Raw& raw, ConfigSources& sourc
     }
     sources.flags.push_back(flag(key, "--limit", assignment.substr(equals + 1)));
   }
-  if (app.count("--config") != 0 && raw.config.empty()) {
+  if (app.count("--config") != 0) sources.file = app.get_option("--config")->results().front();
+  if (app.count("--config") != 0 && sources.file.empty())
     return "--config is empty: give it the path of a TOML file, or leave it out";
-  }
-  sources.file = raw.config;
   return {};
 }
 
@@ -226,7 +199,7 @@ std::string checked(const CommandLine& line) {
   return text + (line.files.empty() ? " no file\n" : "\n");
 }
 
-std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLine line) {
+std::variant<CommandLine, CommandLineEnding> read_all(const CLI::App& app, CommandLine line) {
   ReadConfiguration read = read_configuration(line.sources, {.pipe_patience = kPipePatience});
   if (!read.faults.empty()) {
     CommandLineEnding ending{2, {}};
@@ -242,8 +215,8 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
   for (const Fault& warning : read.warnings) line.warnings.push_back(warning.text());
   line.configuration = std::move(read.configuration);
   line.files = std::move(read.files);
-  if (raw.check_config) return CommandLineEnding{0, checked(line)};
-  if (raw.print_config) return CommandLineEnding{0, print(line.configuration)};
+  if (is_on(app, "--check-config")) return CommandLineEnding{0, checked(line)};
+  if (is_on(app, "--print-config")) return CommandLineEnding{0, print(line.configuration)};
   return line;
 }
 
@@ -252,8 +225,7 @@ std::variant<CommandLine, CommandLineEnding> read_all(const Raw& raw, CommandLin
 std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const char* const* argv,
                                                                 const char* const* environment) {
   CLI::App app{"tcphub carries messages between the nodes of a GIMnet.", "tcphub"};
-  Raw raw;
-  declare(app, raw);
+  declare(app);
   const std::span words(argv, static_cast<std::size_t>(argc));
   if (const std::string word = wrong_word(app, words.subspan(words.empty() ? 0 : 1)); !word.empty())
     return wrong(word);
@@ -262,16 +234,16 @@ std::variant<CommandLine, CommandLineEnding> parse_command_line(int argc, const 
   } catch (const CLI::ParseError& error) {
     return wrong(syntax_error(app, error));
   }
-  if (raw.help) return CommandLineEnding{0, app.help()};
+  if (is_on(app, "--help")) return CommandLineEnding{0, app.help()};
   if (const std::string fault = leftover_fault(app.remaining()); !fault.empty())
     return wrong(fault);
-  if (raw.version) return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};
-  if (raw.help_limits) return CommandLineEnding{0, help_limits()};
+  if (is_on(app, "--version"))
+    return CommandLineEnding{0, std::string{"tcphub "} + kVersion + "\n"};
+  if (is_on(app, "--help-limits")) return CommandLineEnding{0, help_limits()};
   CommandLine line;
-  if (const std::string error = read_flags(app, raw, line.sources); !error.empty())
-    return wrong(error);
+  if (const std::string error = read_flags(app, line.sources); !error.empty()) return wrong(error);
   line.warnings = read_environment(line.sources, environment);
-  return read_all(raw, std::move(line));
+  return read_all(app, std::move(line));
 }
 
 }  // namespace gimnet::hub

@@ -62,4 +62,18 @@ enum class LineKind : std::uint8_t { kIgnored, kOdometry, kScan };
 /// counted. Errors: those of the file, with the line number; a log without ODOM and FLASER lines.
 [[nodiscard]] Result<RobotLog> load_robot_log(const std::string& path);
 
+/// Longest pause that a playback keeps, in seconds: longer ones are gaps of the recording, not of
+/// the drive.
+inline constexpr double kLongestPause_s = 5.0;
+/// How long before the robot first moves or scans a playback begins, in seconds.
+inline constexpr double kLeadIn_s = 1.0;
+/// A shorter standing still at the beginning is played, in seconds.
+inline constexpr double kShortestLeftOut_s = 5.0;
+
+/// Fills in `due_s` of every record and the note. Records keep their order. Stamps that step back,
+/// as merged logs have them, are played at once; the standing still at the beginning is left out.
+/// Where the stamps were rounded until nothing is left of them, the robot's way sets the pace: 0.5
+/// m/s and 0.8 rad/s. REQUIRES: at least one record.
+void pace_log(RobotLog& log);
+
 }  // namespace gimnet::demo

@@ -1,14 +1,35 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
-#include "tools/demo/course.hpp"
+#include "tools/demo/geometry.hpp"
+#include "tools/demo/keys.hpp"
 #include "tools/demo/messages.hpp"
 #include "tools/demo/monitor.hpp"
-#include "tools/demo/teleop.hpp"
 
 namespace gimnet::demo {
+
+/// A driver that visits corners in turn, for ever: turns towards the next one, then drives, slower
+/// where it must turn. It steers by what it hears from the robot, so that the loop is closed over
+/// the network. Thread safety: one thread.
+class Course {
+ public:
+  explicit Course(std::vector<Point> corners) : corners_(std::move(corners)) {}
+
+  /// What to do at that pose. Without corners: stand still.
+  [[nodiscard]] Twist steer(const Pose& pose);
+
+  /// Corners that were reached.
+  [[nodiscard]] std::size_t reached() const { return reached_; }
+
+ private:
+  std::vector<Point> corners_;
+  std::size_t next_ = 0;
+  std::size_t reached_ = 0;
+};
 
 /// Decides what the robot is told, and when: a simulated one 20 times a second, by the keyboard or
 /// by the course; a log only when its speed or its holding changes. Thread safety: one thread.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace gimnet::demo {
 namespace {
 
@@ -10,23 +12,17 @@ constexpr std::string_view kDropPrefix = "dropped.";
 }  // namespace
 
 void HubCounters::add(std::string_view name, std::uint64_t value) {
-  if (name == "accepted") {
-    accepted += value;
-  } else if (name == "copies") {
-    copies += value;
-  } else if (name == "delivered") {
-    delivered += value;
-  } else if (name == "queued") {
-    queued += value;
-  } else if (name.starts_with(kDropPrefix) && value != 0) {
-    const std::string_view reason = name.substr(kDropPrefix.size());
-    for (Drop& drop : drops) {
-      if (drop.reason == reason) {
-        drop.frames += value;
-        return;
-      }
-    }
+  if (name == "accepted") accepted += value;
+  if (name == "copies") copies += value;
+  if (name == "delivered") delivered += value;
+  if (name == "queued") queued += value;
+  if (!name.starts_with(kDropPrefix) || value == 0) return;
+  const std::string_view reason = name.substr(kDropPrefix.size());
+  const auto known = std::ranges::find(drops, reason, &Drop::reason);
+  if (known == drops.end()) {
     drops.push_back({std::string(reason), value});
+  } else {
+    known->frames += value;
   }
 }
 

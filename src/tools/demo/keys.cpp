@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 
 namespace gimnet::demo {
 namespace {
@@ -9,76 +10,26 @@ namespace {
 constexpr char kEscape = '\x1b';
 constexpr std::size_t kSequenceMax = 32;
 
-std::optional<Key> key_of(char byte) {
-  switch (byte) {
-    case 'w':
-    case 'W':
-      return Key::kForward;
-    case 's':
-    case 'S':
-      return Key::kBack;
-    case 'a':
-    case 'A':
-      return Key::kLeft;
-    case 'd':
-    case 'D':
-      return Key::kRight;
-    case ' ':
-      return Key::kStop;
-    case ']':
-    case '>':
-    case '.':
-      return Key::kFaster;
-    case '[':
-    case '<':
-    case ',':
-      return Key::kSlower;
-    case '+':
-    case '=':
-      return Key::kZoomIn;
-    case '-':
-    case '_':
-      return Key::kZoomOut;
-    case '0':
-      return Key::kFit;
-    case 'f':
-    case 'F':
-      return Key::kFollow;
-    case 't':
-    case 'T':
-      return Key::kTrail;
-    case 'p':
-    case 'P':
-      return Key::kAutopilot;
-    case 'h':
-    case 'H':
-    case '?':
-      return Key::kHelp;
-    case '\x0c':
-      return Key::kRedraw;
-    case 'q':
-    case 'Q':
-    case '\x03':
-    case '\x04':
-      return Key::kQuit;
-    default:
-      return std::nullopt;
-  }
-}
+struct Meaning {
+  std::string_view bytes;  // each of which means it
+  Key key;
+};
 
-std::optional<Key> arrow_of(char byte) {
-  switch (byte) {
-    case 'A':
-      return Key::kForward;
-    case 'B':
-      return Key::kBack;
-    case 'C':
-      return Key::kRight;
-    case 'D':
-      return Key::kLeft;
-    default:
-      return std::nullopt;
+constexpr Meaning kMeanings[] = {
+    {"wW", Key::kForward},     {"sS", Key::kBack},   {"aA", Key::kLeft},
+    {"dD", Key::kRight},       {" ", Key::kStop},    {"]>.", Key::kFaster},
+    {"[<,", Key::kSlower},     {"+=", Key::kZoomIn}, {"-_", Key::kZoomOut},
+    {"0", Key::kFit},          {"fF", Key::kFollow}, {"tT", Key::kTrail},
+    {"pP", Key::kAutopilot},   {"hH?", Key::kHelp},  {"\x0c", Key::kRedraw},
+    {"qQ\x03\x04", Key::kQuit}};
+constexpr Meaning kArrows[] = {
+    {"A", Key::kForward}, {"B", Key::kBack}, {"C", Key::kRight}, {"D", Key::kLeft}};
+
+std::optional<Key> key_in(std::span<const Meaning> meanings, char byte) {
+  for (const Meaning& meaning : meanings) {
+    if (meaning.bytes.find(byte) != std::string_view::npos) return meaning.key;
   }
+  return std::nullopt;
 }
 
 // What a text that begins with Esc begins with. Its end may be still to come: size 0.
@@ -104,7 +55,7 @@ Sequence sequence_at_front(std::string_view text) {
 }
 
 std::optional<Key> key_of_sequence(std::string_view sequence) {
-  return sequence[2] == '[' ? std::nullopt : arrow_of(sequence.back());
+  return sequence[2] == '[' ? std::nullopt : key_in(kArrows, sequence.back());
 }
 
 }  // namespace
@@ -120,7 +71,7 @@ std::vector<Key> KeyParser::take(std::string_view bytes, std::int64_t now_ns) {
   std::string_view rest = pending_;
   while (!rest.empty()) {
     if (rest.front() != kEscape) {
-      if (const std::optional<Key> key = key_of(rest.front())) keys.push_back(*key);
+      if (const std::optional<Key> key = key_in(kMeanings, rest.front())) keys.push_back(*key);
       rest.remove_prefix(1);
       continue;
     }
@@ -134,6 +85,30 @@ std::vector<Key> KeyParser::take(std::string_view bytes, std::int64_t now_ns) {
   }
   pending_ = std::string(rest);
   return keys;
+}
+
+void Teleop::press(Key key, std::int64_t now_ns) {
+  switch (key) {
+    case Key::kForward:
+    case Key::kBack:
+      linear_ = key == Key::kForward ? kLinear_mps : -kLinear_mps / 2.0;
+      linear_until_ns_ = now_ns + kHoldLinear_ns;
+      break;
+    case Key::kLeft:
+    case Key::kRight:
+      angular_ = key == Key::kLeft ? kAngular_radps : -kAngular_radps;
+      angular_until_ns_ = now_ns + kHoldAngular_ns;
+      break;
+    case Key::kStop:
+      linear_until_ns_ = angular_until_ns_ = now_ns;
+      break;
+    default:
+      break;
+  }
+}
+
+Twist Teleop::twist(std::int64_t now_ns) const {
+  return {now_ns < linear_until_ns_ ? linear_ : 0.0, now_ns < angular_until_ns_ ? angular_ : 0.0};
 }
 
 }  // namespace gimnet::demo

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "tools/demo/carmen_log.hpp"
-#include "tools/demo/robot_source.hpp"
+#include "tools/demo/robot.hpp"
 
 namespace gimnet::demo {
 

@@ -1,11 +1,175 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "base/standard_streams.hpp"
+#include "tools/demo/carmen_log.hpp"
+#include "tools/demo/log_player.hpp"
+#include "tools/demo/node_port.hpp"
 #include "tools/demo/options.hpp"
-#include "tools/demo/run.hpp"
+#include "tools/demo/own_network.hpp"
+#include "tools/demo/robot.hpp"
+#include "tools/demo/simulated_robot.hpp"
 #include "tools/demo/stop_signal.hpp"
+#include "tools/demo/viewer.hpp"
+
+namespace gimnet::demo {
+namespace {
+
+constexpr Extent kPicture{80, 24};
+
+// fmt::print() throws where nobody reads any more (a closed terminal, `| head`); that must not keep
+// the children alive.
+void say(const std::string& text) {
+  (void)std::fwrite(text.data(), 1, text.size(), stderr);
+  (void)std::fflush(stderr);
+}
+
+void complain(const Error& error) { say(fmt::format("gimnet-demo: {}\n", error.sentence)); }
+
+// Says which lines of a log are left out; a recording that is cut or damaged in one place still
+// plays.
+void say_skipped(const RobotLog& log) {
+  if (!log.cut.empty()) say(fmt::format("gimnet-demo: {}\n", log.cut));
+  if (log.skipped == 0) return;
+  say(fmt::format("gimnet-demo: skipped {} {} of the log that cannot be read; the first is {}\n",
+                  log.skipped, log.skipped == 1 ? "line" : "lines", log.first_skipped));
+}
+
+Result<Robot::SourceMaker> source_maker(const Options& options) {
+  if (!options.log.empty()) {
+    Result<RobotLog> log = load_robot_log(options.log);
+    if (!log) return log.error();
+    say_skipped(*log);
+    const std::string name = std::filesystem::path(options.log).filename().string();
+    return Robot::SourceMaker(
+        [log = std::move(*log), name, speed = options.speed](std::int64_t now_ns) {
+          return std::make_unique<LogPlayer>(log, LogPlayer::Start{name, speed, now_ns});
+        });
+  }
+  Result<WorldMap> map =
+      options.map.empty() ? Result<WorldMap>(WorldMap::hall()) : WorldMap::load(options.map);
+  if (!map) return map.error();
+  return Robot::SourceMaker([map = std::move(*map)](std::int64_t now_ns) {
+    return std::make_unique<SimulatedRobot>(map, now_ns);
+  });
+}
+
+// What the screen can show: the choice of the user, then the environment, then the terminal itself.
+TerminalStyle style_for(const Options& options, Terminal* terminal) {
+  TerminalStyle style;
+  style.colours = terminal == nullptr ? ColourDepth::kNone : colours_of_environment();
+  std::optional<bool> utf8 = utf8_of_environment();
+  if (!utf8 && terminal != nullptr) utf8 = terminal->understands_utf8();
+  if (options.glyphs != Glyphs::kAuto) utf8 = options.glyphs == Glyphs::kUtf8;
+  style.utf8 = utf8.value_or(false);
+  return style;
+}
+
+// A demo that was told to run for a time, or has no keyboard, drives by itself.
+bool drives_itself(const Options& options, const Terminal* terminal) {
+  return options.seconds.has_value() || terminal == nullptr;
+}
+
+// Checks what the robot's process would only find later, where the sentence would be harder to
+// find.
+std::optional<Error> unusable_input(const Options& options) {
+  if (options.role != Role::kAll) return std::nullopt;
+  const Result<Robot::SourceMaker> maker = source_maker(options);
+  return maker ? std::nullopt : std::optional(maker.error());
+}
+
+// Writes to standard output. False: it cannot be written, which standard error was told. A reader
+// that went away has enough, and is no failure.
+[[nodiscard]] bool show(const std::string& text) {
+  const std::string why = write_standard_output(text);
+  if (!why.empty()) complain(Error{fmt::format("cannot write to standard output: {}", why)});
+  return why.empty();
+}
+
+[[nodiscard]] bool show_summary(const Viewer& viewer, const TerminalStyle& style,
+                                bool interactive) {
+  const std::string picture = interactive ? "" : viewer.last_picture(kPicture) + "\n";
+  return show(picture + summary_text(viewer.monitor(), viewer.record(), style.utf8));
+}
+
+// Runs the robot's process until it is told to end.
+ExitCode run_robot(const Options& options) {
+  Result<Robot::SourceMaker> maker = source_maker(options);
+  if (!maker) {
+    complain(maker.error());
+    return ExitCode::kUsage;
+  }
+  Result<std::unique_ptr<NodePort>> port = connect_robot({options.hub_url, options.robot});
+  if (!port) {
+    complain(port.error());
+    return ExitCode::kNoNetwork;
+  }
+  // Who reads it goes on without it, or does not: the robot is there.
+  (void)show("ready\n");
+  Robot robot(**port, std::move(*maker));
+  while (stop_signal() == 0) {
+    if (const std::optional<Error> error = robot.step()) {
+      complain(*error);
+      return ExitCode::kLost;
+    }
+  }
+  return ExitCode::kGood;
+}
+
+// Runs the viewer's process, with an own hub and robot unless the role is kView; prints the summary
+// at the end.
+ExitCode run_viewer(const Options& options) {
+  if (const std::optional<Error> error = unusable_input(options)) {
+    complain(*error);
+    return ExitCode::kUsage;
+  }
+  std::optional<OwnNetwork> network;
+  ViewerOptions viewing;
+  viewing.hub_url = options.hub_url;
+  viewing.own_robot = options.role == Role::kAll;
+  if (viewing.own_robot) {
+    Result<OwnNetwork> started = OwnNetwork::start(options, folder_of_this_program());
+    if (!started) {
+      complain(started.error());
+      return ExitCode::kNoNetwork;
+    }
+    network.emplace(std::move(*started));
+    viewing.hub_url = network->hub_url();
+    viewing.trouble = [&network](std::int64_t wait_ns) { return network->trouble(wait_ns); };
+  }
+  Result<std::unique_ptr<NodePort>> port = connect_viewer({viewing.hub_url, options.robot});
+  if (!port) {
+    complain(port.error());
+    return ExitCode::kNoNetwork;
+  }
+
+  std::unique_ptr<Terminal> terminal = Terminal::open({STDIN_FILENO, STDOUT_FILENO});
+  const bool interactive = terminal != nullptr;
+  viewing.seconds = options.seconds;
+  viewing.autopilot = drives_itself(options, terminal.get());
+  viewing.style = style_for(options, terminal.get());
+  if (!interactive) viewing.on_progress = [](const std::string& line) { say(line + "\n"); };
+  const TerminalStyle style = viewing.style;
+  Viewer viewer(**port, terminal.get(), std::move(viewing));
+  const std::optional<Error> error = viewer.run();
+  terminal.reset();
+  if (error) complain(*error);
+  if (error && !viewer.monitor().info()) return ExitCode::kLost;
+  if (!show_summary(viewer, style, interactive)) return ExitCode::kLost;
+  return complaints_about(viewer.monitor(), viewer.record()).empty() ? ExitCode::kGood
+                                                                     : ExitCode::kLost;
+}
+
+}  // namespace
+}  // namespace gimnet::demo
 
 int main(int count, char** words) {
   using namespace gimnet::demo;

@@ -1,6 +1,59 @@
 #include "tools/demo/monitor.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace gimnet::demo {
+
+void SampleWindow::add(std::int64_t duration_ns) {
+  if (samples_.size() < capacity_) {
+    samples_.push_back(duration_ns);
+    return;
+  }
+  samples_[oldest_] = duration_ns;
+  oldest_ = (oldest_ + 1) % capacity_;
+}
+
+std::optional<std::int64_t> SampleWindow::percentile_ns(double percent) const {
+  if (samples_.empty()) return std::nullopt;
+  std::vector<std::int64_t> sorted = samples_;
+  const double rank = std::ceil(percent / 100.0 * static_cast<double>(sorted.size()));
+  const auto index =
+      static_cast<std::size_t>(std::clamp(rank, 1.0, static_cast<double>(sorted.size()))) - 1;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(index),
+                   sorted.end());
+  return sorted[index];
+}
+
+std::vector<std::int64_t> SampleWindow::latest(std::size_t count) const {
+  std::vector<std::int64_t> ordered;
+  const std::size_t size = samples_.size();
+  const std::size_t taken = std::min(count, size);
+  for (std::size_t index = size - taken; index < size; ++index)
+    ordered.push_back(samples_[(oldest_ + index) % size]);
+  return ordered;
+}
+
+void RateMeter::add(std::int64_t now_ns) {
+  if (!first_ns_) first_ns_ = now_ns;
+  std::erase_if(times_ns_,
+                [now_ns](std::int64_t time_ns) { return time_ns <= now_ns - kWindow_ns; });
+  times_ns_.push_back(now_ns);
+}
+
+double RateMeter::rate_hz(std::int64_t now_ns) const {
+  const auto recent =
+      std::count_if(times_ns_.begin(), times_ns_.end(),
+                    [now_ns](std::int64_t time_ns) { return time_ns > now_ns - kWindow_ns; });
+  if (recent == 0) return 0.0;
+  // Until the window is full the first event opens the interval and is not in it.
+  const std::int64_t open_ns = now_ns - *first_ns_;
+  if (open_ns < kWindow_ns)
+    return open_ns < 100'000'000
+               ? 0.0
+               : static_cast<double>(recent - 1) / (static_cast<double>(open_ns) * 1e-9);
+  return static_cast<double>(recent) / (static_cast<double>(kWindow_ns) * 1e-9);
+}
 
 void StreamRecord::take(std::uint64_t number, std::int64_t now_ns) {
   rate.add(now_ns);

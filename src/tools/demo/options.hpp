@@ -10,6 +10,9 @@
 
 namespace gimnet::demo {
 
+/// Exit codes of the demo.
+enum class ExitCode : std::uint8_t { kGood = 0, kLost = 1, kUsage = 2, kNoNetwork = 3 };
+
 /// Which process this is.
 enum class Role : std::uint8_t { kAll, kRobot, kView };
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/demo/ansi_writer.hpp"
+#include "tools/demo/terminal.hpp"
 #include "tools/demo/text_format.hpp"
 
 namespace gimnet::demo {

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "base/result.hpp"
-#include "tools/demo/ansi_writer.hpp"
 #include "tools/demo/driver.hpp"
 #include "tools/demo/monitor.hpp"
 #include "tools/demo/node_port.hpp"

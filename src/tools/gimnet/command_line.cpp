@@ -8,9 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "base/option_words.hpp"
 #include "base/suggest.hpp"
-#include "tools/gimnet/command_help.hpp"
 #include "tools/gimnet/command_options.hpp"
 
 namespace gimnet::tool {

@@ -1,15 +1,168 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string_view>
 #include <utility>
 
 #include "tools/gimnet/options.hpp"
 
 namespace CLI {
+class FormatterBase;
+}
+
+namespace gimnet::tool {
+
+/// How help is laid out: commands in a line each, and options without the types and ranges that
+/// their descriptions say in words. Thread safety: immutable.
+[[nodiscard]] std::shared_ptr<CLI::FormatterBase> help_format();
+
+}  // namespace gimnet::tool
+
+namespace CLI {
+
 class App;
 class Validator;
+
 }  // namespace CLI
+
+// What `gimnet --help` and `gimnet COMMAND --help` begin with: what it does, and examples.
+
+namespace gimnet::tool::help {
+
+inline constexpr const char* kAbout = R"(Talk to a GIMnet hub from the command line.
+
+Examples:
+  gimnet recv --name B --raw                print what is sent to B
+  gimnet send B < lines                     send each line to B, and wait until B has them all
+  gimnet pub robot/odom < lines             publish each line as robot/odom
+  gimnet echo robot/odom -n 10              print ten messages of robot/odom
+  gimnet hz 'robot/*'                       how often do its services send, and how evenly?
+  gimnet ping B                             how far away is B?
+  gimnet watch                              who comes and goes?
+  gimnet nodes; gimnet services; gimnet status --json
+  gimnet impair LISTEN TARGET --delay 80ms  relay as a bad network does
+  gimnet ctl connections                    administer the hub: kick, reassign, drain, reload, log
+
+Data goes to standard output, words to standard error. Ends with 0 done, 1 failed, 2 wrong arguments, 3 cannot connect,
+4 not found, 5 no answer or no data in time, 6 denied, 7 the hub has another version, 129, 130 and 143 by signal.
+)";
+
+/// What each command's help ends with.
+inline constexpr const char* kEverywhere =
+    "With every command: --hub URL, --json, --color WORD; `gimnet --help` explains them.";
+
+inline constexpr const char* kSendAbout =
+    R"(Send messages to a node, or to a service that accepts data, and wait until all are acknowledged.
+
+Examples:
+  gimnet send B < lines                     a message for each line
+  gimnet send robot/drive < lines           the same to the service drive of the node robot
+  gimnet send 7.17 --file map.png           one message
+  echo stop | gimnet send B --lane real_time
+
+At most 64 messages wait for their acknowledgement. Ends with 0 when all are acknowledged; stops at the first loss and says
+why: ends with 4 if nobody is there, otherwise with 1.
+)";
+
+inline constexpr const char* kRecvAbout = R"(Print the messages that are sent to this node.
+
+Examples:
+  gimnet recv --name B                      one line a message, with its sender
+  gimnet recv --name B -n 1000 --raw        the payload and a newline each, and end after 1,000
+  gimnet recv --name B --json | jq .text
+
+Overwrites nothing: when the reader of its output is slow, it stops reading from the hub.
+)";
+
+inline constexpr const char* kPubAbout = R"(Publish each line of standard input as a service.
+
+Examples:
+  gimnet pub robot/odom < lines             the node robot provides the service odom
+  gimnet pub robot/odom --rate 40 --wait 1 < lines
+  gimnet pub robot/pose --delivery latest < lines
+  gimnet pub robot/camera --delivery sync:2 < lines
+  gimnet pub robot/map --retain --stay < lines
+                                            who comes later, while it stays, gets the last line
+)";
+
+inline constexpr const char* kEchoAbout =
+    R"(Print the messages of services. A service need not exist yet.
+
+Examples:
+  gimnet echo robot/odom
+  gimnet echo 'robot/*' --seconds 10        all services of robot, those that come meanwhile too
+  gimnet echo robot/odom -n 10 --raw
+  gimnet echo robot/odom --rate 2           the newest, twice a second
+  gimnet echo robot/odom --json | jq .age_us
+
+By full name nothing is missed of a service that begins later; by pattern what is published before the hub has told of
+it: `gimnet pub --wait 1` waits for that.
+)";
+
+inline constexpr const char* kHzAbout = R"(Measure how often services send, and how evenly.
+
+Examples:
+  gimnet hz robot/odom
+  gimnet hz '**' --seconds 10               all services, those that come meanwhile too
+  gimnet hz robot/odom --window 1 --json | jq .rate_hz
+
+Once a second: messages a second, the shortest, longest and mean gap between two and its standard deviation over the
+last --window seconds, and how many did not come. At the end the same over all of it.
+)";
+
+inline constexpr const char* kBwAbout =
+    R"(Measure how many bytes services send, and how large their messages are.
+
+Examples:
+  gimnet bw robot/camera
+  gimnet bw '**' --seconds 10 --json
+
+Payload bytes, as the publisher gave them; once a second over the last --window seconds, at the end over all of it.
+)";
+
+inline constexpr const char* kPingAbout =
+    R"(Measure the way to a node and back. Its library answers by itself.
+
+Examples:
+  gimnet ping B
+  gimnet ping 7.17 -c 1000 -i 0.001 --json
+)";
+
+inline constexpr const char* kNodesAbout = R"(List the nodes.
+
+Examples:
+  gimnet nodes
+  gimnet nodes 'robot/**'                   only those whose name matches
+  gimnet nodes --all                        those of gimnet, too
+  gimnet --json nodes | jq '.[].name'
+)";
+
+inline constexpr const char* kServicesAbout = R"(List the services.
+
+Examples:
+  gimnet services
+  gimnet services 'robot/*' --json
+)";
+
+inline constexpr const char* kWatchAbout =
+    R"(Tell which nodes and services are there, and who comes and goes from then on.
+
+Examples:
+  gimnet watch
+  gimnet watch 'robot/**' --changes         only what changes
+  gimnet watch robot -n 1 --seconds 10      wait for robot: ends with 0 when it is there, else with 5
+  gimnet watch --json | jq .change
+)";
+
+inline constexpr const char* kStatusAbout = R"(Show what the hub counted.
+
+Examples:
+  gimnet status
+  gimnet status --json | jq .ledger
+)";
+
+}  // namespace gimnet::tool::help
 
 namespace gimnet::tool {
 

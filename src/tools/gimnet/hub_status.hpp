@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gimnet/gimi/records.hpp"
-#include "tools/gimnet/paint.hpp"
+#include "tools/gimnet/table.hpp"
 
 namespace gimnet::tool {
 

@@ -8,7 +8,7 @@
 #include "impair/control_line.hpp"
 #include "impair/fault_proxy.hpp"
 #include "tools/gimnet/command_options.hpp"
-#include "tools/gimnet/line_input.hpp"
+#include "tools/gimnet/input.hpp"
 #include "tools/gimnet/output.hpp"
 #include "tools/gimnet/session.hpp"
 

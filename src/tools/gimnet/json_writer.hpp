@@ -3,9 +3,12 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "gimnet/gimi/records.hpp"
 
 namespace gimnet::tool {
 
@@ -52,5 +55,15 @@ class JsonWriter {
   std::string json_;
   bool first_ = true;
 };
+
+/// Writes a record as an object, everywhere with the same members.
+void write(JsonWriter& json, const NodeRecord& node);
+/// `place`: that of its node, where it is known.
+void write(JsonWriter& json, const ServiceRecord& service,
+           std::optional<std::string_view> place = std::nullopt);
+
+[[nodiscard]] const char* text_of(Direction direction);
+/// As `pub --delivery` takes it.
+[[nodiscard]] std::string delivery_of(const ServiceRecord& service);
 
 }  // namespace gimnet::tool

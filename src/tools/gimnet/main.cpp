@@ -4,7 +4,7 @@
 
 #include "base/standard_streams.hpp"
 #include "tools/gimnet/command_line.hpp"
-#include "tools/gimnet/commands.hpp"
+#include "tools/gimnet/session.hpp"
 
 namespace {
 

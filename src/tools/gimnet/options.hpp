@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "gimnet/gimi.hpp"
-#include "tools/gimnet/ctl_options.hpp"
+#include "tools/gimnet/ctl.hpp"
 #include "tools/gimnet/impair.hpp"
 
 namespace gimnet::tool {

@@ -1,3 +1,5 @@
+#include "tools/gimnet/pub.hpp"
+
 #include <unistd.h>
 
 #include <algorithm>
@@ -5,14 +7,24 @@
 #include <cstring>
 
 #include "base/clock.hpp"
-#include "tools/gimnet/commands.hpp"
-#include "tools/gimnet/connection_watch.hpp"
+#include "tools/gimnet/input.hpp"
 #include "tools/gimnet/json_writer.hpp"
-#include "tools/gimnet/line_input.hpp"
-#include "tools/gimnet/progress.hpp"
-#include "tools/gimnet/unheard_lines.hpp"
+#include "tools/gimnet/output.hpp"
+#include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {
+
+std::string UnheardLines::sentence(const std::string& service, bool waited) const {
+  if (unheard_ == 0) return {};
+  const std::string all = std::to_string(lines_);
+  std::string count = std::to_string(unheard_) + " of " + all + " lines went to nobody: ";
+  if (unheard_ == lines_)
+    count = lines_ == 1 ? "the line went to nobody: " : "all " + all + " lines went to nobody: ";
+  if (waited) return count + "the last subscriber of " + service + " had left";
+  return count + "nobody had subscribed to " + service +
+         " then; --wait 1 holds the first until somebody has";
+}
+
 namespace {
 
 /// How long the last lines may take to leave.

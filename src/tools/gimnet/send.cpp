@@ -8,14 +8,12 @@
 #include <utility>
 
 #include "base/clock.hpp"
-#include "tools/gimnet/commands.hpp"
-#include "tools/gimnet/connection_watch.hpp"
-#include "tools/gimnet/decimal.hpp"
-#include "tools/gimnet/file_content.hpp"
+#include "tools/gimnet/input.hpp"
 #include "tools/gimnet/json_writer.hpp"
-#include "tools/gimnet/line_input.hpp"
-#include "tools/gimnet/loss_words.hpp"
-#include "tools/gimnet/progress.hpp"
+#include "tools/gimnet/losses.hpp"
+#include "tools/gimnet/output.hpp"
+#include "tools/gimnet/session.hpp"
+#include "tools/gimnet/table.hpp"
 
 namespace gimnet::tool {
 namespace {

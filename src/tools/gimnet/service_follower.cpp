@@ -7,6 +7,108 @@
 #include "tools/gimnet/session.hpp"
 
 namespace gimnet::tool {
+
+std::optional<std::string> MatchingServices::take(const WatchEvent& event) {
+  if (event.change == Change::snapshot_begins) {
+    for (auto& [name, service] : services_) service.shown = false;
+  } else if (event.change == Change::snapshot_ends) {
+    on_snapshot_end();
+  }
+  if (!event.service) return std::nullopt;
+  const std::string& name = event.service->name;
+  if (event.change == Change::withdrawn) {
+    const auto found = services_.find(name);
+    if (found == services_.end() || !found->second.there) return std::nullopt;
+    const bool late = found->second.late;
+    on_gone(found);
+    return late ? std::optional(name) : std::nullopt;
+  }
+  const bool is_there = event.change == Change::present || event.change == Change::advertised;
+  if (is_there && event.service->direction == Direction::provides) on_there(name);
+  return std::nullopt;
+}
+
+void MatchingServices::on_there(const std::string& name) {
+  const auto [found, is_new] = services_.try_emplace(name);
+  Service& service = found->second;
+  service.shown = true;
+  if (service.there) return;
+  service.there = true;
+  // One with a subscription, from the last time, is not late.
+  service.late = complete_ && !service.settled;
+  service.lateness = service.late;
+  if (is_new) {
+    wanted_.push_back(name);
+  } else {
+    std::erase(gone_, name);
+  }
+}
+
+void MatchingServices::on_gone(Services::iterator found) {
+  found->second.there = false;
+  gone_.push_back(found->first);
+}
+
+void MatchingServices::on_snapshot_end() {
+  for (auto service = services_.begin(); service != services_.end(); ++service) {
+    if (service->second.there && !service->second.shown) on_gone(service);
+  }
+  complete_ = true;
+}
+
+void MatchingServices::settle(std::string_view name) {
+  std::erase(wanted_, name);
+  if (const auto found = services_.find(name); found != services_.end())
+    found->second.settled = true;
+}
+
+void MatchingServices::forget(const std::string& name) {
+  std::erase(wanted_, name);
+  std::erase(gone_, name);
+  services_.erase(name);
+}
+
+bool MatchingServices::take_lateness(std::string_view name) {
+  const auto found = services_.find(name);
+  return found != services_.end() && std::exchange(found->second.lateness, false);
+}
+
+void VanishedServices::judge(const Gone& gone) {
+  if (!gone.is_silent()) return;
+  if (count_ == 0) first_ = gone.name;
+  ++count_;
+}
+
+void VanishedServices::on_there(const std::string& name) {
+  for (const Gone& gone : waiting_) {
+    if (gone.name == name) judge(gone);
+  }
+  std::erase_if(waiting_, [&](const Gone& gone) { return gone.name == name; });
+}
+
+std::vector<std::string> VanishedServices::news(std::int64_t now_ns) {
+  while (!waiting_.empty() && waiting_.front().due_ns <= now_ns) {
+    judge(waiting_.front());
+    waiting_.pop_front();
+  }
+  if (count_ == 0 || !pace_.due(now_ns)) return {};
+  const std::size_t others = std::exchange(count_, 0) - 1;
+  const std::string who = others == 0 ? first_
+                                      : first_ + " and " + std::to_string(others) +
+                                            (others == 1 ? " other" : " others");
+  return {who + " came and went, and nothing came of " + (others == 0 ? "it" : "them") +
+          ": what is published before this node has heard of a service and subscribed to it passes "
+          "it by "
+          "(`gimnet pub --wait 1` waits for that)"};
+}
+
+std::vector<std::string> VanishedServices::rest() {
+  for (const Gone& gone : waiting_) judge(gone);
+  waiting_.clear();
+  pace_ = {};
+  return news(0);
+}
+
 namespace {
 
 /// How long it waits before it asks again for what the hub has refused.

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
+#include <utility>
+
+#include "proto/frame/frame_header.hpp"
+
 namespace gimnet::gimi {
 namespace {
 
@@ -33,4 +38,47 @@ TEST(LossTally, KnowsWhoFilledTheQueueLast) {
 }
 
 }  // namespace
+
+namespace {
+
+TEST(ReportWords, SayWhatAReasonMeansWhereItsNameDoesNot) {
+  EXPECT_EQ(report_words("no_such_node"), "the hub reports no_such_node: no node has that id");
+  EXPECT_EQ(report_words("too_old"), "the hub reports too_old");
+}
+
+TEST(ReportedLoss, IsWhatTheWireSays) {
+  const std::pair<LossReason, proto::DropReason> pairs[] = {
+      {LossReason::no_such_node, proto::DropReason::no_such_node},
+      {LossReason::no_route, proto::DropReason::no_route},
+      {LossReason::away, proto::DropReason::away},
+      {LossReason::queue_full, proto::DropReason::queue_full},
+      {LossReason::replaced, proto::DropReason::replaced},
+      {LossReason::too_old, proto::DropReason::too_old},
+      {LossReason::hop_limit, proto::DropReason::hop_limit},
+      {LossReason::too_large, proto::DropReason::too_large},
+      {LossReason::not_allowed, proto::DropReason::not_allowed},
+      {LossReason::wrong_way, proto::DropReason::wrong_way},
+      {LossReason::link_lost, proto::DropReason::link_lost},
+      {LossReason::shard_full, proto::DropReason::shard_full},
+      {LossReason::no_such_group, proto::DropReason::no_such_group},
+      {LossReason::renumbered, proto::DropReason::renumbered},
+      {LossReason::over_budget, proto::DropReason::over_budget},
+      {LossReason::timed_out, proto::DropReason::timed_out},
+      {LossReason::cut_message, proto::DropReason::cut_message},
+      {LossReason::no_subscriber, proto::DropReason::no_subscriber},
+      {LossReason::malformed, proto::DropReason::malformed},
+      {LossReason::wrong_source, proto::DropReason::wrong_source},
+  };
+  EXPECT_EQ(std::size(pairs) + 2, proto::kDropReasonCount)
+      << "and none, and not_retained, which is no loss";
+  for (const auto& [known, wire] : pairs) {
+    const auto reason = static_cast<std::uint32_t>(wire);
+    EXPECT_EQ(reported_loss(reason, proto::drop_reason_name(wire)).reason, known);
+  }
+  EXPECT_EQ(reported_loss(66, "of a later hub").reason, LossReason::none)
+      << "none that this node knows by itself";
+}
+
+}  // namespace
+
 }  // namespace gimnet::gimi

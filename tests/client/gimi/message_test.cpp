@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/gimi/message_access.hpp"
+#include "client/gimi/message.hpp"
 #include "gimnet/gimi/message.hpp"
 #include "tests/client/gimi/support/made_message.hpp"
 

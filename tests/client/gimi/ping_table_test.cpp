@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "client/gimi/deadline.hpp"
+#include "client/gimi/ending.hpp"
 
 namespace gimnet::gimi {
 namespace {

@@ -63,4 +63,88 @@ TEST(Utf8, WhatIsNoneIsReplacedByteByByte) {
 }
 
 }  // namespace
+
+namespace {
+
+// 4 by 2 characters, 8 by 8 dots of 1 m; the origin in the middle.
+constexpr Extent kExtent{4, 2};
+constexpr View kView{{0.0, 0.0}, 1.0};
+
+char32_t code_at(const Plot& plot, Place place) {
+  Canvas canvas(kExtent);
+  plot.draw(canvas, {0, 0});
+  return canvas.at(place).code;
+}
+
+TEST(Plot, SetsTheDotOfAPoint) {
+  Plot plot(kExtent, kView);
+  plot.dot({-3.5, 3.5}, Ink::kWall);
+  EXPECT_EQ(code_at(plot, {0, 0}), U'\u2801');
+  plot.dot({3.5, -3.5}, Ink::kWall);
+  EXPECT_EQ(code_at(plot, {3, 1}), U'\u2880');
+  EXPECT_EQ(code_at(plot, {1, 0}), U' ');
+}
+
+TEST(Plot, WhatLiesOutsideIsNotDrawn) {
+  Plot plot(kExtent, kView);
+  for (const Point& point :
+       {Point{-4.5, 0}, {4.5, 0}, {0, 4.5}, {0, -4.5}, {1e300, 0}, {0, -1e300}}) {
+    plot.dot(point, Ink::kWall);
+    plot.ground(point, Ground::kBeam);
+  }
+  plot.fill({{100, 100}, {200, 200}}, Ink::kWall);
+  plot.fill({{-1e300, 100}, {1e300, 200}}, Ink::kWall);
+  plot.line({10, 10}, {20, 20}, Ink::kWall);
+  for (int column = 0; column < 4; ++column) EXPECT_EQ(code_at(plot, {column, 0}), U' ');
+}
+
+TEST(Plot, FillsABoxOnce) {
+  Plot plot(kExtent, kView);
+  plot.fill({{-4, 0}, {-2, 4}}, Ink::kWall);
+  EXPECT_EQ(code_at(plot, {0, 0}), U'\u28FF');
+  EXPECT_EQ(code_at(plot, {1, 0}), U' ');
+  EXPECT_EQ(code_at(plot, {0, 1}), U' ');
+}
+
+TEST(Plot, ABoxIsNeverNothing) {
+  Plot plot(kExtent, kView);
+  plot.fill({{-3.6, 3.4}, {-3.5, 3.5}}, Ink::kWall);
+  EXPECT_EQ(code_at(plot, {0, 0}), U'\u2801');
+}
+
+TEST(Plot, TheHighestInkColoursAndTheRobotPushesOthersOut) {
+  Plot plot(kExtent, kView);
+  Canvas canvas(kExtent);
+  plot.dot({-3.5, 3.5}, Ink::kScan);
+  plot.dot({-2.5, 3.5}, Ink::kWall);
+  plot.draw(canvas, {0, 0});
+  EXPECT_EQ(canvas.at({0, 0}).code, U'\u2809');
+  EXPECT_EQ(canvas.at({0, 0}).ink, Ink::kScan);
+  plot.dot({-3.5, 2.5}, Ink::kRobot);
+  plot.draw(canvas, {0, 0});
+  EXPECT_EQ(canvas.at({0, 0}).code, U'\u2802');
+  EXPECT_EQ(canvas.at({0, 0}).ink, Ink::kRobot);
+}
+
+TEST(Plot, DrawsLinesAndTriangles) {
+  Plot plot(kExtent, kView);
+  plot.line({-3.5, 3.5}, {3.5, 3.5}, Ink::kTrail);
+  for (int column = 0; column < 4; ++column) EXPECT_EQ(code_at(plot, {column, 0}), U'\u2809');
+  plot.triangle({-3.9, -3.9}, {-3.9, -0.1}, {-0.1, -3.9}, Ink::kRobot);
+  EXPECT_NE(code_at(plot, {0, 1}), U' ');
+  EXPECT_EQ(code_at(plot, {3, 1}), U' ');
+}
+
+TEST(Plot, FitsABoxWithAMargin) {
+  const View view = Plot::fitted({{0, 0}, {16, 4}}, kExtent);
+  EXPECT_EQ(view.centre.x_m, 8.0);
+  EXPECT_EQ(view.centre.y_m, 2.0);
+  const Box seen = Plot(kExtent, view).seen();
+  EXPECT_LT(seen.least.x_m, 0.0);
+  EXPECT_GT(seen.most.x_m, 16.0);
+  EXPECT_LT(seen.most.x_m, 18.0);
+}
+
+}  // namespace
+
 }  // namespace gimnet::demo

@@ -7,7 +7,7 @@
 
 #include <csignal>
 
-#include "tools/demo/temporary_folder.hpp"
+#include "tools/demo/own_network.hpp"
 
 namespace gimnet::demo {
 namespace {

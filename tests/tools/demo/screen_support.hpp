@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "tools/demo/ansi_writer.hpp"
 #include "tools/demo/monitor.hpp"
 #include "tools/demo/screen.hpp"
+#include "tools/demo/terminal.hpp"
 
 namespace gimnet::demo {
 

@@ -90,4 +90,96 @@ TEST(Screen, HelpLiesOverTheMap) {
 }
 
 }  // namespace
+
+namespace {
+
+constexpr Extent kExtent{40, 20};
+
+Monitor in_the_hall() {
+  Monitor monitor(0);
+  RobotInfo info;
+  info.map = WorldMap::hall().text();
+  monitor.take(info, 0);
+  Odometry odometry;
+  odometry.stamp.number = 1;
+  odometry.pose = {4.0, 5.0, 0.0};
+  monitor.take(odometry, 0);
+  return monitor;
+}
+
+std::size_t glyphs_with(const Canvas& canvas, Ink ink) {
+  std::size_t count = 0;
+  for (int row = 0; row < canvas.extent().rows; ++row) {
+    for (int column = 0; column < canvas.extent().columns; ++column) {
+      const Glyph& glyph = canvas.at({column, row});
+      if (glyph.ink == ink && glyph.code != U' ') ++count;
+    }
+  }
+  return count;
+}
+
+Canvas drawn(const Monitor& monitor, const MapChoice& choice) {
+  Plot plot(kExtent, choose_view(monitor, choice, kExtent));
+  draw_map(plot, monitor, choice);
+  Canvas canvas(kExtent);
+  plot.draw(canvas, {0, 0});
+  return canvas;
+}
+
+TEST(MapView, ShowsTheWholeHall) {
+  const View view = choose_view(in_the_hall(), MapChoice{}, kExtent);
+  EXPECT_EQ(view.centre.x_m, 9.0);
+  EXPECT_EQ(view.centre.y_m, 6.0);
+}
+
+TEST(MapView, FollowsAndZoomsAroundTheRobot) {
+  MapChoice choice;
+  choice.follow = true;
+  EXPECT_EQ(choose_view(in_the_hall(), choice, kExtent).centre.x_m, 4.0);
+  choice.follow = false;
+  choice.zoom = 2.0;
+  const View near = choose_view(in_the_hall(), choice, kExtent);
+  EXPECT_EQ(near.centre.y_m, 5.0);
+  EXPECT_NEAR(near.metres_per_dot * 2.0,
+              choose_view(in_the_hall(), MapChoice{}, kExtent).metres_per_dot, 1e-9);
+}
+
+TEST(MapView, DrawsEachLayer) {
+  Monitor monitor = in_the_hall();
+  Scan scan;
+  scan.stamp.number = 1;
+  scan.pose = {4.0, 5.0, 0.0};
+  scan.range_max_m = 10.0;
+  scan.ranges_m = {5.0F};
+  monitor.take(scan, 0);
+  Odometry odometry;
+  odometry.stamp.number = 2;
+  odometry.pose = {2.5, 5.0, 0.0};
+  monitor.take(odometry, 0);
+  const Canvas canvas = drawn(monitor, MapChoice{});
+  EXPECT_GT(glyphs_with(canvas, Ink::kPlan), 50U);
+  EXPECT_EQ(glyphs_with(canvas, Ink::kScan), 1U);
+  EXPECT_GE(glyphs_with(canvas, Ink::kRobot), 2U);
+  EXPECT_GE(glyphs_with(canvas, Ink::kTrail), 1U);
+  MapChoice without_trail;
+  without_trail.trail = false;
+  EXPECT_EQ(glyphs_with(drawn(monitor, without_trail), Ink::kTrail), 0U);
+}
+
+TEST(MapView, ShowsSomethingBeforeAnythingCame) {
+  const Monitor monitor(0);
+  EXPECT_GT(choose_view(monitor, MapChoice{}, kExtent).metres_per_dot, 0.0);
+  EXPECT_EQ(glyphs_with(drawn(monitor, MapChoice{}), Ink::kRobot), 0U);
+}
+
+TEST(MapView, TheScaleIsARoundLength) {
+  Canvas canvas({20, 1});
+  draw_scale(canvas, {0, 0}, {{}, 0.1});
+  EXPECT_EQ(canvas.at({0, 0}).code, U'├');
+  EXPECT_EQ(canvas.at({4, 0}).code, U'┤');
+  EXPECT_EQ(canvas.at({6, 0}).code, U'1');
+}
+
+}  // namespace
+
 }  // namespace gimnet::demo

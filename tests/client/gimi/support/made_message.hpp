@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "client/gimi/message_access.hpp"
+#include "client/gimi/message.hpp"
 
 namespace gimnet::test {
 

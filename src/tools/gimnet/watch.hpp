@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+
+#include "gimnet/gimi.hpp"
+#include "tools/gimnet/table.hpp"
+
+namespace gimnet::tool {
+
+/// A look by this tool, which nobody looks for.
+[[nodiscard]] bool is_tool(const NodeRecord& node);
+
+/// Leaves out the comings and goings of this tool's own looks. Thread safety: one thread. Memory:
+/// an id for each that is there.
+class ToolFilter {
+ public:
+  /// Is the event of one of them?
+  [[nodiscard]] bool hides(const WatchEvent& event);
+
+ private:
+  std::set<std::uint32_t> hidden_;  ///< the last event of a node tells no more than its id
+};
+
+/// Is it part of what was there before, not a change?
+[[nodiscard]] bool is_snapshot(Change change);
+
+/// An object and a newline. `now_ns`: wall_now_ns() when it came.
+[[nodiscard]] std::string json_line(const WatchEvent& event, std::int64_t now_ns);
+/// A line for people, in local time; "" for what they need not see.
+[[nodiscard]] std::string text_line(const WatchEvent& event, std::int64_t now_ns,
+                                    Paint paint = Paint{});
+
+}  // namespace gimnet::tool

@@ -1,0 +1,70 @@
+#include "tools/gimnet/ctl.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <variant>
+#include <vector>
+
+#include "tools/gimnet/command_line.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::variant<Options, CommandLineEnding> parse(std::vector<const char*> words) {
+  words.insert(words.begin(), "gimnet");
+  return parse_command_line(static_cast<int>(words.size()), words.data());
+}
+
+CtlOptions ctl(const std::vector<const char*>& words) {
+  const auto parsed = parse(words);
+  const auto* options = std::get_if<Options>(&parsed);
+  EXPECT_NE(options, nullptr) << std::get<CommandLineEnding>(parsed).text;
+  if (options == nullptr) return {};
+  EXPECT_EQ(options->command, Command::ctl);
+  return options->ctl;
+}
+
+TEST(CtlOptions, EveryActionIsUnderstood) {
+  EXPECT_EQ(ctl({"ctl", "connections"}).action, CtlAction::connections);
+  EXPECT_EQ(ctl({"ctl", "routes"}).action, CtlAction::routes);
+  EXPECT_EQ(ctl({"ctl", "drain"}).action, CtlAction::drain);
+  EXPECT_EQ(ctl({"ctl", "reload"}).action, CtlAction::reload);
+  const CtlOptions kick = ctl({"ctl", "kick", "robot", "--reason", "it stands in the way"});
+  EXPECT_EQ(kick.action, CtlAction::kick);
+  EXPECT_EQ(kick.node, "robot");
+  EXPECT_EQ(kick.reason, "it stands in the way");
+  const CtlOptions reassign = ctl({"ctl", "reassign", "7.17", "7.100"});
+  EXPECT_EQ(reassign.action, CtlAction::reassign);
+  EXPECT_EQ(reassign.new_id, "7.100");
+  EXPECT_EQ(ctl({"ctl", "log", "debug"}).level, "debug");
+}
+
+TEST(CtlOptions, OptionsOfAllCommandsStandAnywhere) {
+  const auto parsed = parse({"--hub", "unix:/a", "ctl", "connections", "--json"});
+  const auto& options = std::get<Options>(parsed);
+  EXPECT_TRUE(options.json);
+  EXPECT_EQ(options.hub, "unix:/a");
+}
+
+TEST(CtlOptions, WhatIsMissingIsToldWithExitCode2) {
+  for (const std::vector<const char*>& words : {std::vector<const char*>{"ctl"},
+                                                {"ctl", "kick"},
+                                                {"ctl", "reassign", "7.1"},
+                                                {"ctl", "log"},
+                                                {"ctl", "kik"}}) {
+    const auto parsed = parse(words);
+    ASSERT_TRUE(std::holds_alternative<CommandLineEnding>(parsed)) << words.size();
+    EXPECT_EQ(std::get<CommandLineEnding>(parsed).code, ExitCode::usage);
+  }
+}
+
+TEST(CtlOptions, HelpShowsExamples) {
+  const auto parsed = parse({"ctl", "--help"});
+  EXPECT_THAT(std::get<CommandLineEnding>(parsed).text, HasSubstr("ctl reassign"));
+}
+
+}  // namespace
+}  // namespace gimnet::tool

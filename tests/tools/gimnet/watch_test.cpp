@@ -1,0 +1,110 @@
+#include "tools/gimnet/watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <ctime>
+
+#include "tools/gimnet/session.hpp"
+
+namespace gimnet::tool {
+namespace {
+
+constexpr std::int64_t kNoon = (12ll * 3600 + 34 * 60 + 56) * 1'000'000'000 + 789'000'000;
+
+WatchEvent node_event(Change change, std::uint32_t index, const std::string& name,
+                      const std::string& description) {
+  WatchEvent event;
+  event.change = change;
+  event.hub_id = 7;
+  event.epoch = 3;
+  event.version = 9;
+  NodeRecord node;
+  node.node = Peer{(7u << 20) | index};
+  node.name = name;
+  node.description = description;
+  node.hub_name = "lab";
+  node.hub_id = 7;
+  event.node = node;
+  return event;
+}
+
+TEST(WatchReport, ALineForPeople) {
+  ::setenv("TZ", "UTC", 1);
+  ::tzset();
+  WatchEvent joined = node_event(Change::joined, 17, "robot", "a\x1b[2J");
+  joined.node->place = "127.0.0.1:5";
+  EXPECT_EQ(text_line(joined, kNoon),
+            "12:34:56.789  joined      node robot 7.17, from 127.0.0.1:5, a.[2J\n");
+  WatchEvent renamed = node_event(Change::renamed, 17, "two", "");
+  renamed.former_name = "one";
+  EXPECT_EQ(text_line(renamed, kNoon), "12:34:56.789  renamed     node two 7.17, before one\n");
+  WatchEvent service;
+  service.change = Change::withdrawn;
+  service.service.emplace();
+  service.service->name = "robot/odom";
+  service.service->node = Peer{(7u << 20) | 17};
+  EXPECT_EQ(text_line(service, kNoon, Paint(true)),
+            "\x1b[31m12:34:56.789  withdrawn   service robot/odom of 7.17\x1b[0m\n");
+  EXPECT_EQ(text_line(WatchEvent{}, kNoon), "") << "of the watch itself";
+}
+
+TEST(WatchReport, AnObjectForPrograms) {
+  EXPECT_EQ(json_line(node_event(Change::left, 17, "robot", ""), 5),
+            R"({"time_ns":5,"change":"left","hub_id":7,"epoch":3,"version":9,)"
+            R"("node":{"id":"7.17","name":"robot","hub_id":7}})"
+            "\n");
+  EXPECT_EQ(
+      json_line(node_event(Change::joined, 17, "robot", ""), 5),
+      R"({"time_ns":5,"change":"joined","hub_id":7,"epoch":3,"version":9,"node":{"id":"7.17","name":"robot",)"
+      R"("hub":"lab","hub_id":7,"connected":false,"description":"","place":"","joined_ms":0,"services":0}})"
+      "\n");
+  EXPECT_EQ(json_line(WatchEvent{}, 5),
+            R"({"time_ns":5,"change":"snapshot_begins","hub_id":0,"epoch":0,"version":0})"
+            "\n");
+}
+
+TEST(WatchReport, OfAWithdrawnServiceOnlyWhoItWas) {
+  WatchEvent event;
+  event.change = Change::withdrawn;
+  event.service.emplace();
+  event.service->name = "robot/odom";
+  event.service->node = Peer{(7u << 20) | 17};
+  event.service->group_id = 12;
+  EXPECT_EQ(json_line(event, 5),
+            R"({"time_ns":5,"change":"withdrawn","hub_id":0,"epoch":0,"version":0,)"
+            R"("service":{"name":"robot/odom","node":"7.17","group":12}})"
+            "\n");
+}
+
+TEST(WatchReport, KnowsWhatWasThereBefore) {
+  EXPECT_TRUE(is_snapshot(Change::snapshot_begins));
+  EXPECT_TRUE(is_snapshot(Change::present));
+  EXPECT_TRUE(is_snapshot(Change::snapshot_ends));
+  EXPECT_FALSE(is_snapshot(Change::joined));
+}
+
+TEST(ToolFilter, HidesTheWholeLifeOfALook) {
+  ToolFilter filter;
+  EXPECT_TRUE(filter.hides(node_event(Change::joined, 1, "", kToolDescription)));
+  EXPECT_TRUE(filter.hides(node_event(Change::away, 1, "", kToolDescription)));
+  EXPECT_TRUE(filter.hides(node_event(Change::left, 1, "", "")))
+      << "the last event tells no description";
+  EXPECT_FALSE(filter.hides(node_event(Change::joined, 1, "", ""))) << "the id is another's now";
+}
+
+TEST(ToolFilter, ShowsWhatThisToolDoesUnderAName) {
+  ToolFilter filter;
+  EXPECT_FALSE(filter.hides(node_event(Change::joined, 2, "B", kToolDescription)));
+  EXPECT_FALSE(filter.hides(node_event(Change::left, 2, "B", "")));
+}
+
+TEST(ToolFilter, ForgetsWhenToldAgainFromTheStart) {
+  ToolFilter filter;
+  EXPECT_TRUE(filter.hides(node_event(Change::present, 1, "", kToolDescription)));
+  EXPECT_FALSE(filter.hides(WatchEvent{}));
+  EXPECT_FALSE(filter.hides(node_event(Change::present, 1, "", "")));
+}
+
+}  // namespace
+}  // namespace gimnet::tool
