@@ -157,9 +157,9 @@ Given flag(const std::string& key, const std::string& label, std::string text) {
 std::string read_flags(const CLI::App& app, ConfigSources& sources) {
   if (app.count("--listen") != 0) {
     Given& listen = sources.flags.emplace_back(flag("listen", "--listen", {}));
-    listen.value.kind = Value::Kind::list;
+    listen.value.kind = ConfigValue::Kind::list;
     for (const std::string& url : app.get_option("--listen")->results())
-      listen.value.items.push_back({Value::Kind::words, url, {}, {}});
+      listen.value.items.push_back({ConfigValue::Kind::words, url, {}, {}});
   }
   for (const char* name : {"--shards", "--hub-id", "--hub-name", "--state-dir", "--placement",
                            "--log-level", "--spin", "--insecure"}) {

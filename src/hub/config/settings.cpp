@@ -19,7 +19,7 @@
 namespace gimnet::hub {
 namespace {
 
-using Kind = Value::Kind;
+using Kind = ConfigValue::Kind;
 
 constexpr std::string_view kLimits = "limits.";
 constexpr std::array<std::string_view, 2> kPlacements{"spread", "hint"};
@@ -46,7 +46,7 @@ bool has_kind(const Given& given, Kind wanted, const std::string& example, Fault
 
 /// What may be written instead of a value that is no whole number: the nearest one to what can be
 /// read as a number, or the usual one.
-std::uint64_t nearest_number(const Value& value, std::uint64_t least, std::uint64_t most,
+std::uint64_t nearest_number(const ConfigValue& value, std::uint64_t least, std::uint64_t most,
                              std::uint64_t usual) {
   if (value.kind != Kind::text && value.kind != Kind::fraction) return usual;
   double number = 0.0;
@@ -93,7 +93,7 @@ bool any_free_port(const ListenUrl& url) {
 }
 
 void set_listen(Configuration& configuration, const Given& given, Faults& faults) {
-  std::vector<Value> urls = given.value.items;
+  std::vector<ConfigValue> urls = given.value.items;
   if (given.value.kind == Kind::text) urls = {given.value};
   if (given.value.kind != Kind::text &&
       !has_kind(given, Kind::list, "listen = [\"tcp://127.0.0.1:7450\"]", faults)) {
@@ -106,7 +106,7 @@ void set_listen(Configuration& configuration, const Given& given, Faults& faults
         fault(given, given.label + " names no address; leave it out for the default ones"));
   }
   std::set<std::string> known;
-  for (const Value& url : urls) {
+  for (const ConfigValue& url : urls) {
     if (url.kind != Kind::text && url.kind != Kind::words) {
       faults.push_back({url.place, "an address of listen is a text, not " +
                                        std::string{kind_name(url.kind)} +

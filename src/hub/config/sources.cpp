@@ -161,12 +161,12 @@ std::string nearest_variable(std::string_view variable) {
 }
 
 /// Addresses stand side by side in a variable, with blanks or commas between them.
-std::vector<Value> split(std::string_view text) {
+std::vector<ConfigValue> split(std::string_view text) {
   constexpr std::string_view kBetween = ", \t";
-  std::vector<Value> parts;
+  std::vector<ConfigValue> parts;
   for (std::size_t at = text.find_first_not_of(kBetween); at != std::string_view::npos;) {
     const std::size_t end = std::min(text.find_first_of(kBetween, at), text.size());
-    parts.push_back({Value::Kind::words, std::string{text.substr(at, end - at)}, {}, {}});
+    parts.push_back({ConfigValue::Kind::words, std::string{text.substr(at, end - at)}, {}, {}});
     at = text.find_first_not_of(kBetween, end);
   }
   return parts;
@@ -179,7 +179,7 @@ Given from_environment(const std::string& variable, const std::string& key, std:
   given.origin = "environment " + variable;
   given.value.text = text;
   if (key == "listen") {
-    given.value.kind = Value::Kind::list;
+    given.value.kind = ConfigValue::Kind::list;
     given.value.items = split(text);
   }
   return given;

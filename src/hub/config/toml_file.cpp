@@ -110,27 +110,27 @@ std::string text_of(const Node& node) {
   return {};
 }
 
-Value::Kind kind_of(const toml::node& node) {
+ConfigValue::Kind kind_of(const toml::node& node) {
   switch (node.type()) {
     case toml::node_type::string:
-      return Value::Kind::text;
+      return ConfigValue::Kind::text;
     case toml::node_type::integer:
-      return Value::Kind::integer;
+      return ConfigValue::Kind::integer;
     case toml::node_type::boolean:
-      return Value::Kind::boolean;
+      return ConfigValue::Kind::boolean;
     case toml::node_type::floating_point:
-      return Value::Kind::fraction;
+      return ConfigValue::Kind::fraction;
     case toml::node_type::array:
-      return Value::Kind::list;
+      return ConfigValue::Kind::list;
     case toml::node_type::table:
-      return Value::Kind::table;
+      return ConfigValue::Kind::table;
     default:
-      return Value::Kind::time;
+      return ConfigValue::Kind::time;
   }
 }
 
-Value value_of(const toml::node& node, const Places& places) {
-  Value value;
+ConfigValue value_of(const toml::node& node, const Places& places) {
+  ConfigValue value;
   value.kind = kind_of(node);
   value.text = text_of(node);
   value.place = places.of(node.source());

@@ -56,26 +56,26 @@ Canvas::Canvas(Extent extent)
     : extent_{std::clamp(extent.columns, 0, kExtentMax), std::clamp(extent.rows, 0, kExtentMax)},
       glyphs_(static_cast<std::size_t>(extent_.columns) * static_cast<std::size_t>(extent_.rows)) {}
 
-bool Canvas::inside(Place place) const {
+bool Canvas::inside(ScreenPlace place) const {
   return place.column >= 0 && place.row >= 0 && place.column < extent_.columns &&
          place.row < extent_.rows;
 }
 
-std::size_t Canvas::index_of(Place place) const {
+std::size_t Canvas::index_of(ScreenPlace place) const {
   return static_cast<std::size_t>(place.row) * static_cast<std::size_t>(extent_.columns) +
          static_cast<std::size_t>(place.column);
 }
 
-const Glyph& Canvas::at(Place place) const {
+const Glyph& Canvas::at(ScreenPlace place) const {
   GIMNET_CHECK(inside(place));
   return glyphs_[index_of(place)];
 }
 
-void Canvas::put(Place place, const Glyph& glyph) {
+void Canvas::put(ScreenPlace place, const Glyph& glyph) {
   if (inside(place)) glyphs_[index_of(place)] = glyph;
 }
 
-int Canvas::text(Place place, std::string_view utf8, Ink ink) {
+int Canvas::text(ScreenPlace place, std::string_view utf8, Ink ink) {
   for (const char32_t code : decoded_utf8(utf8)) {
     const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
     if (inside(place)) put(place, {control ? kReplacement : code, ink, at(place).ground});
@@ -84,7 +84,7 @@ int Canvas::text(Place place, std::string_view utf8, Ink ink) {
   return place.column;
 }
 
-void Canvas::lay_ground(Place place, int columns, Ground ground) {
+void Canvas::lay_ground(ScreenPlace place, int columns, Ground ground) {
   for (int index = 0; index < columns; ++index, ++place.column) {
     if (!inside(place)) continue;
     Glyph glyph = at(place);
@@ -232,7 +232,7 @@ void Plot::ground(const Point& point, Ground ground) {
   if (patch != nullptr) patch->ground = std::max(patch->ground, ground);
 }
 
-void Plot::draw(Canvas& canvas, Place corner) const {
+void Plot::draw(Canvas& canvas, ScreenPlace corner) const {
   std::size_t next = 0;
   for (int row = 0; row < extent_.rows; ++row) {
     for (int column = 0; column < extent_.columns; ++column) {

@@ -39,14 +39,14 @@ struct Extent {
 };
 
 /// A place on the screen, from the left top corner.
-struct Place {
+struct ScreenPlace {
   int column = 0;
   int row = 0;
 };
 
 /// A part of the screen.
 struct Area {
-  Place corner;
+  ScreenPlace corner;
   Extent extent;
 };
 
@@ -67,20 +67,20 @@ class Canvas {
 
   [[nodiscard]] Extent extent() const { return extent_; }
   /// REQUIRES: inside.
-  [[nodiscard]] const Glyph& at(Place place) const;
+  [[nodiscard]] const Glyph& at(ScreenPlace place) const;
 
-  void put(Place place, const Glyph& glyph);
+  void put(ScreenPlace place, const Glyph& glyph);
   /// Writes UTF-8 from there to the right; bytes that are no UTF-8 become U+FFFD. Gives the column
   /// after it.
-  int text(Place place, std::string_view utf8, Ink ink);
+  int text(ScreenPlace place, std::string_view utf8, Ink ink);
   /// Lays a ground under a part of a row.
-  void lay_ground(Place place, int columns, Ground ground);
+  void lay_ground(ScreenPlace place, int columns, Ground ground);
   /// A frame with rounded corners along the edge of the area.
   void frame(const Area& area);
 
  private:
-  [[nodiscard]] bool inside(Place place) const;
-  [[nodiscard]] std::size_t index_of(Place place) const;
+  [[nodiscard]] bool inside(ScreenPlace place) const;
+  [[nodiscard]] std::size_t index_of(ScreenPlace place) const;
 
   Extent extent_;
   std::vector<Glyph> glyphs_;
@@ -133,7 +133,7 @@ class Plot {
   [[nodiscard]] Box seen() const;
 
   /// Copies the picture onto a canvas.
-  void draw(Canvas& canvas, Place corner) const;
+  void draw(Canvas& canvas, ScreenPlace corner) const;
 
  private:
   struct Patch {

@@ -43,7 +43,7 @@ void say_skipped(const RobotLog& log) {
                   log.skipped, log.skipped == 1 ? "line" : "lines", log.first_skipped));
 }
 
-Result<Robot::SourceMaker> source_maker(const Options& options) {
+Result<Robot::SourceMaker> source_maker(const DemoOptions& options) {
   if (!options.log.empty()) {
     Result<RobotLog> log = load_robot_log(options.log);
     if (!log) return log.error();
@@ -63,7 +63,7 @@ Result<Robot::SourceMaker> source_maker(const Options& options) {
 }
 
 // What the screen can show: the choice of the user, then the environment, then the terminal itself.
-TerminalStyle style_for(const Options& options, Terminal* terminal) {
+TerminalStyle style_for(const DemoOptions& options, Terminal* terminal) {
   TerminalStyle style;
   style.colours = terminal == nullptr ? ColourDepth::kNone : colours_of_environment();
   std::optional<bool> utf8 = utf8_of_environment();
@@ -74,13 +74,13 @@ TerminalStyle style_for(const Options& options, Terminal* terminal) {
 }
 
 // A demo that was told to run for a time, or has no keyboard, drives by itself.
-bool drives_itself(const Options& options, const Terminal* terminal) {
+bool drives_itself(const DemoOptions& options, const Terminal* terminal) {
   return options.seconds.has_value() || terminal == nullptr;
 }
 
 // Checks what the robot's process would only find later, where the sentence would be harder to
 // find.
-std::optional<Error> unusable_input(const Options& options) {
+std::optional<Error> unusable_input(const DemoOptions& options) {
   if (options.role != Role::kAll) return std::nullopt;
   const Result<Robot::SourceMaker> maker = source_maker(options);
   return maker ? std::nullopt : std::optional(maker.error());
@@ -101,7 +101,7 @@ std::optional<Error> unusable_input(const Options& options) {
 }
 
 // Runs the robot's process until it is told to end.
-ExitCode run_robot(const Options& options) {
+ExitCode run_robot(const DemoOptions& options) {
   Result<Robot::SourceMaker> maker = source_maker(options);
   if (!maker) {
     complain(maker.error());
@@ -126,7 +126,7 @@ ExitCode run_robot(const Options& options) {
 
 // Runs the viewer's process, with an own hub and robot unless the role is kView; prints the summary
 // at the end.
-ExitCode run_viewer(const Options& options) {
+ExitCode run_viewer(const DemoOptions& options) {
   if (const std::optional<Error> error = unusable_input(options)) {
     complain(*error);
     return ExitCode::kUsage;
@@ -176,7 +176,7 @@ int main(int count, char** words) {
   gimnet::hold_standard_descriptors();
   gimnet::have_failed_writes_told();
   const std::span<const char* const> all(words, static_cast<std::size_t>(count));
-  const gimnet::Result<Options> options = parse_options(all.empty() ? all : all.subspan(1));
+  const gimnet::Result<DemoOptions> options = parse_options(all.empty() ? all : all.subspan(1));
   if (!options) {
     (void)std::fprintf(stderr, "gimnet-demo: %s\n", options.error().sentence.c_str());
     return static_cast<int>(ExitCode::kUsage);

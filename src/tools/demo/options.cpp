@@ -74,7 +74,7 @@ bool is_node_name(std::string_view name) {
          std::all_of(name.begin(), name.end(), allowed);
 }
 
-std::optional<Error> apply(Options& options, std::string_view name, std::string_view value) {
+std::optional<Error> apply(DemoOptions& options, std::string_view name, std::string_view value) {
   if (name == "--log") options.log = value;
   if (name == "--map") options.map = value;
   if (name == "--hub") options.hub_url = value;
@@ -94,14 +94,14 @@ std::optional<Error> apply(Options& options, std::string_view name, std::string_
     options.speed = *number;
   }
   if (name == "--seconds") {
-    const Result<double> number = number_of(name, value, {0.1, Options::kSecondsMax});
+    const Result<double> number = number_of(name, value, {0.1, DemoOptions::kSecondsMax});
     if (!number) return number.error();
     options.seconds = *number;
   }
   return std::nullopt;
 }
 
-std::optional<Error> contradiction(const Options& options,
+std::optional<Error> contradiction(const DemoOptions& options,
                                    const std::vector<std::string_view>& given) {
   const auto has = [&](std::string_view name) {
     return std::find(given.begin(), given.end(), name) != given.end();
@@ -142,8 +142,8 @@ std::optional<Error> contradiction(const Options& options,
 
 std::string_view usage_text() { return kUsage; }
 
-Result<Options> parse_options(std::span<const char* const> arguments) {
-  Options options;
+Result<DemoOptions> parse_options(std::span<const char* const> arguments) {
+  DemoOptions options;
   std::vector<std::string_view> given;
   std::size_t index = 0;
   if (!arguments.empty()) {

@@ -20,7 +20,7 @@ enum class Role : std::uint8_t { kAll, kRobot, kView };
 enum class Glyphs : std::uint8_t { kAuto, kUtf8, kAscii };
 
 /// What the command line says. Limits: `kSecondsMax`; speeds as in log_player.hpp.
-struct Options {
+struct DemoOptions {
   static constexpr double kSecondsMax = 86'400.0;
 
   Role role = Role::kAll;
@@ -42,7 +42,7 @@ struct Options {
 /// Reads the arguments behind the program's name. Errors: unknown or repeated arguments, values
 /// that are missing or out of range, and combinations that mean nothing; the sentence says what to
 /// do.
-[[nodiscard]] Result<Options> parse_options(std::span<const char* const> arguments);
+[[nodiscard]] Result<DemoOptions> parse_options(std::span<const char* const> arguments);
 
 /// The text of --help.
 [[nodiscard]] std::string_view usage_text();

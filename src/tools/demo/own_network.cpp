@@ -50,7 +50,7 @@ namespace {
 
 constexpr std::int64_t kReady_ns = 10'000'000'000;
 
-std::vector<std::string> robot_words(const Options& options, const std::string& program,
+std::vector<std::string> robot_words(const DemoOptions& options, const std::string& program,
                                      const std::string& hub_url) {
   std::vector<std::string> words = {program, "robot", "--hub", hub_url, "--robot", options.robot};
   if (!options.map.empty()) words.insert(words.end(), {"--map", options.map});
@@ -85,7 +85,7 @@ std::string folder_of_this_program() {
   return error ? "." : program.parent_path().string();
 }
 
-Result<OwnNetwork> OwnNetwork::start(const Options& options,
+Result<OwnNetwork> OwnNetwork::start(const DemoOptions& options,
                                      const std::string& folder_of_programs) {
   Result<TemporaryFolder> folder = TemporaryFolder::make();
   if (!folder) return folder.error();

@@ -36,7 +36,8 @@ class OwnNetwork {
   /// Starts a hub on a free port and a Unix socket, then a robot that connects over the socket.
   /// `folder_of_programs` holds tcphub and gimnet-demo. Errors: a program is missing, does not
   /// start, or does not say that it is ready.
-  static Result<OwnNetwork> start(const Options& options, const std::string& folder_of_programs);
+  static Result<OwnNetwork> start(const DemoOptions& options,
+                                  const std::string& folder_of_programs);
 
   /// Where the viewer connects: the TCP address.
   [[nodiscard]] const std::string& hub_url() const { return hub_url_; }

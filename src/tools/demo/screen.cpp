@@ -120,7 +120,7 @@ void draw_map(Plot& plot, const Monitor& monitor, const MapChoice& choice) {
   if (monitor.pose()) draw_robot(plot, *monitor.pose());
 }
 
-void draw_scale(Canvas& canvas, Place place, const View& view) {
+void draw_scale(Canvas& canvas, ScreenPlace place, const View& view) {
   constexpr double kLengths_m[] = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0};
   constexpr int kLeastColumns = 4;
   const double column_m = view.metres_per_dot * Plot::kDotColumns;
@@ -201,8 +201,8 @@ void draw_help(Canvas& canvas, const Area& area, bool log) {
   lines.insert(lines.begin(), own.begin(), own.end());
   const int columns = std::min(area.extent.columns, 51);
   const int rows = std::min(area.extent.rows, static_cast<int>(lines.size()) + 2);
-  const Place corner{area.corner.column + (area.extent.columns - columns) / 2,
-                     area.corner.row + (area.extent.rows - rows) / 2};
+  const ScreenPlace corner{area.corner.column + (area.extent.columns - columns) / 2,
+                           area.corner.row + (area.extent.rows - rows) / 2};
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column)
       canvas.put({corner.column + column, corner.row + row}, Glyph{});

@@ -25,7 +25,7 @@ struct MapChoice {
 void draw_map(Plot& plot, const Monitor& monitor, const MapChoice& choice);
 
 /// Draws a bar of a round length with its length in metres, from that place to the right.
-void draw_scale(Canvas& canvas, Place place, const View& view);
+void draw_scale(Canvas& canvas, ScreenPlace place, const View& view);
 
 /// What the viewer's screen shows beside what was heard.
 struct ScreenState {

@@ -14,7 +14,7 @@ namespace gimnet::tool {
 /// steady_now_ns(). Thread safety: one thread.
 class Bounds {
  public:
-  explicit Bounds(const Options& options, std::int64_t now_ns = steady_now_ns())
+  explicit Bounds(const ToolOptions& options, std::int64_t now_ns = steady_now_ns())
       : count_(options.count),
         end_ns_(options.seconds > 0.0 ? now_ns + std::llround(options.seconds * 1e9) : 0) {}
 

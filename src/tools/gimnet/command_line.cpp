@@ -49,7 +49,7 @@ Called called_by(std::span<const char* const> arguments) {
   return called;
 }
 
-CommandLineEnding wrong(const std::string& sentence, const Called& called) {
+CommandEnding wrong(const std::string& sentence, const Called& called) {
   return {ExitCode::usage,
           "gimnet: " + sentence + "\n`" + called.text() + " --help` shows how it is called.\n"};
 }
@@ -74,7 +74,7 @@ std::string_view command_meant(std::string_view word) {
   return {};
 }
 
-CommandLineEnding unknown_command(std::string_view word) {
+CommandEnding unknown_command(std::string_view word) {
   if (const std::string_view meant = command_meant(word); !meant.empty()) {
     return wrong(
         "there is no command '" + std::string(word) + "'; did you mean " + std::string(meant) + "?",
@@ -104,7 +104,7 @@ std::string_view stranger_before(std::string_view command, std::span<const char*
 }
 
 /// A line each: the whole help is longer than a screen.
-CommandLineEnding missing_command(const CLI::App& app) {
+CommandEnding missing_command(const CLI::App& app) {
   constexpr std::size_t kColumn = 10;
   std::string text = "gimnet: the command is missing; these are there:\n";
   for (const auto& [word, command] : kCommands) {
@@ -127,19 +127,17 @@ std::string all_actions() {
   return names;
 }
 
-CommandLineEnding unknown_action(std::string_view word) {
+CommandEnding unknown_action(std::string_view word) {
   const std::string nearest = did_you_mean(word, kCtlActions);
   return wrong("there is no action '" + std::string(word) + "' of gimnet ctl" +
                    (nearest.empty() ? ": give " + all_actions() : nearest),
                {"ctl", ""});
 }
 
-CommandLineEnding missing_action() {
-  return wrong("action is missing: " + all_actions(), {"ctl", ""});
-}
+CommandEnding missing_action() { return wrong("action is missing: " + all_actions(), {"ctl", ""}); }
 
 /// A pattern where one node is meant.
-std::string too_many(const Options& options, const Called& called) {
+std::string too_many(const ToolOptions& options, const Called& called) {
   const bool acts = options.command == Command::ctl;
   const std::string& word = acts ? options.ctl.node : options.target;
   const bool names_node =
@@ -150,7 +148,7 @@ std::string too_many(const Options& options, const Called& called) {
 }
 
 /// What CLI11 cannot know.
-std::string contradiction(const Options& options) {
+std::string contradiction(const ToolOptions& options) {
   if (options.json && options.raw)
     return "--json and --raw contradict each other: give one of them";
   if (options.command != Command::ctl && options.target.find_first_of("#+>") != std::string::npos) {
@@ -283,8 +281,8 @@ std::string explained(const CLI::ParseError& error,
 
 }  // namespace
 
-std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char* const* argv) {
-  Options options;
+std::variant<ToolOptions, CommandEnding> parse_command_line(int argc, const char* const* argv) {
+  ToolOptions options;
   CLI::App app(help::kAbout, "gimnet");
   add_commands(app, options);
   const std::span arguments(argv, static_cast<std::size_t>(argc));
@@ -303,9 +301,9 @@ std::variant<Options, CommandLineEnding> parse_command_line(int argc, const char
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    return CommandLineEnding{ExitCode::done, app.help()};
+    return CommandEnding{ExitCode::done, app.help()};
   } catch (const CLI::CallForVersion& version) {
-    return CommandLineEnding{ExitCode::done, std::string(version.what()) + "\n"};
+    return CommandEnding{ExitCode::done, std::string(version.what()) + "\n"};
   } catch (const CLI::ParseError& error) {
     sentence = explained(error, options_of(app, called));
   }

@@ -56,7 +56,7 @@ CLI::Validator within(Number least, Number most) {
       "");
 }
 
-void add_key(CLI::App& command, Options& options) {
+void add_key(CLI::App& command, ToolOptions& options) {
   command
       .add_option("--type", options.key.type,
                   "message type, a whole number up to 4294967295, default 0")
@@ -72,7 +72,7 @@ void add_key(CLI::App& command, Options& options) {
 constexpr std::uint32_t kSyncWindowMax = 1'000'000;
 constexpr std::uint32_t kDepthMax = 4'096;
 
-void add_lane(CLI::App& command, Options& options) {
+void add_lane(CLI::App& command, ToolOptions& options) {
   static const std::map<std::string, Lane> kLanes{{"real_time", Lane::real_time},
                                                   {"normal", Lane::normal},
                                                   {"bulk", Lane::bulk},
@@ -81,7 +81,7 @@ void add_lane(CLI::App& command, Options& options) {
       ->transform(CLI::CheckedTransformer(kLanes).description(""));
 }
 
-void add_bounds(CLI::App& command, Options& options) {
+void add_bounds(CLI::App& command, ToolOptions& options) {
   command
       .add_option("-n,--count", options.count, "end after that many messages or events, 1 or more")
       ->transform(within(std::uint64_t{1}, std::uint64_t{1} << 62));
@@ -90,13 +90,13 @@ void add_bounds(CLI::App& command, Options& options) {
       ->transform(within(0.001, 1e9));
 }
 
-void add_printing(CLI::App& command, Options& options) {
+void add_printing(CLI::App& command, ToolOptions& options) {
   add_bounds(command, options);
   command.add_flag("--raw", options.raw, "print each payload as it is, and a newline");
   add_key(command, options);
 }
 
-void add_send(CLI::App& app, Options& options) {
+void add_send(CLI::App& app, ToolOptions& options) {
   CLI::App& send = *app.add_subcommand("send", help::kSendAbout);
   send.add_option("node", options.target, "name or id of the receiver, or node/service")
       ->required()
@@ -107,7 +107,7 @@ void add_send(CLI::App& app, Options& options) {
   add_key(send, options);
 }
 
-void add_recv(CLI::App& app, Options& options) {
+void add_recv(CLI::App& app, ToolOptions& options) {
   CLI::App& recv = *app.add_subcommand("recv", help::kRecvAbout);
   recv.add_option("--name", options.name, "name of this node, to which others send")
       ->required()
@@ -119,7 +119,7 @@ void add_recv(CLI::App& app, Options& options) {
 }
 
 /// `stream`, `latest`, `sync` or `sync:N`.
-void read_delivery(const std::string& word, Options& options) {
+void read_delivery(const std::string& word, ToolOptions& options) {
   constexpr std::string_view kSync = "sync:";
   if (word == "stream" || word == "latest" || word == "sync") {
     options.delivery = word == "stream"   ? Delivery::stream
@@ -139,7 +139,7 @@ void read_delivery(const std::string& word, Options& options) {
                         std::to_string(kSyncWindowMax));
 }
 
-void add_pub(CLI::App& app, Options& options) {
+void add_pub(CLI::App& app, ToolOptions& options) {
   CLI::App& pub = *app.add_subcommand("pub", help::kPubAbout);
   pub.add_option("service", options.target, "full name: node/service")
       ->required()
@@ -166,7 +166,7 @@ void add_pub(CLI::App& app, Options& options) {
   add_key(pub, options);
 }
 
-void add_echo(CLI::App& app, Options& options) {
+void add_echo(CLI::App& app, ToolOptions& options) {
   CLI::App& echo = *app.add_subcommand("echo", help::kEchoAbout);
   echo.add_option("service", options.target,
                   "full name, node/service, or a pattern: `*` one part, `**` any number")
@@ -185,7 +185,7 @@ void add_echo(CLI::App& app, Options& options) {
   add_printing(echo, options);
 }
 
-void add_meter(CLI::App& app, const char* name, const char* about, Options& options) {
+void add_meter(CLI::App& app, const char* name, const char* about, ToolOptions& options) {
   CLI::App& meter = *app.add_subcommand(name, about);
   meter
       .add_option("service", options.target,
@@ -199,7 +199,7 @@ void add_meter(CLI::App& app, const char* name, const char* about, Options& opti
   add_bounds(meter, options);
 }
 
-void add_ping(CLI::App& app, Options& options) {
+void add_ping(CLI::App& app, ToolOptions& options) {
   CLI::App& ping = *app.add_subcommand("ping", help::kPingAbout);
   ping.add_option("node", options.target, "name or id")->required()->check(not_empty());
   ping.add_option("-c,--count", options.pings, "how many, 1 to 1000000000, default 10")
@@ -213,7 +213,7 @@ void add_ping(CLI::App& app, Options& options) {
   add_lane(ping, options);
 }
 
-void add_lists(CLI::App& app, Options& options) {
+void add_lists(CLI::App& app, ToolOptions& options) {
   CLI::App& nodes = *app.add_subcommand("nodes", help::kNodesAbout);
   nodes.add_option("pattern", options.target,
                    "`*` is one part of a name, `**` any number; or an id, 7.17");
@@ -236,7 +236,7 @@ const CLI::Validator& not_empty() {
   return kNotEmpty;
 }
 
-void add_commands(CLI::App& app, Options& options) {
+void add_commands(CLI::App& app, ToolOptions& options) {
   static const std::map<std::string, Colour> kColours{
       {"auto", Colour::automatic}, {"always", Colour::always}, {"never", Colour::never}};
   app.formatter(help_format());  // before the commands, which take it over

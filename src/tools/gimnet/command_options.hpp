@@ -185,7 +185,7 @@ inline constexpr std::array<std::pair<std::string_view, Command>, 13> kCommands{
 /// Declares every command and option; parsing writes to `options`, which must outlive `app`. Each
 /// option's description says its unit, range and default: it is what a wrong value is answered
 /// with.
-void add_commands(CLI::App& app, Options& options);
+void add_commands(CLI::App& app, ToolOptions& options);
 
 /// An empty word is a mistake of a script, not a default.
 [[nodiscard]] const CLI::Validator& not_empty();

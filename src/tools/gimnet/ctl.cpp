@@ -165,7 +165,7 @@ std::optional<Peer> parse_new_id(const std::string& text, Peer node) {
 }
 
 /// What a command that only changes something says when it is done.
-ExitCode done(Session& session, const Outcome<void>& outcome, const std::string& text) {
+ExitCode done(ToolSession& session, const Outcome<void>& outcome, const std::string& text) {
   if (!outcome) return session.fail(outcome.failure());
   if (session.options().json) {
     session.output().write("{\"done\":true}\n");
@@ -175,7 +175,7 @@ ExitCode done(Session& session, const Outcome<void>& outcome, const std::string&
   return session.finish();
 }
 
-ExitCode connections(Session& session) {
+ExitCode connections(ToolSession& session) {
   const auto found = session.node().hub_connections();
   if (!found) return session.fail(found.failure());
   session.output().write(session.options().json ? tool::json_of(*found)
@@ -183,14 +183,14 @@ ExitCode connections(Session& session) {
   return session.finish();
 }
 
-ExitCode routes(Session& session) {
+ExitCode routes(ToolSession& session) {
   const auto found = session.node().hub_routes();
   if (!found) return session.fail(found.failure());
   session.output().write(session.options().json ? json_of(*found) : table_of(*found));
   return session.finish();
 }
 
-ExitCode kick(Session& session) {
+ExitCode kick(ToolSession& session) {
   const CtlOptions& ctl = session.options().ctl;
   const auto peer = session.find(ctl.node);
   if (!peer) return session.code();
@@ -200,7 +200,7 @@ ExitCode kick(Session& session) {
   return done(session, {}, "kicked " + peer->text());
 }
 
-ExitCode reassign(Session& session) {
+ExitCode reassign(ToolSession& session) {
   const CtlOptions& ctl = session.options().ctl;
   const auto peer = session.find(ctl.node);
   if (!peer) return session.code();
@@ -213,7 +213,7 @@ ExitCode reassign(Session& session) {
               peer->text() + " is " + new_id->text() + " now");
 }
 
-ExitCode reload(Session& session) {
+ExitCode reload(ToolSession& session) {
   const auto changes = session.node().reload_hub();
   if (!changes) {
     // The configuration is wrong, not the command line.
@@ -225,7 +225,7 @@ ExitCode reload(Session& session) {
   return session.finish();
 }
 
-ExitCode log(Session& session) {
+ExitCode log(ToolSession& session) {
   const std::string& level = session.options().ctl.level;
   const auto before = session.node().set_hub_log_level(level);
   if (!before) {
@@ -252,7 +252,7 @@ bool only_reads(CtlAction action) {
 
 }  // namespace
 
-ExitCode run_ctl(Session& session) {
+ExitCode run_ctl(ToolSession& session) {
   const CtlAction action = session.options().ctl.action;
   NodeOptions how;
   how.administrator = !only_reads(action);

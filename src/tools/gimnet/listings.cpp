@@ -34,9 +34,9 @@ std::string table_of(const std::vector<NodeRecord>& nodes, Paint paint) {
 
 }  // namespace
 
-ExitCode run_nodes(Session& session) {
+ExitCode run_nodes(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
-  const Options& options = session.options();
+  const ToolOptions& options = session.options();
   // No name reads as an id does, so that nothing else can be meant.
   const auto id = Peer::parse(options.target);
   auto nodes = session.node().nodes(id ? std::string() : options.target);
@@ -89,7 +89,7 @@ std::string table_of(const std::vector<ServiceRecord>& services, const Places& p
 
 }  // namespace
 
-ExitCode run_services(Session& session) {
+ExitCode run_services(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
   const auto services = session.node().services(session.options().target);
   if (!services) return session.fail(services.failure());
@@ -107,7 +107,7 @@ ExitCode run_services(Session& session) {
   return session.finish();
 }
 
-ExitCode run_status(Session& session) {
+ExitCode run_status(ToolSession& session) {
   if (const auto ending = session.join_to_look()) return *ending;
   const auto hub = session.node().hub();
   if (!hub) return session.fail(hub.failure());

@@ -10,10 +10,10 @@ namespace {
 
 using namespace gimnet::tool;
 
-ExitCode run(const Options& options) {
+ExitCode run(const ToolOptions& options) {
   StopSignal stop;
   if (options.command == Command::impair) return run_impair(options.impair, stop);
-  Session session(options, stop);
+  ToolSession session(options, stop);
   switch (options.command) {
     case Command::send:
       return run_send(session);
@@ -46,7 +46,7 @@ ExitCode run(const Options& options) {
 }
 
 /// Help goes to standard output, what is wrong to standard error.
-ExitCode show(const CommandLineEnding& ending) {
+ExitCode show(const CommandEnding& ending) {
   if (ending.code != ExitCode::done) {
     std::fputs(ending.text.c_str(), stderr);
     return ending.code;
@@ -63,10 +63,10 @@ int main(int argc, char** argv) {
   gimnet::have_failed_writes_told();
   try {
     const auto parsed = parse_command_line(argc, argv);
-    if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {
+    if (const auto* ending = std::get_if<CommandEnding>(&parsed)) {
       return static_cast<int>(show(*ending));
     }
-    return static_cast<int>(run(std::get<Options>(parsed)));
+    return static_cast<int>(run(std::get<ToolOptions>(parsed)));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "gimnet: cannot go on: %s\n", error.what());
     return static_cast<int>(ExitCode::failed);

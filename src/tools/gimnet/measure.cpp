@@ -20,7 +20,7 @@ double seconds_of(std::int64_t ns) {
 
 }  // namespace
 
-void Statistics::add(double value) {
+void MeterStatistics::add(double value) {
   min_ = count_ == 0 ? value : std::min(min_, value);
   max_ = count_ == 0 ? value : std::max(max_, value);
   ++count_;
@@ -29,15 +29,15 @@ void Statistics::add(double value) {
   squares_ += from_old_mean * (value - mean_);
 }
 
-double Statistics::deviation() const {
+double MeterStatistics::deviation() const {
   return count_ < 2 ? 0.0 : std::sqrt(std::max(squares_, 0.0) / static_cast<double>(count_));
 }
 
-double Reading::rate_hz() const {
+double MeterReading::rate_hz() const {
   return gaps_ms.sum() > 0.0 ? 1000.0 * static_cast<double>(gaps_ms.count()) / gaps_ms.sum() : 0.0;
 }
 
-void Meter::count(Reading& reading, const Arrival& arrival) {
+void Meter::count(MeterReading& reading, const Arrival& arrival) {
   reading.sizes_bytes.add(static_cast<double>(arrival.bytes));
   if (arrival.gap_ns >= 0) reading.gaps_ms.add(static_cast<double>(arrival.gap_ns) / 1e6);
 }
@@ -52,18 +52,18 @@ void Meter::add(std::int64_t at_ns, std::size_t bytes) {
   arrivals_.push_back(arrival);
 }
 
-Reading Meter::recent(std::int64_t now_ns) {
+MeterReading Meter::recent(std::int64_t now_ns) {
   const std::int64_t from_ns = std::max(begin_ns_, now_ns - window_ns_);
   while (!arrivals_.empty() && arrivals_.front().at_ns < from_ns) arrivals_.pop_front();
-  Reading reading;
+  MeterReading reading;
   for (const Arrival& arrival : arrivals_) count(reading, arrival);
   reading.seconds = seconds_of(now_ns - from_ns);
   reading.silent_s = whole(now_ns).silent_s;
   return reading;
 }
 
-Reading Meter::whole(std::int64_t now_ns) const {
-  Reading reading = whole_;
+MeterReading Meter::whole(std::int64_t now_ns) const {
+  MeterReading reading = whole_;
   reading.seconds = seconds_of(now_ns - begin_ns_);
   reading.silent_s =
       reading.sizes_bytes.count() == 0 ? reading.seconds : seconds_of(now_ns - last_ns_);
@@ -76,7 +76,7 @@ namespace {
 constexpr double kSilentGaps = 3.0;
 constexpr double kSilentLeastS = 1.0;
 
-bool is_silent(const Reading& reading) {
+bool is_silent(const MeterReading& reading) {
   return reading.silent_s >= kSilentLeastS &&
          reading.silent_s * 1000.0 > kSilentGaps * reading.gaps_ms.max();
 }
@@ -87,8 +87,8 @@ std::string missed_cell(const ServiceReading& one) {
 }
 
 std::vector<std::string> rate_cells(const ServiceReading& one) {
-  const Reading& reading = one.reading;
-  const Statistics& gaps = reading.gaps_ms;
+  const MeterReading& reading = one.reading;
+  const MeterStatistics& gaps = reading.gaps_ms;
   const auto gap = [&](double value) {
     return gaps.count() == 0 ? std::string("-") : decimal(value, 3);
   };
@@ -103,8 +103,8 @@ std::vector<std::string> rate_cells(const ServiceReading& one) {
 }
 
 std::vector<std::string> byte_cells(const ServiceReading& one) {
-  const Reading& reading = one.reading;
-  const Statistics& sizes = reading.sizes_bytes;
+  const MeterReading& reading = one.reading;
+  const MeterStatistics& sizes = reading.sizes_bytes;
   const auto size = [&](double value) {
     return sizes.count() == 0 ? std::string("-") : byte_count(value);
   };
@@ -123,20 +123,20 @@ std::vector<std::string> byte_cells(const ServiceReading& one) {
 std::string json_of(const std::vector<ServiceReading>& readings, Measure measure, Span span) {
   std::string lines;
   for (const ServiceReading& one : readings) {
-    const Reading& reading = one.reading;
+    const MeterReading& reading = one.reading;
     JsonWriter json;
     json.begin_object().member("service", one.service).member("whole", span == Span::whole);
     json.member("seconds", reading.seconds).member("messages", reading.sizes_bytes.count());
     json.member("missed", one.missed).member("skipped", one.latest ? one.missed : 0);
     json.member("silent_s", reading.silent_s);
     if (measure == Measure::rate) {
-      const Statistics& gaps = reading.gaps_ms;
+      const MeterStatistics& gaps = reading.gaps_ms;
       json.member("rate_hz", reading.rate_hz())
           .member("gap_min_ms", gaps.min())
           .member("gap_mean_ms", gaps.mean());
       json.member("gap_max_ms", gaps.max()).member("gap_std_ms", gaps.deviation());
     } else {
-      const Statistics& sizes = reading.sizes_bytes;
+      const MeterStatistics& sizes = reading.sizes_bytes;
       json.member("bytes_per_s", reading.bytes_per_s()).member("bytes", std::llround(sizes.sum()));
       json.member("size_min", std::llround(sizes.min())).member("size_mean", sizes.mean());
       json.member("size_max", std::llround(sizes.max()));
@@ -172,7 +172,7 @@ constexpr Timeout kReport{1'000};
 /// A meter for each service that is or was there.
 class Meters {
  public:
-  Meters(Session& session, Measure measure)
+  Meters(ToolSession& session, Measure measure)
       : session_(session),
         subscriptions_(session.node(), session.options().target),
         measure_(measure),
@@ -236,7 +236,7 @@ class Meters {
     }
   }
 
-  Session& session_;
+  ToolSession& session_;
   Subscriptions subscriptions_;
   Measure measure_;
   std::int64_t window_ns_;
@@ -244,7 +244,7 @@ class Meters {
   std::uint64_t messages_ = 0;
 };
 
-ExitCode measure(Session& session, Measure measure) {
+ExitCode measure(ToolSession& session, Measure measure) {
   if (const auto ending = session.join({})) return *ending;
   Meters meters(session, measure);
   if (const auto opened = meters.open(); !opened) return session.fail(opened.failure());
@@ -275,7 +275,7 @@ ExitCode measure(Session& session, Measure measure) {
 
 }  // namespace
 
-ExitCode run_hz(Session& session) { return measure(session, Measure::rate); }
-ExitCode run_bw(Session& session) { return measure(session, Measure::bytes); }
+ExitCode run_hz(ToolSession& session) { return measure(session, Measure::rate); }
+ExitCode run_bw(ToolSession& session) { return measure(session, Measure::bytes); }
 
 }  // namespace gimnet::tool

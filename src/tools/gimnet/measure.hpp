@@ -12,7 +12,7 @@ namespace gimnet::tool {
 
 /// Values seen one after the other: how many, least, most, mean and standard deviation. Thread
 /// safety: one thread.
-class Statistics {
+class MeterStatistics {
  public:
   void add(double value);
   [[nodiscard]] std::uint64_t count() const { return count_; }
@@ -32,11 +32,11 @@ class Statistics {
 };
 
 /// What came of one service in some time.
-struct Reading {
-  Statistics gaps_ms;      ///< between a message and the one before it, ended in that time
-  Statistics sizes_bytes;  ///< payloads; its count is the number of messages
-  double seconds = 0.0;    ///< the time itself
-  double silent_s = 0.0;   ///< since the last message; of none: the whole time
+struct MeterReading {
+  MeterStatistics gaps_ms;      ///< between a message and the one before it, ended in that time
+  MeterStatistics sizes_bytes;  ///< payloads; its count is the number of messages
+  double seconds = 0.0;         ///< the time itself
+  double silent_s = 0.0;        ///< since the last message; of none: the whole time
   /// Messages a second by their gaps: exact however the time begins and ends. 0: fewer than two
   /// ever came.
   [[nodiscard]] double rate_hz() const;
@@ -57,9 +57,9 @@ class Meter {
       : begin_ns_(begin_ns), window_ns_(window_ns) {}
   void add(std::int64_t at_ns, std::size_t bytes);
   /// Of the last window, or of the time since the beginning if that is shorter.
-  [[nodiscard]] Reading recent(std::int64_t now_ns);
+  [[nodiscard]] MeterReading recent(std::int64_t now_ns);
   /// Since the beginning.
-  [[nodiscard]] Reading whole(std::int64_t now_ns) const;
+  [[nodiscard]] MeterReading whole(std::int64_t now_ns) const;
 
  private:
   struct Arrival {
@@ -67,13 +67,13 @@ class Meter {
     std::int64_t gap_ns;  ///< negative: the first of all
     std::size_t bytes;
   };
-  static void count(Reading& reading, const Arrival& arrival);
+  static void count(MeterReading& reading, const Arrival& arrival);
 
   std::int64_t begin_ns_;
   std::int64_t window_ns_;
   std::int64_t last_ns_ = 0;
   std::deque<Arrival> arrivals_;  ///< Limit: kMessagesMax
-  Reading whole_;
+  MeterReading whole_;
 };
 
 /// What `gimnet hz` and `gimnet bw` are asked for.
@@ -83,7 +83,7 @@ enum class Span : std::uint8_t { recent, whole };
 
 struct ServiceReading {
   std::string service;
-  Reading reading;
+  MeterReading reading;
   std::uint64_t missed = 0;  ///< since the beginning
   bool latest = false;       ///< of Delivery::latest: what is missed was skipped for newer ones
 };

@@ -37,7 +37,7 @@ enum class Command : std::uint8_t {
 enum class Colour : std::uint8_t { automatic, always, never };
 
 /// What the command line asks for. Thread safety: immutable once read.
-struct Options {
+struct ToolOptions {
   Command command = Command::status;
   std::string hub;  ///< "": the environment's GIMNET_HUB, else the hub of this machine
   bool json = false;

@@ -50,12 +50,12 @@ constexpr std::int64_t kEachNs = 200'000'000;
 
 }  // namespace
 
-Progress::Progress(std::function<std::string()> text, int descriptor)
+ProgressLine::ProgressLine(std::function<std::string()> text, int descriptor)
     : text_(std::move(text)), descriptor_(descriptor) {
   if (::isatty(descriptor) == 1) thread_ = std::thread([this] { run(); });
 }
 
-Progress::~Progress() {
+ProgressLine::~ProgressLine() {
   {
     const MutexLock lock(mutex_);
     stopping_ = true;
@@ -64,7 +64,7 @@ Progress::~Progress() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Progress::run() {
+void ProgressLine::run() {
   bool shown = false;
   std::int64_t next_ns = steady_now_ns() + kFirstNs;
   for (;;) {
@@ -81,7 +81,7 @@ void Progress::run() {
   if (shown) write("\r\x1b[K");
 }
 
-void Progress::write(const std::string& text) const {
+void ProgressLine::write(const std::string& text) const {
   // A terminal that takes nothing is no reason to stop the work.
   static_cast<void>(!::write(descriptor_, text.data(), text.size()));
 }

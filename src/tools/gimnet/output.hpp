@@ -42,13 +42,13 @@ class Output {
 
 /// A line at a terminal that tells how far long work is, renewed some times a second and taken away
 /// at the end. Not at a terminal: nothing. Work that is done at once shows none.
-class Progress {
+class ProgressLine {
  public:
   /// `text` is called on another thread until this goes. `descriptor`: of standard error.
-  explicit Progress(std::function<std::string()> text, int descriptor = 2);
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  explicit ProgressLine(std::function<std::string()> text, int descriptor = 2);
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
 
  private:
   void run() GIMNET_EXCLUDES(mutex_);

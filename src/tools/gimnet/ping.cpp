@@ -38,7 +38,7 @@ struct Tally {
 
 std::string microseconds(double value) { return decimal(value, 1); }
 
-void print_json(Session& session, Peer peer, const Tally& tally) {
+void print_json(ToolSession& session, Peer peer, const Tally& tally) {
   const RoundTrips::Summary us = tally.round_trips.summary_us();
   JsonWriter json;
   json.begin_object().member("target", session.options().target).member("id", peer.text());
@@ -48,7 +48,7 @@ void print_json(Session& session, Peer peer, const Tally& tally) {
   session.output().write(json.str() + "\n");
 }
 
-void print_text(Session& session, const Tally& tally) {
+void print_text(ToolSession& session, const Tally& tally) {
   const RoundTrips::Summary us = tally.round_trips.summary_us();
   session.output().write(std::to_string(tally.sent) + " sent, " + std::to_string(tally.lost) +
                          " lost\n");
@@ -60,8 +60,8 @@ void print_text(Session& session, const Tally& tally) {
 }
 
 /// Nothing: go on.
-std::optional<Failure> ping_once(Session& session, Peer peer, Tally& tally) {
-  const Options& options = session.options();
+std::optional<Failure> ping_once(ToolSession& session, Peer peer, Tally& tally) {
+  const ToolOptions& options = session.options();
   ++tally.sent;
   const auto answer =
       session.node().ping(peer, Timeout{std::llround(options.timeout_s * 1000.0)}, options.lane);
@@ -86,8 +86,8 @@ std::optional<Failure> ping_once(Session& session, Peer peer, Tally& tally) {
 
 }  // namespace
 
-ExitCode run_ping(Session& session) {
-  const Options& options = session.options();
+ExitCode run_ping(ToolSession& session) {
+  const ToolOptions& options = session.options();
   NodeOptions how;
   how.reconnect = false;
   if (const auto ending = session.join(how)) return *ending;

@@ -38,7 +38,7 @@ constexpr std::int64_t kLookNs = 200'000'000;
 /// nothing stands, since publishing would wait without a word.
 class Standing {
  public:
-  Standing(Session& session, const Publisher& publisher)
+  Standing(ToolSession& session, const Publisher& publisher)
       : session_(session), publisher_(publisher), watch_(session.node()) {}
 
   /// False: none will come any more, or a signal came; outcome() says which.
@@ -67,11 +67,11 @@ class Standing {
     if (!session_.node().state().ended) {
       if (auto stands = publisher_.standing(); !stands) return stands;
     }
-    return Session::gone();
+    return ToolSession::gone();
   }
 
  private:
-  Session& session_;
+  ToolSession& session_;
   const Publisher& publisher_;
   ConnectionWatch watch_;
   std::int64_t next_look_ns_ = 0;
@@ -91,7 +91,8 @@ class Retaining {
 };
 
 /// Whoever publishes may hear that the service was refused a moment before the library says why.
-Outcome<void> why_refused(Session& session, const Publisher& publisher, const Outcome<void>& sent) {
+Outcome<void> why_refused(ToolSession& session, const Publisher& publisher,
+                          const Outcome<void>& sent) {
   const std::int64_t end_ns = steady_now_ns() + kWhyNs;
   while (!session.node().state().ended && steady_now_ns() < end_ns) {
     if (auto stands = publisher.standing(); !stands) return stands;
@@ -100,13 +101,13 @@ Outcome<void> why_refused(Session& session, const Publisher& publisher, const Ou
   return sent;
 }
 
-Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standing& standing,
+Outcome<void> publish_lines(ToolSession& session, const Publisher& publisher, Standing& standing,
                             UnheardLines& unheard, Retaining& retaining) {
   const double rate = session.options().rate_hz;
   const auto period_ns = rate > 0.0 ? static_cast<std::int64_t>(std::llround(1e9 / rate)) : 0;
   std::int64_t next_ns = steady_now_ns();
   LineInput input(STDIN_FILENO, session.stop().descriptor(), [&] { return standing.goes_on(); });
-  const Progress progress([&] {
+  const ProgressLine progress([&] {
     return std::to_string(publisher.published()) + " published to " +
            std::to_string(publisher.subscribers());
   });
@@ -138,7 +139,7 @@ Outcome<void> publish_lines(Session& session, const Publisher& publisher, Standi
   }
 }
 
-Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publisher,
+Outcome<void> wait_for_subscribers(const ToolSession& session, const Publisher& publisher,
                                    Standing& standing) {
   const std::size_t wanted = session.options().subscribers;
   if (publisher.subscribers() >= wanted) return {};
@@ -153,7 +154,7 @@ Outcome<void> wait_for_subscribers(const Session& session, const Publisher& publ
 
 /// The service stands, and with it what is retained, until a signal comes or the hub wants this
 /// node no more.
-Outcome<void> stay(Session& session, const Publisher& publisher, Standing& standing,
+Outcome<void> stay(ToolSession& session, const Publisher& publisher, Standing& standing,
                    Retaining& retaining) {
   session.output().flush();
   say("the input has ended; the service stays until Ctrl-C");
@@ -165,7 +166,7 @@ Outcome<void> stay(Session& session, const Publisher& publisher, Standing& stand
   return standing.outcome();
 }
 
-void write_counts(Session& session, const Publisher& publisher) {
+void write_counts(ToolSession& session, const Publisher& publisher) {
   if (!session.options().json) return;
   JsonWriter json;
   json.begin_object()
@@ -176,8 +177,8 @@ void write_counts(Session& session, const Publisher& publisher) {
 
 }  // namespace
 
-ExitCode run_pub(Session& session) {
-  const Options& options = session.options();
+ExitCode run_pub(ToolSession& session) {
+  const ToolOptions& options = session.options();
   const std::size_t middle = options.target.rfind('/');
   NodeOptions how;
   how.name = options.target.substr(0, middle);

@@ -12,7 +12,7 @@
 namespace gimnet::tool {
 namespace {
 
-void print(Session& session, const Message& message, const Absent& absent) {
+void print(ToolSession& session, const Message& message, const Absent& absent) {
   Output& output = session.output();
   if (session.options().raw) {
     output.write(message.data());
@@ -60,7 +60,7 @@ std::string json_line(const Message& message, const Absent& absent) {
   return json.str() + "\n";
 }
 
-ExitCode print_messages(Session& session, const Receive& receive, MissedMessages* missed) {
+ExitCode print_messages(ToolSession& session, const Receive& receive, MissedMessages* missed) {
   const Bounds bounds(session.options());
   ConnectionWatch watch(session.node());
   LostMessages lost;
@@ -110,8 +110,8 @@ constexpr std::size_t kWaitingMessages = 4096;
 
 }  // namespace
 
-ExitCode run_recv(Session& session) {
-  const Options& options = session.options();
+ExitCode run_recv(ToolSession& session) {
+  const ToolOptions& options = session.options();
   NodeOptions how;
   how.name = options.name;
   how.message_bytes_max = options.bytes_max;
@@ -122,7 +122,7 @@ ExitCode run_recv(Session& session) {
   return print_messages(session, [&](Timeout timeout) { return queue.receive(timeout); });
 }
 
-ExitCode run_echo(Session& session) {
+ExitCode run_echo(ToolSession& session) {
   if (const auto ending = session.join({})) return *ending;
   Subscriptions subscriptions(session.node(), session.options().target, session.options().pace);
   // Whoever asks for less than all has gaps on purpose.

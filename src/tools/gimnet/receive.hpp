@@ -30,7 +30,7 @@ using Receive = std::function<Outcome<Message>(Timeout)>;
 /// Prints what comes, until as many have come or as much time has passed as the options say. Writes
 /// at the latest when nothing more is there at once. Says so when the connection breaks and when it
 /// is back, what was lost on its way, and what did not come where `missed` is given.
-[[nodiscard]] ExitCode print_messages(Session& session, const Receive& receive,
+[[nodiscard]] ExitCode print_messages(ToolSession& session, const Receive& receive,
                                       MissedMessages* missed = nullptr);
 
 }  // namespace gimnet::tool

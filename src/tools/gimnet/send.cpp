@@ -41,7 +41,7 @@ Outcome<void> send_file(const Sender& sender, const std::string& path) {
   const auto content = FileContent::read(path, kMessageBytesMax);
   if (!content) return content.failure();
   const std::int64_t begin_ns = steady_now_ns();
-  const Progress progress([&] {
+  const ProgressLine progress([&] {
     return "sending " + path + ", " + byte_count(static_cast<double>(content->bytes().size())) +
            ": " + std::to_string((steady_now_ns() - begin_ns) / 1'000'000'000) + " s";
   });
@@ -60,12 +60,12 @@ Outcome<void> settle_before(const Sender& sender, Outcome<void> unsent) {
   return settled ? Failure{Status::not_delivered, "messages were lost"} : settled;
 }
 
-Outcome<void> send_lines(Session& session, const Sender& sender, Unsent& unsent) {
+Outcome<void> send_lines(ToolSession& session, const Sender& sender, Unsent& unsent) {
   ConnectionWatch watch(session.node());
   LineInput input(STDIN_FILENO, session.stop().descriptor(),
                   [&] { return watch.goes_on() && sender.counts().lost == 0; });
   unsent = Unsent::rest;
-  const Progress progress([&] {
+  const ProgressLine progress([&] {
     const SendCounts counts = sender.counts();
     return std::to_string(counts.sent) + " sent, " + std::to_string(counts.acknowledged) +
            " acknowledged";
@@ -82,7 +82,7 @@ Outcome<void> send_lines(Session& session, const Sender& sender, Unsent& unsent)
       case LineInput::State::failed:
         return cannot_read("standard input", input.error());
       case LineInput::State::given_up:
-        return sender.counts().lost != 0 ? settle_before(sender, {}) : Session::gone();
+        return sender.counts().lost != 0 ? settle_before(sender, {}) : ToolSession::gone();
       case LineInput::State::stopped:
         return {};
       case LineInput::State::end:
@@ -92,7 +92,7 @@ Outcome<void> send_lines(Session& session, const Sender& sender, Unsent& unsent)
   }
 }
 
-void print(Session& session, const SendCounts& counts) {
+void print(ToolSession& session, const SendCounts& counts) {
   if (!session.options().json) return;
   JsonWriter json;
   json.begin_object().member("sent", counts.sent).member("acknowledged", counts.acknowledged);
@@ -105,7 +105,8 @@ std::string acknowledged_words(const SendCounts& counts) {
 }
 
 /// Why not all arrived: what the stream knows says more than the call that failed after it.
-Failure reason(const Session& session, const SendCounts& counts, Unsent unsent, Failure failure) {
+Failure reason(const ToolSession& session, const SendCounts& counts, Unsent unsent,
+               Failure failure) {
   const std::string& target = session.options().target;
   if (counts.lost == 0) {
     if (unsent == Unsent::line_and_rest) {
@@ -138,8 +139,8 @@ bool nobody_there(const SendCounts& counts) {
 
 }  // namespace
 
-ExitCode run_send(Session& session) {
-  const Options& options = session.options();
+ExitCode run_send(ToolSession& session) {
+  const ToolOptions& options = session.options();
   if (const auto readable = check_readable(options.file); !readable)
     return session.fail(readable.failure());
   NodeOptions how;

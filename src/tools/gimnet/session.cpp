@@ -58,18 +58,18 @@ void say(const std::string& sentence) {
   std::fprintf(stderr, "gimnet: %s\n", shown.c_str());
 }
 
-NodeOptions Session::options_for(NodeOptions how) const {
+NodeOptions ToolSession::options_for(NodeOptions how) const {
   how.hub = options_.hub;
   how.shard = options_.shard;
   if (how.description.empty()) how.description = kToolDescription;
   return how;
 }
 
-std::optional<ExitCode> Session::join(NodeOptions how) {
+std::optional<ExitCode> ToolSession::join(NodeOptions how) {
   return settle(Node::join(options_for(std::move(how))));
 }
 
-std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
+std::optional<ExitCode> ToolSession::join_to_look(NodeOptions how) {
   how = options_for(std::move(how));
   auto joined = Node::join(how);
   if (joined || !joined.is(Status::refused)) return settle(std::move(joined));
@@ -78,7 +78,7 @@ std::optional<ExitCode> Session::join_to_look(NodeOptions how) {
   return settle(as_administrator ? std::move(as_administrator) : std::move(joined));
 }
 
-std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
+std::optional<ExitCode> ToolSession::settle(Outcome<Node> joined) {
   if (!joined) {
     Failure failure = joined.failure();
     if (failure.status == Status::no_hub || failure.status == Status::no_host) {
@@ -99,7 +99,7 @@ std::optional<ExitCode> Session::settle(Outcome<Node> joined) {
   return std::nullopt;
 }
 
-std::optional<Peer> Session::find(std::string_view name) {
+std::optional<Peer> ToolSession::find(std::string_view name) {
   auto peer = node_->find(name);
   if (peer.is(Status::not_found) && is_listed(name))
     peer = node_->find(name);  // it came in between
@@ -116,13 +116,13 @@ std::optional<Peer> Session::find(std::string_view name) {
   return std::nullopt;
 }
 
-std::string Session::id_words(std::string_view name) {
+std::string ToolSession::id_words(std::string_view name) {
   if (name.empty() || name.find_first_not_of("0123456789") != std::string_view::npos) return {};
   const std::string own = node_->peer().text();
   return "; the id is written " + own.substr(0, own.find('.') + 1) + std::string(name);
 }
 
-std::string Session::words_for_no_node(std::string_view name) {
+std::string ToolSession::words_for_no_node(std::string_view name) {
   if (is_service(name)) return service_words(name);
   const std::size_t slash = name.rfind('/');
   if (slash == std::string_view::npos || !is_listed(name.substr(0, slash)))
@@ -131,20 +131,20 @@ std::string Session::words_for_no_node(std::string_view name) {
          std::string(name.substr(slash + 1)) + "'" + nearest_name("service", name);
 }
 
-void Session::tell_if_away(std::string_view name) {
+void ToolSession::tell_if_away(std::string_view name) {
   const auto nodes = node_->nodes(name);
   if (!nodes || nodes->empty() || nodes->front().name != name || nodes->front().connected) return;
   say("the node '" + std::string(name) +
       "' is away: its connection broke; `gimnet watch` shows when it is back");
 }
 
-bool Session::is_listed(std::string_view name) {
+bool ToolSession::is_listed(std::string_view name) {
   const auto nodes = node_->nodes("**");
   return nodes &&
          std::ranges::any_of(*nodes, [&](const NodeRecord& node) { return node.name == name; });
 }
 
-bool Session::is_service(std::string_view name) {
+bool ToolSession::is_service(std::string_view name) {
   if (name.find('/') == std::string_view::npos) return false;
   const auto services = node_->services(name);
   return services && std::ranges::any_of(*services, [&](const ServiceRecord& service) {
@@ -152,11 +152,11 @@ bool Session::is_service(std::string_view name) {
          });
 }
 
-std::string Session::service_words(std::string_view name) {
+std::string ToolSession::service_words(std::string_view name) {
   return ": that is a service of the node " + std::string(name.substr(0, name.rfind('/')));
 }
 
-std::string Session::wider_pattern(const std::string& kind, const std::string& word) {
+std::string ToolSession::wider_pattern(const std::string& kind, const std::string& word) {
   const std::string wider = word + "/**";
   const auto is_any = [](const auto& found) { return found && !found->empty(); };
   const bool any = kind == "node" ? is_any(node_->nodes(wider)) : is_any(node_->services(wider));
@@ -164,13 +164,13 @@ std::string Session::wider_pattern(const std::string& kind, const std::string& w
 }
 
 /// What to do where no hub answers: `remedy`, or name another.
-std::string Session::hub() const {
+std::string ToolSession::hub() const {
   if (!options_.hub.empty()) return options_.hub;
   const char* named = std::getenv("GIMNET_HUB");
   return named != nullptr ? named : "";
 }
 
-std::string Session::advice(std::string remedy) const {
+std::string ToolSession::advice(std::string remedy) const {
   if (options_.hub.empty() && !hub().empty()) {
     return " That address is GIMNET_HUB's: " + remedy + ", or change it";
   }
@@ -179,7 +179,7 @@ std::string Session::advice(std::string remedy) const {
   return " " + remedy + ", or name another with --hub";
 }
 
-std::string Session::nearest_name(const std::string& kind, std::string_view word) {
+std::string ToolSession::nearest_name(const std::string& kind, std::string_view word) {
   std::vector<std::string> names;
   if (kind == "node") {
     if (const auto nodes = node_->nodes("**")) {
@@ -193,7 +193,7 @@ std::string Session::nearest_name(const std::string& kind, std::string_view word
   return suggestion.empty() ? "; `gimnet " + kind + "s` lists those that are there" : suggestion;
 }
 
-ExitCode Session::fail_unmatched(const std::string& kind) {
+ExitCode ToolSession::fail_unmatched(const std::string& kind) {
   output_.flush();
   const std::string& target = options_.target;
   const std::string sentence = "no " + kind + " matches '" + target + "'";
@@ -204,7 +204,7 @@ ExitCode Session::fail_unmatched(const std::string& kind) {
   return fail({Status::not_found, sentence + (wider.empty() ? nearest_name(kind, target) : wider)});
 }
 
-ExitCode Session::fail(const Failure& failure) {
+ExitCode ToolSession::fail(const Failure& failure) {
   if (stopped()) return exit_code_of_signal(stop_.signal());
   const bool lost = failure.status == Status::not_connected || failure.status == Status::refused;
   const NodeState state = lost && node_ ? node_->state() : NodeState{};
@@ -214,12 +214,12 @@ ExitCode Session::fail(const Failure& failure) {
   return exit_code_of(failure.status);
 }
 
-ExitCode Session::finish() {
+ExitCode ToolSession::finish() {
   if (!output_.finish()) return ExitCode::failed;
   return stopped() ? fail({}) : ExitCode::done;
 }
 
-ExitCode Session::finish_stream(const Bounds& bounds, std::uint64_t messages) {
+ExitCode ToolSession::finish_stream(const Bounds& bounds, std::uint64_t messages) {
   const ExitCode code = finish();
   if (code != ExitCode::done || !output_.ok() || !bounds.late() || !bounds.missed(messages))
     return code;

@@ -54,14 +54,14 @@ class ConnectionWatch {
 inline constexpr const char* kToolDescription = "gimnet tool";
 
 /// What a command works with. Thread safety: one thread.
-class Session {
+class ToolSession {
  public:
-  Session(const Options& options, StopSignal& stop) : options_(options), stop_(stop) {}
-  ~Session() { stop_.on_stop({}); }
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  ToolSession(const ToolOptions& options, StopSignal& stop) : options_(options), stop_(stop) {}
+  ~ToolSession() { stop_.on_stop({}); }
+  ToolSession(const ToolSession&) = delete;
+  ToolSession& operator=(const ToolSession&) = delete;
 
-  [[nodiscard]] const Options& options() const { return options_; }
+  [[nodiscard]] const ToolOptions& options() const { return options_; }
   [[nodiscard]] StopSignal& stop() { return stop_; }
   [[nodiscard]] Output& output() { return output_; }
   [[nodiscard]] Paint paint() const { return Paint::of(options_.colour, STDOUT_FILENO); }
@@ -117,7 +117,7 @@ class Session {
   /// That a service was called where a node was meant.
   [[nodiscard]] static std::string service_words(std::string_view name);
 
-  const Options& options_;
+  const ToolOptions& options_;
   StopSignal& stop_;
   Output output_;
   std::optional<Node> node_;
@@ -130,17 +130,17 @@ void say(const std::string& sentence);
 // The commands, a file for each. They print data to the session's output and words to standard
 // error.
 
-[[nodiscard]] ExitCode run_send(Session& session);
-[[nodiscard]] ExitCode run_recv(Session& session);
-[[nodiscard]] ExitCode run_pub(Session& session);
-[[nodiscard]] ExitCode run_echo(Session& session);
-[[nodiscard]] ExitCode run_hz(Session& session);
-[[nodiscard]] ExitCode run_bw(Session& session);
-[[nodiscard]] ExitCode run_ping(Session& session);
-[[nodiscard]] ExitCode run_nodes(Session& session);
-[[nodiscard]] ExitCode run_services(Session& session);
-[[nodiscard]] ExitCode run_watch(Session& session);
-[[nodiscard]] ExitCode run_status(Session& session);
-[[nodiscard]] ExitCode run_ctl(Session& session);
+[[nodiscard]] ExitCode run_send(ToolSession& session);
+[[nodiscard]] ExitCode run_recv(ToolSession& session);
+[[nodiscard]] ExitCode run_pub(ToolSession& session);
+[[nodiscard]] ExitCode run_echo(ToolSession& session);
+[[nodiscard]] ExitCode run_hz(ToolSession& session);
+[[nodiscard]] ExitCode run_bw(ToolSession& session);
+[[nodiscard]] ExitCode run_ping(ToolSession& session);
+[[nodiscard]] ExitCode run_nodes(ToolSession& session);
+[[nodiscard]] ExitCode run_services(ToolSession& session);
+[[nodiscard]] ExitCode run_watch(ToolSession& session);
+[[nodiscard]] ExitCode run_status(ToolSession& session);
+[[nodiscard]] ExitCode run_ctl(ToolSession& session);
 
 }  // namespace gimnet::tool

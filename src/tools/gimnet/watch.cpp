@@ -117,14 +117,14 @@ std::string text_line(const WatchEvent& event, std::int64_t now_ns, Paint paint)
 namespace {
 
 /// There is nothing to print, and there may not be for long.
-void say_that_it_waits(const Options& options) {
+void say_that_it_waits(const ToolOptions& options) {
   say("nothing " + (options.target.empty() ? "is there" : "matches " + options.target) +
       " yet; waiting");
 }
 
 /// Prints what is to be seen. True: it was an event that the user asked for.
-bool print(Session& session, ToolFilter& filter, const WatchEvent& event) {
-  const Options& options = session.options();
+bool print(ToolSession& session, ToolFilter& filter, const WatchEvent& event) {
+  const ToolOptions& options = session.options();
   if (!options.all && filter.hides(event)) return false;
   if (options.changes && is_snapshot(event.change)) return false;
   const std::int64_t now_ns = wall_now_ns();
@@ -135,14 +135,14 @@ bool print(Session& session, ToolFilter& filter, const WatchEvent& event) {
 
 }  // namespace
 
-ExitCode run_watch(Session& session) {
+ExitCode run_watch(ToolSession& session) {
   if (const auto ending = session.join({})) return *ending;
   const auto watch = session.node().watch(session.options().target);
   if (!watch) return session.fail(watch.failure());
   const Bounds bounds(session.options());
   ConnectionWatch connection(session.node());
   ToolFilter filter;
-  const Options& options = session.options();
+  const ToolOptions& options = session.options();
   std::uint64_t events = 0;
   bool told = false;
   while (!bounds.enough(events) && !bounds.late() && session.output().ok()) {

@@ -39,7 +39,7 @@ TEST(TomlFile, TellsTheKindsApart) {
   const TomlFile file =
       read_toml("a = 1\nb = 'x'\nc = true\nd = 1.5\ne = 1979-05-27\nf = ['x', 2]\n[g]\n", "f");
   ASSERT_THAT(file.keys, SizeIs(7));
-  using Kind = Value::Kind;
+  using Kind = ConfigValue::Kind;
   const Kind kinds[] = {Kind::integer, Kind::text, Kind::boolean, Kind::fraction,
                         Kind::time,    Kind::list, Kind::table};
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(file.keys[i].value.kind, kinds[i]) << i;

@@ -70,7 +70,7 @@ namespace {
 constexpr Extent kExtent{4, 2};
 constexpr View kView{{0.0, 0.0}, 1.0};
 
-char32_t code_at(const Plot& plot, Place place) {
+char32_t code_at(const Plot& plot, ScreenPlace place) {
   Canvas canvas(kExtent);
   plot.draw(canvas, {0, 0});
   return canvas.at(place).code;

@@ -10,34 +10,35 @@ namespace {
 
 using testing::HasSubstr;
 
-Result<Options> parsed(const std::vector<const char*>& words) { return parse_options(words); }
+Result<DemoOptions> parsed(const std::vector<const char*>& words) { return parse_options(words); }
 
 std::string complaint(const std::vector<const char*>& words) {
-  const Result<Options> options = parsed(words);
+  const Result<DemoOptions> options = parsed(words);
   return options ? "none" : options.error().sentence;
 }
 
-TEST(Options, WithoutArgumentsEverythingIsStarted) {
-  const Options options = parsed({}).value();
+TEST(DemoOptions, WithoutArgumentsEverythingIsStarted) {
+  const DemoOptions options = parsed({}).value();
   EXPECT_EQ(options.role, Role::kAll);
   EXPECT_FALSE(options.seconds);
   EXPECT_TRUE(options.log.empty());
 }
 
-TEST(Options, TakesValuesBehindABlankOrAnEqualsSign) {
-  const Options options = parsed({"--log", "a.log.gz", "--seconds=10", "--speed", "2.5"}).value();
+TEST(DemoOptions, TakesValuesBehindABlankOrAnEqualsSign) {
+  const DemoOptions options =
+      parsed({"--log", "a.log.gz", "--seconds=10", "--speed", "2.5"}).value();
   EXPECT_EQ(options.log, "a.log.gz");
   EXPECT_EQ(options.seconds, 10.0);
   EXPECT_EQ(options.speed, 2.5);
 }
 
-TEST(Options, TheRolesComeFirst) {
+TEST(DemoOptions, TheRolesComeFirst) {
   EXPECT_EQ(parsed({"robot", "--hub", "unix:/x"}).value().role, Role::kRobot);
   EXPECT_EQ(parsed({"view", "--robot", "r2.d-2"}).value().role, Role::kView);
   EXPECT_THAT(complaint({"--seconds", "1", "robot"}), HasSubstr("no argument 'robot'"));
 }
 
-TEST(Options, SaysWhatIsWrong) {
+TEST(DemoOptions, SaysWhatIsWrong) {
   EXPECT_THAT(complaint({"--frobnicate"}), HasSubstr("no argument '--frobnicate'"));
   EXPECT_THAT(complaint({"--log"}), HasSubstr("needs a value"));
   EXPECT_THAT(complaint({"--log="}), HasSubstr("--log is empty"));
@@ -46,7 +47,7 @@ TEST(Options, SaysWhatIsWrong) {
   EXPECT_THAT(complaint({"--robot", "a/b"}), HasSubstr("takes a name"));
 }
 
-TEST(Options, NumbersHaveBounds) {
+TEST(DemoOptions, NumbersHaveBounds) {
   EXPECT_EQ(complaint({"--seconds", "0.1"}), "none");
   EXPECT_EQ(complaint({"--seconds", "86400"}), "none");
   for (const char* bad : {"0.09", "86401", "-1", "nan", "inf", "ten", "5s", ""}) {
@@ -57,7 +58,7 @@ TEST(Options, NumbersHaveBounds) {
   EXPECT_THAT(complaint({"--log", "a", "--speed", "101"}), HasSubstr("from 0.1 to 100"));
 }
 
-TEST(Options, RefusesWhatMeansNothingTogether) {
+TEST(DemoOptions, RefusesWhatMeansNothingTogether) {
   EXPECT_THAT(complaint({"--log", "a", "--map", "b"}), HasSubstr("exclude each other"));
   EXPECT_THAT(complaint({"--speed", "2"}), HasSubstr("speed of a log"));
   EXPECT_THAT(complaint({"--hub", "unix:/x"}), HasSubstr("say 'robot' or 'view' first"));
@@ -66,7 +67,7 @@ TEST(Options, RefusesWhatMeansNothingTogether) {
   EXPECT_THAT(complaint({"--ascii", "--utf8"}), HasSubstr("exclude each other"));
 }
 
-TEST(Options, HelpNeedsNothingElse) {
+TEST(DemoOptions, HelpNeedsNothingElse) {
   EXPECT_TRUE(parsed({"--help"}).value().help);
   EXPECT_TRUE(parsed({"robot", "-h"}).value().help);
   EXPECT_THAT(std::string(usage_text()), HasSubstr("--seconds"));

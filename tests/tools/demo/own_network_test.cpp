@@ -35,14 +35,14 @@ TEST(ReadyLine, AnotherLineIsRefused) {
 
 TEST(OwnNetwork, SaysThatTheHubIsMissing) {
   const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
-  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence,
+  EXPECT_THAT(OwnNetwork::start(DemoOptions{}, programs.path()).error().sentence,
               HasSubstr("cannot start the hub"));
 }
 
 TEST(OwnNetwork, PassesOnWhyTheHubDoesNotStart) {
   const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
   plant(programs, "tcphub", "echo 'no room' >&2; exit 1");
-  EXPECT_THAT(OwnNetwork::start(Options{}, programs.path()).error().sentence,
+  EXPECT_THAT(OwnNetwork::start(DemoOptions{}, programs.path()).error().sentence,
               HasSubstr("ended at once: no room"));
 }
 
@@ -50,7 +50,7 @@ TEST(OwnNetwork, GivesTheRobotItsArgumentsAndNoticesItsEnd) {
   const TemporaryFolder programs = std::move(TemporaryFolder::make().value());
   plant(programs, "tcphub", "echo ready tcp://127.0.0.1:1 unix:/x; exec tail -f /dev/null");
   plant(programs, "gimnet-demo", "echo ready; echo \"$*\" >&2; exit 3");
-  Options options;
+  DemoOptions options;
   options.log = "a b.log";
   options.speed = 2.5;
   Result<OwnNetwork> network = OwnNetwork::start(options, programs.path());

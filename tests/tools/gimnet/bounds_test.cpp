@@ -5,8 +5,8 @@
 namespace gimnet::tool {
 namespace {
 
-Options options(std::uint64_t count, double seconds) {
-  Options options;
+ToolOptions options(std::uint64_t count, double seconds) {
+  ToolOptions options;
   options.count = count;
   options.seconds = seconds;
   return options;

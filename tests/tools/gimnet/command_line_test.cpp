@@ -12,29 +12,30 @@
 namespace gimnet::tool {
 namespace {
 
-std::variant<Options, CommandLineEnding> parse(std::initializer_list<const char*> words) {
+std::variant<ToolOptions, CommandEnding> parse(std::initializer_list<const char*> words) {
   std::vector<const char*> arguments{"gimnet"};
   arguments.insert(arguments.end(), words);
   return parse_command_line(static_cast<int>(arguments.size()), arguments.data());
 }
-Options options(std::initializer_list<const char*> words) {
+ToolOptions options(std::initializer_list<const char*> words) {
   const auto parsed = parse(words);
-  if (const auto* ending = std::get_if<CommandLineEnding>(&parsed)) {
+  if (const auto* ending = std::get_if<CommandEnding>(&parsed)) {
     ADD_FAILURE() << ending->text;
     return {};
   }
-  return std::get<Options>(parsed);
+  return std::get<ToolOptions>(parsed);
 }
 std::string refusal(std::initializer_list<const char*> words) {
   const auto parsed = parse(words);
-  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  const auto* ending = std::get_if<CommandEnding>(&parsed);
   if (ending == nullptr || ending->code != ExitCode::usage) return "not refused";
   return ending->text;
 }
 
 TEST(CommandLine, TakesCommonOptionsBeforeAndAfterTheCommand) {
-  for (const Options& read : {options({"--hub", "tcp://h:1", "--json", "--shard", "1", "nodes"}),
-                              options({"nodes", "--hub", "tcp://h:1", "--json", "--shard", "1"})}) {
+  for (const ToolOptions& read :
+       {options({"--hub", "tcp://h:1", "--json", "--shard", "1", "nodes"}),
+        options({"nodes", "--hub", "tcp://h:1", "--json", "--shard", "1"})}) {
     EXPECT_EQ(read.command, Command::nodes);
     EXPECT_EQ(read.hub, "tcp://h:1");
     EXPECT_TRUE(read.json);
@@ -50,12 +51,13 @@ TEST(CommandLine, ReadsEachCommand) {
   EXPECT_EQ(options({"pub", "robot/odom", "--delivery", "latest", "--rate", "2.5"}).delivery,
             Delivery::latest);
   EXPECT_EQ(options({"pub", "a/b", "--wait", "3"}).subscribers, 3u);
-  const Options sync = options({"pub", "a/b", "--delivery", "sync:3", "--retain"});
+  const ToolOptions sync = options({"pub", "a/b", "--delivery", "sync:3", "--retain"});
   EXPECT_EQ(sync.delivery, Delivery::sync);
   EXPECT_EQ(sync.window, 3u);
   EXPECT_TRUE(sync.retain);
   EXPECT_EQ(options({"pub", "a/b", "--delivery", "sync"}).window, 1u);
-  const Options paced = options({"echo", "a/*", "--window", "2", "--depth", "4", "--rate", "0.5"});
+  const ToolOptions paced =
+      options({"echo", "a/*", "--window", "2", "--depth", "4", "--rate", "0.5"});
   EXPECT_EQ(paced.pace.window, 2u);
   EXPECT_EQ(paced.pace.depth, 4u);
   EXPECT_EQ(paced.pace.rate_hz, 0.5);
@@ -258,7 +260,7 @@ TEST(CommandLine, SaysWhatAHiddenOptionTakes) {
 
 TEST(CommandLine, ReadsTheBoundsOfWhatGoesOn) {
   for (const char* command : {"echo", "hz", "bw", "watch"}) {
-    const Options read = options({command, "robot/*", "-n", "5", "--seconds", "2.5"});
+    const ToolOptions read = options({command, "robot/*", "-n", "5", "--seconds", "2.5"});
     EXPECT_EQ(read.count, 5u);
     EXPECT_EQ(read.seconds, 2.5);
     EXPECT_EQ(read.target, "robot/*");
@@ -345,7 +347,7 @@ TEST(CommandLine, RefusesWindowsThatNoHubTakes) {
 
 TEST(CommandLine, HelpEndsWell) {
   const auto parsed = parse({"send", "--help"});
-  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  const auto* ending = std::get_if<CommandEnding>(&parsed);
   ASSERT_NE(ending, nullptr);
   EXPECT_EQ(ending->code, ExitCode::done);
   EXPECT_NE(ending->text.find("Examples:"), std::string::npos);

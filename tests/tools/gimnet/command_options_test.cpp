@@ -18,7 +18,7 @@ std::string help(const std::vector<std::string>& words) {
   for (const std::string& word : words) arguments.push_back(word.c_str());
   arguments.push_back("--help");
   const auto parsed = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
-  const auto* ending = std::get_if<CommandLineEnding>(&parsed);
+  const auto* ending = std::get_if<CommandEnding>(&parsed);
   if (ending == nullptr || ending->code != ExitCode::done) return "no help";
   return ending->text;
 }

@@ -13,15 +13,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::variant<Options, CommandLineEnding> parse(std::vector<const char*> words) {
+std::variant<ToolOptions, CommandEnding> parse(std::vector<const char*> words) {
   words.insert(words.begin(), "gimnet");
   return parse_command_line(static_cast<int>(words.size()), words.data());
 }
 
 CtlOptions ctl(const std::vector<const char*>& words) {
   const auto parsed = parse(words);
-  const auto* options = std::get_if<Options>(&parsed);
-  EXPECT_NE(options, nullptr) << std::get<CommandLineEnding>(parsed).text;
+  const auto* options = std::get_if<ToolOptions>(&parsed);
+  EXPECT_NE(options, nullptr) << std::get<CommandEnding>(parsed).text;
   if (options == nullptr) return {};
   EXPECT_EQ(options->command, Command::ctl);
   return options->ctl;
@@ -44,7 +44,7 @@ TEST(CtlOptions, EveryActionIsUnderstood) {
 
 TEST(CtlOptions, OptionsOfAllCommandsStandAnywhere) {
   const auto parsed = parse({"--hub", "unix:/a", "ctl", "connections", "--json"});
-  const auto& options = std::get<Options>(parsed);
+  const auto& options = std::get<ToolOptions>(parsed);
   EXPECT_TRUE(options.json);
   EXPECT_EQ(options.hub, "unix:/a");
 }
@@ -56,14 +56,14 @@ TEST(CtlOptions, WhatIsMissingIsToldWithExitCode2) {
                                                 {"ctl", "log"},
                                                 {"ctl", "kik"}}) {
     const auto parsed = parse(words);
-    ASSERT_TRUE(std::holds_alternative<CommandLineEnding>(parsed)) << words.size();
-    EXPECT_EQ(std::get<CommandLineEnding>(parsed).code, ExitCode::usage);
+    ASSERT_TRUE(std::holds_alternative<CommandEnding>(parsed)) << words.size();
+    EXPECT_EQ(std::get<CommandEnding>(parsed).code, ExitCode::usage);
   }
 }
 
 TEST(CtlOptions, HelpShowsExamples) {
   const auto parsed = parse({"ctl", "--help"});
-  EXPECT_THAT(std::get<CommandLineEnding>(parsed).text, HasSubstr("ctl reassign"));
+  EXPECT_THAT(std::get<CommandEnding>(parsed).text, HasSubstr("ctl reassign"));
 }
 
 }  // namespace

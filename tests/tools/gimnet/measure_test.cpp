@@ -8,15 +8,15 @@ namespace {
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kSecond = 1000 * kMs;
 
-TEST(Statistics, OfNothingAreZero) {
-  const Statistics none;
+TEST(MeterStatistics, OfNothingAreZero) {
+  const MeterStatistics none;
   EXPECT_EQ(none.count(), 0u);
   EXPECT_EQ(none.mean(), 0.0);
   EXPECT_EQ(none.deviation(), 0.0);
 }
 
-TEST(Statistics, KeepsLeastMostMeanAndDeviation) {
-  Statistics values;
+TEST(MeterStatistics, KeepsLeastMostMeanAndDeviation) {
+  MeterStatistics values;
   for (const double value : {2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0}) values.add(value);
   EXPECT_EQ(values.count(), 8u);
   EXPECT_EQ(values.min(), 2.0);
@@ -28,7 +28,7 @@ TEST(Statistics, KeepsLeastMostMeanAndDeviation) {
 
 TEST(Meter, ANewOneSaysNothingCame) {
   Meter meter(0, 5 * kSecond);
-  const Reading reading = meter.recent(2 * kSecond);
+  const MeterReading reading = meter.recent(2 * kSecond);
   EXPECT_EQ(reading.rate_hz(), 0.0);
   EXPECT_EQ(reading.bytes_per_s(), 0.0);
   EXPECT_EQ(reading.seconds, 2.0);
@@ -38,7 +38,7 @@ TEST(Meter, ANewOneSaysNothingCame) {
 TEST(Meter, MeasuresTheRateByTheGaps) {
   Meter meter(0, 5 * kSecond);
   for (std::int64_t ms = 100; ms <= 1100; ms += 25) meter.add(ms * kMs, 10);
-  const Reading reading = meter.recent(1110 * kMs);
+  const MeterReading reading = meter.recent(1110 * kMs);
   EXPECT_DOUBLE_EQ(reading.rate_hz(), 40.0);
   EXPECT_DOUBLE_EQ(reading.gaps_ms.min(), 25.0);
   EXPECT_DOUBLE_EQ(reading.gaps_ms.max(), 25.0);
@@ -51,11 +51,11 @@ TEST(Meter, ForgetsWhatIsOlderThanTheWindowButNotInTheWhole) {
   meter.add(100 * kMs, 1000);
   meter.add(2000 * kMs, 10);
   meter.add(2500 * kMs, 30);
-  const Reading recent = meter.recent(3000 * kMs);
+  const MeterReading recent = meter.recent(3000 * kMs);
   EXPECT_EQ(recent.sizes_bytes.count(), 2u);
   EXPECT_DOUBLE_EQ(recent.bytes_per_s(), 40.0);
   EXPECT_DOUBLE_EQ(recent.gaps_ms.max(), 1900.0) << "a gap counts where it ends";
-  const Reading whole = meter.whole(3000 * kMs);
+  const MeterReading whole = meter.whole(3000 * kMs);
   EXPECT_EQ(whole.sizes_bytes.count(), 3u);
   EXPECT_DOUBLE_EQ(whole.sizes_bytes.max(), 1000.0);
   EXPECT_DOUBLE_EQ(whole.seconds, 3.0);

@@ -94,12 +94,12 @@ TEST(Output, SaysThatNobodyReads) {
 
 namespace {
 
-TEST(Progress, IsSilentWhereThereIsNoTerminal) {
+TEST(ProgressLine, IsSilentWhereThereIsNoTerminal) {
   std::array<int, 2> pipe{};
   ASSERT_EQ(::pipe(pipe.data()), 0);
   std::atomic<int> asked{0};
   {
-    const Progress progress(
+    const ProgressLine progress(
         [&] {
           ++asked;
           return std::string("x");
@@ -113,7 +113,7 @@ TEST(Progress, IsSilentWhereThereIsNoTerminal) {
   ::close(pipe[0]);
 }
 
-TEST(Progress, RenewsItsLineAtATerminalAndTakesItAway) {
+TEST(ProgressLine, RenewsItsLineAtATerminalAndTakesItAway) {
   const int master = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
   ASSERT_GE(master, 0);
   ASSERT_EQ(::grantpt(master), 0);
@@ -134,7 +134,7 @@ TEST(Progress, RenewsItsLineAtATerminalAndTakesItAway) {
   };
   {
     std::atomic<int> number{0};
-    const Progress progress([&] { return std::to_string(++number) + " sent"; }, terminal);
+    const ProgressLine progress([&] { return std::to_string(++number) + " sent"; }, terminal);
     EXPECT_TRUE(read_until("\r1 sent\x1b[K"));
     EXPECT_TRUE(read_until("\r2 sent\x1b[K"));
     shown.clear();
