@@ -176,7 +176,7 @@ void NetworkState::advance(std::chrono::milliseconds now) {
 
 void NetworkState::say_own(std::chrono::milliseconds now) {
   for (const PartRef& part : own_.take_due(now)) {
-    store_.take(part, now);
+    store_.put_own(part);
     flood(part, LinkNumber{});
     map_changed_ = true;
   }

@@ -89,6 +89,8 @@ RecordStore::Taken RecordStore::take(const PartRef& part, std::chrono::milliseco
   return Taken::newer;
 }
 
+void RecordStore::put_own(const PartRef& part) { records_[part->said.hub].put(part); }
+
 bool RecordStore::has_room_for(HubId hub) const {
   const auto first = records_.lower_bound(proto::HubKey{hub, {}});
   const auto end =

@@ -72,6 +72,8 @@ class RecordStore {
 
   enum class Taken : std::uint8_t { newer, known, too_many };
   Taken take(const PartRef& part, std::chrono::milliseconds now);
+  /// Keeps what this hub says of itself: others cannot take its place away.
+  void put_own(const PartRef& part);
 
   [[nodiscard]] const std::map<proto::HubKey, HubRecord>& records() const { return records_; }
   /// Null: it is not known.

@@ -109,6 +109,19 @@ TEST(OwnRecordGoesOn, BehindEqualSequencesAndWhatItWillSayNext) {
   EXPECT_EQ(record.take_due(kBegin + std::chrono::seconds(1)).front()->said.sequence, 10u);
 }
 
+TEST(OwnRecordGoesOn, BehindAPartThatIsNewerThanItsOwn) {
+  OwnRecord record = make_record();
+  record.set_neighbours(neighbours_up_to(65));
+  (void)record.take_due(kBegin);
+  auto neighbours = neighbours_up_to(65);
+  neighbours.back().cost = 11;
+  record.set_neighbours(neighbours);
+  EXPECT_EQ(record.take_due(kBegin + std::chrono::seconds(1)).front()->said.sequence, 3u);
+  // Part 1 has sequence 3 and part 0 still has 1, so this one would hold.
+  record.hear(said(identity(4'000, 6), 2));
+  EXPECT_EQ(record.take_due(kBegin + std::chrono::seconds(2)).size(), 2u);
+}
+
 TEST(OwnRecordGoesOn, AtMostOnceASecond) {
   OwnRecord record = make_record();
   (void)record.take_due(kBegin);

@@ -107,6 +107,8 @@ TEST(RecordStoreLimit, TakesSoManyRecordsOfOneHubId) {
   EXPECT_EQ(store.take(part(identity(6, 1), 1), kNow), Taken::newer) << "another hub id";
   EXPECT_EQ(store.take(part({hub_key(5, 1), proto::HubInstance{1}, true}, 2), kNow), Taken::newer)
       << "one that is known";
+  store.put_own(nth(200));
+  EXPECT_NE(store.find(hub_key(5, 200)), nullptr) << "others cannot take its place away";
 }
 
 TEST(RecordStoreForget, ThrowsAwayHubsThatCouldNotBeReachedForTenMinutes) {
