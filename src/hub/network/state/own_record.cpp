@@ -1,6 +1,7 @@
 #include "hub/network/state/own_record.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/check.hpp"
 
@@ -56,10 +57,6 @@ void OwnRecord::renumber(HubId hub) {
 
 void OwnRecord::hear(const RecordPart& heard) {
   if (heard.instance == identity_.instance && heard.sequence <= sequence_) return;
-  if (heard.part == 0 && heard.instance != identity_.instance &&
-      heard.behind == identity_.instance) {
-    living_copy_ = heard.instance;
-  }
   // The part would hold against what was said, or against what this hub says there next.
   RecordPart mine;
   mine.instance = identity_.instance;
@@ -70,7 +67,16 @@ void OwnRecord::hear(const RecordPart& heard) {
   const bool equal = heard.sequence == mine.sequence || heard.sequence == next.sequence;
   if (!equal && !is_newer(heard, mine) && !is_newer(heard, next)) return;
   pass_ = std::max(pass_.value_or(0), heard.sequence);
-  if (heard.instance != identity_.instance) behind_ = heard.instance;
+  if (heard.instance == identity_.instance) return;
+  behind_ = heard.instance;
+  if (heard.part != 0 || heard.behind != identity_.instance) return;
+  is_named_ = true;
+  if (question_ && heard.sequence > *question_) living_copy_ = heard.instance;
+}
+
+void OwnRecord::forget_copy() {
+  living_copy_.reset();
+  question_.reset();
 }
 
 std::optional<std::chrono::milliseconds> OwnRecord::next_due() const {
@@ -87,6 +93,7 @@ std::vector<PartRef> OwnRecord::take_due(std::chrono::milliseconds now) {
   if (goes_on) {
     sequence_ = std::max(sequence_, *pass_);
     pass_.reset();
+    if (std::exchange(is_named_, false)) question_ = sequence_ + 1;
     go_on_pace_.note_done(now);
     for (Part& part : parts_) part.changed = true;
   }

@@ -52,10 +52,10 @@ class OwnRecord {
   /// or invented. If it would be taken for newer than what the hub says or will say next, the hub
   /// goes on behind it.
   void hear(const proto::route::RecordPart& heard);
-  /// Another process with this unique id runs: it went on behind this instance. Nothing: none is
-  /// known.
+  /// Another process with this unique id runs: this hub went on behind a record that named it, and
+  /// was named again. One record alone may be of a process that has ended. Nothing: none is known.
   [[nodiscard]] std::optional<proto::HubInstance> living_copy() const { return living_copy_; }
-  void forget_copy() { living_copy_.reset(); }
+  void forget_copy();
 
   /// The parts that are to be sent now.
   [[nodiscard]] std::vector<PartRef> take_due(std::chrono::milliseconds now);
@@ -81,6 +81,9 @@ class OwnRecord {
   /// The highest sequence heard of another instance that has to be passed. Nothing: none.
   std::optional<std::uint64_t> pass_;
   ChangePace go_on_pace_{{kGoOnPause, kGoOnPause}};
+  bool is_named_ = false;  ///< by a record that is to be passed
+  /// The sequence of part 0 when this hub last went on behind a record that named it.
+  std::optional<std::uint64_t> question_;
   std::optional<proto::HubInstance> living_copy_;
 };
 

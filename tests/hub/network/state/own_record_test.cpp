@@ -152,10 +152,21 @@ TEST(OwnRecordCopy, IsOneThatWentOnBehindThisInstance) {
   record.hear(copy);
   EXPECT_FALSE(record.living_copy()) << "a former life went on behind one before it";
   copy.behind = proto::HubInstance{7};
+  copy.sequence = 50;
   record.hear(copy);
-  EXPECT_EQ(record.living_copy(), proto::HubInstance{6});
+  EXPECT_FALSE(record.living_copy()) << "it may have ended since";
+  EXPECT_EQ(record.take_due(kBegin + milliseconds(1'000)).front()->said.sequence, 51u);
+  record.hear(copy);
+  EXPECT_FALSE(record.living_copy()) << "the same record again";
+  copy.sequence = 52;
+  record.hear(copy);
+  EXPECT_EQ(record.living_copy(), proto::HubInstance{6}) << "it heard this hub, and went on";
   record.forget_copy();
   EXPECT_FALSE(record.living_copy());
+  (void)record.take_due(kBegin + milliseconds(3'000));
+  copy.sequence = 53;
+  record.hear(copy);
+  EXPECT_FALSE(record.living_copy()) << "asked anew";
 }
 
 TEST(OwnRecordRenumber, GoesOnWithItsSequence) {
