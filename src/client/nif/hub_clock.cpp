@@ -16,6 +16,16 @@ std::int64_t sum(std::int64_t time_ns, std::int64_t offset_ns) {
                                    static_cast<std::uint64_t>(offset_ns));
 }
 
+/// Either offset is known to half of its round trip.
+bool contradict(const HubClock::Measurement& a, const HubClock::Measurement& b) {
+  const auto apart = [&](std::int64_t one, std::int64_t other) {
+    const auto between = static_cast<std::uint64_t>(difference(one, other));
+    return std::min(between, 0 - between) >
+           static_cast<std::uint64_t>(a.round_trip_ns / 2 + b.round_trip_ns / 2 + 1);
+  };
+  return apart(a.offset_ns, b.offset_ns) || apart(a.steady_offset_ns, b.steady_offset_ns);
+}
+
 }  // namespace
 
 proto::flow::Ping HubClock::ping(std::int64_t steady_ns, std::int64_t wall_ns) {
@@ -37,6 +47,8 @@ void HubClock::on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) {
   measured.offset_ns = difference(pong.now_ns, ping.wall_ns + half_ns);
   measured.steady_offset_ns = difference(pong.now_ns, ping.steady_ns + half_ns);
   ping.answer = measured;
+  // A clock was set: what was measured before says nothing any more.
+  if (measured_ != 0 && contradict(shortest(), measured)) measured_ = 0;
   kept_[measured_ % kKept] = measured;
   ++measured_;
   steady_offset_ns_ = shortest().steady_offset_ns;

@@ -25,7 +25,8 @@ class HubClock {
   /// A PING that is about to be sent.
   [[nodiscard]] proto::flow::Ping ping(std::int64_t steady_ns, std::int64_t wall_ns)
       GIMNET_EXCLUDES(mutex_);
-  /// A PONG. What was not asked, or was answered already, is ignored.
+  /// A PONG. What was not asked, or was answered already, is ignored. If it contradicts the
+  /// measurements before it, since a clock was set, they are forgotten.
   void on_pong(const proto::flow::Pong& pong, std::int64_t steady_ns) GIMNET_EXCLUDES(mutex_);
   /// A WELCOME said that it is `hub_ns` at the hub: what counts until a PONG says better.
   void begin(std::int64_t hub_ns, std::int64_t steady_ns) GIMNET_EXCLUDES(mutex_);

@@ -109,6 +109,7 @@ bool Node::take_over(Admitted admitted, bool first) {
   if (!let_go) return false;
   id_.store(session_.id, std::memory_order_relaxed);  // a number by itself
   last_heard_ns_ = last_tick_ns_ = steady_now_ns();
+  last_ping_ns_ = 0;
   if (session_.hub_time_ns != 0) clock_.begin(session_.hub_time_ns, last_heard_ns_);
   address_ = std::move(admitted.address);
   keep_token();

@@ -177,6 +177,7 @@ class Node final : private InboundHost {
   std::uint64_t confirmed_ = 0;
   std::int64_t last_heard_ns_ = 0;
   std::int64_t last_tick_ns_ = 0;
+  std::int64_t last_ping_ns_ = 0;  ///< 0: none on this connection
   bool was_reading_ = true;
   bool resumes_only_ = false;  ///< the next connection has to resume the session ...
   std::int64_t broke_ns_ = 0;  ///< ... whose last one broke then

@@ -17,6 +17,8 @@ namespace {
 constexpr std::int64_t kLeaveNs = 1'000'000'000;
 /// How long one try of a reconnect may take.
 constexpr std::int64_t kRedialNs = 5'000'000'000;
+/// Keep-alive intervals after which the hub's clock is measured again, however busy the node is.
+constexpr std::int64_t kMeasureIntervals = 5;
 
 thread_local constinit const Node* t_node = nullptr;
 
@@ -156,7 +158,8 @@ void Node::on_timers(std::int64_t now, bool reading) {
   }
   if (now - last_tick_ns_ < session_.keep_alive_ns / 4) return;
   const Outbound::Wants wants = outbound_.wants();
-  const bool due = now - wants.last_write_ns >= session_.keep_alive_ns;
+  const bool due = now - wants.last_write_ns >= session_.keep_alive_ns ||
+                   now - last_ping_ns_ >= kMeasureIntervals * session_.keep_alive_ns;
   if (!due && now - last_tick_ns_ < session_.keep_alive_ns) return;
   last_tick_ns_ = now;
   backoff_.reset();  // only now: a hub that admits and closes at once must not be dialed in a tight
@@ -164,7 +167,10 @@ void Node::on_timers(std::int64_t now, bool reading) {
   confirm();
   // While the kernel is full the hub does not read, so it cannot miss a PING, and they must not
   // pile up.
-  if (due && !wants.blocked) outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
+  if (due && !wants.blocked) {
+    last_ping_ns_ = now;
+    outbound_.post(clock_.ping(steady_now_ns(), wall_now_ns()));
+  }
   outbound_.look_after_held();
   static_cast<void>(outbound_.flush());
 }

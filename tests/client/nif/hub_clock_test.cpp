@@ -15,7 +15,7 @@ TEST(HubClock, TakesTheOffsetOfTheShortestRoundTrip) {
   EXPECT_EQ(first.sent_ns, 5000);
   clock.on_pong({first.sequence, 5000, 5150}, 1100);  // 100 ns round trip, 100 ahead
   const auto slow = clock.ping(2000, 6000);
-  clock.on_pong({slow.sequence, 6000, 9999}, 3000);
+  clock.on_pong({slow.sequence, 6000, 6990}, 3000);
   ASSERT_TRUE(clock.best());
   EXPECT_EQ(clock.best()->offset_ns, 100);
   EXPECT_EQ(clock.best()->round_trip_ns, 1000) << "the last one";
@@ -29,13 +29,33 @@ TEST(HubClock, TellsTheHubsTimeByTheWelcomeAndThenByTheShortestRoundTrip) {
   const auto first = clock.ping(2'000, 9);
   clock.on_pong({first.sequence, 9, 70'050}, 2'100);
   EXPECT_EQ(clock.hub_time(3'050), 71'050);
-  const auto slow = clock.ping(4'000, 9);
-  clock.on_pong({slow.sequence, 9, 99'999}, 5'000);
+  const auto slow = clock.ping(4'000, 2'009);
+  clock.on_pong({slow.sequence, 2'009, 72'900}, 5'000);
   EXPECT_EQ(clock.hub_time(3'050), 71'050) << "a longer round trip says less";
   clock.clear();
   EXPECT_EQ(clock.hub_time(3'050), 71'050) << "it goes on while the connection is broken";
   clock.begin(10, 3'050);
   EXPECT_EQ(clock.hub_time(3'050), 10) << "another hub";
+}
+
+TEST(HubClock, FollowsAClockThatWasSet) {
+  HubClock clock;
+  const auto measure = [&clock](std::int64_t steady_ns, std::int64_t wall_ns, std::int64_t hub_ns,
+                                std::int64_t round_trip_ns) {
+    const auto ping = clock.ping(steady_ns, wall_ns);
+    clock.on_pong({ping.sequence, wall_ns, hub_ns + round_trip_ns / 2}, steady_ns + round_trip_ns);
+  };
+  measure(1'000, 5'000, 5'000, 10);
+  EXPECT_EQ(clock.hub_time(2'000), 6'000);
+  measure(2'000, 6'000, 6'000 + 505, 1'000);
+  EXPECT_EQ(clock.hub_time(2'000), 6'000) << "it may be the same time";
+  measure(3'000, 7'000, 7'000 + 507, 1'000);
+  EXPECT_EQ(clock.hub_time(3'000), 7'507) << "the hub's clock was set";
+  measure(4'000, 8'000, 8'000 - 3'600, 2'000);
+  EXPECT_EQ(clock.hub_time(4'000), 4'400) << "back, and by a long round trip";
+  EXPECT_EQ(clock.best()->offset_ns, -3'600);
+  measure(5'000, 90'000, 5'400, 1'000);
+  EXPECT_EQ(clock.best()->offset_ns, 5'400 - 90'000) << "the own one was set";
 }
 
 TEST(HubClock, IgnoresWhatWasNotAskedAndRepeats) {

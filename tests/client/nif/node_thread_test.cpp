@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
 
 #include "client/nif/node.hpp"
+#include "proto/frame/extensions.hpp"
 #include "tests/client/nif/support/fake_hub.hpp"
 #include "tests/client/nif/support/recording_host.hpp"
 
@@ -31,6 +33,38 @@ TEST(NodeThread, PingsWhenItHasSentNothingAndAnswersPings) {
   ASSERT_TRUE(pong);
   EXPECT_EQ(pong->sequence, 5u);
   EXPECT_EQ(pong->sent_ns, 6);
+}
+
+// The hub PINGs first, and the node always has something to write.
+TEST(NodeThread, FollowsTheHubsClockWhileItIsBusy) {
+  FakeHub hub;
+  proto::Welcome welcome = make_welcome();
+  welcome.hub_time_ns = wall_now_ns();
+  Connected connected = connect_to(hub, default_options(), welcome);
+  nif_outgoing message = NIF_OUTGOING_INIT;
+  message.to = kPeerId;
+  message.age_ms_max = 100;
+  constexpr std::int64_t kHourNs = 3'600'000'000'000;
+  for (const std::int64_t ahead_ns : {kHourNs, -kHourNs}) {
+    const Deadline until = steady_now_ns() + std::chrono::nanoseconds(kPatience).count();
+    for (bool followed = false; !followed;) {
+      ASSERT_LT(steady_now_ns(), until) << ahead_ns;
+      ASSERT_EQ(nif_send(connected.node.get(), &message, NIF_FOREVER), NIF_OK);
+      const auto frame = connected.hub.next();
+      ASSERT_TRUE(frame) << ahead_ns;
+      if (const auto flow = frame->flow(); frame->header.kind == proto::Kind::flow) {
+        const auto* ping = std::get_if<proto::flow::Ping>(&*flow);
+        if (ping == nullptr) continue;
+        connected.hub.send(
+            proto::flow::Pong{ping->sequence, ping->sent_ns, wall_now_ns() + ahead_ns});
+        continue;
+      }
+      const auto age = proto::find_age(frame->view().extensions);
+      ASSERT_TRUE(age);
+      const std::int64_t apart_ns = age->origin_ns - (wall_now_ns() + ahead_ns);
+      followed = apart_ns > -kHourNs / 2 && apart_ns < kHourNs / 2;
+    }
+  }
 }
 
 TEST(NodeThread, ConfirmsWithEveryKeepAliveAndEachQuarter) {
