@@ -1,5 +1,6 @@
 #include "client/gimi/inbox.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "client/gimi/ending.hpp"
@@ -92,11 +93,7 @@ bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
     bound_unasked();
     return true;
   }
-  if (unasked_keys_ == kUnaskedKeysMax) {
-    ++dropped_;
-    return true;
-  }
-  ++unasked_keys_;
+  if (unasked_.size() == kUnaskedKeysMax) forget_unasked();
   MessageQueue& queue = queues_.emplace_back(
       *this, QueueOptions{unasked_messages_, AtFullQueue::overwrite_oldest}, bytes_max_);
   by_key_.emplace(key, &queue);
@@ -104,6 +101,17 @@ bool Inbox::put(MessageKey key, Message& message, Receipt* receipt) {
   static_cast<void>(push(queue, message, receipt));  // it refuses nothing
   bound_unasked();
   return true;
+}
+
+void Inbox::forget_unasked() {
+  const auto goes = std::ranges::min_element(unasked_, {}, [](const MessageQueue* queue) {
+    return queue->empty() ? 0 : queue->first_arrival();
+  });
+  MessageQueue* const queue = *goes;
+  unasked_.erase(goes);
+  dropped_ += queue->size();
+  std::erase_if(by_key_, [queue](const auto& each) { return each.second == queue; });
+  queues_.remove_if([queue](const MessageQueue& each) { return &each == queue; });
 }
 
 void Inbox::bound_unasked() {

@@ -30,7 +30,8 @@ class Receipt {
 /// of subscriptions.
 class Inbox {
  public:
-  /// Keys for which nobody asked that get a queue.
+  /// Keys for which nobody asked that have a queue. Beyond it an empty one goes, or that of which
+  /// a message waits longest.
   static constexpr std::size_t kUnaskedKeysMax = 1024;
   /// Bytes that wait in their queues together, as many as the largest message has by default: a
   /// program that never looks there does not grow, whatever strangers send it.
@@ -64,8 +65,8 @@ class Inbox {
   /// False: no room, the message is unchanged; on_room() will be called. `receipt` may be null.
   [[nodiscard]] bool put(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
-  /// As put() to the queue of the key; of too many keys it is dropped, and true. Where nobody asked
-  /// for the key, older messages of such keys may go for it.
+  /// As put() to the queue of the key. Where nobody asked for the key, older messages of such keys
+  /// may go for it.
   [[nodiscard]] bool put(MessageKey key, Message& message, Receipt* receipt)
       GIMNET_EXCLUDES(mutex_);
   void count_dropped() GIMNET_EXCLUDES(mutex_);
@@ -93,6 +94,8 @@ class Inbox {
   [[nodiscard]] bool push(MessageQueue& queue, Message& message, Receipt* receipt)
       GIMNET_REQUIRES(mutex_);
   [[nodiscard]] MessageQueue* first_waiting() GIMNET_REQUIRES(mutex_);
+  /// Makes room for another key. REQUIRES: there are kUnaskedKeysMax.
+  void forget_unasked() GIMNET_REQUIRES(mutex_);
   /// Overwrites the oldest messages beyond kUnaskedBytesMax; the newest one stays.
   void bound_unasked() GIMNET_REQUIRES(mutex_);
   [[nodiscard]] bool is_room_wanted(const MessageQueue& queue) GIMNET_REQUIRES(mutex_);
@@ -117,8 +120,7 @@ class Inbox {
   /// Limit: the queues that the program asked for, and kUnaskedKeysMax
   std::list<MessageQueue> queues_ GIMNET_GUARDED_BY(mutex_);
   std::map<MessageKey, MessageQueue*> by_key_ GIMNET_GUARDED_BY(mutex_);
-  std::size_t unasked_keys_ GIMNET_GUARDED_BY(mutex_) = 0;
-  /// Of those keys, the ones for which still nobody asked. Limit: kUnaskedKeysMax
+  /// Those of keys for which nobody asked. Limit: kUnaskedKeysMax
   std::vector<MessageQueue*> unasked_ GIMNET_GUARDED_BY(mutex_);
   std::size_t any_waiters_ GIMNET_GUARDED_BY(mutex_) = 0;
   MessageQueue* refusing_ GIMNET_GUARDED_BY(mutex_) =

@@ -157,15 +157,25 @@ TEST(Inbox, TellsWhatWasTakenOfAWindowWhicheverWayItWent) {
   EXPECT_EQ(told, (std::vector<std::string>{"6x2", "7x1+", "7x1"}));
 }
 
-TEST_F(InboxTest, DropsMessagesOfTooManyKeys) {
+// Or 1,024 messages of a stranger would close the node to new keys for ever.
+TEST_F(InboxTest, OfTooManyKeysForgetsAnEmptyQueueOrTheOldest) {
   for (std::uint32_t type = 0; type < Inbox::kUnaskedKeysMax; ++type) EXPECT_TRUE(put({type, 0}));
   EXPECT_EQ(inbox_.dropped(), 0u);
   EXPECT_TRUE(put({5000, 0}));
-  EXPECT_EQ(inbox_.dropped(), 1u);
+  EXPECT_EQ(inbox_.dropped(), 1u) << "that of the first key";
+  EXPECT_EQ(inbox_.queues(), Inbox::kUnaskedKeysMax);
+  EXPECT_EQ(inbox_.receive_any(kNoWait)->key().type, 1u);
+  EXPECT_TRUE(put({5001, 0}));
+  EXPECT_EQ(inbox_.dropped(), 1u) << "an empty queue went";
   const QueueOptions options;
-  inbox_.queue({5000, 0}, &options);
-  EXPECT_TRUE(put({5000, 0}));
-  EXPECT_EQ(inbox_.dropped(), 1u) << "one that is asked for has room";
+  MessageQueue& asked = inbox_.queue({2, 0}, &options);
+  EXPECT_EQ(inbox_.counts(asked).size, 1u);
+  for (std::uint32_t type = 6000; type < 6000 + 2 * Inbox::kUnaskedKeysMax; ++type)
+    EXPECT_TRUE(put({type, 0}));
+  EXPECT_EQ(inbox_.counts(asked).size, 1u) << "that of a key which is asked for stays";
+  EXPECT_EQ(inbox_.queues(), Inbox::kUnaskedKeysMax + 1);
+  EXPECT_EQ(inbox_.receive_any(kNoWait)->key().type, 2u);
+  EXPECT_EQ(inbox_.receive_any(kNoWait)->key().type, 6000 + Inbox::kUnaskedKeysMax);
 }
 
 TEST_F(InboxTest, BoundsTheBytesForWhichNobodyAsked) {
