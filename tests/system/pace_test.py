@@ -5,6 +5,7 @@ not by time."""
 import os
 import pathlib
 import struct
+import subprocess
 import sys
 import unittest
 
@@ -17,6 +18,30 @@ from support.waiting import wait_until
 from support.wire import CREDIT, FLOW, GROUP, NS, Client, number, text
 
 FULL = os.environ.get("GIMNET_STRESS") == "full"
+
+
+class Latest(unittest.TestCase):
+    LINES = 500
+
+    def test_echo_shows_the_newest_however_slowly_its_output_is_read(self):
+        for target in ("camera/pose", "camera/*"):
+            with self.subTest(target=target):
+                hub = Hub(self)
+                reading, writing = os.pipe()
+                echo = start_gimnet(self, hub, "echo", target, "--raw", stdout=writing)
+                os.close(writing)
+                lines = b"".join(b"%04096d\n" % number for number in range(self.LINES))
+                pub = start_gimnet(self, hub, "pub", "camera/pose", "--delivery", "latest", "--wait", "1",
+                                   "--rate", "1000", stdin=subprocess.PIPE).feed(lines)
+                self.assertEqual(pub.wait(), 0, pub.err)
+                with open(reading, "rb") as output:
+                    shown = [int(output.readline())]
+                    while shown[-1] != self.LINES - 1:
+                        shown.append(int(output.readline()))
+                self.assertLess(len(shown), self.LINES / 4, "as many as the pipe holds, and some that were under way")
+                self.assertEqual(shown, sorted(set(shown)))
+                echo.signal(2)
+                self.assertEqual(echo.wait(), 130, echo.err)
 
 
 class Windows(unittest.TestCase):

@@ -77,8 +77,8 @@ enum class AtFullQueue : std::uint8_t {
 };
 
 struct QueueOptions {
-  /// 1..kQueueMessagesMax; 0: kQueueMessagesDefault, and 1 of a subscription to a service with
-  /// Delivery::latest.
+  /// 1..kQueueMessagesMax; 0: kQueueMessagesDefault, and of a subscription to a service with
+  /// Delivery::latest 1, which a newer message overwrites, whatever `at_full` says.
   std::size_t messages = 0;
   AtFullQueue at_full = AtFullQueue::overwrite_oldest;
 };

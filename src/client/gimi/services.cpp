@@ -186,7 +186,7 @@ std::uint64_t SubscribedService::missed() {
 
 QueueOptions SubscribedService::queue_options() const {
   QueueOptions options = chosen_queue;
-  if (options.messages == 0 && place.latest) options.messages = 1;
+  if (options.messages == 0 && place.latest) options = {1, AtFullQueue::overwrite_oldest};
   return options;
 }
 

@@ -174,7 +174,7 @@ class Meters {
  public:
   Meters(ToolSession& session, Measure measure)
       : session_(session),
-        subscriptions_(session.node(), session.options().target),
+        subscriptions_(session.node(), session.options().target, kAllMessages),
         measure_(measure),
         window_ns_(std::llround(session.options().window_s * 1e9)) {}
 

@@ -187,8 +187,7 @@ Outcome<void> ServiceFollower::subscribe_next(Timeout timeout) {
     if (const std::string* wanted = matching_.wanted()) name = *wanted;
   }
   if (!name.empty()) {
-    auto subscription =
-        node_.subscribe(name, {kQueueMessages, AtFullQueue::stop_reading}, timeout, pace_);
+    auto subscription = node_.subscribe(name, queue_, timeout, pace_);
     if (!subscription) return subscription.failure();
     told_ = false;
     const MutexLock lock(mutex_);

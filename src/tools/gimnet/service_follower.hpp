@@ -110,8 +110,10 @@ class VanishedServices {
   NewsPace pace_;
 };
 
-/// Messages of one service that wait in this process; then it stops reading from the hub.
-inline constexpr std::size_t kQueueMessages = 4096;
+/// So many messages of one service wait in this process; then it stops reading from the hub.
+inline constexpr QueueOptions kAllMessages{4096, AtFullQueue::stop_reading};
+/// As the library chooses: of a service with delivery `latest` only the newest message waits.
+inline constexpr QueueOptions kFreshMessages{0, AtFullQueue::stop_reading};
 /// How long subscribing may take.
 inline constexpr Timeout kSubscribe{5'000};
 
@@ -122,8 +124,9 @@ inline constexpr Timeout kSubscribe{5'000};
 class ServiceFollower {
  public:
   /// `node` must outlive it, and is closed with it.
-  ServiceFollower(Node& node, std::string pattern, const PaceOptions& pace)
-      : node_(node), pattern_(std::move(pattern)), pace_(pace) {}
+  ServiceFollower(Node& node, std::string pattern, const QueueOptions& queue,
+                  const PaceOptions& pace)
+      : node_(node), pattern_(std::move(pattern)), queue_(queue), pace_(pace) {}
   ~ServiceFollower();
   ServiceFollower(const ServiceFollower&) = delete;
   ServiceFollower& operator=(const ServiceFollower&) = delete;
@@ -165,6 +168,7 @@ class ServiceFollower {
 
   Node& node_;
   const std::string pattern_;
+  const QueueOptions queue_;
   const PaceOptions pace_;
   std::optional<Watch> watch_;  ///< open()'s, then the thread's
   std::int64_t retry_ns_ = 0;   ///< not earlier is asked again; the thread's, as the next two

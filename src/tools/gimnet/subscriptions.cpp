@@ -14,13 +14,12 @@ bool wants_less(const PaceOptions& pace) {
 
 Outcome<void> Subscriptions::open() {
   if (!is_pattern(word_)) {
-    auto subscription =
-        node_.subscribe(word_, {kQueueMessages, AtFullQueue::stop_reading}, kSubscribe, pace_);
+    auto subscription = node_.subscribe(word_, queue_, kSubscribe, pace_);
     if (!subscription) return subscription.failure();
     one_ = std::move(*subscription);
     return {};
   }
-  follower_.emplace(node_, word_, pace_);
+  follower_.emplace(node_, word_, queue_, pace_);
   if (auto done = follower_->open(); !done) return done;
   return !follower_->any() && wants_less(pace_) ? ask_terms() : Outcome<void>{};
 }

@@ -19,8 +19,9 @@ namespace gimnet::tool {
 class Subscriptions {
  public:
   /// `node` must outlive it; with a pattern it is closed with it.
-  Subscriptions(Node& node, std::string word, const PaceOptions& pace = {})
-      : node_(node), word_(std::move(word)), pace_(pace) {}
+  Subscriptions(Node& node, std::string word, const QueueOptions& queue,
+                const PaceOptions& pace = {})
+      : node_(node), word_(std::move(word)), queue_(queue), pace_(pace) {}
 
   /// Subscribes to what is there; of a pattern to the first, and to the others meanwhile. Errors:
   /// as Node::subscribe() and Node::watch().
@@ -45,6 +46,7 @@ class Subscriptions {
 
   Node& node_;
   std::string word_;
+  QueueOptions queue_;
   PaceOptions pace_;
   std::optional<Subscription> one_;          ///< by its full name
   std::optional<ServiceFollower> follower_;  ///< of a pattern
