@@ -115,7 +115,7 @@ void check_limits(const std::vector<Step>& steps) {
   std::uint64_t lost = 0;
   for (const Step& step : steps) {
     const auto result = reassembler.take(stream_of(step.stream), step.fragment, step.payload);
-    lost += result.lost_messages;
+    lost += result.lost_messages + result.displaced.size();
     FUZZ_MUST(reassembler.waiting_bytes() <= limits.waiting_bytes_max);
     FUZZ_MUST(reassembler.open_messages() <= limits.streams_max);
     FUZZ_MUST(reassembler.lost_messages() == lost);

@@ -188,6 +188,9 @@ Inbound::Verdict Inbound::take_fragment(const proto::FrameView& view, const std:
     if (cut > 0) add_gap(view.header.src, cut, proto::DropReason::cut_message);
     if (too_large) add_gap(view.header.src, 1, proto::DropReason::too_large);
   }
+  counts_.messages_lost += reassembled.displaced.size();
+  for (const std::uint32_t source : reassembled.displaced)
+    add_gap(source, 1, proto::DropReason::cut_message);
   if (reassembled.state != proto::Reassembled::State::whole) {
     if (view.header.kind == proto::Kind::group && view.ends_message())
       host_.on_message_lost(view.header.dst);

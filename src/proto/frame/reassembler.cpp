@@ -33,7 +33,9 @@ Reassembled Reassembler::take(const FragmentStream& stream, const FragmentHeader
     result = fragment.offset == 0 ? begin(entry, fragment, payload)
                                   : refuse(entry, fragment.message, State::lost);
   }
-  result.lost_messages = static_cast<std::uint32_t>(lost_messages_ - lost_before);
+  result.lost_messages =
+      static_cast<std::uint32_t>(lost_messages_ - lost_before - displaced_.size());
+  result.displaced = std::exchange(displaced_, {});
   return result;
 }
 
@@ -81,17 +83,34 @@ std::vector<Reassembler::Standing> Reassembler::standings(std::optional<NodeId> 
   return found;
 }
 
-/// The stream's entry, moved to the end of those that wait; where there are too many, the first one
-/// goes.
+template <class AmountOf>
+Reassembler::Entries::iterator Reassembler::fullest(AmountOf amount_of) {
+  std::vector<Holding> holdings;
+  holdings.reserve(entries_.size());
+  for (const Entry& entry : entries_)
+    holdings.push_back({.src = entry.stream.src, .amount = amount_of(entry)});
+  return std::next(entries_.begin(),
+                   static_cast<std::ptrdiff_t>(first_of_fullest_source(holdings)));
+}
+
+void Reassembler::displace(Entry& entry) {
+  const std::uint64_t lost_before = lost_messages_;
+  lose(entry);
+  if (lost_messages_ != lost_before) displaced_.push_back(entry.stream.src);
+}
+
+/// The stream's entry, moved to the end of those that wait. Where there are too many, one goes of
+/// the source that has most of them.
 Reassembler::Entry& Reassembler::touch(const FragmentStream& stream) {
   if (const auto found = by_stream_.find(stream); found != by_stream_.end()) {
     entries_.splice(entries_.end(), entries_, found->second);
     return *found->second;
   }
   if (entries_.size() >= limits_.streams_max) {
-    lose(entries_.front());
-    by_stream_.erase(entries_.front().stream);
-    entries_.pop_front();
+    const auto goes = fullest([](const Entry&) { return std::uint64_t{1}; });
+    displace(*goes);
+    by_stream_.erase(goes->stream);
+    entries_.erase(goes);
   }
   entries_.push_back(Entry{.stream = stream, .bytes = {}});
   by_stream_.emplace(stream, std::prev(entries_.end()));
@@ -118,14 +137,16 @@ void Reassembler::lose(Entry& entry) {
   remember_lost(entry, entry.message);
 }
 
-/// Loses messages that waited longest until `bytes` more fit. False: they do not fit beside the one
-/// that is kept.
+/// Displaces messages until `bytes` more fit. False: the one that is kept is the next that would
+/// go.
 bool Reassembler::make_room(const Entry& keep, std::size_t bytes) {
-  for (auto& entry : entries_) {
-    if (waiting_bytes_ + bytes <= limits_.waiting_bytes_max) return true;
-    if (&entry != &keep) lose(entry);
+  while (waiting_bytes_ + bytes > limits_.waiting_bytes_max) {
+    const auto goes = fullest(
+        [&](const Entry& entry) { return entry.bytes.size() + (&entry == &keep ? bytes : 0); });
+    if (&*goes == &keep) return false;
+    displace(*goes);
   }
-  return waiting_bytes_ + bytes <= limits_.waiting_bytes_max;
+  return true;
 }
 
 Reassembled Reassembler::begin(Entry& entry, const FragmentHeader& fragment,

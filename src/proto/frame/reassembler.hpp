@@ -36,11 +36,13 @@ struct Reassembled {
                 ///< refusing TAKEN)
     lost,  ///< discarded: the fragment does not follow what was received, or belongs to a message
            ///< lost before
-    no_memory,  ///< discarded: the system has no memory
+    no_memory,  ///< discarded: there is no room for it beside what its source has, or no memory
   };
   State state = State::part;
   std::uint32_t lost_messages =
-      0;                    ///< messages, this one or others, that ended as lost by this call
+      0;  ///< messages of this stream that ended as lost by this call, this one or one before it
+  /// Sources of messages that were lost to make room for this one, a source for each message.
+  std::vector<std::uint32_t> displaced{};
   std::uint32_t taken = 0;  ///< bytes of this message received so far
   /// The whole message: in `storage`, or, where it came in one fragment, in the caller's bytes.
   std::span<const std::byte> message;
@@ -57,7 +59,8 @@ class Reassembler {
   /// REQUIRES: message_bytes_max <= kMessageBytesMax and <= waiting_bytes_max, streams_max >= 1.
   explicit Reassembler(const ReassemblyLimits& limits = {});
 
-  /// Where a limit is reached, the messages that waited longest for their next fragment are lost.
+  /// Where a limit is reached, the source that holds most of the room loses what waited longest for
+  /// its next fragment.
   /// REQUIRES: the fragment fits its own total, as parse_frame() checks.
   [[nodiscard]] Reassembled take(const FragmentStream& stream, const FragmentHeader& fragment,
                                  std::span<const std::byte> payload);
@@ -106,6 +109,10 @@ class Reassembler {
   void remember_lost(Entry& entry, std::uint32_t message);
   void close(Entry& entry);
   void lose(Entry& entry);
+  /// The one that waited longest of the source with the largest sum of amounts.
+  template <class AmountOf>
+  [[nodiscard]] Entries::iterator fullest(AmountOf amount_of);
+  void displace(Entry& entry);
   bool make_room(const Entry& keep, std::size_t bytes);
   Reassembled begin(Entry& entry, const FragmentHeader& fragment,
                     std::span<const std::byte> payload);
@@ -119,6 +126,7 @@ class Reassembler {
   std::uint64_t waiting_bytes_ = 0;
   std::size_t open_messages_ = 0;
   std::uint64_t lost_messages_ = 0;
+  std::vector<std::uint32_t> displaced_;  ///< by the take() that is under way
 };
 
 }  // namespace gimnet::proto

@@ -52,6 +52,32 @@ TEST(HostileNode, SendsFramesThatAreDroppedAndCounted) {
   }
 }
 
+// 16 connections with 16 streams each would take the place of everybody's unfinished messages.
+TEST(HostileNode, LosesItsOwnUnfinishedMessagesWhereThereAreTooMany) {
+  Receiving receiving;
+  std::vector<std::byte> bytes;
+  proto::FrameParts first = from_peer();
+  first.fragment = proto::FragmentHeader{1, 0, 6};
+  add_frame(bytes, first, "abc");
+  const std::uint32_t streams = proto::ReassemblyLimits{}.streams_max;
+  for (std::uint32_t i = 0; i < streams + 100; ++i) {
+    proto::FrameParts parts = from_peer(proto::Kind::group);
+    parts.header.src = kPeerId + 1 + i % 16;
+    parts.header.dst = 1 + i;
+    parts.fragment = proto::FragmentHeader{1 + i, 0, 6};
+    add_frame(bytes, parts, "abc");
+  }
+  first.fragment->offset = 3;
+  add_frame(bytes, first, "def");
+  ASSERT_EQ(receiving.feed(bytes), Inbound::Verdict::going);
+  EXPECT_EQ(receiving.host.texts(), std::vector<std::string>{"abcdef"});
+  EXPECT_EQ(receiving.inbound.counts().messages_lost, 101u);
+  EXPECT_EQ(receiving.host.gaps(), 101u);
+  for (const auto& item : receiving.host.items) {
+    EXPECT_FALSE(item.type == NIF_GAP && item.from == kPeerId) << "it names the loser";
+  }
+}
+
 // A node that does not read must not make its hub stop reading the one that answers it.
 TEST(HostileNode, IsToldNothingWhileTheHubHasPausedTheWay) {
   FakeHub hub;

@@ -130,26 +130,55 @@ TEST(Reassembler, ReservesWhatComesAndNotWhatIsClaimed) {
   EXPECT_EQ(reassembler.waiting_bytes(), 100'000u);
 }
 
-TEST(Reassembler, LosesWhatWaitedLongestWhenBytesRunOut) {
-  Reassembler reassembler({.message_bytes_max = 10, .waiting_bytes_max = 10});
+TEST(Reassembler, OfTheSourceWithMostBytesLosesWhatWaitedLongest) {
+  Reassembler reassembler({.message_bytes_max = 10, .waiting_bytes_max = 21});
+  ASSERT_EQ(take(reassembler, {1, 0, 10}, "aaaaaa", stream_of(1)).state, State::part);
+  ASSERT_EQ(take(reassembler, {1, 0, 10}, "bbbb", stream_of(2)).state, State::part);
+  ASSERT_EQ(take(reassembler, {2, 0, 10}, "bbbb", stream_of(2, 7)).state, State::part);
+  ASSERT_EQ(take(reassembler, {1, 4, 10}, "b", stream_of(2)).state, State::part);
+  const auto third = take(reassembler, {1, 0, 10}, "ccccccc", stream_of(3));
+  EXPECT_EQ(third.state, State::part);
+  EXPECT_EQ(third.lost_messages, 0u);
+  EXPECT_EQ(third.displaced, (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(reassembler.waiting_bytes(), 18u);
+  EXPECT_EQ(reassembler.lost_messages(), 1u);
+  EXPECT_EQ(take(reassembler, {2, 4, 10}, "bbbbbb", stream_of(2, 7)).state, State::lost);
+  EXPECT_EQ(text_of(take(reassembler, {1, 7, 10}, "ccc", stream_of(3))), "cccccccccc");
+  EXPECT_EQ(text_of(take(reassembler, {1, 6, 10}, "aaaa", stream_of(1))), "aaaaaaaaaa");
+}
+
+TEST(Reassembler, RefusesBytesOfASourceThatHasMostOfThem) {
+  Reassembler reassembler({.message_bytes_max = 10, .waiting_bytes_max = 12});
   ASSERT_EQ(take(reassembler, {1, 0, 10}, "aaaa", stream_of(1)).state, State::part);
   ASSERT_EQ(take(reassembler, {1, 0, 10}, "bbbb", stream_of(2)).state, State::part);
-  ASSERT_EQ(take(reassembler, {1, 4, 10}, "a", stream_of(1)).state, State::part);
-  const auto third = take(reassembler, {1, 0, 10}, "ccccc", stream_of(3));
-  EXPECT_EQ(third.state, State::part);
-  EXPECT_EQ(third.lost_messages, 1u);
-  EXPECT_EQ(reassembler.waiting_bytes(), 10u);
-  EXPECT_EQ(take(reassembler, {1, 4, 10}, "b", stream_of(2)).state, State::lost);
-  EXPECT_EQ(text_of(take(reassembler, {1, 5, 10}, "aaaaa", stream_of(1))), "aaaaaaaaaa");
+  const auto refused = take(reassembler, {1, 4, 10}, "bbbbb", stream_of(2));
+  EXPECT_EQ(refused.state, State::no_memory);
+  EXPECT_EQ(refused.lost_messages, 1u);
+  EXPECT_TRUE(refused.displaced.empty());
+  EXPECT_EQ(text_of(take(reassembler, {1, 4, 10}, "aaaaaa", stream_of(1))), "aaaaaaaaaa");
 }
 
 TEST(Reassembler, RemembersAsManyStreamsAsItMay) {
   Reassembler reassembler({.streams_max = 2});
   ASSERT_EQ(take(reassembler, {1, 0, 4}, "ab", stream_of(1)).state, State::part);
   ASSERT_EQ(take(reassembler, {1, 0, 4}, "ab", stream_of(2)).state, State::part);
-  EXPECT_EQ(take(reassembler, {1, 0, 4}, "ab", stream_of(3)).lost_messages, 1u);
+  EXPECT_EQ(take(reassembler, {1, 0, 4}, "ab", stream_of(3)).displaced,
+            (std::vector<std::uint32_t>{1}));
   EXPECT_EQ(reassembler.open_messages(), 2u);
   EXPECT_EQ(text_of(take(reassembler, {1, 2, 4}, "cd", stream_of(2))), "abcd");
+}
+
+TEST(Reassembler, ASourceOfManyStreamsDisplacesNoOther) {
+  Reassembler reassembler({.streams_max = 5});
+  ASSERT_EQ(take(reassembler, {1, 0, 4}, "ab", stream_of(1)).state, State::part);
+  ASSERT_EQ(take(reassembler, {2, 0, 4}, "ab", stream_of(1, 7)).state, State::part);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    const auto step = take(reassembler, {i, 0, 4}, "ab", stream_of(9, i));
+    EXPECT_EQ(step.displaced.size(), i < 3 ? 0u : 1u);
+    for (const std::uint32_t source : step.displaced) EXPECT_EQ(source, 9u);
+  }
+  EXPECT_EQ(text_of(take(reassembler, {1, 2, 4}, "cd", stream_of(1))), "abcd");
+  EXPECT_EQ(text_of(take(reassembler, {2, 2, 4}, "cd", stream_of(1, 7))), "abcd");
 }
 
 TEST(Reassembler, IsInterruptedByAnUnfragmentedMessage) {
