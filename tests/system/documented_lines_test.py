@@ -14,7 +14,7 @@ import subprocess
 import tempfile
 import unittest
 
-from support.processes import BIN, ROOT, Hub, Process, start_gimnet
+from support.processes import BIN, ROOT, Hub, Process, run_gimnet, start_gimnet
 from support.waiting import wait_until
 
 BUILD = BIN.parent
@@ -160,11 +160,11 @@ class Documented(unittest.TestCase):
         hub.process.wait()
         wait_until(lambda: "the hub has been away for " in publisher.err, f"the reason; it said: {publisher.err}")
         before = subscriber.out.count(b"\n")
-        hub.again(self)
+        hub = hub.again(self)
         wait_until(lambda: subscriber.out.count(b"\n") >= before + 3, "messages by the hub that was started anew")
         self.assertIsNone(publisher.popen.poll(), publisher.err)
-        publisher.signal(9)
-        publisher.wait()
+        self.assertEqual(run_gimnet(f"unix:{hub.socket_path}", "ctl", "kick", "robot").code, 0)
+        self.assertEqual(publisher.wait(), 0, publisher.err)
 
     def test_gimi_takes_what_the_c_example_of_nif_sends(self):
         text = (ROOT / "docs" / "nif.md").read_text(encoding="utf-8")
