@@ -82,8 +82,12 @@ const char* service_full_name_fault(std::string_view name) {
            "services match";
   }
   if (const char* found = name_fault(name)) return found;
-  const bool is_one_part = name.find('/') == std::string_view::npos;
-  return is_one_part ? "it is no full name of a service: write NODE/SERVICE" : nullptr;
+  const auto slash = name.rfind('/');
+  if (slash == std::string_view::npos) return "it is no full name of a service: write NODE/SERVICE";
+  return reads_as_id(name.substr(0, slash))
+             ? "it begins with an id, and services are called by names: write NODE/SERVICE with "
+               "the name of the node"
+             : nullptr;
 }
 
 bool valid_pattern(std::string_view pattern) {

@@ -56,6 +56,11 @@ TEST(Names, OfServicesInFullHaveANodeAndNoWildcard) {
   EXPECT_STREQ(service_full_name_fault("hall/robot/odom"), nullptr);
   EXPECT_STREQ(service_full_name_fault("odom"),
                "it is no full name of a service: write NODE/SERVICE");
+  EXPECT_STREQ(
+      service_full_name_fault("1.3/odom"),
+      "it begins with an id, and services are called by names: write NODE/SERVICE with the "
+      "name of the node");
+  EXPECT_STREQ(service_full_name_fault("1.3/arm/odom"), nullptr) << "a node may be named 1.3/arm";
   for (const char* pattern : {"*", "**", "robot/*", "*/odom"}) {
     EXPECT_THAT(service_full_name_fault(pattern), testing::StartsWith("it is a pattern"))
         << pattern;
