@@ -17,21 +17,15 @@ namespace gimnet::hub {
   return user == std::string_view::npos ? address : address.substr(user);
 }
 
-/// The name of a peer for limits on strangers: its address without the port; "" over loopback or a
-/// Unix socket, where many are behind one address by right. Valid until: `address` changes.
-[[nodiscard]] constexpr std::string_view remote_address(std::string_view transport,
-                                                        std::string_view address) {
-  if (transport != "tcp") return {};
-  const bool local = address.starts_with("127.") || address.starts_with("[::1]") ||
-                     address.starts_with("[::ffff:127.");
-  return local ? std::string_view{} : log_peer(transport, address);
-}
+/// The name of a peer for limits on strangers: its address without the port, of IPv6 the network of
+/// 64 bits, of which one host has as many addresses as it likes; "" over loopback or a Unix socket,
+/// where many are behind one address by right.
+[[nodiscard]] std::string remote_address(std::string_view transport, std::string_view address);
 
 /// The crowd that a peer counts in, of which none may have more than half of the places: the user
 /// of a Unix socket, and of TCP peers the remote_address().
 [[nodiscard]] inline std::string crowd_of(const Identity& identity, std::string_view address) {
-  return identity == Identity::open() ? std::string{remote_address("tcp", address)}
-                                      : identity.text();
+  return identity == Identity::open() ? remote_address("tcp", address) : identity.text();
 }
 
 }  // namespace gimnet::hub

@@ -47,7 +47,7 @@ WaitingRoom::WaitingRoom(const Limits& limits, Judge judge, RefusalCounters& ref
 WaitingRoom::~WaitingRoom() { ::close(poll_); }
 
 void WaitingRoom::enter(Stranger stranger, milliseconds now) {
-  const std::string address{remote_address(stranger.peer.transport, stranger.peer.address)};
+  const std::string address = remote_address(stranger.peer.transport, stranger.peer.address);
   if (!address.empty()) make_place_for(address, now);
   if (waiting_.size() >= limits_.handshakes) {
     end_waiting(waiting_.front(), "too many connections wait for their HELLO; try again", now);

@@ -20,9 +20,20 @@ TEST(LogPeer, IsTheAddressWhereThereIsNothingToLeaveOut) {
 TEST(RemoteAddress, IsThatOfAnotherMachine) {
   EXPECT_EQ(remote_address("tcp", "10.0.0.1:5000"), "10.0.0.1");
   EXPECT_EQ(remote_address("tcp", "12.7.0.1:5000"), "12.7.0.1");
-  EXPECT_EQ(remote_address("tcp", "[fe80::1]:5000"), "[fe80::1]");
-  EXPECT_EQ(remote_address("tcp", "[::ffff:10.0.0.1]:5000"), "[::ffff:10.0.0.1]");
-  EXPECT_EQ(remote_address("tcp", "[::12]:5000"), "[::12]");
+  EXPECT_EQ(remote_address("tcp", "[::ffff:10.0.0.1]:5000"), "10.0.0.1") << "the same as by IPv4";
+  EXPECT_EQ(remote_address("tcp", "unknown"), "unknown");
+  EXPECT_EQ(remote_address("tcp", "[unknown]:5000"), "[unknown]");
+}
+
+// One host has as many addresses of its network as it likes.
+TEST(RemoteAddress, IsTheNetworkOfAnIpv6Host) {
+  for (const char* host :
+       {"[2001:db8:0:7::1]:5000", "[2001:db8:0:7:ffff::2]:5000", "[2001:db8::7:9:8:7:6]:5000"}) {
+    EXPECT_EQ(remote_address("tcp", host), "2001:db8:0:7::/64") << host;
+  }
+  EXPECT_EQ(remote_address("tcp", "[2001:db8:0:8::1]:5000"), "2001:db8:0:8::/64");
+  EXPECT_EQ(remote_address("tcp", "[fe80::1%eth0]:5000"), "[fe80::1%eth0]") << "neighbours";
+  EXPECT_EQ(remote_address("tcp", "[::12]:5000"), "::/64");
 }
 
 TEST(RemoteAddress, IsNoneForThisMachinesOwn) {
@@ -36,6 +47,7 @@ TEST(RemoteAddress, IsNoneForThisMachinesOwn) {
 TEST(CrowdOf, IsTheAddressOfAnotherMachineOrTheUser) {
   EXPECT_EQ(crowd_of(Identity::open(), "10.0.0.1:5000"), "10.0.0.1");
   EXPECT_EQ(crowd_of(Identity::open(), "127.0.0.1:5000"), "");
+  EXPECT_EQ(crowd_of(Identity::open(), "[2001:db8::1]:5000"), "2001:db8::/64");
   EXPECT_EQ(crowd_of(Identity::of_user(1000), "pid 77 uid 1000"), "uid 1000");
   EXPECT_EQ(crowd_of(Identity{}, "unknown"), "unknown");
 }

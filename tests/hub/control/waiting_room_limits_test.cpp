@@ -44,7 +44,7 @@ TEST_F(WaitingRoomTest, WhoseHelloIsThereByNowDoesNotMakeWay) {
 
 TEST_F(WaitingRoomTest, AtTheLimitOfAnAddressItsOldestGoes) {
   ASSERT_EQ(limits_.handshakes_per_address, 128u);
-  for (const char* address : {"10.0.0.1", "[fe80::1]", "[::ffff:10.0.0.1]"}) {
+  for (const char* address : {"10.0.0.1", "[fe80::1]", "[::ffff:10.0.0.3]"}) {
     Peer& other = enter_from("10.0.0.2");
     Peer& oldest = enter_from(address);
     Peer& second = enter_from(address);

@@ -1,0 +1,34 @@
+#include "hub/control/log_peer.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+namespace gimnet::hub {
+
+std::string remote_address(std::string_view transport, std::string_view address) {
+  if (transport != "tcp") return {};
+  std::string host{log_peer(transport, address)};
+  if (host.starts_with('[')) {
+    in6_addr parsed{};
+    // A link-local address may end with its interface: fe80::1%eth0.
+    const std::string digits = host.substr(1, host.find_first_of("%]") - 1);
+    if (::inet_pton(AF_INET6, digits.c_str(), &parsed) != 1) return host;
+    if (IN6_IS_ADDR_LOOPBACK(&parsed)) return {};
+    std::array<char, INET6_ADDRSTRLEN> text{};
+    if (IN6_IS_ADDR_V4MAPPED(&parsed)) {
+      ::inet_ntop(AF_INET, &parsed.s6_addr[12], text.data(), text.size());
+      host = text.data();
+    } else if (!IN6_IS_ADDR_LINKLOCAL(&parsed)) {  // all neighbours share that network
+      std::fill_n(&parsed.s6_addr[8], 8, std::uint8_t{0});
+      ::inet_ntop(AF_INET6, &parsed, text.data(), text.size());
+      return std::string{text.data()} + "/64";
+    }
+  }
+  return host.starts_with("127.") ? std::string{} : host;
+}
+
+}  // namespace gimnet::hub
