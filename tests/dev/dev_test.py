@@ -145,13 +145,17 @@ class Door(unittest.TestCase):
         self.assertRegex(installs[0], r"--no-remove .*-- .*\blibjemalloc-dev\b")
         self.assertTrue([call for call in calls if call.startswith("cmake --build")], calls)
 
-    def test_takes_any_boost_that_is_there(self):
-        for found, expected in (("", True), ("/usr/include/boost/version.hpp", False)):
-            with self.subTest(found=found):
-                self.put_program("find", f"#!/bin/sh\necho {found}\n" if found else "#!/bin/sh\n")
+    def test_takes_any_boost_from_1_74_on(self):
+        header = self.folder / "version.hpp"
+        for version in (None, 107400, 199900):
+            with self.subTest(version=version):
+                self.put_program("find", f"#!/bin/sh\necho {header}\n" if version else "#!/bin/sh\n")
+                header.write_text(f"//\n#define BOOST_VERSION {version}\n#define BOOST_LIB_VERSION \"1_74\"\n")
                 process, calls = self.dev("build")
                 self.assertEqual(process.returncode, 0, process.stderr)
-                self.assertEqual(any(" libboost-dev" in call for call in calls), expected, calls)
+                self.assertEqual(any(" libboost-dev" in call for call in calls), version is None, calls)
+        header.write_text("#define BOOST_VERSION 107399 // 1.73\n")
+        self.assert_refuses("build", saying="is 1.73, and the hub needs 1.74 or newer")
 
     def test_builds_the_product_alone_unless_told(self):
         _, calls = self.dev("build")
