@@ -120,7 +120,7 @@ WITH_A_HUB = [
     (FAILED, ["cannot read {folder}: Is a directory"], ["send", "robot", "--file", "{folder}"], b""),
     (FAILED, ["cannot send {folder}/huge: it is larger than a message can be, 1073741824 bytes; send it in parts"],
      ["send", "robot", "--file", "{folder}/huge"], b""),
-    (FAILED, ["cannot send to {robot}: the receiver refused the message: it is larger than it takes"],
+    (FAILED, ["cannot send to robot: the receiver refused the message: it is larger than it takes"],
      ["send", "robot", "--file", "{folder}/large"], b""),
 ]
 

@@ -104,10 +104,14 @@ std::string acknowledged_words(const SendCounts& counts) {
   return std::to_string(counts.acknowledged) + (counts.acknowledged == 1 ? " was" : " were");
 }
 
-/// Why not all arrived: what the stream knows says more than the call that failed after it.
-Failure reason(const ToolSession& session, const SendCounts& counts, Unsent unsent,
-               Failure failure) {
+/// Why not all arrived: what the stream knows says more than the call that failed after it. The
+/// stream calls a node by its id, and the user by the name that was given.
+Failure reason(const ToolSession& session, const Peer& peer, const SendCounts& counts,
+               Unsent unsent, Failure failure) {
   const std::string& target = session.options().target;
+  const std::string to_id = "cannot send to " + peer.text() + ":";
+  if (failure.sentence.starts_with(to_id))
+    failure.sentence.replace(0, to_id.size(), "cannot send to " + target + ":");
   if (counts.lost == 0) {
     if (unsent == Unsent::line_and_rest) {
       failure.sentence += "; of " + std::to_string(counts.sent) + " messages before it " +
@@ -170,7 +174,7 @@ ExitCode run_send(ToolSession& session) {
   print(session, counts);
   if (sent) return session.finish();
   session.output().flush();
-  const ExitCode code = session.fail(reason(session, counts, unsent, sent.failure()));
+  const ExitCode code = session.fail(reason(session, *peer, counts, unsent, sent.failure()));
   if (session.stopped()) return code;
   if (code == ExitCode::no_connection) {
     say(std::to_string(counts.acknowledged) + " of " + std::to_string(counts.sent) +
