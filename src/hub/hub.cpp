@@ -83,7 +83,7 @@ class Shards final : public ShardProxy {
 struct Ground {
   explicit Ground(const HubOptions& options)
       : quiescence(options.shards),
-        budget(options.limits.budget_bytes),
+        budget(options.limits.budget_bytes, options.shards),
         retained_budget(options.limits.retained_budget_bytes),
         inbox(options.shards) {
     // As many as a reload may allow: what is not used costs nothing.

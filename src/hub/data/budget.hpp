@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 namespace gimnet::hub {
@@ -12,8 +13,12 @@ namespace gimnet::hub {
 /// lease what they count. Thread safety: any thread.
 class Budget {
  public:
-  explicit Budget(std::uint64_t bytes)
-      : total_(static_cast<std::int64_t>(bytes)), left_(static_cast<std::int64_t>(bytes)) {}
+  /// `shards`: so many lease from it.
+  explicit Budget(std::uint64_t bytes, std::size_t shards = 1)
+      : total_(static_cast<std::int64_t>(bytes)),
+        piece_bytes_(std::clamp(total_ / kPieces / static_cast<std::int64_t>(shards),
+                                kPieceBytesMin, kPieceBytesMax)),
+        left_(total_) {}
 
   /// Leases `bytes`, or nothing if less is left.
   [[nodiscard]] bool lease(std::int64_t bytes) {
@@ -31,6 +36,8 @@ class Budget {
   // relaxed: a count
   [[nodiscard]] std::int64_t left() const { return left_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::int64_t total() const { return total_; }
+  /// A shard leases so many bytes at a time.
+  [[nodiscard]] std::int64_t piece_bytes() const { return piece_bytes_; }
 
   /// So many more connections have data waiting, or fewer.
   void add_waiting(std::int64_t connections) {
@@ -40,7 +47,14 @@ class Budget {
   [[nodiscard]] std::int64_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
+  /// A shard keeps up to three pieces that it does not use, which to the others are not free: of
+  /// all shards together at most 3/64 of the budget.
+  static constexpr std::int64_t kPieces = 64;
+  static constexpr std::int64_t kPieceBytesMin = 4 * 1024;
+  static constexpr std::int64_t kPieceBytesMax = 1 << 20;
+
   const std::int64_t total_;
+  const std::int64_t piece_bytes_;
   std::atomic<std::int64_t> left_;
   std::atomic<std::int64_t> waiting_{0};
 };
@@ -72,13 +86,13 @@ class BudgetLease {
   /// exhaust the lease.
   void take(std::uint64_t bytes) {
     used_ += static_cast<std::int64_t>(bytes);
-    while (used_ > leased_ && budget_.lease(kPieceBytes)) leased_ += kPieceBytes;
+    while (used_ > leased_ && budget_.lease(piece_bytes_)) leased_ += piece_bytes_;
   }
   void give_back(std::uint64_t bytes) {
     used_ -= static_cast<std::int64_t>(bytes);
-    while (leased_ - used_ > kKeepBytes) {
-      leased_ -= kPieceBytes;
-      budget_.give_back(kPieceBytes);
+    while (leased_ - used_ > kKeptPieces * piece_bytes_) {
+      leased_ -= piece_bytes_;
+      budget_.give_back(piece_bytes_);
     }
   }
   /// Is more pinned than could be leased? Then what would have to wait is refused.
@@ -104,8 +118,7 @@ class BudgetLease {
   void end_waiting() { --waiting_; }
 
  private:
-  static constexpr std::int64_t kPieceBytes = 1 << 20;
-  static constexpr std::int64_t kKeepBytes = 2 * kPieceBytes;
+  static constexpr std::int64_t kKeptPieces = 2;
 
   void tell(std::uint64_t now_ms) {
     told_ms_ = now_ms;
@@ -119,6 +132,7 @@ class BudgetLease {
   }
 
   Budget& budget_;
+  const std::int64_t piece_bytes_ = budget_.piece_bytes();
   std::int64_t leased_ = 0;
   std::int64_t used_ = 0;
   std::int64_t waiting_ = 0;

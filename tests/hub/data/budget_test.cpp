@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
+
 namespace gimnet::hub {
 namespace {
 
@@ -12,7 +14,7 @@ TEST(BudgetLease, LeasesInPiecesAndGivesBack) {
   {
     BudgetLease lease(budget);
     lease.take(100);
-    EXPECT_EQ(budget.left(), 3 << 20);
+    EXPECT_EQ(budget.left(), (4 << 20) - (64 << 10)) << "a 64th";
     lease.take(4 << 20);
     EXPECT_EQ(budget.left(), 0);
     EXPECT_TRUE(lease.exhausted());
@@ -45,16 +47,34 @@ TEST(BudgetLease, MemoryIsScarceWhileLessThanAThirdIsFree) {
 }
 
 TEST(BudgetLease, WhatAnotherShardHasLeasedIsNotFree) {
-  Budget budget(30 * kMiB);
+  Budget budget(192 * kMiB, 2);
   BudgetLease lease(budget);
   BudgetLease other(budget);
-  other.take(20 * kMiB);
+  other.take(128 * kMiB);
   lease.begin_turn(0);
   EXPECT_FALSE(lease.scarce());
   other.take(1);
   lease.begin_turn(0);
   EXPECT_TRUE(lease.scarce());
-  other.give_back(20 * kMiB + 1);
+  other.give_back(128 * kMiB + 1);
+}
+
+TEST(BudgetLease, WhatShardsKeepUnusedMakesNoMemoryScarce) {
+  constexpr std::size_t kShards = 16;
+  for (const std::uint64_t bytes : {4 * kMiB, 16 * kMiB, 256 * kMiB}) {
+    Budget budget(bytes, kShards);
+    std::deque<BudgetLease> leases;
+    for (std::size_t i = 0; i < kShards; ++i) {
+      BudgetLease& lease = leases.emplace_back(budget);
+      lease.take(kMiB);
+      lease.give_back(kMiB);
+    }
+    for (BudgetLease& lease : leases) {
+      lease.begin_turn(0);
+      EXPECT_FALSE(lease.scarce()) << bytes;
+    }
+    EXPECT_GE(static_cast<std::uint64_t>(budget.left()), bytes - bytes / 21);
+  }
 }
 
 TEST(BudgetLease, AShareIsAThirdByTheConnectionsThatWaitWithinBounds) {

@@ -83,7 +83,7 @@ std::vector<proto::Report> FakeNode::reports() const {
 }
 
 HubRig::HubRig(std::size_t shards, Limits limits)
-    : limits_(limits), quiescence_(shards), budget_(limits.budget_bytes), inbox_(shards) {
+    : limits_(limits), quiescence_(shards), budget_(limits.budget_bytes, shards), inbox_(shards) {
   std::vector<Mailbox*> mailboxes;
   std::vector<Waker*> wakers;
   std::vector<ShardCounters*> counters;
