@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "proto/control/ns.hpp"
+#include "proto/control/ns_register.hpp"
 #include "tests/client/gimi/support/conversation.hpp"
 
 namespace gimnet::gimi {
@@ -147,6 +148,68 @@ TEST_F(StreamEpochsTest, SendersOfOneStreamShareItsEpoch) {
   options.key = {9, 9};
   node_->send(Peer{kPeerId}, "c", options).or_throw();
   EXPECT_NE(next().header.epoch, first.header.epoch);
+}
+
+class KeptEpochs : public Conversation {
+ protected:
+  KeptEpochs() : Conversation(true) {}
+  /// The node wants to be told the group of its service.
+  void answer_advertise() {
+    std::uint16_t number = 0;
+    EXPECT_TRUE(hub_.next_request<proto::ns::Advertise>(number));
+    proto::ns::AdvertiseAnswer advertised;
+    advertised.group = GroupId{kGroup};
+    advertised.subscribers = 1;
+    hub_.send_control(proto::Kind::ns, proto::encode_answer(advertised, number));
+  }
+  void come_back(const proto::Welcome& welcome) {
+    hub_.close();
+    hub_ = fake_.admit(welcome);
+    answer_advertise();
+  }
+};
+
+TEST_F(KeptEpochs, OutliveBreaksRestartsOfTheHubOtherIdsAndNames) {
+  const Sender stream = sender(0);
+  std::optional<Publisher> map;
+  std::thread advertising([&] { map.emplace(node_->advertise("map").or_throw()); });
+  answer_advertise();
+  advertising.join();
+  std::uint32_t sequence = 0;
+  std::array<std::uint32_t, 2> epochs{};
+  const auto expect_epochs = [&](const char* after) {
+    SCOPED_TRACE(after);
+    ++sequence;
+    stream.send("x").or_throw();
+    const Taken sent = next_data();
+    map->publish("x", kForever).or_throw();
+    const Taken published = next_data();
+    if (sequence == 1) epochs = {sent.header.epoch, published.header.epoch};
+    EXPECT_EQ(sent.header.epoch, epochs[0]);
+    EXPECT_EQ(published.header.epoch, epochs[1]);
+    EXPECT_EQ(sent.header.sequence, sequence);
+    EXPECT_EQ(published.header.sequence, sequence);
+  };
+  expect_epochs("the beginning");
+  EXPECT_NE(epochs[0], epochs[1]);
+  proto::Welcome welcome = nif::test::make_welcome();
+  come_back(welcome);
+  expect_epochs("a break");
+  ++welcome.epoch;
+  come_back(welcome);
+  expect_epochs("a restart of the hub");
+  welcome.node = NodeId{kOwnId + 1};
+  come_back(welcome);
+  expect_epochs("another id");
+  std::thread renaming([&] { node_->take_name("forklift").or_throw(); });
+  std::uint16_t number = 0;
+  EXPECT_TRUE(hub_.next_request<proto::ns::RegisterName>(number));
+  hub_.send_control(
+      proto::Kind::ns,
+      proto::encode_answer(proto::ns::RegisterNameAnswer{"forklift", false, {}}, number));
+  answer_advertise();
+  renaming.join();
+  expect_epochs("another name");
 }
 
 TEST_F(StreamEpochsTest, APlainMessageIsGivenOutAsSuch) {
